@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+/// Lines in, lines out. Levels here are physical: true is high. Polarity belongs to who knows the
+/// wiring (see axis/config.h); nothing below this interface inverts anything.
+namespace stepdriver::gpio {
+
+/// A line that is driven.
+struct OutputRequest {
+  std::string line;      ///< `chip:offset`, `label:offset` or the kernel's name of the line
+  bool safe_level;       ///< driven from the request on, without a glitch, and again before release
+  bool keep_on_release;  ///< leave the last level instead of driving the safe one before release
+};
+
+/// A line that is read.
+struct InputRequest {
+  std::string line;
+};
+
+/// An output, by its index in the request, and the level that it is to have.
+struct LineWrite {
+  int output;
+  bool level;
+};
+
+/// The lines of one request, held until destruction.
+///
+/// write() and read() may be called from several threads. They neither throw nor allocate: they
+/// are called by the pulse thread.
+class Lines {
+ public:
+  Lines() = default;
+  Lines(const Lines&) = delete;
+  Lines& operator=(const Lines&) = delete;
+
+  /// Drives the safe levels (see OutputRequest) and releases the lines.
+  virtual ~Lines() = default;
+
+  /// Sets outputs that change at one instant; the others keep their levels.
+  ///
+  /// A kernel driver may set the lines one after the other, in any order: lines whose order
+  /// matters go in separate calls.
+  ///
+  /// @return 0, or the errno of the failed call; then any of these outputs may have changed or not.
+  [[nodiscard]] virtual int write(const LineWrite* writes, std::size_t count) noexcept = 0;
+
+  /// @return the level of an input, by its index in the request (0 or 1), or -errno.
+  [[nodiscard]] virtual int read(int input) noexcept = 0;
+};
+
+/// Where lines come from.
+class Backend {
+ public:
+  virtual ~Backend() = default;
+
+  /// Takes all lines, or none.
+  ///
+  /// @throw GpioError naming the line, the reason and the remedy.
+  virtual std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
+                                         const std::vector<InputRequest>& inputs) = 0;
+};
+
+}  // namespace stepdriver::gpio

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/gpio/lines.h"
+
+namespace stepdriver::gpio {
+
+/// What is wired to simulated lines: it sees every change of an output and decides every input.
+///
+/// The calls come one at a time, in the order of the changes, from whichever thread writes.
+class Board {
+ public:
+  virtual ~Board() = default;
+
+  /// The line was requested as an output and has this level from now on.
+  virtual void onRequest(const std::string& line, bool level, std::int64_t time_ns) = 0;
+
+  /// The output changed. Called once for each line that changed, not for one that was set to the
+  /// level that it had.
+  virtual void onEdge(const std::string& line, bool level, std::int64_t time_ns) = 0;
+
+  /// The line was released.
+  virtual void onRelease(const std::string& line, std::int64_t time_ns) = 0;
+
+  /// The level of an input now.
+  virtual bool inputLevel(const std::string& line, std::int64_t time_ns) = 0;
+
+  /// @return 0, or the errno with which a write to the line fails; the line then keeps its level.
+  virtual int writeFault(const std::string& line, std::int64_t time_ns) = 0;
+};
+
+/// Simulated lines: any name is a line, each can be held once; a Board is wired to them.
+class SimulatedBackend : public Backend {
+ public:
+  /// Nanoseconds on the clock that edges are stamped with.
+  using TimeSource = std::function<std::int64_t()>;
+
+  /// @param board what is wired to the lines; outlives the backend and its lines.
+  SimulatedBackend(Board& board, TimeSource now);
+  ~SimulatedBackend() override;
+
+  /// @throw GpioError where a line is named twice or is held by an earlier request (EBUSY).
+  std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
+                                 const std::vector<InputRequest>& inputs) override;
+
+ private:
+  struct Shared;
+  std::shared_ptr<Shared> shared_;
+};
+
+}  // namespace stepdriver::gpio

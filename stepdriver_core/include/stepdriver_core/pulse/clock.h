@@ -1,0 +1,92 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <limits>
+#include <mutex>
+
+namespace stepdriver::pulse {
+
+/// Nanoseconds on a Clock. Its zero means nothing; the steady clock's is CLOCK_MONOTONIC's.
+using Nanoseconds = std::int64_t;
+
+constexpr Nanoseconds kNever = std::numeric_limits<Nanoseconds>::max();
+
+/// The time that pulses are put out by. now() and wake() may be called from any thread; waitUntil()
+/// only by the one that serves the pulses.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+
+  virtual Nanoseconds now() = 0;
+
+  /// Returns when the time has come, or earlier after a wake(). kNever waits for a wake() alone.
+  virtual void waitUntil(Nanoseconds time) = 0;
+
+  /// Ends the wait under way, or else the next one.
+  virtual void wake() = 0;
+
+  /// While anyone holds the clock, a virtual clock stands still; a real one goes on.
+  virtual void hold() {}
+  virtual void release() {}
+};
+
+/// Holds a clock for as long as it lives: for planning against a moment that must not pass.
+class ClockHold {
+ public:
+  explicit ClockHold(Clock& clock) : clock_(clock) { clock_.hold(); }
+  ~ClockHold() { clock_.release(); }
+  ClockHold(const ClockHold&) = delete;
+  ClockHold& operator=(const ClockHold&) = delete;
+
+ private:
+  Clock& clock_;
+};
+
+/// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins.
+class SteadyClock : public Clock {
+ public:
+  /// @param guard how long before the time the sleep ends; at most 200 us, so that the spinning
+  ///   stays far below what the kernel's real-time throttle allows.
+  explicit SteadyClock(Nanoseconds guard = 60'000);
+
+  Nanoseconds now() override;
+  void waitUntil(Nanoseconds time) override;
+  void wake() override;
+
+ private:
+  Nanoseconds guard_;
+  std::atomic<std::uint32_t> wakes_{0};
+  std::uint32_t seen_ = 0;
+};
+
+/// Time that is only as real as it has to be: it goes from event to event, each at its exact
+/// nanosecond, however late the thread that serves them.
+class VirtualClock : public Clock {
+ public:
+  /// @param speed virtual seconds per second of CLOCK_MONOTONIC; 0: a wait ends at once, and the
+  ///   clock stands still while there is nothing to wait for.
+  explicit VirtualClock(double speed = 0.0);
+
+  Nanoseconds now() override;
+  void waitUntil(Nanoseconds time) override;
+  void wake() override;
+  void hold() override;
+  void release() override;
+
+ private:
+  Nanoseconds projected() const;
+
+  const double speed_;
+  const Nanoseconds started_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  Nanoseconds now_ = 0;
+  Nanoseconds awaited_ = 0;
+  bool waiting_ = false;
+  bool woken_ = false;
+  int holds_ = 0;
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/gpio/simulated_lines.h"
+#include "stepdriver_core/sim/pin_trace.h"
+
+/// The simulated rig: for each axis a driver chip that reads its pins as the datasheet says, a
+/// motor, a carriage and two switches, behind the lines of a gpio::SimulatedBackend.
+namespace stepdriver::sim {
+
+/// How a line reaches the chip. An empty name: the pin isn't wired.
+struct Wire {
+  std::string line;
+  bool inverted = false;  ///< the chip sees the other level, as with common-anode wiring
+};
+
+/// An endstop switch that the carriage presses.
+struct SwitchSpec {
+  std::string line;
+  bool active_level = false;   ///< level of the line while the switch is pressed
+  double position = 0.0;       ///< [mm|deg] pressed from here on outwards
+  double hysteresis = 0.0;     ///< [mm|deg] released again this far inside of position
+  int bounces = 0;             ///< extra on-off pairs after each change
+  std::int64_t bounce_ns = 0;  ///< time from one bounce edge to the next
+};
+
+struct RigAxisSpec {
+  std::string name;
+  chip::Model model = chip::Model::kA4988;
+  chip::Timing timing{};  ///< what counts as a violation
+  Wire step, dir, enable, ms1, ms2, ms3, sleep, reset;
+  int microsteps = 1;  ///< the DIP switches, or how unwired microstep pins are strapped
+  double full_step_travel = 0.0;  ///< [mm|deg] that the carriage moves for a full step
+  double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
+  std::optional<SwitchSpec> min_switch, max_switch;
+};
+
+/// Everything that the chip must never see.
+enum class Violation {
+  kShortStepHigh,
+  kShortStepLow,
+  kDirSetup,
+  kDirHold,
+  kModeSetup,
+  kModeHold,
+  kUndefinedMode,      ///< an undefined code on the microstep pins, even in passing
+  kStepWhileDisabled,
+  kStepAfterEnable,    ///< before the enable time is over
+  kStepWhileAsleep,
+  kStepAfterWake,      ///< before the wake-up time is over
+  kStepInReset,        ///< while RESET is held, or before the time after it is over
+  kStepIntoSwitch,     ///< a step towards a switch whose line reads active
+};
+
+/// In words, as in reports: `short step high`.
+const char* nameOf(Violation violation);
+
+/// What an axis of the rig has seen so far.
+struct RigAxisReport {
+  std::int64_t pulses_forward = 0;   ///< active STEP edges with DIR forward
+  std::int64_t pulses_backward = 0;
+  std::int64_t translator = 0;       ///< microsteps of the finest mode, counted from Home at start
+  double carriage = 0.0;             ///< [mm|deg]
+  int microsteps = 1;                ///< the mode that the last STEP edge was taken in
+  bool energized = false;
+  bool min_pressed = false;          ///< as its line reads
+  bool max_pressed = false;
+  std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
+
+  std::int64_t totalViolations() const;
+};
+
+/// Knobs that break things.
+struct RigFaults {
+  std::optional<bool> min_stuck;  ///< the min switch reads active (true) or inactive whatever happens
+  std::optional<bool> max_stuck;
+  std::int64_t lose_every = 0;    ///< the motor ignores every n-th step; 0: none
+};
+
+/// All calls are safe from any thread.
+class Rig : public gpio::Board {
+ public:
+  /// @param trace where every edge goes; may be null.
+  explicit Rig(std::vector<RigAxisSpec> axes, std::shared_ptr<PinTrace> trace = nullptr);
+  ~Rig() override;
+
+  /// @throw std::out_of_range where there is no such axis; so do all that take an axis.
+  RigAxisReport report(const std::string& axis) const;
+  std::vector<std::string> axes() const;
+
+  void setFaults(const std::string& axis, const RigFaults& faults);
+
+  /// The write that comes after `writes` more successful ones on this line fails with `error`
+  /// (an errno), and so do all after it until clearWriteFault().
+  void failWrites(const std::string& line, std::int64_t writes, int error);
+  void clearWriteFault(const std::string& line);
+
+  /// Puts the carriage somewhere else, as a hand would: no step is counted.
+  void placeCarriage(const std::string& axis, double position, std::int64_t time_ns);
+
+  void onRequest(const std::string& line, bool level, std::int64_t time_ns) override;
+  void onEdge(const std::string& line, bool level, std::int64_t time_ns) override;
+  void onRelease(const std::string& line, std::int64_t time_ns) override;
+  bool inputLevel(const std::string& line, std::int64_t time_ns) override;
+  int writeFault(const std::string& line, std::int64_t time_ns) override;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stepdriver::sim
