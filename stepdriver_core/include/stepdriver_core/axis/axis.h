@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/config.h"
+
+namespace stepdriver::pulse {
+class PulseEngine;
+class Driver;
+}  // namespace stepdriver::pulse
+
+namespace stepdriver::axis {
+
+class AxisLines;
+
+/// One axis: units in, pulses out. Made by the Machine that it belongs to.
+///
+/// All calls are safe from any thread, and none of them but wait() takes longer than the chip does
+/// to wake, to be reset or to be enabled. Every command either is accepted whole or throws Refused
+/// and changes nothing. A unit is m on a linear axis, rad on a rotary one.
+class Axis {
+ public:
+  Axis(AxisConfig config, int index, const AxisLines& lines, pulse::Driver& driver);
+  ~Axis();
+  Axis(const Axis&) = delete;
+  Axis& operator=(const Axis&) = delete;
+
+  const AxisConfig& config() const;
+
+  /// Starts a motion from rest to rest.
+  ///
+  /// @param position [unit] absolute, or from where the axis stands where `relative`.
+  /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
+  /// @throw Refused where a number isn't finite, the target is beyond a soft limit, the velocity
+  ///   beyond the axis's maximum, the endstop on the way is active, the axis moves, is disabled,
+  ///   asleep or at fault, or the machine shuts down.
+  Move moveTo(double position, bool relative = false, double velocity = 0.0);
+
+  /// Turns the motor by a number of rounds, which need not be whole.
+  ///
+  /// @throw Refused as moveTo(), and where the steps of a round are not known.
+  Move moveRounds(double rounds, double velocity = 0.0);
+
+  /// Returns when the move has ended.
+  MoveResult wait(const Move& move);
+
+  /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
+  /// Without effect at rest.
+  void stop();
+
+  /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
+  /// ends the trust in the position: nothing holds the motor.
+  ///
+  /// @throw Refused where the axis is at fault (enabling only), or enable isn't wired.
+  void enable(bool on);
+
+  /// Puts the chip to sleep, or wakes it. @throw Refused while moving, and where SLEEP isn't wired.
+  void sleep(bool asleep);
+
+  /// Pulses RESET: the translator goes to Home. @throw Refused while moving, and where RESET isn't
+  /// wired.
+  void reset();
+
+  /// Changes the microstep mode and keeps the position; steps per unit follow. Where the new mode
+  /// has no place at this position it is refused, or, with AxisConfig::align_on_microstep_change,
+  /// the axis moves to the nearest common one first (the call then waits for that).
+  ///
+  /// @throw Refused while moving, for a mode that the chip doesn't have or whose pins aren't wired,
+  ///   and for chips whose mode is set by switches.
+  void setMicrosteps(int microsteps);
+
+  /// Declares where the axis stands; the position is trusted from then on. Nothing moves.
+  ///
+  /// @throw Refused while moving, where the number isn't finite or is beyond a soft limit.
+  void setPosition(double position);
+
+  AxisState state() const;
+  EndstopState endstops() const;
+
+  // What follows is the machine's side.
+
+  /// Ends a latched fault; the axis stands as it is.
+  void recover();
+  /// Latches the fault of an emergency stop that the engine has been told of.
+  void noteEmergencyStop();
+  /// Refuses everything from now on, with this reason.
+  void close(const std::string& reason);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stepdriver::axis

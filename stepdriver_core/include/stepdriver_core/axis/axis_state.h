@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace stepdriver::axis {
+
+/// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
+struct AxisState {
+  bool enabled = false;
+  bool asleep = false;
+  bool moving = false;
+  bool homed = false;
+  bool position_valid = false;  ///< the position can be trusted
+  int microsteps = 1;
+  double position = 0.0;  ///< [unit] from the count of the edges that went out
+  double velocity = 0.0;  ///< [unit/s]
+  double target = 0.0;    ///< [unit] where the motion under way ends; the position at rest
+  std::string fault;      ///< in words; empty: none
+};
+
+/// Levels of the switches as their lines read now, true where active. None where there is none.
+struct EndstopState {
+  std::optional<bool> min;
+  std::optional<bool> max;
+};
+
+/// A motion that was accepted.
+struct Move {
+  std::uint64_t id = 0;   ///< never the same twice on one axis
+  double target = 0.0;    ///< [unit]
+  double duration = 0.0;  ///< [s] as planned
+};
+
+/// How a move ended.
+enum class MoveEnd {
+  kReached,
+  kStopped,     ///< by a stop, a disable or a shutdown; decelerated
+  kEndstopMin,  ///< the min endstop was met
+  kEndstopMax,
+  kEmergencyStop,
+  kFault,  ///< pulses too late, or a line that failed
+};
+
+struct MoveResult {
+  MoveEnd end = MoveEnd::kReached;
+  std::string message;    ///< a sentence that says how and where
+  double position = 0.0;  ///< [unit] where the axis stands
+  double duration = 0.0;  ///< [s] that the motion took
+};
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "stepdriver_core/chip/chip.h"
+
+namespace stepdriver::axis {
+
+enum class Kind {
+  kLinear,  ///< mm in configurations, m outside
+  kRotary,  ///< degrees in configurations, rad outside
+};
+
+/// A line of the driver chip. An empty name: the pin isn't wired.
+struct Pin {
+  std::string line;       ///< `chip:offset`, `label:offset` or the kernel's name
+  bool inverted = false;  ///< the wiring inverts the level on its way to the chip
+
+  bool wired() const { return !line.empty(); }
+};
+
+struct Pins {
+  Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
+};
+
+struct Endstop {
+  std::string line;
+  bool active_level = false;  ///< level of the line while the switch is pressed
+};
+
+/// All that an axis needs to know, checked by readAxes(). A unit is m on a linear axis, rad on a
+/// rotary one; a step is a microstep of the configured mode.
+struct AxisConfig {
+  std::string name;
+  std::string joint;  ///< its name in joint_states and in the URDF
+  Kind kind = Kind::kLinear;
+  chip::Model driver = chip::Model::kA4988;
+  chip::Timing timing{};
+  Pins pins;
+
+  int microsteps = 1;            ///< microsteps per full step that steps_per_unit counts
+  double steps_per_unit = 0.0;   ///< [steps/unit]
+  double steps_per_round = 0.0;  ///< [steps/round of the motor]; 0: not known
+
+  double max_speed = 0.0;     ///< [unit/s]
+  double start_speed = 0.0;   ///< [unit/s] reached without a ramp (pull-in); 0: ramps start at rest
+  double acceleration = 0.0;  ///< [unit/s^2]
+  double deceleration = 0.0;  ///< [unit/s^2]
+  std::optional<double> min_position;  ///< [unit] soft limits
+  std::optional<double> max_position;
+
+  std::optional<Endstop> endstop_min;
+  std::optional<Endstop> endstop_max;
+
+  bool enable_on_start = false;
+  bool disable_on_shutdown = true;
+  /// A microstep change where the new mode has no position moves to the nearest common one first;
+  /// else it is refused.
+  bool align_on_microstep_change = false;
+};
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::machine {
+
+struct MachineOptions {
+  /// Serve the pulses in a thread of the machine's own. Without, waiting calls serve them, and
+  /// advance() does: for tests on a virtual clock.
+  bool threaded = true;
+  /// A pulse that comes later than this at a speed that the motor can't restart from is a fault.
+  double max_lateness = 0.005;  ///< [s]
+};
+
+/// What the pulse engine has done since the start.
+struct EngineFigures {
+  std::uint64_t pulses = 0;
+  std::uint64_t slips = 0;      ///< times that the timeline was slid because a pulse was late
+  double slipped = 0.0;         ///< [s] by how much altogether
+  double worst_lateness = 0.0;  ///< [s] of one pulse
+  std::string realtime;         ///< how the pulse thread runs, in words
+};
+
+/// All axes, one pulse engine, one set of lines. All calls are safe from any thread.
+class Machine {
+ public:
+  /// Takes the lines, all with their safe levels, and brings each chip to a known state; enables
+  /// the axes that want it. Nothing moves.
+  ///
+  /// @param backend, clock outlive the machine.
+  /// @throw GpioError where a line can't be had; then none is held.
+  Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
+          const MachineOptions& options = {});
+
+  /// shutdown(), where that wasn't called.
+  ~Machine();
+  Machine(const Machine&) = delete;
+  Machine& operator=(const Machine&) = delete;
+
+  /// The axes in the order of the configuration.
+  const std::vector<std::unique_ptr<axis::Axis>>& axes() const;
+
+  /// @throw Refused naming the axes that there are.
+  axis::Axis& axis(const std::string& name) const;
+
+  /// Decelerates every axis to rest.
+  void stop();
+
+  /// Lets the pulse that is out finish and sends no other. Every axis is at fault until recover();
+  /// motors stay energized.
+  void emergencyStop();
+  bool emergencyStopped() const;
+
+  /// Ends the emergency stop and all faults. Nothing moves.
+  void recover();
+
+  /// Refuses new commands, decelerates, disables the axes that are configured so, and releases the
+  /// lines at their safe levels. Returns when that is done.
+  void shutdown();
+
+  EngineFigures figures() const;
+
+  /// Serves the pulses for a time of the clock. Only where the machine has no thread.
+  void advance(double seconds);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stepdriver::machine
