@@ -7,14 +7,17 @@
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/axis/config.h"
 
+namespace stepdriver::gpio {
+class Lines;
+}
+
 namespace stepdriver::pulse {
-class PulseEngine;
-class Driver;
-}  // namespace stepdriver::pulse
+class PulseDriver;
+}
 
 namespace stepdriver::axis {
 
-class AxisLines;
+struct AxisLines;
 
 /// One axis: units in, pulses out. Made by the Machine that it belongs to.
 ///
@@ -23,7 +26,10 @@ class AxisLines;
 /// and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
-  Axis(AxisConfig config, int index, const AxisLines& lines, pulse::Driver& driver);
+  /// @param channel of the engine, as made from lines.
+  /// @param lines, driver outlive the axis.
+  Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
+       pulse::PulseDriver& driver);
   ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
@@ -78,16 +84,27 @@ class Axis {
   void setPosition(double position);
 
   AxisState state() const;
+
+  /// @throw GpioError where a line can't be read.
   EndstopState endstops() const;
 
   // What follows is the machine's side.
 
-  /// Ends a latched fault; the axis stands as it is.
+  /// Wakes the chip, ends its reset, and enables it where the configuration says so.
+  /// @throw GpioError
+  void bringUp();
+
+  /// Ends a latched fault; the axis stands as it is. @throw GpioError where a line still fails.
   void recover();
+
   /// Latches the fault of an emergency stop that the engine has been told of.
   void noteEmergencyStop();
-  /// Refuses everything from now on, with this reason.
+
+  /// Refuses every command from now on, with this reason, and decelerates to rest.
   void close(const std::string& reason);
+
+  /// After close(): waits for the rest, and disables where the configuration says so.
+  void shutDown();
 
  private:
   class Impl;

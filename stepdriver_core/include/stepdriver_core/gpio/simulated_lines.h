@@ -25,17 +25,22 @@ class Board {
   /// level that it had.
   virtual void onEdge(const std::string& line, bool level, std::int64_t time_ns) = 0;
 
-  /// The line was released.
+  /// The output was released. Its last edge, if any, was the one to the safe level.
   virtual void onRelease(const std::string& line, std::int64_t time_ns) = 0;
 
-  /// The level of an input now.
+  /// The level of an input now. Never called for outputs.
   virtual bool inputLevel(const std::string& line, std::int64_t time_ns) = 0;
 
-  /// @return 0, or the errno with which a write to the line fails; the line then keeps its level.
+  /// Called before each write, once for each line that it names, changed or not.
+  ///
+  /// @return 0, or the errno with which the write fails; then all lines of it keep their levels.
   virtual int writeFault(const std::string& line, std::int64_t time_ns) = 0;
 };
 
 /// Simulated lines: any name is a line, each can be held once; a Board is wired to them.
+///
+/// Lines of one write change at the same time, and the board sees them in the order of the write.
+/// A write or a read of an index that the request doesn't have fails with EINVAL.
 class SimulatedBackend : public Backend {
  public:
   /// Nanoseconds on the clock that edges are stamped with.
@@ -51,6 +56,7 @@ class SimulatedBackend : public Backend {
 
  private:
   struct Shared;
+  class HeldLines;
   std::shared_ptr<Shared> shared_;
 };
 

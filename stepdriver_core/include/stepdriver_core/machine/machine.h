@@ -40,7 +40,8 @@ class Machine {
   Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 
-  /// shutdown(), where that wasn't called.
+  /// shutdown(), where that wasn't called; then drives every line to its safe level and releases
+  /// it.
   ~Machine();
   Machine(const Machine&) = delete;
   Machine& operator=(const Machine&) = delete;
@@ -62,8 +63,8 @@ class Machine {
   /// Ends the emergency stop and all faults. Nothing moves.
   void recover();
 
-  /// Refuses new commands, decelerates, disables the axes that are configured so, and releases the
-  /// lines at their safe levels. Returns when that is done.
+  /// Refuses every command from now on, decelerates, and disables the axes that are configured so.
+  /// Returns when that is done. @throw Error where a line can't be written; all others are, then.
   void shutdown();
 
   EngineFigures figures() const;

@@ -27,6 +27,9 @@ class Clock {
   /// Ends the wait under way, or else the next one.
   virtual void wake() = 0;
 
+  /// Whether being late matters: the thread that serves the pulses then asks for real-time rights.
+  virtual bool realtime() const { return false; }
+
   /// While anyone holds the clock, a virtual clock stands still; a real one goes on.
   virtual void hold() {}
   virtual void release() {}
@@ -54,11 +57,14 @@ class SteadyClock : public Clock {
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
   void wake() override;
+  bool realtime() const override { return true; }
 
  private:
   Nanoseconds guard_;
   std::atomic<std::uint32_t> wakes_{0};
   std::uint32_t seen_ = 0;
+  Nanoseconds window_ = 0;  // start of the window in which spun_ was spent spinning
+  Nanoseconds spun_ = 0;
 };
 
 /// Time that is only as real as it has to be: it goes from event to event, each at its exact
@@ -76,7 +82,8 @@ class VirtualClock : public Clock {
   void release() override;
 
  private:
-  Nanoseconds projected() const;
+  Nanoseconds current() const;
+  Nanoseconds paced() const;
 
   const double speed_;
   const Nanoseconds started_;

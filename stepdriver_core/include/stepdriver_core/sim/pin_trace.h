@@ -21,9 +21,12 @@ class PinTrace {
   virtual void begin(const std::vector<TracePin>& pins, const std::vector<bool>& levels,
                      std::int64_t time_ns) = 0;
   virtual void edge(int pin, bool level, std::int64_t time_ns) = 0;
+
+  /// Makes what came so far visible to whoever reads the trace while it grows.
+  virtual void flush() {}
 };
 
-/// Keeps every edge in memory, for tests.
+/// Keeps every edge in memory, for tests. Read it while nothing moves.
 class MemoryTrace : public PinTrace {
  public:
   struct Edge {
@@ -37,12 +40,13 @@ class MemoryTrace : public PinTrace {
   void edge(int pin, bool level, std::int64_t time_ns) override;
 
   const std::vector<TracePin>& pins() const { return pins_; }
+  const std::vector<bool>& levels() const { return levels_; }  ///< at begin()
   const std::vector<Edge>& edges() const { return edges_; }
 
   /// @return index of the pin. @throw std::out_of_range
   int pin(const std::string& scope, const std::string& variable) const;
 
-  /// Times at which the pin took this level.
+  /// Times at which the pin took this level; the one that it had at begin() isn't among them.
   std::vector<std::int64_t> times(const std::string& scope, const std::string& variable,
                                   bool level) const;
 

@@ -10,7 +10,11 @@
 namespace stepdriver::sim {
 
 /// Writes the edges to a VCD file (IEEE 1364-2005, clause 18; timescale 1 ns, time 0 at begin()),
-/// which GTKWave, PulseView and sigrok-cli open. A last time stamp closes the file.
+/// which GTKWave, PulseView and sigrok-cli open. A last time stamp, 1 us after the last edge,
+/// closes the file: without it viewers leave the last levels out.
+///
+/// The same edges make the same file: there is no date in it. Edges are buffered; the file is
+/// complete up to the last edge after flush() and after destruction.
 class VcdTrace : public PinTrace {
  public:
   /// @throw Error where the file can't be written; an existing one is replaced.
@@ -21,8 +25,18 @@ class VcdTrace : public PinTrace {
              std::int64_t time_ns) override;
   void edge(int pin, bool level, std::int64_t time_ns) override;
 
+  /// @throw Error where the file couldn't be written, now or earlier.
+  void flush() override;
+
  private:
+  void stamp(std::int64_t time_ns);
+  void writeOut();
+
+  const std::string path_;
   std::ofstream file_;
+  std::string buffer_;
+  std::vector<std::string> ids_;
+  bool begun_ = false;
   std::int64_t start_ns_ = 0;
   std::int64_t last_ns_ = 0;
 };

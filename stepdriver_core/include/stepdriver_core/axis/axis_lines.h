@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+namespace stepdriver::axis {
+
+/// Where the lines of an axis are in the request of all axes. -1: not wired.
+struct AxisLines {
+  int step = -1;
+  int dir = -1;
+  int enable = -1;
+  std::array<int, 3> mode = {-1, -1, -1};
+  int sleep = -1;
+  int reset = -1;
+  int endstop_min = -1;
+  int endstop_max = -1;
+};
+
+/// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and
+/// the configured microstep mode. An axis that stays enabled over a shutdown keeps its chip awake.
+AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest>& outputs,
+                       std::vector<gpio::InputRequest>& inputs);
+
+/// The axis as the pulse engine sees it.
+pulse::ChannelConfig channelConfig(const AxisConfig& config, const AxisLines& lines);
+
+}  // namespace stepdriver::axis

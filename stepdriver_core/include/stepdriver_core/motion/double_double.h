@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+
+namespace stepdriver::motion {
+
+/// The unevaluated sum of two doubles: about 106 bits of mantissa.
+///
+/// A move may be 2^40 steps long and last for years, and yet each step is wanted to the nanosecond:
+/// that takes more than a double's 53 bits. Algorithms: error-free sum and product after Knuth and
+/// Dekker (T. J. Dekker, A floating-point technique for extending the available precision, 1971).
+struct DoubleDouble {
+  double hi = 0.0;
+  double lo = 0.0;
+
+  constexpr DoubleDouble() = default;
+  constexpr DoubleDouble(double value) : hi(value) {}  // NOLINT: a double is one of these
+  constexpr DoubleDouble(double high, double low) : hi(high), lo(low) {}
+
+  double value() const { return hi + lo; }
+};
+
+/// Every integer of 64 bits is one exactly.
+DoubleDouble fromInteger(std::int64_t value);
+
+DoubleDouble operator+(DoubleDouble a, DoubleDouble b);
+DoubleDouble operator-(DoubleDouble a, DoubleDouble b);
+DoubleDouble operator*(DoubleDouble a, DoubleDouble b);
+DoubleDouble operator/(DoubleDouble a, DoubleDouble b);
+DoubleDouble operator-(DoubleDouble a);
+bool operator<(DoubleDouble a, DoubleDouble b);
+
+/// A number as the nearest integer and what is left, at most a half.
+struct Split {
+  std::int64_t whole = 0;
+  double rest = 0.0;
+};
+
+/// @pre |value| < 2^62
+Split split(DoubleDouble value);
+
+/// Seconds as whole nanoseconds and the fraction of one that is left.
+Split splitNanoseconds(DoubleDouble seconds);
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "stepdriver_core/motion/double_double.h"
+
+namespace stepdriver::motion {
+
+/// A cubic piece of position over time: p0 + v0 t + a t^2/2 + j t^3/6 for t from 0 to duration.
+struct Piece {
+  DoubleDouble duration;  ///< [s]
+  DoubleDouble p0;        ///< [microsteps]
+  double v0 = 0.0;        ///< [microsteps/s]
+  double a = 0.0;         ///< [microsteps/s^2]
+  double j = 0.0;         ///< [microsteps/s^3]
+
+  DoubleDouble positionAt(DoubleDouble t) const;
+  DoubleDouble velocityAt(DoubleDouble t) const;
+};
+
+/// Where a motion is at one time.
+struct MotionState {
+  DoubleDouble position;      ///< [microsteps]
+  double velocity = 0.0;      ///< [microsteps/s]
+  double acceleration = 0.0;  ///< [microsteps/s^2]
+};
+
+/// A motion: pieces in a row from a start time on, at rest before and after. Times are motion time,
+/// in nanoseconds. Never changed once made, so any thread may read it.
+class Profile {
+ public:
+  /// No motion: rest at `position`.
+  Profile(std::int64_t start_ns, DoubleDouble position);
+
+  /// @param pieces each begins where the one before it ends; at least one.
+  /// @throw std::range_error where the motion takes longer than kLongest.
+  Profile(std::int64_t start_ns, std::vector<Piece> pieces);
+
+  static constexpr double kLongest = 4.0e9;  ///< [s] a good 126 years; nanoseconds stay in int64
+
+  std::int64_t startNs() const { return start_ns_; }
+  /// When the motion is over, to the nearest nanosecond; no step is later.
+  std::int64_t endNs() const { return end_ns_; }
+  DoubleDouble duration() const { return starts_.back(); }  ///< [s]
+  DoubleDouble endPosition() const { return end_position_; }
+  /// Highest speed on the way [microsteps/s], a lower bound where a piece has a jerk.
+  double peakSpeed() const;
+
+  MotionState stateAt(std::int64_t time_ns) const;
+
+  const std::vector<Piece>& pieces() const { return pieces_; }
+  /// When a piece begins, counted from the start [s]; one more than there are pieces: the end.
+  DoubleDouble pieceStart(std::size_t index) const { return starts_[index]; }
+
+ private:
+  std::int64_t start_ns_;
+  std::int64_t end_ns_;
+  DoubleDouble start_position_;
+  DoubleDouble end_position_;
+  std::vector<Piece> pieces_;
+  std::vector<DoubleDouble> starts_;
+};
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+namespace stepdriver::pulse {
+
+/// Keeps an engine served: in a thread of its own, or, on a virtual clock, by whoever waits.
+///
+/// The thread asks for SCHED_FIFO 50 and locked memory where the clock says that being late
+/// matters; where that is refused it goes on without, and realtime() says so.
+class PulseDriver {
+ public:
+  /// @param engine, clock outlive the driver.
+  PulseDriver(PulseEngine& engine, Clock& clock, bool threaded);
+
+  /// stop(), where that wasn't called.
+  ~PulseDriver();
+  PulseDriver(const PulseDriver&) = delete;
+  PulseDriver& operator=(const PulseDriver&) = delete;
+
+  /// Hands an order to the engine, from any thread.
+  void post(const Command& command);
+
+  /// Ends the thread; no pulse goes out from then on.
+  void stop();
+
+  /// Returns when `ready` says so. It is asked often, from the calling thread.
+  ///
+  /// @throw Error where there is no thread and the engine has nothing to do that could change it.
+  void waitFor(const std::function<bool()>& ready);
+
+  /// Serves the engine for this long on the clock. Only without a thread.
+  void advance(Nanoseconds time);
+
+  PulseEngine& engine() { return engine_; }
+  const PulseEngine& engine() const { return engine_; }
+  Clock& clock() const { return clock_; }
+
+  /// Clock time less all slips: the time that profiles are planned in.
+  Nanoseconds motionNow() const { return clock_.now() - engine_.state().slipped; }
+
+  /// How the thread runs, in a sentence.
+  std::string realtime() const;
+
+ private:
+  void run();
+
+  PulseEngine& engine_;
+  Clock& clock_;
+  std::mutex posting_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not asked for
+  std::atomic<int> lock_error_{-1};
+  std::thread thread_;
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+namespace stepdriver::pulse {
+
+/// A value that one thread writes without ever waiting and any thread reads whole (a sequence lock:
+/// a reader that meets a write tries again).
+template <typename T>
+class Snapshot {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  Snapshot() { store(T{}); }
+
+  /// From one thread at a time.
+  void store(const T& value) {
+    std::array<std::uint64_t, kWords> words{};
+    std::memcpy(words.data(), &value, sizeof(T));
+    const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);
+    sequence_.store(sequence + 1, std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_release);
+    for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_relaxed);
+    sequence_.store(sequence + 2, std::memory_order_release);
+  }
+
+  T load() const {
+    std::array<std::uint64_t, kWords> words{};
+    std::uint64_t before = 0;
+    std::uint64_t after = 0;
+    do {
+      before = sequence_.load(std::memory_order_acquire);
+      for (std::size_t i = 0; i < kWords; ++i) words[i] = words_[i].load(std::memory_order_relaxed);
+      std::atomic_thread_fence(std::memory_order_acquire);
+      after = sequence_.load(std::memory_order_relaxed);
+    } while (before != after || (before & 1) != 0);
+    T value;
+    std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));
+    return value;
+  }
+
+ private:
+  static constexpr std::size_t kWords = (sizeof(T) + 7) / 8;
+
+  std::atomic<std::uint64_t> sequence_{0};
+  std::array<std::atomic<std::uint64_t>, kWords> words_{};
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,219 @@
+#include "stepdriver_core/axis/axis.h"
+
+#include <cmath>
+#include <utility>
+
+#include "axis_impl.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::axis {
+namespace {
+
+using Lock = std::lock_guard<std::mutex>;
+
+}  // namespace
+
+Axis::Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
+           pulse::PulseDriver& driver)
+    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver)) {}
+
+Axis::~Axis() = default;
+
+const AxisConfig& Axis::config() const { return impl_->config; }
+
+// ---- motion ----
+
+Move Axis::moveTo(double position, bool relative, double velocity) {
+  const Lock lock(impl_->mutex);
+  return impl_->checkedMove(position, relative, velocity);
+}
+
+Move Axis::moveRounds(double rounds, double velocity) {
+  const Lock lock(impl_->mutex);
+  if (impl_->config.steps_per_round <= 0.0) {
+    impl_->refuse(
+        "the steps of a round are not known: configure steps_per_round or full_steps_per_round");
+  }
+  return impl_->checkedMove(rounds * impl_->config.steps_per_round / impl_->config.steps_per_unit,
+                            true, velocity);
+}
+
+MoveResult Axis::wait(const Move& move) {
+  std::optional<MoveResult> result;
+  impl_->driver.waitFor([&] {
+    const Lock lock(impl_->mutex);
+    impl_->harvest();
+    result = impl_->log.result(move.id);
+    return result.has_value();
+  });
+  return *result;
+}
+
+void Axis::stop() {
+  const Lock lock(impl_->mutex);
+  impl_->decelerate("it was stopped");
+}
+
+// ---- the chip ----
+
+void Axis::bringUp() {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  if (const auto sequence = axis.pins.bringUp(); sequence.size > 0) axis.writePins(sequence);
+  if (axis.config.enable_on_start && axis.pins.hasEnable()) {
+    axis.writePins(axis.pins.enable(true));
+    axis.enabled = true;
+  }
+}
+
+void Axis::enable(bool on) {
+  Impl& axis = *impl_;
+  std::unique_lock<std::mutex> lock(axis.mutex);
+  axis.refuseUnlessOpen();
+  if (!axis.pins.hasEnable()) {
+    axis.refuse("pins/enable isn't configured: the motor is energized as long as the chip is");
+  }
+  axis.harvest();
+  if (on) {
+    if (!axis.fault.empty()) axis.refuse("at fault: " + axis.fault + "; call recover first");
+    if (axis.disabling) axis.refuse("busy: it is being disabled");
+    if (axis.enabled) return;
+    axis.writePins(axis.pins.enable(true));
+    axis.enabled = true;
+    return;
+  }
+  axis.restAndDisable(lock, "it was disabled");
+}
+
+void Axis::sleep(bool asleep) {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  axis.refuseWhileMoving(asleep ? "it is put to sleep" : "it is woken");
+  if (!axis.pins.hasSleep()) {
+    axis.refuse(axis.chip.has_sleep ? "pins/sleep isn't configured"
+                                    : "a " + axis.chip.title + " has no SLEEP pin");
+  }
+  if (axis.asleep == asleep) return;
+  axis.writePins(axis.pins.sleep(asleep));
+  axis.asleep = asleep;
+  // Asleep nothing holds the motor, and the chip wakes at Home.
+  axis.position_valid = false;
+  axis.home_count = axis.harvest().count;
+}
+
+void Axis::reset() {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  axis.refuseWhileMoving("it is reset");
+  if (!axis.pins.hasReset()) {
+    axis.refuse(axis.chip.has_reset ? "pins/reset isn't configured"
+                                    : "a " + axis.chip.title + " has no RESET pin");
+  }
+  axis.writePins(axis.pins.reset());
+  axis.position_valid = false;
+  axis.home_count = axis.harvest().count;
+}
+
+void Axis::setMicrosteps(int microsteps) {
+  Impl& axis = *impl_;
+  std::unique_lock<std::mutex> lock(axis.mutex);
+  axis.refuseMicrosteps(microsteps);
+  if (microsteps == axis.microsteps) return;
+  const std::int64_t common = axis.nearestCommon(microsteps);
+  if (common != axis.harvest().count) {
+    if (!axis.config.align_on_microstep_change) {
+      axis.refuse("1/" + std::to_string(microsteps) + " has no position at " +
+                  axis.show(axis.positionOf(static_cast<double>(axis.harvest().count))) +
+                  "; the nearest that both modes have is " +
+                  axis.show(axis.positionOf(static_cast<double>(common))) +
+                  ": move there first, or configure align_on_microstep_change");
+    }
+    axis.refuseUnlessReadyToMove();
+    axis.refuseBeyondLimits(axis.positionOf(static_cast<double>(common)), "the common position");
+    axis.refuseIntoEndstop(common - axis.harvest().count);
+    const Move move = axis.start(common, axis.maxSpeed());
+    lock.unlock();
+    const MoveResult result = wait(move);
+    lock.lock();
+    if (result.end != MoveEnd::kReached) axis.refuse(result.message);
+    axis.refuseMicrosteps(microsteps);
+  }
+  axis.changeMicrosteps(microsteps);
+}
+
+void Axis::setPosition(double position) {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  axis.refuseWhileMoving("its position is set");
+  if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
+  axis.refuseBeyondLimits(position, "the position");
+  axis.origin = position - static_cast<double>(axis.harvest().count) / axis.stepsPerUnit();
+  axis.position_valid = true;
+}
+
+// ---- state ----
+
+AxisState Axis::state() const {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  const pulse::ChannelState channel = axis.harvest();
+  AxisState state;
+  state.enabled = axis.enabled;
+  state.asleep = axis.asleep;
+  state.moving = channel.following != 0;
+  state.homed = axis.homed;
+  state.position_valid = axis.position_valid;
+  state.microsteps = axis.microsteps;
+  state.position = axis.positionOf(static_cast<double>(channel.count));
+  state.target = state.position;
+  state.fault = axis.fault;
+  if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
+    const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
+    state.velocity = velocity / axis.stepsPerUnit();
+    state.target =
+        axis.positionOf(motion->stopped_by.empty() ? static_cast<double>(motion->target)
+                                                   : motion->profile->endPosition().value());
+  }
+  return state;
+}
+
+EndstopState Axis::endstops() const {
+  const Impl& axis = *impl_;
+  return {axis.endstopActive(axis.axis_lines.endstop_min, axis.config.endstop_min),
+          axis.endstopActive(axis.axis_lines.endstop_max, axis.config.endstop_max)};
+}
+
+// ---- the machine's side ----
+
+void Axis::recover() {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  axis.harvest();
+  if (axis.fault.empty()) return;
+  axis.restorePins();
+  axis.fault.clear();
+}
+
+void Axis::noteEmergencyStop() {
+  const Lock lock(impl_->mutex);
+  Impl& axis = *impl_;
+  axis.driver.waitFor([&axis] { return !axis.moving(); });
+  axis.fault = "emergency stop";
+}
+
+void Axis::close(const std::string& reason) {
+  const Lock lock(impl_->mutex);
+  impl_->closed = reason;
+  impl_->decelerate(reason);
+}
+
+void Axis::shutDown() {
+  std::unique_lock<std::mutex> lock(impl_->mutex);
+  if (impl_->pins.hasEnable() && impl_->config.disable_on_shutdown) {
+    impl_->restAndDisable(lock, impl_->closed);
+  } else {
+    impl_->awaitRest(lock, impl_->closed);
+  }
+}
+
+}  // namespace stepdriver::axis

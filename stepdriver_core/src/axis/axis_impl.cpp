@@ -1,0 +1,131 @@
+#include "axis_impl.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+namespace stepdriver::axis {
+
+Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& own_lines,
+                 gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver)
+    : config(std::move(axis_config)),
+      chip(chip::chipOf(config.driver)),
+      axis_lines(own_lines),
+      pins(config, own_lines),
+      lines(all_lines),
+      driver(pulse_driver),
+      channel(engine_channel),
+      enabled(!pins.hasEnable()),
+      microsteps(config.microsteps) {}
+
+// ---- what the engine has done ----
+
+pulse::ChannelState Axis::Impl::harvest() {
+  const pulse::ChannelState state = driver.engine().channel(channel);
+  if (state.line_errors != line_errors_seen_) {
+    line_errors_seen_ = state.line_errors;
+    fault = "a GPIO line failed: " + std::string(std::strerror(state.error));
+    position_valid = false;
+    pins_doubtful_ = true;
+  }
+  if (state.ended != ended_seen_) {
+    ended_seen_ = state.ended;
+    conclude(state);
+  }
+  log.dropBefore(state.following != 0 ? state.following : state.ended);
+  return state;
+}
+
+void Axis::Impl::conclude(const pulse::ChannelState& state) {
+  switch (state.end) {
+    case pulse::EndReason::kEmergencyStop:
+      fault = "emergency stop";
+      break;
+    case pulse::EndReason::kTooLate:
+      fault = "a pulse was " + inMilliseconds(state.end_lateness) +
+              " late, more than the motor can go on from at this speed";
+      position_valid = false;
+      break;
+    default:
+      break;
+  }
+  if (state.end_abrupt && state.end != pulse::EndReason::kDone) position_valid = false;
+  if (const Motion* motion = log.find(state.ended)) {
+    log.conclude(motion->move, resultOf(*motion, state));
+  }
+}
+
+MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState& state) {
+  MoveResult result;
+  result.position = positionOf(static_cast<double>(state.count));
+  result.duration = std::max(0.0, static_cast<double>(state.end_time - motion.begin_ns) * 1e-9);
+  std::string why;
+  switch (state.end) {
+    case pulse::EndReason::kDone:
+      result.end = motion.stopped_by.empty() ? MoveEnd::kReached : MoveEnd::kStopped;
+      why = motion.stopped_by;
+      break;
+    case pulse::EndReason::kEndstopMin:
+      result.end = MoveEnd::kEndstopMin;
+      why = "the min endstop was met";
+      break;
+    case pulse::EndReason::kEndstopMax:
+      result.end = MoveEnd::kEndstopMax;
+      why = "the max endstop was met";
+      break;
+    case pulse::EndReason::kEmergencyStop:
+      result.end = MoveEnd::kEmergencyStop;
+      why = "emergency stop";
+      break;
+    case pulse::EndReason::kTooLate:
+    case pulse::EndReason::kLineError:
+      result.end = MoveEnd::kFault;
+      why = fault;
+      break;
+  }
+  if (result.end == MoveEnd::kReached) {
+    result.message = config.name + " reached " + show(result.position);
+  } else {
+    result.message = config.name + " stands at " + show(result.position) + ", not at " +
+                     show(positionOf(static_cast<double>(motion.target))) + ": " + why;
+    if (!position_valid && state.end_abrupt) {
+      result.message += "; it stopped too fast for the position to be trusted";
+    }
+  }
+  return result;
+}
+
+// ---- scales ----
+
+double Axis::Impl::stepsPerUnit() const {
+  return config.steps_per_unit * microsteps / config.microsteps;
+}
+
+double Axis::Impl::maxSpeed() const {
+  // At finer microsteps than the configured ones the chip's own limit may come first.
+  const double period =
+      static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
+  return std::min(config.max_speed, 1.0 / (period * stepsPerUnit()));
+}
+
+motion::TrapezoidLimits Axis::Impl::limits(double velocity) const {
+  const double scale = stepsPerUnit();
+  return {config.start_speed * scale, velocity * scale, config.acceleration * scale,
+          config.deceleration * scale};
+}
+
+std::string Axis::Impl::show(double value, const char* per) const {
+  char text[64];
+  std::snprintf(text, sizeof(text), "%.9g %s%s", value, config.kind == Kind::kLinear ? "m" : "rad",
+                per);
+  return text;
+}
+
+std::string Axis::Impl::inMilliseconds(pulse::Nanoseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3g ms", static_cast<double>(time) * 1e-6);
+  return text;
+}
+
+}  // namespace stepdriver::axis

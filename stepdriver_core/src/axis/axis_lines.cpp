@@ -1,0 +1,56 @@
+#include "stepdriver_core/axis/axis_lines.h"
+
+namespace stepdriver::axis {
+
+AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest>& outputs,
+                       std::vector<gpio::InputRequest>& inputs) {
+  const chip::Chip& chip = chip::chipOf(config.driver);
+  const auto output = [&outputs](const Pin& pin, bool chip_level, bool keep) {
+    if (!pin.wired()) return -1;
+    outputs.push_back({pin.line, chip_level != pin.inverted, keep});
+    return static_cast<int>(outputs.size()) - 1;
+  };
+  const auto input = [&inputs](const std::optional<Endstop>& endstop) {
+    if (!endstop) return -1;
+    inputs.push_back({endstop->line});
+    return static_cast<int>(inputs.size()) - 1;
+  };
+
+  const bool keep = !config.disable_on_shutdown;
+  const Pins& pins = config.pins;
+  AxisLines lines;
+  lines.enable = output(pins.enable, !chip.enable_on, keep);
+  lines.sleep = output(pins.sleep, chip.sleep_asleep, keep);
+  lines.reset = output(pins.reset, chip.reset_held, keep);
+  const auto code = chip::codeOf(chip, config.microsteps);
+  const std::array<const Pin*, 3> mode_pins = {&pins.ms1, &pins.ms2, &pins.ms3};
+  for (std::size_t i = 0; i < mode_pins.size(); ++i) {
+    lines.mode[i] = output(*mode_pins[i], code && (*code)[i], keep);
+  }
+  lines.dir = output(pins.dir, false, false);
+  lines.step = output(pins.step, !chip.step_active, false);
+  lines.endstop_min = input(config.endstop_min);
+  lines.endstop_max = input(config.endstop_max);
+  return lines;
+}
+
+pulse::ChannelConfig channelConfig(const AxisConfig& config, const AxisLines& lines) {
+  const chip::Chip& chip = chip::chipOf(config.driver);
+  pulse::ChannelConfig channel;
+  channel.step = {lines.step, chip.step_active != config.pins.step.inverted};
+  channel.dir = {lines.dir, !config.pins.dir.inverted};
+  if (config.endstop_min) {
+    channel.endstop_min = pulse::Signal{lines.endstop_min, config.endstop_min->active_level};
+  }
+  if (config.endstop_max) {
+    channel.endstop_max = pulse::Signal{lines.endstop_max, config.endstop_max->active_level};
+  }
+  channel.step_high = config.timing.step_high_ns;
+  channel.step_low = config.timing.step_low_ns;
+  channel.dir_setup = config.timing.dir_setup_ns;
+  channel.dir_hold = config.timing.dir_hold_ns;
+  channel.mode_hold = config.timing.mode_hold_ns;
+  return channel;
+}
+
+}  // namespace stepdriver::axis

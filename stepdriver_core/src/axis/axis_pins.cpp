@@ -1,0 +1,38 @@
+#include <cstring>
+
+#include "axis_impl.h"
+
+namespace stepdriver::axis {
+
+void Axis::Impl::writePins(const pulse::PinSequence& sequence, std::optional<std::int64_t> count) {
+  pulse::Command command;
+  command.kind = pulse::Command::Kind::kPins;
+  command.channel = channel;
+  command.serial = ++serial_;
+  command.pins = sequence;
+  command.count = count;
+  driver.post(command);
+  pulse::ChannelState state;
+  driver.waitFor([&] {
+    state = driver.engine().channel(channel);
+    return state.pins_done == command.serial || state.pins_failed == command.serial ||
+           state.refused == command.serial;
+  });
+  harvest();
+  if (state.pins_failed == command.serial) {
+    throw GpioError(config.name +
+                    ": a line could not be written: " + std::string(std::strerror(state.error)));
+  }
+  if (state.refused == command.serial) refuse("it moves");
+}
+
+void Axis::Impl::restorePins() {
+  if (!pins_doubtful_) return;
+  writePins(pins.restore(enabled, asleep));
+  // Each pin on the way back that the failed change did not reach is where it should be already.
+  if (mode_failed_ != 0) writePins(pins.mode(mode_failed_, microsteps));
+  mode_failed_ = 0;
+  pins_doubtful_ = false;
+}
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/config.h"
+
+namespace stepdriver::axis {
+
+/// The keys of an axis's motion in one of the two units, and that unit.
+struct MotionKeys {
+  Kind kind;
+  std::string unit;               ///< as in messages
+  long double units_per_si_unit;  ///< mm in a m, degrees in a rad
+  long double units_per_round;    ///< 360 degrees; 0: given by per_round
+  std::string steps_per_unit;
+  std::string per_round;  ///< empty: there is none
+  std::string max_speed, min_speed;
+  std::string acceleration, deceleration;
+  std::string min_position, max_position;
+
+  std::vector<std::string> all() const {
+    std::vector<std::string> keys{steps_per_unit, max_speed,    min_speed,   acceleration,
+                                  deceleration,   min_position, max_position};
+    if (!per_round.empty()) keys.push_back(per_round);
+    return keys;
+  }
+};
+
+inline const MotionKeys& motionKeys(Kind kind) {
+  constexpr long double kPi = 3.14159265358979323846264338327950288L;
+  static const MotionKeys linear{Kind::kLinear,
+                                 "mm",
+                                 1000.0L,
+                                 0.0L,
+                                 "steps_per_mm",
+                                 "mm_per_round",
+                                 "max_speed_mm_s",
+                                 "min_speed_mm_s",
+                                 "acceleration_mm_s2",
+                                 "deceleration_mm_s2",
+                                 "min_position_mm",
+                                 "max_position_mm"};
+  static const MotionKeys rotary{Kind::kRotary,         "degree",
+                                 180.0L / kPi,          360.0L,
+                                 "steps_per_degree",    "",
+                                 "max_speed_deg_s",     "min_speed_deg_s",
+                                 "acceleration_deg_s2", "deceleration_deg_s2",
+                                 "min_position_deg",    "max_position_deg"};
+  return kind == Kind::kLinear ? linear : rotary;
+}
+
+}  // namespace stepdriver::axis

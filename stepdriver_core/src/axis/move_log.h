@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/motion/profile.h"
+
+namespace stepdriver::axis {
+
+/// A profile that the pulse engine has, and the move that it belongs to.
+struct Motion {
+  std::uint64_t serial = 0;  ///< of the command that it went out with
+  std::uint64_t move = 0;
+  std::int64_t target = 0;    ///< [microsteps]
+  std::int64_t begin_ns = 0;  ///< motion time at which the move began
+  std::string stopped_by;     ///< what decelerates it; empty: it goes to its target
+  std::unique_ptr<const motion::Profile> profile;
+};
+
+/// The motions that the engine may still look at, and how the last moves ended.
+class MoveLog {
+ public:
+  void add(Motion motion) { motions_.push_back(std::move(motion)); }
+
+  /// The engine never took this one.
+  void withdraw(std::uint64_t serial);
+
+  /// Forgets what the engine has no more use for: all before the one that it follows or that ended.
+  void dropBefore(std::uint64_t serial);
+
+  /// The motion that went out last; nullptr where none is in the log.
+  const Motion* latest() const { return motions_.empty() ? nullptr : &motions_.back(); }
+  const Motion* find(std::uint64_t serial) const;
+
+  void conclude(std::uint64_t move, MoveResult result);
+  std::optional<MoveResult> result(std::uint64_t move) const;
+
+ private:
+  struct Concluded {
+    std::uint64_t move;
+    MoveResult result;
+  };
+
+  std::deque<Motion> motions_;
+  std::deque<Concluded> concluded_;
+};
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,267 @@
+#include "read_motion.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "message_text.h"
+#include "motion_keys.h"
+
+namespace stepdriver::axis {
+namespace {
+
+// Far beyond any machine, and well inside what the motion can count and time in 64 bits.
+constexpr double kLowestScale = 1e-9;  // [steps/unit]
+constexpr double kHighestScale = 1e9;
+constexpr double kLowestRate = 1e-3;          // [steps/s]
+constexpr double kLowestAcceleration = 1e-3;  // [steps/s^2]
+constexpr double kHighestAcceleration = 1e12;
+constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: each step is a double of its own
+constexpr int kMostFullSteps = 1'000'000;
+// What is beyond a limit only by the rounding of units, or of the bound in a message, isn't.
+constexpr double kSlack = 1.0 + 1e-9;
+
+const char* const kFullSteps = "full_steps_per_round";
+const char* const kGear = "gear_ratio";
+const char* const kStepsPerRound = "steps_per_round";
+
+/// The first key of this unit that is given; empty: none.
+std::string firstGiven(const ConfigReader& axis, const MotionKeys& keys) {
+  for (const std::string& key : keys.all()) {
+    if (axis.has(key)) return key;
+  }
+  return {};
+}
+
+/// @return nullopt where the keys don't tell, which is an issue.
+std::optional<Kind> readKind(ConfigReader& axis) {
+  const std::string linear = firstGiven(axis, motionKeys(Kind::kLinear));
+  const std::string rotary = firstGiven(axis, motionKeys(Kind::kRotary));
+  if (!linear.empty() && !rotary.empty()) {
+    axis.issue("", "has " + linear + " and " + rotary +
+                       ", but must be either linear, with all of it in mm, or rotary, with all of "
+                       "it in degrees");
+    return {};
+  }
+  if (!linear.empty()) return Kind::kLinear;
+  if (!rotary.empty()) return Kind::kRotary;
+  if (axis.isMap()) {
+    axis.issue("",
+               "has no key with a unit; it must have steps_per_mm, max_speed_mm_s and "
+               "acceleration_mm_s2 where it is linear, or steps_per_degree, max_speed_deg_s and "
+               "acceleration_deg_s2 where it is rotary");
+  }
+  return {};
+}
+
+/// Reads what is given in one unit.
+class MotionReader {
+ public:
+  /// @param presence kOptional: what is missing isn't to be reported.
+  MotionReader(ConfigReader& axis, const MotionContext& context, Kind kind, Presence presence)
+      : axis_(axis), context_(context), keys_(motionKeys(kind)), presence_(presence) {}
+
+  void read(std::optional<int> full_steps, std::optional<double> gear, AxisConfig& config) {
+    config.kind = keys_.kind;
+    const auto scale = readScale(full_steps, gear);
+    // Where the unit isn't certain, nothing is computed from it.
+    if (scale && presence_ == Presence::kRequired && checkScale(*scale)) {
+      config.steps_per_unit = static_cast<double>(*scale * keys_.units_per_si_unit);
+      steps_per_unit_ = static_cast<double>(*scale);
+    }
+    readSpeeds(config);
+    readAccelerations(config);
+    readPositions(config);
+  }
+
+ private:
+  double si(double units) const { return static_cast<double>(units / keys_.units_per_si_unit); }
+
+  std::string is(const std::string& key) const {
+    return "is " + axis_.shown(key) + ", but must be ";
+  }
+
+  bool scaleIsGivenBy(const std::string& key) const { return !key.empty() && axis_.has(key); }
+
+  /// @return [microsteps/unit]; none where something that it needs is missing or wrong.
+  std::optional<long double> readScale(std::optional<int> full_steps, std::optional<double> gear) {
+    const bool by_rounds =
+        scaleIsGivenBy(kFullSteps) || scaleIsGivenBy(kGear) || scaleIsGivenBy(keys_.per_round);
+    if (axis_.has(keys_.steps_per_unit) || !by_rounds) return readDirectScale(by_rounds);
+    std::optional<long double> per_round = keys_.units_per_round;
+    if (!keys_.per_round.empty()) {
+      per_round = axis_.findNumber(keys_.per_round, Range::positive(), presence_);
+    }
+    if (presence_ == Presence::kRequired && !axis_.has(kFullSteps)) {
+      axis_.issue(kFullSteps,
+                  "is missing; it must be an integer of 1 or more, as the axis is scaled by " +
+                      (axis_.has(keys_.per_round) ? keys_.per_round : kGear));
+    }
+    if (!full_steps || !gear || !per_round || !context_.microsteps) return {};
+    return static_cast<long double>(*full_steps) * *context_.microsteps * *gear / *per_round;
+  }
+
+  std::optional<long double> readDirectScale(bool by_rounds) {
+    const std::string& key = keys_.steps_per_unit;
+    if (!axis_.has(key)) {
+      if (presence_ == Presence::kRequired) {
+        axis_.issue(
+            key, "is missing; it must be a number above 0, or else " + std::string(kFullSteps) +
+                     (keys_.per_round.empty() ? "" : " and " + keys_.per_round) + " must be given");
+      }
+      return {};
+    }
+    const auto scale = axis_.findNumber(key, Range::positive(), presence_);
+    if (!by_rounds) return scale;
+    std::vector<std::string> given;
+    for (const std::string& other :
+         {std::string(kFullSteps), keys_.per_round, std::string(kGear)}) {
+      if (scaleIsGivenBy(other)) given.push_back(other);
+    }
+    if (!keys_.per_round.empty()) {
+      axis_.findNumber(keys_.per_round, Range::positive(), Presence::kOptional);
+    }
+    axis_.issue(key, "is " + axis_.shown(key) + ", but " + listText(given, "and") +
+                         " must not be given with it: the axis is scaled by either (the motor's "
+                         "own steps can be given as " +
+                         kStepsPerRound + ")");
+    return {};
+  }
+
+  bool checkScale(long double scale) {
+    if (scale >= kLowestScale && scale <= kHighestScale) return true;
+    std::string key = kFullSteps;
+    for (const std::string& other : {std::string(kGear), keys_.per_round, keys_.steps_per_unit}) {
+      if (scaleIsGivenBy(other)) key = other;
+    }
+    axis_.issue(key, "is " + axis_.shown(key) + ", which makes " +
+                         roughText(static_cast<double>(scale)) + " steps per " + keys_.unit +
+                         ", but must make from " + numberText(kLowestScale) + " to " +
+                         numberText(kHighestScale));
+    return false;
+  }
+
+  void readSpeeds(AxisConfig& config) {
+    const auto max = axis_.findNumber(keys_.max_speed, Range::positive(), presence_);
+    const auto min = axis_.findNumber(keys_.min_speed, Range::notNegative(), Presence::kOptional);
+    if (min && max && *min > *max) {
+      axis_.issue(keys_.min_speed, is(keys_.min_speed) + "at most " + keys_.max_speed +
+                                       ", which is " + axis_.shown(keys_.max_speed));
+    }
+    if (max) checkRate(*max);
+    config.max_speed = si(max.value_or(0.0));
+    config.start_speed = si(min.value_or(0.0));
+  }
+
+  void checkRate(double max_speed) {
+    if (!steps_per_unit_) return;
+    const double rate = max_speed * *steps_per_unit_;
+    if (rate * kSlack < kLowestRate) {
+      axis_.issue(keys_.max_speed, is(keys_.max_speed) + "at least " +
+                                       lowerBoundText(kLowestRate / *steps_per_unit_) +
+                                       ", which is " + numberText(kLowestRate) + " steps/s");
+    }
+    if (!context_.timing) return;
+    const double high_us = static_cast<double>(context_.timing->step_high_ns) / 1e3;
+    const double low_us = static_cast<double>(context_.timing->step_low_ns) / 1e3;
+    const double highest = 1e6 / (high_us + low_us);
+    if (rate <= highest * kSlack) return;
+    axis_.issue(keys_.max_speed,
+                is(keys_.max_speed) + "at most " + upperBoundText(highest / *steps_per_unit_) +
+                    ": it is " + roughText(rate) + " steps/s (at " + roughText(*steps_per_unit_) +
+                    " steps per " + keys_.unit + "), and the " + context_.chip_title +
+                    " takes at most " + upperBoundText(highest) + " steps/s (" +
+                    numberText(high_us) + " us high, " + numberText(low_us) + " us low)");
+  }
+
+  void readAccelerations(AxisConfig& config) {
+    const auto up = axis_.findNumber(keys_.acceleration, Range::positive(), presence_);
+    const auto down = axis_.findNumber(keys_.deceleration, Range::positive(), Presence::kOptional);
+    if (up) checkAcceleration(keys_.acceleration, *up);
+    if (down) checkAcceleration(keys_.deceleration, *down);
+    config.acceleration = si(up.value_or(0.0));
+    config.deceleration = down ? si(*down) : config.acceleration;
+  }
+
+  void checkAcceleration(const std::string& key, double acceleration) {
+    if (!steps_per_unit_) return;
+    const double steps = acceleration * *steps_per_unit_;
+    if (steps * kSlack >= kLowestAcceleration && steps <= kHighestAcceleration * kSlack) return;
+    axis_.issue(key, is(key) + "from " + lowerBoundText(kLowestAcceleration / *steps_per_unit_) +
+                         " to " + upperBoundText(kHighestAcceleration / *steps_per_unit_) +
+                         ", which is " + numberText(kLowestAcceleration) + " to " +
+                         numberText(kHighestAcceleration) + " steps/s^2");
+  }
+
+  void readPositions(AxisConfig& config) {
+    const auto min = readPosition(keys_.min_position);
+    const auto max = readPosition(keys_.max_position);
+    if (min && max && *min >= *max) {
+      axis_.issue(keys_.min_position, is(keys_.min_position) + "below " + keys_.max_position +
+                                          ", which is " + axis_.shown(keys_.max_position));
+    }
+    if (min) config.min_position = si(*min);
+    if (max) config.max_position = si(*max);
+  }
+
+  std::optional<double> readPosition(const std::string& key) {
+    const auto position = axis_.findNumber(key, Range{}, Presence::kOptional);
+    if (position && steps_per_unit_ && std::abs(*position) * *steps_per_unit_ > kFarthestStep) {
+      const std::string bound = upperBoundText(kFarthestStep / *steps_per_unit_);
+      axis_.issue(key, is(key) + "from -" + bound + " to " + bound +
+                           ", which is as far as steps are counted");
+    }
+    return position;
+  }
+
+  ConfigReader& axis_;
+  const MotionContext& context_;
+  const MotionKeys& keys_;
+  Presence presence_;
+  std::optional<double> steps_per_unit_;
+};
+
+double readStepsPerRound(ConfigReader& axis, std::optional<int> full_steps,
+                         std::optional<int> microsteps) {
+  const auto steps =
+      axis.findInteger(kStepsPerRound, 1, std::numeric_limits<int>::max(), Presence::kOptional);
+  const std::string is = "is " + axis.shown(kStepsPerRound) + ", but must be ";
+  const bool by_full_steps = full_steps && microsteps;
+  const int product = by_full_steps ? *full_steps * *microsteps : 0;
+  if (steps && by_full_steps && *steps != product) {
+    axis.issue(kStepsPerRound, is + std::to_string(product) + ": " + kFullSteps + " (" +
+                                   std::to_string(*full_steps) + ") times microsteps (" +
+                                   std::to_string(*microsteps) + ")");
+  } else if (steps && microsteps && *steps % *microsteps != 0) {
+    axis.issue(kStepsPerRound, is + "a multiple of microsteps, which is " +
+                                   std::to_string(*microsteps) +
+                                   ": it counts the microsteps of whole full steps");
+  }
+  return steps.value_or(product);
+}
+
+}  // namespace
+
+void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config) {
+  for (const Kind kind : {Kind::kLinear, Kind::kRotary}) {
+    for (const std::string& key : motionKeys(kind).all()) axis.allow(key);
+  }
+  const auto full_steps = axis.findInteger(kFullSteps, 1, kMostFullSteps, Presence::kOptional);
+  auto gear = axis.findNumber(kGear, Range::positive(), Presence::kOptional);
+  if (!axis.has(kGear)) gear = 1.0;
+  config.steps_per_round = readStepsPerRound(axis, full_steps, context.microsteps);
+
+  const auto kind = readKind(axis);
+  if (kind) {
+    MotionReader(axis, context, *kind, Presence::kRequired).read(full_steps, gear, config);
+    return;
+  }
+  // Each value that is there can be right or wrong by itself.
+  for (const Kind each : {Kind::kLinear, Kind::kRotary}) {
+    MotionReader(axis, context, each, Presence::kOptional).read(full_steps, gear, config);
+  }
+}
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "stepdriver_core/axis/config_reader.h"
+
+namespace stepdriver::axis {
+
+/// What the motion of an axis is checked against. A member is empty where it isn't known because
+/// something is wrong with it; then nothing is said about what depends on it.
+struct MotionContext {
+  std::optional<int> microsteps;
+  std::optional<chip::Timing> timing;  ///< with the configuration's overrides
+  std::string chip_title;
+};
+
+/// Reads the kind of the axis, its scale, speeds, accelerations and soft limits.
+///
+/// The unit of the keys tells the kind; in the configuration a unit is mm or a degree.
+void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config);
+
+}  // namespace stepdriver::axis

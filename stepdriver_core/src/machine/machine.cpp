@@ -1,0 +1,126 @@
+#include "stepdriver_core/machine/machine.h"
+
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "stepdriver_core/axis/axis_lines.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/pulse/pulse_driver.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+namespace stepdriver::machine {
+namespace {
+
+pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+
+}  // namespace
+
+class Machine::Impl {
+ public:
+  Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
+       const MachineOptions& options) {
+    std::vector<gpio::OutputRequest> outputs;
+    std::vector<gpio::InputRequest> inputs;
+    std::vector<axis::AxisLines> axis_lines;
+    std::vector<pulse::ChannelConfig> channels;
+    for (const axis::AxisConfig& config : configs) {
+      axis_lines.push_back(axis::requestLines(config, outputs, inputs));
+      channels.push_back(axis::channelConfig(config, axis_lines.back()));
+    }
+    lines_ = backend.request(outputs, inputs);
+    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, channels,
+                                                   nanoseconds(options.max_lateness));
+    driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
+    for (std::size_t i = 0; i < configs.size(); ++i) {
+      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i), axis_lines[i],
+                                                   *lines_, *driver_));
+    }
+    for (const auto& axis : axes_) axis->bringUp();
+  }
+
+  ~Impl() {
+    try {
+      shutdown();
+    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): told to whoever calls shutdown()
+    }
+    driver_->stop();
+  }
+
+  void shutdown() {
+    if (shut_.exchange(true)) return;
+    for (const auto& axis : axes_) axis->close("the machine was shut down");
+    forAll([](axis::Axis& axis) { axis.shutDown(); });
+  }
+
+  // Does it for each axis, whatever happens to the others, and then tells all that went wrong.
+  void forAll(const std::function<void(axis::Axis&)>& action) {
+    std::string errors;
+    for (const auto& axis : axes_) {
+      try {
+        action(*axis);
+      } catch (const Error& error) {
+        errors += (errors.empty() ? "" : "; ") + std::string(error.what());
+      }
+    }
+    if (!errors.empty()) throw Error(errors);
+  }
+
+  // In the order in which they must go: axes, driver, engine, lines.
+  std::unique_ptr<gpio::Lines> lines_;
+  std::unique_ptr<pulse::PulseEngine> engine_;
+  std::unique_ptr<pulse::PulseDriver> driver_;
+  std::vector<std::unique_ptr<axis::Axis>> axes_;
+  std::atomic<bool> shut_{false};
+};
+
+Machine::Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
+                 pulse::Clock& clock, const MachineOptions& options)
+    : impl_(std::make_unique<Impl>(axes, backend, clock, options)) {}
+
+Machine::~Machine() = default;
+
+const std::vector<std::unique_ptr<axis::Axis>>& Machine::axes() const { return impl_->axes_; }
+
+axis::Axis& Machine::axis(const std::string& name) const {
+  std::string names;
+  for (const auto& axis : impl_->axes_) {
+    if (axis->config().name == name) return *axis;
+    names += (names.empty() ? "" : ", ") + axis->config().name;
+  }
+  throw Refused("there is no axis " + name + "; there are " + names);
+}
+
+void Machine::stop() {
+  impl_->forAll([](axis::Axis& axis) { axis.stop(); });
+}
+
+void Machine::emergencyStop() {
+  impl_->engine_->emergencyStop();
+  impl_->forAll([](axis::Axis& axis) { axis.noteEmergencyStop(); });
+}
+
+bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped(); }
+
+void Machine::recover() {
+  impl_->engine_->clearEmergencyStop();
+  impl_->forAll([](axis::Axis& axis) { axis.recover(); });
+}
+
+void Machine::shutdown() { impl_->shutdown(); }
+
+EngineFigures Machine::figures() const {
+  const pulse::EngineState state = impl_->engine_->state();
+  EngineFigures figures;
+  figures.pulses = state.pulses;
+  figures.slips = state.slips;
+  figures.slipped = static_cast<double>(state.slipped) * 1e-9;
+  figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
+  figures.realtime = impl_->driver_->realtime();
+  return figures;
+}
+
+void Machine::advance(double seconds) { impl_->driver_->advance(nanoseconds(seconds)); }
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,125 @@
+#include "stepdriver_core/pulse/clock.h"
+
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+
+namespace stepdriver::pulse {
+namespace {
+
+constexpr Nanoseconds kLongestGuard = 200'000;
+
+// Of each window at most this much is spun: a real-time thread that spins on is stopped for the
+// rest of the second by the kernel (sched_rt_runtime_us), which costs far more than one late
+// wake-up.
+constexpr Nanoseconds kSpinWindow = 100'000'000;
+constexpr Nanoseconds kSpinBudget = 80'000'000;
+
+Nanoseconds steadyNow() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return static_cast<Nanoseconds>(time.tv_sec) * 1'000'000'000 + time.tv_nsec;
+}
+
+// Sleeps until the time of CLOCK_MONOTONIC, or while the word has this value, or less.
+void sleepUntil(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32_t value) {
+  timespec deadline{};
+  deadline.tv_sec = static_cast<time_t>(time / 1'000'000'000);
+  deadline.tv_nsec = static_cast<decltype(deadline.tv_nsec)>(time % 1'000'000'000);
+  syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&word), FUTEX_WAIT_BITSET_PRIVATE, value,
+          time == kNever ? nullptr : &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
+}
+
+}  // namespace
+
+SteadyClock::SteadyClock(Nanoseconds guard)
+    : guard_(std::clamp<Nanoseconds>(guard, 0, kLongestGuard)) {}
+
+Nanoseconds SteadyClock::now() { return steadyNow(); }
+
+void SteadyClock::waitUntil(Nanoseconds time) {
+  Nanoseconds now = steadyNow();
+  if (now - window_ > kSpinWindow) {
+    window_ = now;
+    spun_ = 0;
+  }
+  const Nanoseconds guard = spun_ < kSpinBudget ? guard_ : 0;
+  while (wakes_.load(std::memory_order_acquire) == seen_ && now < time - guard) {
+    sleepUntil(time == kNever ? kNever : time - guard, wakes_, seen_);
+    now = steadyNow();
+  }
+  const Nanoseconds spin_begin = now;
+  while (wakes_.load(std::memory_order_acquire) == seen_ && now < time) now = steadyNow();
+  spun_ += now - spin_begin;
+  seen_ = wakes_.load(std::memory_order_acquire);
+}
+
+void SteadyClock::wake() {
+  wakes_.fetch_add(1, std::memory_order_release);
+  syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&wakes_), FUTEX_WAKE_PRIVATE, 1, nullptr,
+          nullptr, 0);
+}
+
+VirtualClock::VirtualClock(double speed) : speed_(speed), started_(steadyNow()) {}
+
+// Where the pace would have the clock; it is never further than the event that is waited for.
+Nanoseconds VirtualClock::current() const {
+  if (!waiting_ || holds_ > 0 || speed_ == 0.0) return now_;
+  return std::clamp(paced(), now_, std::max(now_, awaited_));
+}
+
+Nanoseconds VirtualClock::paced() const {
+  return std::llround(static_cast<double>(steadyNow() - started_) * speed_);
+}
+
+Nanoseconds VirtualClock::now() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return current();
+}
+
+void VirtualClock::waitUntil(Nanoseconds time) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  awaited_ = time;
+  waiting_ = true;
+  while (!woken_ && now_ < time) {
+    if (holds_ > 0 || (time == kNever && speed_ == 0.0)) {
+      changed_.wait(lock);
+    } else if (speed_ == 0.0) {
+      now_ = time;
+    } else {
+      now_ = current();
+      if (now_ >= time) break;
+      // An event years ahead is waited for in parts: the sum with now() must not overflow.
+      const double wall_ns = std::min(3.6e12, static_cast<double>(time - now_) / speed_);
+      changed_.wait_for(lock, std::chrono::nanoseconds(std::llround(wall_ns)));
+    }
+  }
+  if (woken_) now_ = current();
+  woken_ = false;
+  waiting_ = false;
+}
+
+void VirtualClock::wake() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  woken_ = true;
+  changed_.notify_all();
+}
+
+void VirtualClock::hold() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  now_ = current();
+  ++holds_;
+}
+
+void VirtualClock::release() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  --holds_;
+  changed_.notify_all();
+}
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,354 @@
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+#include <algorithm>
+
+namespace stepdriver::pulse {
+
+PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
+                         const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness)
+    : lines_(lines), clock_(clock), max_lateness_(max_lateness), channels_(channels.size()) {
+  for (std::size_t i = 0; i < channels.size(); ++i) channels_[i].config = channels[i];
+  writes_.reserve(channels.size());
+  writers_.reserve(channels.size());
+}
+
+bool PulseEngine::post(const Command& command) {
+  if (!mail_.push(command)) return false;
+  clock_.wake();
+  return true;
+}
+
+void PulseEngine::emergencyStop() {
+  emergency_.store(true, std::memory_order_release);
+  clock_.wake();
+}
+
+void PulseEngine::clearEmergencyStop() { emergency_.store(false, std::memory_order_release); }
+
+ChannelState PulseEngine::channel(int index) const {
+  return channels_.at(static_cast<std::size_t>(index)).published.load();
+}
+
+Nanoseconds PulseEngine::serve() {
+  takeMail(clock_.now());
+  for (;;) {
+    const Nanoseconds now = clock_.now();
+    if (emergencyStopped()) stopAll(now);
+    meetLateness(now);
+    writeSteps(now);
+    writeOthers(now);
+    scheduleAll();
+    Nanoseconds due = kNever;
+    for (const Channel& channel : channels_) due = std::min(due, channel.due);
+    if (due > clock_.now()) return due;
+  }
+}
+
+PulseEngine::Action PulseEngine::actionOf(const Channel& channel) {
+  if (channel.high) return Action::kFall;
+  if (channel.pins_serial != 0) return Action::kPin;
+  if (channel.next) {
+    return channel.next->direction == channel.direction ? Action::kRise : Action::kTurn;
+  }
+  return channel.profile != nullptr ? Action::kFinish : Action::kNothing;
+}
+
+bool PulseEngine::isDue(const Channel& channel, Action action, Nanoseconds now) {
+  return channel.due <= now && actionOf(channel) == action;
+}
+
+Nanoseconds PulseEngine::interval(const Channel& channel) {
+  return channel.next->time_ns - channel.last_planned;
+}
+
+bool PulseEngine::isFast(const Channel& channel) {
+  return channel.running && channel.next && interval(channel) < channel.restart_interval;
+}
+
+// ---- orders ----
+
+void PulseEngine::takeMail(Nanoseconds now) {
+  while (const Command* command = mail_.front()) {
+    Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
+    if (command->kind == Command::Kind::kFollow) {
+      follow(channel, *command, now);
+    } else {
+      startPins(channel, *command, now);
+    }
+    channel.state.taken = command->serial;
+    channel.published.store(channel.state);
+    mail_.pop();
+    schedule(channel);
+  }
+}
+
+void PulseEngine::follow(Channel& channel, const Command& command, Nanoseconds now) {
+  const Nanoseconds start = command.profile->startNs();
+  const bool late =
+      start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
+  if (late || channel.pins_serial != 0) {
+    channel.state.refused = command.serial;
+    return;
+  }
+  channel.restart_interval = command.restart_interval;
+  if (channel.profile == nullptr) {
+    adopt(channel, *command.profile, command.serial);
+    channel.last_planned = start;
+    channel.running = false;
+  } else {
+    channel.successor = command.profile;
+    channel.successor_serial = command.serial;
+  }
+}
+
+void PulseEngine::startPins(Channel& channel, const Command& command, Nanoseconds now) {
+  if (channel.profile != nullptr || channel.pins_serial != 0) {
+    channel.state.refused = command.serial;
+    return;
+  }
+  channel.pins = command.pins;
+  channel.pin = 0;
+  channel.pins_serial = command.serial;
+  channel.pins_count = command.count;
+  channel.pin_due = now;
+  if (channel.state.pulses != 0) {
+    channel.pin_due = std::max(now, channel.rose + channel.config.mode_hold);
+  }
+}
+
+void PulseEngine::adopt(Channel& channel, const motion::Profile& profile, std::uint64_t serial) {
+  channel.profile = &profile;
+  channel.finder = motion::StepFinder(profile, channel.state.count);
+  channel.state.following = serial;
+  motion::Step step;
+  channel.next.reset();
+  if (channel.finder.next(step)) channel.next = step;
+}
+
+// ---- edges ----
+
+void PulseEngine::stopAll(Nanoseconds now) {
+  for (Channel& channel : channels_) {
+    if (channel.profile != nullptr) end(channel, EndReason::kEmergencyStop, now);
+  }
+}
+
+void PulseEngine::meetLateness(Nanoseconds now) {
+  Nanoseconds excess = 0;
+  for (Channel& channel : channels_) {
+    if (!isDue(channel, Action::kRise, now)) continue;
+    const Nanoseconds late = now - channel.due;
+    state_.worst_lateness = std::max(state_.worst_lateness, late);
+    if (late > max_lateness_ && isFast(channel)) {
+      channel.state.end_lateness = late;
+      end(channel, EndReason::kTooLate, now);
+      continue;
+    }
+    const auto absorbed =
+        static_cast<Nanoseconds>((1.0 - kClosest) * static_cast<double>(interval(channel)));
+    excess = std::max(excess, late - absorbed);
+  }
+  if (excess == 0) return;
+  slide(excess);
+  scheduleAll();
+}
+
+bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
+  const bool forward = channel.next->direction > 0;
+  const auto& endstop = forward ? channel.config.endstop_max : channel.config.endstop_min;
+  if (!endstop) return true;
+  const int level = lines_.read(endstop->line);
+  if (level < 0) {
+    end(channel, EndReason::kLineError, now, -level);
+    return false;
+  }
+  if ((level != 0) != endstop->active) return true;
+  end(channel, forward ? EndReason::kEndstopMax : EndReason::kEndstopMin, now);
+  return false;
+}
+
+void PulseEngine::writeSteps(Nanoseconds now) {
+  writes_.clear();
+  writers_.clear();
+  for (Channel& channel : channels_) {
+    const bool fall = isDue(channel, Action::kFall, now);
+    if (!fall && !(isDue(channel, Action::kRise, now) && mayStep(channel, now))) continue;
+    const Signal& step = channel.config.step;
+    writes_.push_back({step.line, fall ? !step.active : step.active});
+    writers_.push_back(&channel);
+  }
+  if (writes_.empty()) return;
+  // The reads of the switches took time, and a stop may have come in it.
+  if (emergencyStopped()) {
+    stopAll(now);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < writers_.size(); ++i) {
+      if (!writers_[i]->high) continue;
+      writes_[kept] = writes_[i];
+      writers_[kept++] = writers_[i];
+    }
+    writes_.resize(kept);
+    writers_.resize(kept);
+    if (kept == 0) return;
+  }
+  const int error = lines_.write(writes_.data(), writes_.size());
+  const Nanoseconds written = clock_.now();
+  for (Channel* channel : writers_) {
+    const bool fall = channel->high;
+    channel->high = !fall && error == 0;
+    (fall ? channel->fell : channel->rose) = written;
+    if (error != 0) {
+      end(*channel, EndReason::kLineError, now, error);
+    } else if (!fall) {
+      channel->state.count += channel->direction;
+      ++channel->state.pulses;
+      channel->running = true;
+      ++state_.pulses;
+      channel->last_planned = channel->next->time_ns;
+      motion::Step step;
+      channel->next.reset();
+      if (channel->finder.next(step)) channel->next = step;
+      channel->published.store(channel->state);
+    }
+  }
+  figures_.store(state_);
+}
+
+void PulseEngine::writeOthers(Nanoseconds now) {
+  for (Channel& channel : channels_) {
+    if (channel.due > now) continue;
+    switch (actionOf(channel)) {
+      case Action::kTurn:
+        turn(channel, now);
+        break;
+      case Action::kPin:
+        writePin(channel, now);
+        break;
+      case Action::kFinish:
+        if (channel.due <= now) end(channel, EndReason::kDone, now);
+        break;
+      default:
+        break;
+    }
+  }
+}
+
+void PulseEngine::turn(Channel& channel, Nanoseconds now) {
+  const bool forward = channel.next->direction > 0;
+  const Signal& dir = channel.config.dir;
+  const gpio::LineWrite write{dir.line, forward ? dir.active : !dir.active};
+  if (const int error = lines_.write(&write, 1)) {
+    end(channel, EndReason::kLineError, now, error);
+    return;
+  }
+  channel.turned = clock_.now();
+  channel.direction = channel.next->direction;
+}
+
+void PulseEngine::writePin(Channel& channel, Nanoseconds now) {
+  if (channel.pin == channel.pins.size) {
+    pinsDone(channel, 0, now);
+    return;
+  }
+  const PinSequence::Write& pin = channel.pins.writes[channel.pin++];
+  const gpio::LineWrite write{pin.line, pin.level};
+  if (const int error = lines_.write(&write, 1)) {
+    channel.state.pins_failed = channel.pins_serial;
+    channel.state.error = error;
+    ++channel.state.line_errors;
+    channel.pins_serial = 0;
+    channel.published.store(channel.state);
+    return;
+  }
+  const Nanoseconds written = clock_.now();
+  channel.pin_due = written + pin.then_wait;
+  if (channel.pin == channel.pins.size) pinsDone(channel, pin.then_wait, written);
+}
+
+void PulseEngine::pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now) {
+  channel.state.ready = std::max(channel.state.ready, now + then_wait);
+  if (channel.pins_count) channel.state.count = *channel.pins_count;
+  channel.state.pins_done = channel.pins_serial;
+  channel.pins_serial = 0;
+  channel.published.store(channel.state);
+}
+
+void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now, int error) {
+  if (error != 0) ++channel.state.line_errors;
+  channel.state.error = error;
+  // What fails after the motion was over leaves that motion's end as it was.
+  if (channel.profile != nullptr) {
+    channel.state.end = reason;
+    channel.state.end_abrupt = isFast(channel);
+    channel.state.ended =
+        channel.successor != nullptr ? channel.successor_serial : channel.state.following;
+    channel.state.end_time = now - state_.slipped;
+  }
+  channel.state.following = 0;
+  channel.profile = nullptr;
+  channel.successor = nullptr;
+  channel.next.reset();
+  channel.published.store(channel.state);
+}
+
+// ---- times ----
+
+void PulseEngine::scheduleAll() {
+  // A slide moves what was scheduled before it; it can't be followed by another for the same
+  // reason.
+  bool slid = true;
+  while (slid) {
+    slid = false;
+    for (Channel& channel : channels_) slid = schedule(channel) || slid;
+  }
+}
+
+bool PulseEngine::schedule(Channel& channel) {
+  if (channel.successor != nullptr && !channel.high &&
+      (!channel.next || channel.next->time_ns >= channel.successor->startNs())) {
+    const motion::Profile& profile = *channel.successor;
+    channel.successor = nullptr;
+    adopt(channel, profile, channel.successor_serial);
+    channel.published.store(channel.state);
+  }
+  const ChannelConfig& config = channel.config;
+  const bool stepped = channel.state.pulses != 0;
+  switch (actionOf(channel)) {
+    case Action::kNothing:
+      channel.due = kNever;
+      return false;
+    case Action::kFall:
+      channel.due = channel.rose + config.step_high;
+      return false;
+    case Action::kPin:
+      channel.due = channel.pin_due;
+      return false;
+    case Action::kTurn:
+      channel.due = stepped ? channel.rose + config.dir_hold : 0;
+      return false;
+    case Action::kFinish:
+      channel.due = channel.profile->endNs() + state_.slipped;
+      return false;
+    case Action::kRise:
+      break;
+  }
+  Nanoseconds earliest = std::max(channel.state.ready, channel.turned + config.dir_setup);
+  if (stepped) {
+    const auto closest =
+        static_cast<Nanoseconds>(kClosest * static_cast<double>(interval(channel)));
+    earliest = std::max({earliest, channel.fell + config.step_low, channel.rose + closest});
+  }
+  const Nanoseconds planned = channel.next->time_ns + state_.slipped;
+  channel.due = std::max(planned, earliest);
+  if (earliest <= planned) return false;
+  slide(earliest - planned);
+  return true;
+}
+
+void PulseEngine::slide(Nanoseconds by) {
+  state_.slipped += by;
+  ++state_.slips;
+  figures_.store(state_);
+}
+
+}  // namespace stepdriver::pulse

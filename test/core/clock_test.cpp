@@ -1,0 +1,100 @@
+#include "stepdriver_core/pulse/clock.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+namespace stepdriver::pulse {
+namespace {
+
+TEST(SteadyClock, NeverWakesEarly) {
+  SteadyClock clock;
+  for (const Nanoseconds wait : {0, 1'000, 50'000, 300'000, 2'000'000}) {
+    const Nanoseconds time = clock.now() + wait;
+    clock.waitUntil(time);
+    EXPECT_GE(clock.now(), time) << "waited for " << wait << " ns";
+  }
+}
+
+TEST(SteadyClock, EndsItsWaitAtAWake) {
+  SteadyClock clock;
+  std::thread waker([&clock] { clock.wake(); });
+  clock.waitUntil(kNever);
+  waker.join();
+  clock.wake();
+  clock.waitUntil(kNever);  // the wake came before the wait
+}
+
+TEST(VirtualClock, GoesFromEventToEventExactly) {
+  VirtualClock clock;
+  EXPECT_EQ(clock.now(), 0);
+  clock.waitUntil(123'456'789'012'345);
+  EXPECT_EQ(clock.now(), 123'456'789'012'345);
+  clock.waitUntil(5);  // gone by
+  EXPECT_EQ(clock.now(), 123'456'789'012'345);
+}
+
+TEST(VirtualClock, StandsStillAfterAWake) {
+  VirtualClock clock;
+  clock.wake();
+  clock.waitUntil(1'000'000);
+  EXPECT_EQ(clock.now(), 0);
+  clock.waitUntil(1'000'000);
+  EXPECT_EQ(clock.now(), 1'000'000);
+}
+
+TEST(VirtualClock, StandsStillWhileItIsHeld) {
+  for (const double speed : {0.0, 1000.0}) {
+    VirtualClock clock(speed);
+    std::atomic<bool> arrived{false};
+    Nanoseconds held = 0;
+    std::thread waiter;
+    {
+      const ClockHold hold(clock);
+      held = clock.now();
+      waiter = std::thread([&] {
+        clock.waitUntil(held + 1'000);
+        arrived = true;
+      });
+      for (int i = 0; i < 1000; ++i) {
+        ASSERT_EQ(clock.now(), held);
+        ASSERT_FALSE(arrived);
+        std::this_thread::yield();
+      }
+    }
+    waiter.join();
+    EXPECT_GE(clock.now(), held + 1'000);
+  }
+}
+
+TEST(VirtualClock, PacedNeverPassesTheEventThatIsWaitedFor) {
+  VirtualClock clock(1e6);  // a wall nanosecond is a virtual millisecond: the pace is far ahead
+  std::atomic<bool> done{false};
+  std::atomic<Nanoseconds> awaited{0};
+  std::thread waiter([&] {
+    for (Nanoseconds time = 1; time <= 2000; ++time) {
+      awaited = time;
+      clock.waitUntil(time);
+      ASSERT_EQ(clock.now(), time);
+    }
+    done = true;
+  });
+  while (!done) {
+    const Nanoseconds now = clock.now();
+    ASSERT_LE(now, awaited);
+  }
+  waiter.join();
+}
+
+TEST(VirtualClock, PacedGoesOnWhileThereIsNothingToWaitFor) {
+  VirtualClock clock(10.0);
+  std::thread waiter([&] { clock.waitUntil(kNever); });
+  while (clock.now() < 1'000'000) std::this_thread::yield();
+  clock.wake();
+  waiter.join();
+  EXPECT_GE(clock.now(), 1'000'000);
+}
+
+}  // namespace
+}  // namespace stepdriver::pulse

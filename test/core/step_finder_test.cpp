@@ -1,0 +1,157 @@
+#include "stepdriver_core/motion/step_finder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "stepdriver_core/motion/trapezoid.h"
+
+namespace stepdriver::motion {
+namespace {
+
+std::vector<Step> allSteps(const Profile& profile, std::int64_t count) {
+  StepFinder finder(profile, count);
+  std::vector<Step> steps;
+  Step step;
+  while (finder.next(step)) steps.push_back(step);
+  return steps;
+}
+
+Profile onePiece(double duration, double p0, double v0, double a, double j) {
+  return {0, {Piece{duration, p0, v0, a, j}}};
+}
+
+TEST(StepFinder, FindsEachHalfStepLineOfACruise) {
+  const auto steps = allSteps(onePiece(1.0, 0.0, 10.0, 0.0, 0.0), 0);
+  ASSERT_EQ(steps.size(), 10U);
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    EXPECT_EQ(steps[k].time_ns, 50'000'000 + static_cast<std::int64_t>(k) * 100'000'000);
+    EXPECT_EQ(steps[k].direction, 1);
+  }
+}
+
+TEST(StepFinder, CountsBackwardsAcrossZero) {
+  const auto steps = allSteps(onePiece(1.0, 2.0, -5.0, 0.0, 0.0), 2);
+  ASSERT_EQ(steps.size(), 5U);
+  EXPECT_EQ(steps.front().time_ns, 100'000'000);
+  EXPECT_EQ(steps.back().time_ns, 900'000'000);
+  for (const Step& step : steps) EXPECT_EQ(step.direction, -1);
+}
+
+TEST(StepFinder, TurnsRoundInsideAPiece) {
+  // Up to 12.5 - 0.1 and back: the line at 12.5 is not reached.
+  const double v = std::sqrt(2.0 * 12.4);
+  const auto steps = allSteps(onePiece(2.0 * v, 0.0, v, -1.0, 0.0), 0);
+  ASSERT_EQ(steps.size(), 24U);
+  for (std::size_t k = 0; k < 12; ++k) {
+    EXPECT_EQ(steps[k].direction, 1);
+    EXPECT_EQ(steps[23 - k].direction, -1);
+    // Up and down are mirror images about the turning point.
+    EXPECT_NEAR(static_cast<double>(steps[k].time_ns + steps[23 - k].time_ns), 2.0 * v * 1e9, 2.0);
+  }
+}
+
+TEST(StepFinder, MakesNoStepWhereTheCurveOnlyTouchesALine) {
+  // v = 1, a = -1: the turning point is at 0.5 exactly.
+  EXPECT_TRUE(allSteps(onePiece(2.0, 0.0, 1.0, -1.0, 0.0), 0).empty());
+}
+
+TEST(StepFinder, LosesNoStepThatLiesOnTheBorderOfTwoPieces) {
+  const Profile profile(0, {Piece{0.5, 0.0, 1.0, 0.0, 0.0}, Piece{0.5, 0.5, 1.0, 0.0, 0.0}});
+  const auto steps = allSteps(profile, 0);
+  ASSERT_EQ(steps.size(), 1U);
+  EXPECT_EQ(steps[0].time_ns, 500'000'000);
+}
+
+TEST(StepFinder, StartsWithTheStepThatACountBehindTheCurveOwes) {
+  const auto steps = allSteps(onePiece(1.0, 0.75, 1.0, 0.0, 0.0), 0);
+  ASSERT_EQ(steps.size(), 2U);
+  EXPECT_EQ(steps[0].time_ns, 0);
+  EXPECT_EQ(steps[1].time_ns, 750'000'000);
+}
+
+TEST(StepFinder, FollowsRandomCubicsLikeBisectionDoes) {
+  std::mt19937_64 random(20240517);
+  std::uniform_real_distribution<double> spread(-1.0, 1.0);
+  for (int round = 0; round < 2000; ++round) {
+    const double duration = 0.05 + std::abs(spread(random));
+    const Piece piece{duration, 0.49 * spread(random), 2000.0 * spread(random),
+                      8000.0 * spread(random), 60000.0 * spread(random)};
+    const auto at = [&piece](long double t) {
+      return static_cast<long double>(piece.p0.hi) +
+             t * (piece.v0 + t * (piece.a / 2.0L + t * piece.j / 6.0L));
+    };
+    const Profile profile(0, {piece});
+    StepFinder finder(profile, 0);
+    Step step;
+    std::int64_t count = 0;
+    std::int64_t last = 0;
+    while (finder.next(step)) {
+      ASSERT_GE(step.time_ns, last) << "round " << round;
+      last = step.time_ns;
+      // The crossing lies within 1 ns of the step: the curve is on either side of the line there.
+      const long double line = count + 0.5L * step.direction;
+      const long double t = step.time_ns * 1e-9L;
+      const long double before = at(std::max(0.0L, t - 1e-9L)) - line;
+      const long double after = at(std::min<long double>(duration, t + 1e-9L)) - line;
+      const bool crossed = before * step.direction <= 1e-9L && after * step.direction >= -1e-9L;
+      ASSERT_TRUE(crossed) << "round " << round << " line " << static_cast<double>(line) << " at "
+                           << step.time_ns << " ns: " << static_cast<double>(before) << ", "
+                           << static_cast<double>(after);
+      count += step.direction;
+    }
+    EXPECT_LE(std::abs(static_cast<double>(at(duration)) - static_cast<double>(count)), 0.5 + 1e-6)
+        << "round " << round;
+  }
+}
+
+TEST(StepFinder, StaysExactOverYears) {
+  // 0.001 steps/s for 2^20 steps: 33 years. The period is 1000 s to the last bit of 0.001.
+  const Profile profile = planTrapezoid(0, 0, 1 << 20, {0.001, 0.001, 1.0, 1.0});
+  StepFinder finder(profile, 0);
+  Step step;
+  for (std::int64_t k = 0; k < (1 << 20); ++k) {
+    ASSERT_TRUE(finder.next(step));
+    const long double exact = (static_cast<long double>(k) + 0.5L) / 0.001 * 1e9L;
+    ASSERT_LE(std::abs(static_cast<long double>(step.time_ns) - exact), 1.0L) << "step " << k;
+  }
+  EXPECT_FALSE(finder.next(step));
+}
+
+TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
+  const std::int64_t steps = std::int64_t{1} << 40;
+  const double speed = 19999.7;
+  const double acceleration = 12345.6;
+  const Profile profile = planTrapezoid(0, 0, steps, {0.0, speed, acceleration, acceleration});
+  const long double ramp = static_cast<long double>(speed) / acceleration;
+  const long double way = static_cast<long double>(speed) * speed / (2.0L * acceleration);
+  const long double total = 2.0L * ramp + (steps - 2.0L * way) / speed;
+  EXPECT_LE(std::abs(static_cast<long double>(profile.endNs()) - total * 1e9L), 1.0L);
+
+  StepFinder finder(profile, 0);
+  Step step;
+  for (int k = 0; k < 30000; ++k) {
+    ASSERT_TRUE(finder.next(step));
+    const long double line = k + 0.5L;
+    const long double exact =
+        line <= way ? std::sqrt(2.0L * line / acceleration) : ramp + (line - way) / speed;
+    ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 1.0L) << "step " << k;
+  }
+  // The same motion entered 30,000 steps before its end.
+  const std::int64_t late = steps - 30000;
+  StepFinder tail(profile, late);
+  for (std::int64_t k = late; k < steps; ++k) {
+    ASSERT_TRUE(tail.next(step)) << k;
+    if (k - late < 2) continue;  // the finder owes these at once: it was not there when they came
+    const long double left = steps - (k + 0.5L);
+    const long double exact = left <= way ? total - std::sqrt(2.0L * left / acceleration)
+                                          : ramp + (k + 0.5L - way) / speed;
+    ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 1.0L) << "step " << k;
+  }
+  EXPECT_FALSE(tail.next(step));
+}
+
+}  // namespace
+}  // namespace stepdriver::motion
