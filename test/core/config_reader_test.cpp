@@ -6,7 +6,7 @@
 #include <limits>
 #include <locale>
 
-#include "config_map.h"
+#include "support/config_map.h"
 
 namespace stepdriver::axis {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "axis_config.h"
+#include "support/axis_config.h"
 
 namespace stepdriver::axis {
 namespace {

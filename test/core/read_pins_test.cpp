@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "axis_config.h"
+#include "support/axis_config.h"
 
 namespace stepdriver::axis {
 namespace {

@@ -46,10 +46,9 @@ struct Textbook {
 };
 
 void expectTextbook(std::int64_t from, std::int64_t to, const TrapezoidLimits& limits) {
-  SCOPED_TRACE(testing::Message()
-               << from << " to " << to << ", start " << limits.start_speed << ", max "
-               << limits.max_speed << ", a " << limits.acceleration << ", d "
-               << limits.deceleration);
+  SCOPED_TRACE(testing::Message() << from << " to " << to << ", start " << limits.start_speed
+                                  << ", max " << limits.max_speed << ", a " << limits.acceleration
+                                  << ", d " << limits.deceleration);
   const std::int64_t start_ns = 123'456'789;
   const Profile profile = planTrapezoid(start_ns, from, to, limits);
   const std::int64_t length = std::abs(to - from);
@@ -88,10 +87,10 @@ TEST(Trapezoid, NoWayTakesNoTimeAndNoStep) {
 
 TEST(Trapezoid, FollowsTheTextbook) {
   const std::vector<TrapezoidLimits> all = {
-      {0, 1000, 2000, 2000},      {0, 1000, 2000, 500},   {0, 1000, 500, 2000},
-      {100, 1000, 2000, 2000},    {999.9, 1000, 2000, 1}, {1000, 1000, 2000, 2000},
-      {5000, 1000, 2000, 2000},   {0, 1e5, 1e6, 3e5},     {0, 0.001, 0.001, 0.001},
-      {0, 2.5e5, 1e9, 1e9},       {0.3, 7.7, 0.013, 17},  {1, 40000, 3, 1e7},
+      {0, 1000, 2000, 2000},    {0, 1000, 2000, 500},   {0, 1000, 500, 2000},
+      {100, 1000, 2000, 2000},  {999.9, 1000, 2000, 1}, {1000, 1000, 2000, 2000},
+      {5000, 1000, 2000, 2000}, {0, 1e5, 1e6, 3e5},     {0, 0.001, 0.001, 0.001},
+      {0, 2.5e5, 1e9, 1e9},     {0.3, 7.7, 0.013, 17},  {1, 40000, 3, 1e7},
   };
   for (const TrapezoidLimits& limits : all) {
     for (const std::int64_t steps : {1, 2, 3, 4, 5, 7, 16, 99, 1000, 4001}) {

@@ -36,6 +36,7 @@ Nanoseconds PulseEngine::serve() {
     if (emergencyStopped()) stopAll(now);
     meetLateness(now);
     writeSteps(now);
+    scheduleAll();
     writeOthers(now);
     scheduleAll();
     Nanoseconds due = kNever;
@@ -225,7 +226,7 @@ void PulseEngine::writeOthers(Nanoseconds now) {
         writePin(channel, now);
         break;
       case Action::kFinish:
-        if (channel.due <= now) end(channel, EndReason::kDone, now);
+        end(channel, EndReason::kDone, now);
         break;
       default:
         break;

@@ -40,11 +40,11 @@ struct Timing {
 /// A driver chip as its datasheet has it, wired plainly (no inversion on the way to its pins).
 struct Chip {
   Model model;
-  std::string name;        ///< as in configurations: a4988, drv8825, tb6600
-  std::string title;       ///< as in messages: A4988
+  std::string name;   ///< as in configurations: a4988, drv8825, tb6600
+  std::string title;  ///< as in messages: A4988
   Timing timing;
-  std::vector<Mode> modes;     ///< codes that software may drive; empty: set by DIP switches
-  std::vector<int> microsteps; ///< what it can be set to, by pins or by switches
+  std::vector<Mode> modes;      ///< codes that software may drive; empty: set by DIP switches
+  std::vector<int> microsteps;  ///< what it can be set to, by pins or by switches
   bool has_sleep;
   bool has_reset;
   bool counts_while_disabled;  ///< STEP moves the translator although the outputs are off

@@ -9,7 +9,7 @@ namespace stepdriver::sim {
 /// A pin of the rig as a trace shows it: one scope for each axis.
 struct TracePin {
   std::string scope;     ///< name of the axis
-  std::string variable;  ///< step, dir, enable, ms1, ms2, ms3, sleep, reset, endstop_min, endstop_max
+  std::string variable;  ///< step, dir, enable, ms1, ms2, ms3, sleep, reset, endstop_min or _max
 };
 
 /// Where the rig's edges go: levels as they are on the line, times in nanoseconds, never falling.

@@ -41,7 +41,7 @@ struct RigAxisSpec {
   chip::Model model = chip::Model::kA4988;
   chip::Timing timing{};  ///< what counts as a violation
   Wire step, dir, enable, ms1, ms2, ms3, sleep, reset;
-  int microsteps = 1;  ///< the DIP switches, or how unwired microstep pins are strapped
+  int microsteps = 1;             ///< the DIP switches, or how unwired microstep pins are strapped
   double full_step_travel = 0.0;  ///< [mm|deg] that the carriage moves for a full step; above 0
   double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
   std::optional<SwitchSpec> min_switch, max_switch;
@@ -60,9 +60,9 @@ enum class Violation {
   kStepWhileDisabled,  ///< whether the chip counts it or not
   kStepAfterEnable,    ///< before the enable time is over
   kStepWhileAsleep,
-  kStepAfterWake,      ///< before the wake-up time is over
-  kStepInReset,        ///< while RESET is held, or before the time after it is over
-  kStepIntoSwitch,     ///< a step towards a switch whose line reads active
+  kStepAfterWake,   ///< before the wake-up time is over
+  kStepInReset,     ///< while RESET is held, or before the time after it is over
+  kStepIntoSwitch,  ///< a step towards a switch whose line reads active
 };
 
 /// In words, as in reports: `short step high`.
@@ -70,14 +70,14 @@ const char* nameOf(Violation violation);
 
 /// What an axis of the rig has seen so far.
 struct RigAxisReport {
-  std::int64_t pulses_forward = 0;   ///< active STEP edges with DIR forward, taken or not
+  std::int64_t pulses_forward = 0;  ///< active STEP edges with DIR forward, taken or not
   std::int64_t pulses_backward = 0;
-  std::int64_t translator = 0;       ///< microsteps of the finest mode, counted from Home at start;
-                                     ///< RESET and SLEEP bring it to the nearest Home
-  double carriage = 0.0;             ///< [mm|deg]
-  int microsteps = 1;                ///< the mode that the last STEP edge was taken in
-  bool energized = false;            ///< current flows: enabled, awake and not in RESET
-  bool min_pressed = false;          ///< as its line read at the last time that the rig was told
+  std::int64_t translator = 0;  ///< microsteps of the finest mode, counted from Home at start;
+                                ///< RESET and SLEEP bring it to the nearest Home
+  double carriage = 0.0;        ///< [mm|deg]
+  int microsteps = 1;           ///< the mode that the last STEP edge was taken in
+  bool energized = false;       ///< current flows: enabled, awake and not in RESET
+  bool min_pressed = false;     ///< as its line read at the last time that the rig was told
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
 
@@ -86,10 +86,10 @@ struct RigAxisReport {
 
 /// Knobs that break things.
 struct RigFaults {
-  std::optional<bool> min_stuck;  ///< the min switch reads active (true) or inactive whatever happens
+  std::optional<bool> min_stuck;  ///< the switch reads active (true) or inactive whatever happens
   std::optional<bool> max_stuck;
-  std::int64_t lose_every = 0;    ///< every n-th step of the motor, counted from setFaults() on,
-                                  ///< slips: the carriage stays behind for good; 0: none
+  std::int64_t lose_every = 0;  ///< every n-th step of the motor, counted from setFaults() on,
+                                ///< slips: the carriage stays behind for good; 0: none
 };
 
 /// The model of an axis. STEP's active edge moves the translator to the next place that the mode
@@ -113,7 +113,7 @@ class Rig : public gpio::Board {
   ///   levels are those of the lines. May be null.
   /// @throw std::invalid_argument where an axis is named twice, doesn't travel, or has microsteps
   ///   that its chip hasn't.
-  explicit Rig(std::vector<RigAxisSpec> axes, std::shared_ptr<PinTrace> trace = nullptr);
+  explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr);
   ~Rig() override;
 
   /// @throw std::out_of_range where there is no such axis; so do all that take an axis.
@@ -134,7 +134,9 @@ class Rig : public gpio::Board {
   /// full steps away.
   void placeCarriage(const std::string& axis, double position, std::int64_t time_ns);
 
-  /// Makes the trace readable up to now while the rig lives. @throw Error as PinTrace::flush() does.
+  /// Makes the trace readable up to its last edge while the rig lives.
+  ///
+  /// @throw Error where the trace can't be written.
   void flushTrace();
 
   void onRequest(const std::string& line, bool level, std::int64_t time_ns) override;

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "config_map.h"
 #include "stepdriver_core/axis/config_reader.h"
+#include "support/config_map.h"
 
 namespace stepdriver::axis {
 

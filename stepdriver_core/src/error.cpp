@@ -1,0 +1,22 @@
+#include "stepdriver_core/error.h"
+
+#include <utility>
+
+namespace stepdriver {
+namespace {
+
+std::string linesOf(const std::vector<ConfigIssue>& issues) {
+  std::string text;
+  for (const ConfigIssue& issue : issues) {
+    if (!text.empty()) text += '\n';
+    text += issue.key + ": " + issue.message;
+  }
+  return text;
+}
+
+}  // namespace
+
+ConfigError::ConfigError(std::vector<ConfigIssue> issues)
+    : Error(linesOf(issues)), issues_(std::move(issues)) {}
+
+}  // namespace stepdriver

@@ -1,0 +1,126 @@
+#include "stepdriver_core/gpio/simulated_lines.h"
+
+#include <cerrno>
+#include <unordered_map>
+#include <utility>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::gpio {
+
+struct SimulatedBackend::Shared {
+  Shared(Board& wired_board, TimeSource time_source)
+      : board(wired_board), now(std::move(time_source)) {}
+
+  Board& board;
+  const TimeSource now;
+  std::mutex mutex;  // serializes the calls of the board, and so their times
+  std::unordered_map<std::string, std::string> held;  // line -> what it is held as
+};
+
+class SimulatedBackend::HeldLines : public Lines {
+ public:
+  HeldLines(std::shared_ptr<Shared> shared, const std::vector<OutputRequest>& outputs,
+            const std::vector<InputRequest>& inputs)
+      : shared_(std::move(shared)), inputs_(inputs) {
+    outputs_.reserve(outputs.size());
+    for (const OutputRequest& output : outputs) outputs_.push_back({output, output.safe_level});
+  }
+
+  ~HeldLines() override {
+    const std::lock_guard<std::mutex> lock(shared_->mutex);
+    const std::int64_t time_ns = shared_->now();
+    for (Output& output : outputs_) {
+      if (!output.request.keep_on_release) drive(output, output.request.safe_level, time_ns);
+    }
+    for (const Output& output : outputs_) {
+      shared_->board.onRelease(output.request.line, time_ns);
+      shared_->held.erase(output.request.line);
+    }
+    for (const InputRequest& input : inputs_) shared_->held.erase(input.line);
+  }
+
+  int write(const LineWrite* writes, std::size_t count) noexcept override {
+    const std::lock_guard<std::mutex> lock(shared_->mutex);
+    const std::int64_t time_ns = shared_->now();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!has(outputs_, writes[i].output)) return EINVAL;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const int error = shared_->board.writeFault(outputOf(writes[i]).request.line, time_ns);
+      if (error != 0) return error;
+    }
+    for (std::size_t i = 0; i < count; ++i) drive(outputOf(writes[i]), writes[i].level, time_ns);
+    return 0;
+  }
+
+  int read(int input) noexcept override {
+    const std::lock_guard<std::mutex> lock(shared_->mutex);
+    if (!has(inputs_, input)) return -EINVAL;
+    const std::string& line = inputs_[static_cast<std::size_t>(input)].line;
+    return shared_->board.inputLevel(line, shared_->now()) ? 1 : 0;
+  }
+
+ private:
+  struct Output {
+    OutputRequest request;
+    bool level;
+  };
+
+  template <typename Items>
+  static bool has(const Items& items, int index) {
+    return index >= 0 && static_cast<std::size_t>(index) < items.size();
+  }
+
+  Output& outputOf(const LineWrite& write) {
+    return outputs_[static_cast<std::size_t>(write.output)];
+  }
+
+  void drive(Output& output, bool level, std::int64_t time_ns) {
+    if (output.level == level) return;
+    output.level = level;
+    shared_->board.onEdge(output.request.line, level, time_ns);
+  }
+
+  const std::shared_ptr<Shared> shared_;
+  std::vector<Output> outputs_;
+  const std::vector<InputRequest> inputs_;
+};
+
+SimulatedBackend::SimulatedBackend(Board& board, TimeSource now)
+    : shared_(std::make_shared<Shared>(board, std::move(now))) {}
+
+SimulatedBackend::~SimulatedBackend() = default;
+
+std::unique_ptr<Lines> SimulatedBackend::request(const std::vector<OutputRequest>& outputs,
+                                                 const std::vector<InputRequest>& inputs) {
+  std::unique_ptr<Lines> lines;  // outlives the lock, which its destructor would take again
+  const std::lock_guard<std::mutex> lock(shared_->mutex);
+
+  std::unordered_map<std::string, std::string> wanted;
+  const auto want = [&](const std::string& line, const char* use) {
+    const auto earlier = shared_->held.find(line);
+    if (earlier != shared_->held.end()) {
+      throw GpioError("Line " + line +
+                      " is busy (EBUSY): an earlier request still holds it as an " +
+                      earlier->second + ". Release that request first, or name another line.");
+    }
+    const auto twin = wanted.emplace(line, use);
+    if (!twin.second) {
+      throw GpioError("Line " + line + " is named twice in one request (EBUSY), as an " +
+                      twin.first->second + " and as an " + use + ". Name each line once.");
+    }
+  };
+  for (const OutputRequest& output : outputs) want(output.line, "output");
+  for (const InputRequest& input : inputs) want(input.line, "input");
+
+  lines = std::make_unique<HeldLines>(shared_, outputs, inputs);
+  shared_->held.merge(wanted);
+  const std::int64_t time_ns = shared_->now();
+  for (const OutputRequest& output : outputs) {
+    shared_->board.onRequest(output.line, output.safe_level, time_ns);
+  }
+  return lines;
+}
+
+}  // namespace stepdriver::gpio

@@ -1,0 +1,176 @@
+#include "chip_model.h"
+
+#include <algorithm>
+
+namespace stepdriver::sim {
+namespace {
+
+constexpr std::array<const char*, kPinCount> kPinNames{"step", "dir", "enable", "ms1",
+                                                       "ms2",  "ms3", "sleep",  "reset"};
+constexpr std::array<Wire RigAxisSpec::*, kPinCount> kWires{
+    &RigAxisSpec::step, &RigAxisSpec::dir, &RigAxisSpec::enable, &RigAxisSpec::ms1,
+    &RigAxisSpec::ms2,  &RigAxisSpec::ms3, &RigAxisSpec::sleep,  &RigAxisSpec::reset};
+
+std::int64_t floorDivide(std::int64_t dividend, std::int64_t divisor) {
+  const std::int64_t quotient = dividend / divisor;
+  return dividend % divisor < 0 ? quotient - 1 : quotient;
+}
+
+}  // namespace
+
+const char* nameOf(Pin pin) { return kPinNames[static_cast<std::size_t>(pin)]; }
+
+const Wire& wireOf(const RigAxisSpec& spec, Pin pin) {
+  return spec.*kWires[static_cast<std::size_t>(pin)];
+}
+
+ChipModel::ChipModel(const RigAxisSpec& spec)
+    : chip_(chip::chipOf(spec.model)),
+      timing_(spec.timing),
+      finest_(*std::max_element(chip_.microsteps.begin(), chip_.microsteps.end())),
+      declared_microsteps_(spec.microsteps),
+      microsteps_(spec.microsteps) {
+  const chip::ModeCode straps = chip::codeOf(chip_, spec.microsteps).value_or(chip::ModeCode{});
+  for (std::size_t i = 0; i < kPinCount; ++i) {
+    const Pin pin = static_cast<Pin>(i);
+    const Wire& wire = wireOf(spec, pin);
+    pins_[i].inverted = wire.inverted;
+    pins_[i].level = idleLevel(pin, !wire.line.empty(), straps);
+  }
+}
+
+bool ChipModel::idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const {
+  switch (pin) {
+    case Pin::kStep:
+      return !chip_.step_active;
+    case Pin::kDir:
+      return !wired && at(pin).inverted;
+    case Pin::kEnable:
+      return wired ? !chip_.enable_on : chip_.enable_on;
+    case Pin::kMs1:
+      return !wired && straps[0];
+    case Pin::kMs2:
+      return !wired && straps[1];
+    case Pin::kMs3:
+      return !wired && straps[2];
+    case Pin::kSleep:
+      return wired ? chip_.sleep_asleep : !chip_.sleep_asleep;
+    case Pin::kReset:
+      return wired ? chip_.reset_held : !chip_.reset_held;
+  }
+  return false;
+}
+
+std::optional<ChipModel::Pulse> ChipModel::request(Pin pin, bool line_level, std::int64_t time_ns) {
+  PinState& state = at(pin);
+  if (state.driven) return edge(pin, line_level, time_ns);
+  state.driven = true;
+  const bool level = line_level != state.inverted;
+  const bool changes_state = pin == Pin::kEnable || pin == Pin::kSleep || pin == Pin::kReset;
+  if (level != state.level && changes_state) state.changed_ns = time_ns;
+  state.level = level;
+  return std::nullopt;
+}
+
+std::optional<ChipModel::Pulse> ChipModel::edge(Pin pin, bool line_level, std::int64_t time_ns) {
+  PinState& state = at(pin);
+  const bool level = line_level != state.inverted;
+  if (level == state.level) return std::nullopt;
+  state.level = level;
+  state.changed_ns = time_ns;
+  switch (pin) {
+    case Pin::kStep:
+      return onStep(time_ns);
+    case Pin::kDir:
+      checkTime(step_active_ns_, time_ns, timing_.dir_hold_ns, Violation::kDirHold);
+      break;
+    case Pin::kMs1:
+    case Pin::kMs2:
+    case Pin::kMs3:
+      onMode(time_ns);
+      break;
+    case Pin::kEnable:
+      break;
+    case Pin::kSleep:
+    case Pin::kReset:
+      goHomeIfHeld();
+      break;
+  }
+  return std::nullopt;
+}
+
+void ChipModel::checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int64_t limit_ns,
+                          Violation violation) {
+  if (time_ns - since_ns < limit_ns) count(violation);
+}
+
+std::optional<ChipModel::Pulse> ChipModel::onStep(std::int64_t time_ns) {
+  if (at(Pin::kStep).level != chip_.step_active) {
+    checkTime(step_active_ns_, time_ns, timing_.step_high_ns, Violation::kShortStepHigh);
+    step_inactive_ns_ = time_ns;
+    return std::nullopt;
+  }
+  checkPins(time_ns);
+  checkReadiness(time_ns);
+  step_active_ns_ = time_ns;
+
+  Pulse pulse{at(Pin::kDir).level, 0};
+  const bool counts = awake() && !inReset() && (enabled() || chip_.counts_while_disabled);
+  if (counts) pulse.moved = advance(pulse.forward);
+  return pulse;
+}
+
+void ChipModel::checkPins(std::int64_t time_ns) {
+  checkTime(step_inactive_ns_, time_ns, timing_.step_low_ns, Violation::kShortStepLow);
+  checkTime(at(Pin::kDir).changed_ns, time_ns, timing_.dir_setup_ns, Violation::kDirSetup);
+  checkTime(mode_changed_ns_, time_ns, timing_.mode_setup_ns, Violation::kModeSetup);
+  if (!decodedMicrosteps()) count(Violation::kUndefinedMode);
+}
+
+void ChipModel::checkReadiness(std::int64_t time_ns) {
+  if (enabled()) {
+    checkTime(at(Pin::kEnable).changed_ns, time_ns, timing_.enable_ns, Violation::kStepAfterEnable);
+  } else {
+    count(Violation::kStepWhileDisabled);
+  }
+  if (!awake()) {
+    count(Violation::kStepWhileAsleep);
+  } else if (chip_.has_sleep) {
+    checkTime(at(Pin::kSleep).changed_ns, time_ns, timing_.wake_ns, Violation::kStepAfterWake);
+  }
+  if (inReset()) {
+    count(Violation::kStepInReset);
+  } else if (chip_.has_reset) {
+    checkTime(at(Pin::kReset).changed_ns, time_ns, timing_.reset_wait_ns, Violation::kStepInReset);
+  }
+}
+
+void ChipModel::onMode(std::int64_t time_ns) {
+  if (chip_.modes.empty()) return;
+  mode_changed_ns_ = time_ns;
+  checkTime(step_active_ns_, time_ns, timing_.mode_hold_ns, Violation::kModeHold);
+  if (!decodedMicrosteps()) count(Violation::kUndefinedMode);
+}
+
+std::optional<int> ChipModel::decodedMicrosteps() const {
+  if (chip_.modes.empty()) return declared_microsteps_;
+  return chip::microstepsOf(chip_, {at(Pin::kMs1).level, at(Pin::kMs2).level, at(Pin::kMs3).level});
+}
+
+std::int64_t ChipModel::advance(bool forward) {
+  // Where nobody knows what the pins select, the mode before is as good a guess as any.
+  microsteps_ = decodedMicrosteps().value_or(microsteps_);
+  const std::int64_t unit = finest_ / microsteps_;
+  const std::int64_t before = translator_;
+  // From a place that a coarser mode doesn't have, it goes to the next one that the mode has.
+  translator_ =
+      forward ? (floorDivide(before, unit) + 1) * unit : -(floorDivide(-before, unit) + 1) * unit;
+  return translator_ - before;
+}
+
+void ChipModel::goHomeIfHeld() {
+  if (awake() && !inReset()) return;
+  translator_ = cycle() * floorDivide(translator_ + cycle() / 2, cycle());
+}
+
+}  // namespace stepdriver::sim

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "sim_time.h"
+#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::sim {
+
+enum class Pin { kStep, kDir, kEnable, kMs1, kMs2, kMs3, kSleep, kReset };
+constexpr std::size_t kPinCount = 8;
+
+/// How a pin is called in traces.
+const char* nameOf(Pin pin);
+const Wire& wireOf(const RigAxisSpec& spec, Pin pin);
+
+/// A driver chip: pins in, translator out. It knows the times of all edges and counts what breaks
+/// the datasheet. Levels given to it are those of the lines.
+class ChipModel {
+ public:
+  /// A pulse that came in: where DIR pointed, and what the translator made of it.
+  struct Pulse {
+    bool forward;
+    std::int64_t moved;  ///< microsteps of the finest mode; 0 where the chip ignored it
+  };
+
+  explicit ChipModel(const RigAxisSpec& spec);
+
+  /// The pin's line is driven with this level from now on.
+  std::optional<Pulse> request(Pin pin, bool line_level, std::int64_t time_ns);
+
+  /// The pin's line changed to this level.
+  std::optional<Pulse> edge(Pin pin, bool line_level, std::int64_t time_ns);
+
+  /// The level of the pin's line.
+  bool lineLevel(Pin pin) const { return at(pin).level != at(pin).inverted; }
+  bool energized() const { return enabled() && awake() && !inReset(); }
+  std::int64_t translator() const { return translator_; }
+  int microsteps() const { return microsteps_; }
+  int finest() const { return finest_; }
+  std::int64_t cycle() const { return std::int64_t{chip::kFullStepsPerCycle} * finest_; }
+  const std::map<Violation, std::int64_t>& violations() const { return violations_; }
+  void count(Violation violation) { ++violations_[violation]; }
+
+ private:
+  struct PinState {
+    bool inverted = false;
+    bool level = false;   // as the chip sees it
+    bool driven = false;  // was requested once
+    std::int64_t changed_ns = kForEver;
+  };
+
+  PinState& at(Pin pin) { return pins_[static_cast<std::size_t>(pin)]; }
+  const PinState& at(Pin pin) const { return pins_[static_cast<std::size_t>(pin)]; }
+  bool enabled() const { return at(Pin::kEnable).level == chip_.enable_on; }
+  bool awake() const { return !chip_.has_sleep || at(Pin::kSleep).level != chip_.sleep_asleep; }
+  bool inReset() const { return chip_.has_reset && at(Pin::kReset).level == chip_.reset_held; }
+
+  bool idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const;
+  std::optional<int> decodedMicrosteps() const;
+  void checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int64_t limit_ns,
+                 Violation violation);
+  std::optional<Pulse> onStep(std::int64_t time_ns);
+  void checkPins(std::int64_t time_ns);
+  void checkReadiness(std::int64_t time_ns);
+  void onMode(std::int64_t time_ns);
+  std::int64_t advance(bool forward);
+  void goHomeIfHeld();
+
+  const chip::Chip& chip_;
+  const chip::Timing timing_;
+  const int finest_;
+  const int declared_microsteps_;
+  std::array<PinState, kPinCount> pins_;
+  std::int64_t step_active_ns_ = kForEver;
+  std::int64_t step_inactive_ns_ = kForEver;
+  std::int64_t mode_changed_ns_ = kForEver;
+  std::int64_t translator_ = 0;
+  int microsteps_;
+  std::map<Violation, std::int64_t> violations_;
+};
+
+}  // namespace stepdriver::sim

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "sim_time.h"
+#include "stepdriver_core/sim/pin_trace.h"
+#include "switch_model.h"
+
+namespace stepdriver::sim {
+
+/// Brings the edges of pins and the bounces of switches, which no one calls in at their time, to a
+/// trace in the order of time. Does nothing without a trace.
+class TraceFeed {
+ public:
+  explicit TraceFeed(std::shared_ptr<PinTrace> trace) : trace_(std::move(trace)) {}
+
+  /// @return the index of the pin, for settle() and edge().
+  int addPin(const TracePin& pin, bool level);
+
+  /// @param contact outlives the feed.
+  void addSwitch(const TracePin& pin, const SwitchModel* contact);
+
+  /// The pin has this level, by a request. Lines are requested one by one, but at one time: the
+  /// trace begins with all of them in place.
+  void settle(int pin, bool level, std::int64_t time_ns);
+  void edge(int pin, bool level, std::int64_t time_ns);
+
+  /// Brings in the bounces up to this time.
+  void advance(std::int64_t time_ns);
+
+  /// Brings in what switches did just now.
+  void switchesMoved(std::int64_t time_ns);
+
+  void flush();
+
+  /// Brings in the bounces that are still to come. No edge may follow.
+  void finish();
+
+ private:
+  struct Contact {
+    const SwitchModel* contact;
+    int pin;
+  };
+
+  bool settling(std::int64_t time_ns) const;
+  void begin();
+  void record(int pin, bool level, std::int64_t time_ns);
+
+  std::shared_ptr<PinTrace> trace_;
+  std::vector<TracePin> pins_;
+  std::vector<bool> levels_;
+  std::vector<Contact> contacts_;
+  std::optional<std::int64_t> start_ns_;
+  std::int64_t next_bounce_ns_ = kNever;
+  bool begun_ = false;
+};
+
+}  // namespace stepdriver::sim

@@ -1,0 +1,43 @@
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::sim {
+
+const char* nameOf(Violation violation) {
+  switch (violation) {
+    case Violation::kShortStepHigh:
+      return "short step high";
+    case Violation::kShortStepLow:
+      return "short step low";
+    case Violation::kDirSetup:
+      return "direction set too late before a step";
+    case Violation::kDirHold:
+      return "direction changed too soon after a step";
+    case Violation::kModeSetup:
+      return "microstep pins set too late before a step";
+    case Violation::kModeHold:
+      return "microstep pins changed too soon after a step";
+    case Violation::kUndefinedMode:
+      return "undefined microstep code";
+    case Violation::kStepWhileDisabled:
+      return "step while disabled";
+    case Violation::kStepAfterEnable:
+      return "step too soon after enable";
+    case Violation::kStepWhileAsleep:
+      return "step while asleep";
+    case Violation::kStepAfterWake:
+      return "step too soon after wake-up";
+    case Violation::kStepInReset:
+      return "step in reset or too soon after it";
+    case Violation::kStepIntoSwitch:
+      return "step into an active switch";
+  }
+  return "unknown violation";
+}
+
+std::int64_t RigAxisReport::totalViolations() const {
+  std::int64_t total = 0;
+  for (const auto& [violation, count] : violations) total += count;
+  return total;
+}
+
+}  // namespace stepdriver::sim

@@ -1,0 +1,354 @@
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "stepdriver_core/motion/trapezoid.h"
+
+namespace stepdriver::pulse {
+namespace {
+
+constexpr int kLinesPerChannel = 2;  // STEP and DIR
+
+struct Edge {
+  int line;
+  bool level;
+  Nanoseconds time;
+  std::size_t write;  // number of the call that made it
+};
+
+// Lines that remember; a write can take time or fail.
+class RecordingLines : public gpio::Lines {
+ public:
+  explicit RecordingLines(VirtualClock& clock) : clock_(clock) {}
+
+  int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
+    ++calls;
+    if (fail_after-- == 0) return EIO;
+    for (std::size_t i = 0; i < count; ++i) {
+      bool& level = levels[writes[i].output];
+      if (level != writes[i].level) {
+        edges.push_back({writes[i].output, writes[i].level, clock_.now(), calls});
+      }
+      level = writes[i].level;
+    }
+    return 0;
+  }
+
+  int read(int input) noexcept override { return inputs[input]; }
+
+  std::vector<Nanoseconds> rises(int line) const {
+    std::vector<Nanoseconds> times;
+    for (const Edge& edge : edges) {
+      if (edge.line == line && edge.level) times.push_back(edge.time);
+    }
+    return times;
+  }
+
+  std::vector<Edge> edges;
+  std::map<int, bool> levels;
+  std::map<int, int> inputs;
+  std::size_t calls = 0;
+  int fail_after = -1;
+
+ private:
+  VirtualClock& clock_;
+};
+
+class PulseEngineTest : public testing::Test {
+ protected:
+  static ChannelConfig config(int channel) {
+    ChannelConfig config;
+    config.step.line = channel * kLinesPerChannel;
+    config.dir.line = channel * kLinesPerChannel + 1;
+    config.step_high = 1'900;
+    config.step_low = 2'100;
+    config.dir_setup = 650;
+    config.dir_hold = 700;
+    config.mode_hold = 800;
+    return config;
+  }
+
+  void make(std::vector<ChannelConfig> channels, Nanoseconds max_lateness = 5'000'000) {
+    engine = std::make_unique<PulseEngine>(lines, clock, channels, max_lateness);
+  }
+
+  std::uint64_t follow(motion::Profile profile, int channel = 0) {
+    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
+    Command command;
+    command.channel = channel;
+    command.serial = ++serial;
+    command.profile = profiles.back().get();
+    command.restart_interval = restart_interval;
+    EXPECT_TRUE(engine->post(command));
+    return serial;
+  }
+
+  // Serves until nothing is left to do, each time `late` after it is due.
+  void runOut(Nanoseconds late = 0) {
+    for (Nanoseconds due = engine->serve(); due != kNever; due = engine->serve()) {
+      while (clock.now() < due + late) clock.waitUntil(due + late);
+    }
+  }
+
+  void runUntil(Nanoseconds time) {
+    for (Nanoseconds due = engine->serve(); due <= time; due = engine->serve()) {
+      while (clock.now() < due) clock.waitUntil(due);
+    }
+    while (clock.now() < time) clock.waitUntil(time);
+  }
+
+  static motion::Profile cruise(Nanoseconds start, std::int64_t from, std::int64_t to,
+                                double speed) {
+    return motion::planTrapezoid(start, from, to, {speed, speed, 1.0, 1.0});
+  }
+
+  VirtualClock clock;
+  RecordingLines lines{clock};
+  std::unique_ptr<PulseEngine> engine;
+  std::vector<std::unique_ptr<motion::Profile>> profiles;
+  std::uint64_t serial = 0;
+  Nanoseconds restart_interval = 0;
+};
+
+TEST_F(PulseEngineTest, PutsEachStepOutAtItsNanosecond) {
+  make({config(0)});
+  const auto profile = motion::planTrapezoid(1'000'000, 0, 500, {0, 5000, 20000, 30000});
+  motion::StepFinder finder(profile, 0);
+  follow(profile);
+  runOut();
+  const auto rises = lines.rises(0);
+  ASSERT_EQ(rises.size(), 500U);
+  motion::Step step;
+  for (std::size_t k = 0; k < rises.size(); ++k) {
+    ASSERT_TRUE(finder.next(step));
+    ASSERT_EQ(rises[k], step.time_ns) << "step " << k;
+  }
+  for (const Edge& edge : lines.edges) {
+    if (edge.line != 0 || edge.level) continue;
+    EXPECT_EQ(edge.time - (&edge - 1)->time, 1'900);
+  }
+  EXPECT_EQ(engine->channel(0).count, 500);
+  EXPECT_EQ(engine->channel(0).ended, serial);
+  EXPECT_EQ(engine->channel(0).end_time, profile.endNs());
+  EXPECT_EQ(engine->state().slips, 0U);
+}
+
+TEST_F(PulseEngineTest, KeepsDirSetupAndHoldWhateverThePlanWants) {
+  make({config(0)});
+  restart_interval = 0;
+  // Forward and at once back, with a last and a first step 10 ns apart.
+  const double speed = 50'000.0;
+  follow(cruise(1'000'000, 0, 3, speed));
+  runUntil(1'040'000);
+  std::vector<motion::Piece> back{{0.0004, 3.0 - 0.4995, -speed, 0.0, 0.0}};
+  follow({1'050'010, back});
+  runOut();
+  EXPECT_GT(engine->state().slips, 0U);
+  Nanoseconds rose = 0;
+  Nanoseconds turned = 0;
+  Nanoseconds fell = 0;
+  std::size_t last_write = 0;
+  for (const Edge& edge : lines.edges) {
+    if (edge.line == 1) {
+      EXPECT_TRUE(rose == 0 || edge.time - rose >= 700) << "DIR at " << edge.time;
+      turned = edge.time;
+    } else if (edge.level) {
+      EXPECT_TRUE(fell == 0 || edge.time - fell >= 2'100) << "STEP at " << edge.time;
+      EXPECT_TRUE(turned == 0 || edge.time - turned >= 650) << "STEP at " << edge.time;
+      rose = edge.time;
+    } else {
+      EXPECT_GE(edge.time - rose, 1'900);
+      fell = edge.time;
+    }
+    EXPECT_NE(edge.write, last_write) << "STEP and DIR in one write";
+    last_write = edge.write;
+  }
+}
+
+TEST_F(PulseEngineTest, SlidesAPlanThatIsTooFastForTheChip) {
+  make({config(0)});
+  follow(cruise(1'000'000, 0, 1000, 1e6));  // a step each microsecond; the chip wants 4
+  runOut();
+  const auto rises = lines.rises(0);
+  ASSERT_EQ(rises.size(), 1000U);
+  for (std::size_t k = 1; k < rises.size(); ++k) ASSERT_GE(rises[k] - rises[k - 1], 4'000);
+  EXPECT_EQ(engine->channel(0).count, 1000);
+  EXPECT_GT(engine->state().slips, 900U);
+}
+
+TEST_F(PulseEngineTest, WritesSimultaneousStepsTogether) {
+  make({config(0), config(1)});
+  follow(cruise(1'000'000, 0, 10, 1000.0), 0);
+  follow(cruise(1'000'000, 0, 10, 1000.0), 1);
+  runOut();
+  std::map<std::size_t, int> edges_of_write;
+  for (const Edge& edge : lines.edges) {
+    if (edge.line % 2 == 0) ++edges_of_write[edge.write];
+  }
+  for (const auto& [write, edges] : edges_of_write) EXPECT_EQ(edges, 2) << "write " << write;
+}
+
+TEST_F(PulseEngineTest, AbsorbsASmallLatenessAndBunchesNothing) {
+  make({config(0)});
+  follow(cruise(1'000'000, 0, 100, 1000.0));
+  runOut(100'000);  // every wake-up 100 us late, of an interval of 1 ms
+  const auto rises = lines.rises(0);
+  ASSERT_EQ(rises.size(), 100U);
+  for (std::size_t k = 1; k < rises.size(); ++k) ASSERT_GE(rises[k] - rises[k - 1], 1'000'000);
+  EXPECT_EQ(engine->state().slips, 0U);
+  EXPECT_EQ(engine->state().worst_lateness, 100'000);
+}
+
+TEST_F(PulseEngineTest, SlidesTheTimelineOfAllAxesByAGap) {
+  make({config(0), config(1)}, 1'000'000'000);
+  follow(cruise(1'000'000, 0, 200, 1000.0), 0);
+  follow(cruise(1'000'000, 0, 20, 100.0), 1);
+  runUntil(100'000'000);
+  clock.waitUntil(clock.now() + 50'000'000);
+  runOut();
+  const auto fast = lines.rises(0);
+  const auto slow = lines.rises(2);
+  ASSERT_EQ(fast.size(), 200U);
+  ASSERT_EQ(slow.size(), 20U);
+  for (std::size_t k = 1; k < fast.size(); ++k) ASSERT_GE(fast[k] - fast[k - 1], 750'000);
+  for (std::size_t k = 1; k < slow.size(); ++k) ASSERT_GE(slow[k] - slow[k - 1], 7'500'000);
+  // Both are as late at the end: they stay on their line.
+  const Nanoseconds slipped = engine->state().slipped;
+  EXPECT_NEAR(static_cast<double>(slipped), 50e6, 2e6);
+  EXPECT_EQ(fast.back(), 1'000'000 + 199'500'000 + slipped);
+  EXPECT_EQ(slow.back(), 1'000'000 + 195'000'000 + slipped);
+}
+
+TEST_F(PulseEngineTest, FaultsWhereTheMotorCantGoOnAfterAGap) {
+  make({config(0)}, 5'000'000);
+  restart_interval = 2'000'000;  // 500 steps/s
+  const auto serial_of = follow(cruise(1'000'000, 0, 200, 1000.0));
+  runUntil(100'000'000);
+  clock.waitUntil(clock.now() + 10'000'000);
+  runOut();
+  const ChannelState state = engine->channel(0);
+  EXPECT_EQ(state.end, EndReason::kTooLate);
+  EXPECT_EQ(state.ended, serial_of);
+  EXPECT_TRUE(state.end_abrupt);
+  EXPECT_GT(state.end_lateness, 5'000'000);
+  EXPECT_EQ(state.count, static_cast<std::int64_t>(lines.rises(0).size()));
+  EXPECT_LT(state.count, 200);
+  EXPECT_FALSE(lines.levels[0]) << "the pulse that was out is finished";
+}
+
+TEST_F(PulseEngineTest, GoesOnAfterAGapAtASpeedThatTheMotorStartsFrom) {
+  make({config(0)}, 5'000'000);
+  restart_interval = 500'000;
+  follow(cruise(1'000'000, 0, 200, 1000.0));
+  runUntil(100'000'000);
+  clock.waitUntil(clock.now() + 10'000'000);
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(0).count, 200);
+}
+
+TEST_F(PulseEngineTest, FinishesThePulseThatIsOutAtAnEmergencyStop) {
+  make({config(0)});
+  follow(cruise(1'000'000, 0, 100, 1000.0));
+  while (!lines.levels[0]) clock.waitUntil(engine->serve());
+  engine->emergencyStop();
+  const Nanoseconds rose = lines.edges.back().time;
+  runOut();
+  ASSERT_FALSE(lines.levels[0]);
+  EXPECT_EQ(lines.edges.back().time, rose + 1'900);
+  EXPECT_EQ(lines.rises(0).size(), 1U);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kEmergencyStop);
+  // Nothing moves while it lasts, and nothing that was ordered in it moves after it.
+  follow(cruise(clock.now() + 1'000'000, 1, 100, 1000.0));
+  runOut();
+  engine->clearEmergencyStop();
+  runOut();
+  EXPECT_EQ(lines.rises(0).size(), 1U);
+}
+
+TEST_F(PulseEngineTest, SendsNoStepTowardsAnActiveSwitchAndAnyAwayFromIt) {
+  ChannelConfig wired = config(0);
+  wired.endstop_max = Signal{10, false};
+  wired.endstop_min = Signal{11, false};
+  make({wired});
+  lines.inputs = {{10, 1}, {11, 1}};
+  follow(cruise(1'000'000, 0, 100, 1000.0));
+  runUntil(20'000'000);
+  lines.inputs[10] = 0;
+  const std::size_t before = lines.rises(0).size();
+  runOut();
+  EXPECT_EQ(lines.rises(0).size(), before);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kEndstopMax);
+  EXPECT_EQ(engine->channel(0).count, static_cast<std::int64_t>(before));
+  const std::int64_t here = engine->channel(0).count;
+  follow(cruise(clock.now() + 1'000'000, here, here - 5, 1000.0));
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(0).count, here - 5);
+}
+
+TEST_F(PulseEngineTest, SwapsAPlanAtItsTimeAndLosesNoStep) {
+  make({config(0)});
+  const auto first = cruise(1'000'000, 0, 1000, 1000.0);
+  follow(first);
+  runUntil(100'000'000);
+  const Nanoseconds swap = 101'234'567;
+  const motion::MotionState state = first.stateAt(swap);
+  std::vector<motion::Piece> on{{0.05, state.position, 500.0, 0.0, 0.0}};
+  follow({swap, on});
+  runOut();
+  const auto rises = lines.rises(0);
+  EXPECT_EQ(static_cast<double>(rises.size()), 125.0);  // 100.23 at 1000/s, then 25 at 500/s
+  EXPECT_EQ(engine->channel(0).ended, serial);
+  for (std::size_t k = 1; k < rises.size(); ++k) {
+    EXPECT_GE(rises[k] - rises[k - 1], rises[k] < swap ? 999'999 : 1'000'000);
+  }
+}
+
+TEST_F(PulseEngineTest, RefusesAPlanThatComesTooLate) {
+  make({config(0)});
+  clock.waitUntil(5'000'000);
+  const auto late = follow(cruise(4'999'999, 0, 10, 1000.0));
+  runOut();
+  EXPECT_EQ(engine->channel(0).refused, late);
+  EXPECT_TRUE(lines.edges.empty());
+}
+
+TEST_F(PulseEngineTest, WaitsForThePinsBeforeTheFirstStep) {
+  make({config(0)});
+  Command pins;
+  pins.kind = Command::Kind::kPins;
+  pins.serial = ++serial;
+  pins.pins.add(20, true, 1'000'000);
+  pins.pins.add(21, true, 2'000'000);
+  ASSERT_TRUE(engine->post(pins));
+  runOut();
+  EXPECT_EQ(engine->channel(0).pins_done, serial);
+  follow(cruise(clock.now(), 0, 1, 1e5));
+  runOut();
+  ASSERT_EQ(lines.edges.size(), 5U);
+  EXPECT_EQ(lines.edges[1].time - lines.edges[0].time, 1'000'000);
+  EXPECT_GE(lines.rises(0).at(0) - lines.edges[1].time, 2'000'000);
+}
+
+TEST_F(PulseEngineTest, StopsAtALineThatFailsAndDoesNotCountItsEdge) {
+  make({config(0)});
+  lines.fail_after = 10;
+  const auto failing = follow(cruise(1'000'000, 0, 100, 1000.0));
+  runOut();
+  const ChannelState state = engine->channel(0);
+  EXPECT_EQ(state.end, EndReason::kLineError);
+  EXPECT_EQ(state.ended, failing);
+  EXPECT_EQ(state.error, EIO);
+  EXPECT_EQ(state.line_errors, 1U);
+  EXPECT_EQ(state.count, static_cast<std::int64_t>(lines.rises(0).size()));
+}
+
+}  // namespace
+}  // namespace stepdriver::pulse

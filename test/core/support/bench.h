@@ -1,0 +1,131 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/gpio/simulated_lines.h"
+#include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::test {
+
+/// A linear axis with every pin wired, two endstops, 1/16 microsteps, 80 microsteps/mm, 100 mm/s,
+/// 1000 mm/s^2, enabled on start.
+inline axis::AxisConfig linearAxis(const std::string& name,
+                                   chip::Model model = chip::Model::kA4988) {
+  axis::AxisConfig config;
+  config.name = name;
+  config.joint = name;
+  config.driver = model;
+  config.timing = chip::chipOf(model).timing;
+  config.pins.step.line = name + ".step";
+  config.pins.dir.line = name + ".dir";
+  config.pins.enable.line = name + ".enable";
+  if (model != chip::Model::kTb6600) {
+    config.pins.ms1.line = name + ".ms1";
+    config.pins.ms2.line = name + ".ms2";
+    config.pins.ms3.line = name + ".ms3";
+    config.pins.sleep.line = name + ".sleep";
+    config.pins.reset.line = name + ".reset";
+  }
+  config.microsteps = 16;
+  config.steps_per_unit = 80'000.0;
+  config.steps_per_round = 3200.0;
+  config.max_speed = 0.1;
+  config.acceleration = 1.0;
+  config.deceleration = 1.0;
+  config.endstop_min = axis::Endstop{name + ".min", false};
+  config.endstop_max = axis::Endstop{name + ".max", false};
+  config.enable_on_start = true;
+  return config;
+}
+
+/// The rig's side of an axis: switches at -100 mm and 100 mm, the carriage at 0.
+inline sim::RigAxisSpec rigAxis(const axis::AxisConfig& config) {
+  const auto wire = [](const axis::Pin& pin) { return sim::Wire{pin.line, pin.inverted}; };
+  sim::RigAxisSpec spec;
+  spec.name = config.name;
+  spec.model = config.driver;
+  spec.timing = config.timing;
+  spec.step = wire(config.pins.step);
+  spec.dir = wire(config.pins.dir);
+  spec.enable = wire(config.pins.enable);
+  spec.ms1 = wire(config.pins.ms1);
+  spec.ms2 = wire(config.pins.ms2);
+  spec.ms3 = wire(config.pins.ms3);
+  spec.sleep = wire(config.pins.sleep);
+  spec.reset = wire(config.pins.reset);
+  spec.microsteps = config.microsteps;
+  spec.full_step_travel = 1000.0 * config.microsteps / config.steps_per_unit;
+  const auto endstop = [](const std::optional<axis::Endstop>& wanted, double position) {
+    std::optional<sim::SwitchSpec> spec_of;
+    if (!wanted) return spec_of;
+    spec_of.emplace();
+    spec_of->line = wanted->line;
+    spec_of->active_level = wanted->active_level;
+    spec_of->position = position;
+    spec_of->hysteresis = 0.2;
+    return spec_of;
+  };
+  spec.min_switch = endstop(config.endstop_min, -100.0);
+  spec.max_switch = endstop(config.endstop_max, 100.0);
+  return spec;
+}
+
+/// A machine on the simulated rig, on a virtual clock that whoever waits drives.
+class Bench {
+ public:
+  explicit Bench(const std::vector<axis::AxisConfig>& axes, bool threaded = false,
+                 double speed = 0.0)
+      : Bench(axes, rigAxes(axes), threaded, speed) {}
+
+  Bench(const std::vector<axis::AxisConfig>& axes, std::vector<sim::RigAxisSpec> rig_axes,
+        bool threaded = false, double speed = 0.0)
+      : clock(speed),
+        trace(std::make_shared<sim::MemoryTrace>()),
+        rig(std::move(rig_axes), trace),
+        backend(rig, [this] { return clock.now(); }) {
+    machine::MachineOptions options;
+    options.threaded = threaded;
+    machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
+  }
+
+  static std::vector<sim::RigAxisSpec> rigAxes(const std::vector<axis::AxisConfig>& axes) {
+    std::vector<sim::RigAxisSpec> specs;
+    for (const axis::AxisConfig& config : axes) specs.push_back(rigAxis(config));
+    return specs;
+  }
+
+  axis::Axis& axis(const std::string& name = "x") { return machine->axis(name); }
+  sim::RigAxisReport report(const std::string& name = "x") { return rig.report(name); }
+
+  /// Forward less backward pulses that the chip has seen.
+  std::int64_t pulses(const std::string& name = "x") {
+    const sim::RigAxisReport seen = report(name);
+    return seen.pulses_forward - seen.pulses_backward;
+  }
+
+  axis::MoveResult move(double position, const std::string& name = "x") {
+    return axis(name).wait(axis(name).moveTo(position));
+  }
+
+  pulse::VirtualClock clock;
+  std::shared_ptr<sim::MemoryTrace> trace;
+  sim::Rig rig;
+  gpio::SimulatedBackend backend;
+  std::unique_ptr<machine::Machine> machine;
+};
+
+/// What a report has against the axis, in words.
+inline std::string violationsOf(const sim::RigAxisReport& report) {
+  std::string text;
+  for (const auto& [kind, count] : report.violations) {
+    text += std::string(sim::nameOf(kind)) + ": " + std::to_string(count) + "; ";
+  }
+  return text;
+}
+
+}  // namespace stepdriver::test

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/sim/pin_trace.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::test {
+
+/// An axis `x` with every pin that its chip has wired plainly, 0.2 mm a full step, no switches.
+inline sim::RigAxisSpec plainAxis(chip::Model model, const std::string& name = "x") {
+  const chip::Chip& chip = chip::chipOf(model);
+  sim::RigAxisSpec spec;
+  spec.name = name;
+  spec.model = model;
+  spec.timing = chip.timing;
+  spec.step.line = name + ".step";
+  spec.dir.line = name + ".dir";
+  spec.enable.line = name + ".enable";
+  if (!chip.modes.empty()) {
+    spec.ms1.line = name + ".ms1";
+    spec.ms2.line = name + ".ms2";
+    spec.ms3.line = name + ".ms3";
+  }
+  if (chip.has_sleep) spec.sleep.line = name + ".sleep";
+  if (chip.has_reset) spec.reset.line = name + ".reset";
+  spec.full_step_travel = 0.2;
+  return spec;
+}
+
+using Violations = std::map<sim::Violation, std::int64_t>;
+
+/// In words, for messages.
+inline std::string inWords(const Violations& violations) {
+  std::string text;
+  for (const auto& [kind, count] : violations) {
+    text += (text.empty() ? "" : ", ") + std::to_string(count) + " x " + sim::nameOf(kind);
+  }
+  return text.empty() ? "none" : text;
+}
+
+/// A rig whose edges are made by hand, at times that only the test moves on.
+struct HandRig {
+  explicit HandRig(const std::vector<sim::RigAxisSpec>& specs)
+      : trace(std::make_shared<sim::MemoryTrace>()), rig(specs, trace) {}
+  explicit HandRig(const sim::RigAxisSpec& spec) : HandRig(std::vector<sim::RigAxisSpec>{spec}) {}
+  explicit HandRig(chip::Model model) : HandRig(plainAxis(model)) {}
+
+  /// Requests all lines of an axis so that it may step in full steps, and waits until it can.
+  HandRig& ready(const std::string& axis = "x") {
+    request(axis + ".step", false);
+    request(axis + ".dir", true);
+    for (const char* pin : {".ms1", ".ms2", ".ms3"}) request(axis + pin, false);
+    request(axis + ".sleep", true);
+    request(axis + ".reset", true);
+    request(axis + ".enable", false);
+    return wait(1'000'000'000);
+  }
+
+  HandRig& request(const std::string& line, bool level) {
+    rig.onRequest(line, level, now);
+    return *this;
+  }
+  HandRig& set(const std::string& line, bool level) {
+    rig.onEdge(line, level, now);
+    return *this;
+  }
+  HandRig& wait(std::int64_t nanoseconds) {
+    now += nanoseconds;
+    return *this;
+  }
+
+  /// Pulses that no chip finds too fast, the last one with its low time.
+  HandRig& pulse(int count = 1, const std::string& line = "x.step") {
+    for (int i = 0; i < count; ++i) set(line, true).wait(kHalf).set(line, false).wait(kHalf);
+    return *this;
+  }
+  HandRig& direction(bool forward) { return wait(kHalf).set("x.dir", forward).wait(kHalf); }
+
+  bool reads(const std::string& line) { return rig.inputLevel(line, now); }
+  sim::RigAxisReport report(const std::string& axis = "x") const { return rig.report(axis); }
+
+  static constexpr std::int64_t kHalf = 10'000;
+  std::int64_t now = 1'000'000;
+  std::shared_ptr<sim::MemoryTrace> trace;
+  sim::Rig rig;
+};
+
+}  // namespace stepdriver::test
