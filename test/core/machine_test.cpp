@@ -153,6 +153,28 @@ TEST(Machine, ServesItsPulsesInAThreadOfItsOwn) {
   EXPECT_EQ(violationsOf(bench.report("x")) + violationsOf(bench.report("y")), "");
 }
 
+// On the steady clock the machine is never on time, but the chip must not notice.
+TEST(Machine, KeepsTheChipsTimesOnTheSteadyClockToo) {
+  const axis::AxisConfig config = linearAxis("x", chip::Model::kDrv8825);
+  pulse::SteadyClock clock;
+  sim::Rig rig(Bench::rigAxes({config}));
+  gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
+  machine::MachineOptions options;
+  options.max_lateness = 60.0;
+  {
+    machine::Machine machine({config}, backend, clock, options);
+    axis::Axis& x = machine.axis("x");
+    for (const double target : {0.002, -0.001, 0.0}) {
+      EXPECT_EQ(x.wait(x.moveTo(target)).end, axis::MoveEnd::kReached);
+    }
+    EXPECT_EQ(machine.figures().pulses, 160U + 240U + 80U);
+  }
+  const sim::RigAxisReport seen = rig.report("x");
+  EXPECT_EQ(seen.pulses_forward, 160 + 80);
+  EXPECT_EQ(seen.pulses_backward, 240);
+  EXPECT_EQ(violationsOf(seen), "");
+}
+
 // Moves, stops, mode changes, disabling, sleep, resets and switches in any order: whatever happens,
 // the position is the count of the edges, the rig has nothing to object, and the limits hold.
 class RandomCommands {

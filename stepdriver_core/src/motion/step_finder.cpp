@@ -129,21 +129,21 @@ double StepFinder::solveCubic(double way) const {
   const Stretch& s = stretch_;
   double low = s.time_sign > 0.0 ? s.last : 0.0;
   double high = s.time_sign > 0.0 ? s.duration : s.last;
-  const auto wayAt = [&s](double t) { return t * (s.v + t * (s.a / 2.0 + t * (s.j / 6.0))); };
-  const auto speedAt = [&s](double t) { return s.v + t * (s.a + t * (s.j / 2.0)); };
+  const auto way_at = [&s](double t) { return t * (s.v + t * (s.a / 2.0 + t * (s.j / 6.0))); };
+  const auto speed_at = [&s](double t) { return s.v + t * (s.a + t * (s.j / 2.0)); };
 
   double t = s.last;
-  double speed = speedAt(t);
+  double speed = speed_at(t);
   // 100 halvings end at the last bit wherever Newton's steps leave the bracket every time.
   for (int i = 0; i < 100; ++i) {
-    const double error = wayAt(t) - way;
+    const double error = way_at(t) - way;
     if (error == 0.0) return t;
     (error < 0.0 ? low : high) = t;
     double better = t - error / speed;
     if (!(better > low && better < high)) better = low + (high - low) / 2.0;
     if (better == t || std::abs(better - t) <= 2e-16 * high) return better;
     t = better;
-    speed = speedAt(t);
+    speed = speed_at(t);
   }
   return t;
 }

@@ -48,18 +48,18 @@ Profile planTrapezoid(std::int64_t start_ns, std::int64_t from, std::int64_t to,
 
   std::vector<Piece> pieces;
   pieces.reserve(3);
-  const auto signedLength = [sign](DoubleDouble part) { return DoubleDouble(sign) * part; };
+  const auto signed_length = [sign](DoubleDouble part) { return DoubleDouble(sign) * part; };
   if (peak > start) {
     pieces.push_back({rampTime(start, peak, limits.acceleration), fromInteger(from), sign * start,
                       sign * limits.acceleration, 0.0});
   }
   if (cruise.hi > 0.0) {
     pieces.push_back(
-        {cruise / DoubleDouble(peak), fromInteger(from) + signedLength(up), sign * peak, 0.0, 0.0});
+        {cruise / DoubleDouble(peak), fromInteger(from) + signed_length(up), sign * peak, 0.0, 0.0});
   }
   if (peak > start) {
     pieces.push_back({rampTime(start, peak, limits.deceleration),
-                      fromInteger(to) - signedLength(down), sign * peak,
+                      fromInteger(to) - signed_length(down), sign * peak,
                       -sign * limits.deceleration, 0.0});
   }
   return {start_ns, std::move(pieces)};
