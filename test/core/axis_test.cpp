@@ -133,6 +133,7 @@ TEST(Axis, WakesAndEnablesLongEnoughBeforeTheFirstStep) {
       if (config.pins.sleep.wired()) {
         x.sleep(true);
         x.sleep(false);
+        x.wait(x.moveTo(0.0, true));
         x.reset();
       }
       x.wait(x.moveTo(0.0001, true));
@@ -140,6 +141,21 @@ TEST(Axis, WakesAndEnablesLongEnoughBeforeTheFirstStep) {
     }
     EXPECT_EQ(bench.pulses(), 24);
     EXPECT_EQ(violationsOf(bench.report()), "");
+  }
+}
+
+TEST(Axis, WakesWhicheverPinsAreWired) {
+  for (const bool sleep_wired : {false, true}) {
+    for (const bool reset_wired : {false, true}) {
+      axis::AxisConfig config = linearAxis("x", chip::Model::kDrv8825);
+      config.start_speed = config.max_speed;
+      if (!sleep_wired) config.pins.sleep.line.clear();
+      if (!reset_wired) config.pins.reset.line.clear();
+      Bench bench({config});
+      bench.move(0.001);
+      EXPECT_NEAR(bench.report().carriage, 1.0, 1e-9);
+      EXPECT_EQ(violationsOf(bench.report()), "") << sleep_wired << reset_wired;
+    }
   }
 }
 
@@ -255,11 +271,14 @@ TEST(Axis, StopsWithItsDecelerationAndMovesAgainOnlyWhenTold) {
 TEST(Axis, StopsShortlyBeforeTheEndOfAMoveAtItsTarget) {
   Bench bench({linearAxis("x")});
   axis::Axis& x = bench.axis();
-  const axis::Move move = x.moveTo(0.08);
-  bench.machine->advance(move.duration - 0.001);
-  x.stop();
-  x.wait(move);
-  EXPECT_EQ(bench.pulses(), 6400);
+  for (const double before : {0.0, 0.0005, 0.001, 0.0013, 0.002, 0.0071, 0.05, 0.098}) {
+    const axis::Move there = x.moveTo(0.08);
+    bench.machine->advance(there.duration - before);
+    x.stop();
+    x.wait(there);
+    EXPECT_EQ(bench.pulses(), 6400) << before << " s before the end";
+    bench.move(0.0);
+  }
 }
 
 TEST(Axis, DisablingStopsFirstAndDropsTheTarget) {

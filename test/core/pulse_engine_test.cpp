@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "stepdriver_core/motion/trapezoid.h"
@@ -103,6 +104,33 @@ class PulseEngineTest : public testing::Test {
     while (clock.now() < time) clock.waitUntil(time);
   }
 
+  // Holds the edges of the first channel against what the chip wants.
+  void expectTimes(const ChannelConfig& channel) {
+    std::optional<Nanoseconds> rose;
+    std::optional<Nanoseconds> turned;
+    std::optional<Nanoseconds> fell;
+    std::size_t last_write = 0;
+    for (const Edge& edge : lines.edges) {
+      const auto since = [&edge](const std::optional<Nanoseconds>& time) {
+        return time ? edge.time - *time : kNever;
+      };
+      SCOPED_TRACE(testing::Message() << "line " << edge.line << " at " << edge.time);
+      EXPECT_NE(edge.write, last_write) << "STEP and DIR in one write";
+      last_write = edge.write;
+      if (edge.line == 1) {
+        EXPECT_GE(since(rose), channel.dir_hold);
+        turned = edge.time;
+      } else if (edge.level) {
+        EXPECT_GE(since(fell), channel.step_low);
+        EXPECT_GE(since(turned), channel.dir_setup);
+        rose = edge.time;
+      } else {
+        EXPECT_GE(since(rose), channel.step_high);
+        fell = edge.time;
+      }
+    }
+  }
+
   static motion::Profile cruise(Nanoseconds start, std::int64_t from, std::int64_t to,
                                 double speed) {
     return motion::planTrapezoid(start, from, to, {speed, speed, 1.0, 1.0});
@@ -140,35 +168,41 @@ TEST_F(PulseEngineTest, PutsEachStepOutAtItsNanosecond) {
 }
 
 TEST_F(PulseEngineTest, KeepsDirSetupAndHoldWhateverThePlanWants) {
-  make({config(0)});
-  restart_interval = 0;
-  // Forward and at once back, with a last and a first step 10 ns apart.
-  const double speed = 50'000.0;
-  follow(cruise(1'000'000, 0, 3, speed));
-  runUntil(1'040'000);
-  std::vector<motion::Piece> back{{0.0004, 3.0 - 0.4995, -speed, 0.0, 0.0}};
-  follow({1'050'010, back});
-  runOut();
-  EXPECT_GT(engine->state().slips, 0U);
-  Nanoseconds rose = 0;
-  Nanoseconds turned = 0;
-  Nanoseconds fell = 0;
-  std::size_t last_write = 0;
-  for (const Edge& edge : lines.edges) {
-    if (edge.line == 1) {
-      EXPECT_TRUE(rose == 0 || edge.time - rose >= 700) << "DIR at " << edge.time;
-      turned = edge.time;
-    } else if (edge.level) {
-      EXPECT_TRUE(fell == 0 || edge.time - fell >= 2'100) << "STEP at " << edge.time;
-      EXPECT_TRUE(turned == 0 || edge.time - turned >= 650) << "STEP at " << edge.time;
-      rose = edge.time;
-    } else {
-      EXPECT_GE(edge.time - rose, 1'900);
-      fell = edge.time;
-    }
-    EXPECT_NE(edge.write, last_write) << "STEP and DIR in one write";
-    last_write = edge.write;
+  ChannelConfig slow_dir = config(0);
+  slow_dir.dir_hold = 5'000;
+  slow_dir.dir_setup = 7'000;
+  for (const ChannelConfig& channel : {config(0), slow_dir}) {
+    lines.edges.clear();
+    make({channel});
+    // Forward and at once back, with a last and a first step 10 ns apart.
+    const double speed = 50'000.0;
+    const Nanoseconds start = clock.now() + 1'000'000;
+    follow(cruise(start, 0, 3, speed));
+    runUntil(start + 40'000);
+    std::vector<motion::Piece> back{{0.0004, 3.0 - 0.4995, -speed, 0.0, 0.0}};
+    follow({start + 50'010, back});
+    runOut();
+    EXPECT_GT(engine->state().slips, 0U);
+    expectTimes(channel);
   }
+}
+
+TEST_F(PulseEngineTest, KeepsTheModePinsAfterAStepAsLongAsTheChipWants) {
+  ChannelConfig channel = config(0);
+  channel.mode_hold = 30'000;
+  make({channel});
+  follow(cruise(1'000'000, 0, 1, 1e5));
+  runOut();
+  const Nanoseconds rose = lines.rises(0).at(0);
+  ASSERT_LT(clock.now(), rose + 30'000);
+  Command pins;
+  pins.kind = Command::Kind::kPins;
+  pins.serial = ++serial;
+  pins.pins.add(20, true, 0);
+  ASSERT_TRUE(engine->post(pins));
+  runOut();
+  EXPECT_EQ(lines.edges.back().line, 20);
+  EXPECT_EQ(lines.edges.back().time, rose + 30'000);
 }
 
 TEST_F(PulseEngineTest, SlidesAPlanThatIsTooFastForTheChip) {

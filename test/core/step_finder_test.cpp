@@ -153,5 +153,22 @@ TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
   EXPECT_FALSE(tail.next(step));
 }
 
+TEST(StepFinder, IsExactAtTheEndOfALongSlowdown) {
+  // From 20,000 steps/s at 1 step/s^2: v^2 - 2 d s leaves nothing of a double there.
+  const std::int64_t steps = 400'000'000;
+  const Profile profile = planTrapezoid(0, 0, steps, {0.0, 20000.0, 1e6, 1.0});
+  const long double ramps = 20000.0L / 1e6L + 20000.0L;
+  const long double ways = 2e8L + 200.0L;
+  const long double total = ramps + (steps - ways) / 20000.0L;
+  StepFinder tail(profile, steps - 2000);
+  Step step;
+  for (std::int64_t left = 2000; left > 0; --left) {
+    ASSERT_TRUE(tail.next(step));
+    if (left > 1990) continue;
+    const long double exact = total - std::sqrt(2.0L * (left - 0.5L));
+    ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 1.0L) << left << " steps before the end";
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::motion

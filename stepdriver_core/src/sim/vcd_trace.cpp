@@ -24,11 +24,11 @@ std::string identifierOf(std::size_t index) {
   return identifier;
 }
 
-// A name in a VCD file ends at the first blank.
+// A name in a VCD file ends at the first blank, and sigrok-cli's options at `:`, `=` and `,`.
 std::string wordOf(const std::string& name) {
-  std::string clean;
-  for (const char c : name) clean += std::isgraph(static_cast<unsigned char>(c)) != 0 ? c : '_';
-  return clean;
+  std::string word;
+  for (const char c : name) word += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  return word;
 }
 
 }  // namespace
@@ -53,7 +53,8 @@ void VcdTrace::begin(const std::vector<TracePin>& pins, const std::vector<bool>&
     const bool first = i == 0 || pins[i].scope != pins[i - 1].scope;
     if (first && i != 0) buffer_ += "$upscope $end\n";
     if (first) buffer_ += "$scope module " + wordOf(pins[i].scope) + " $end\n";
-    buffer_ += "$var wire 1 " + ids_[i] + ' ' + wordOf(pins[i].variable) + " $end\n";
+    const std::string variable = wordOf(pins[i].scope + '_' + pins[i].variable);
+    buffer_ += "$var wire 1 " + ids_[i] + ' ' + variable + " $end\n";
   }
   if (!pins.empty()) buffer_ += "$upscope $end\n";
   buffer_ += "$enddefinitions $end\n#0\n$dumpvars\n";

@@ -13,6 +13,9 @@ namespace stepdriver::sim {
 /// which GTKWave, PulseView and sigrok-cli open. A last time stamp, 1 us after the last edge,
 /// closes the file: without it viewers leave the last levels out.
 ///
+/// Each axis is a scope, and its name is in the names of its pins too, `x_step`: sigrok drops the
+/// scopes.
+///
 /// The same edges make the same file: there is no date in it. Edges are buffered; the file is
 /// complete up to the last edge after flush() and after destruction.
 class VcdTrace : public PinTrace {
