@@ -47,11 +47,11 @@ TEST_F(VcdTraceTest, WritesWhatViewersRead) {
             "$version stepdriver $end\n"
             "$timescale 1 ns $end\n"
             "$scope module x $end\n"
-            "$var wire 1 a x_step $end\n"
-            "$var wire 1 b x_dir $end\n"
+            "$var wire 1 a step $end\n"
+            "$var wire 1 b dir $end\n"
             "$upscope $end\n"
             "$scope module y $end\n"
-            "$var wire 1 c y_step $end\n"
+            "$var wire 1 c step $end\n"
             "$upscope $end\n"
             "$enddefinitions $end\n"
             "#0\n"
@@ -113,7 +113,7 @@ TEST_F(VcdTraceTest, HasAnIdentifierOfItsOwnForEachOfManyPins) {
 TEST_F(VcdTraceTest, HasNoBlanksOrSeparatorsInNames) {
   { VcdTrace(path_).begin({{"my axis:1", "step"}}, {false}, 0); }
   EXPECT_NE(text().find("$scope module my_axis_1 $end"), std::string::npos) << text();
-  EXPECT_NE(text().find(" my_axis_1_step $end"), std::string::npos) << text();
+  EXPECT_NE(text().find(" step $end"), std::string::npos) << text();
 }
 
 TEST_F(VcdTraceTest, IsTheSameForTheSameEdges) {

@@ -53,7 +53,7 @@ void VcdTrace::begin(const std::vector<TracePin>& pins, const std::vector<bool>&
     const bool first = i == 0 || pins[i].scope != pins[i - 1].scope;
     if (first && i != 0) buffer_ += "$upscope $end\n";
     if (first) buffer_ += "$scope module " + wordOf(pins[i].scope) + " $end\n";
-    const std::string variable = wordOf(pins[i].scope + '_' + pins[i].variable);
+    const std::string variable = wordOf(pins[i].variable);
     buffer_ += "$var wire 1 " + ids_[i] + ' ' + variable + " $end\n";
   }
   if (!pins.empty()) buffer_ += "$upscope $end\n";
