@@ -1,0 +1,145 @@
+#!/usr/bin/env bash
+# Brings up an axis on the simulated rig, moves it and shows what came out of its pins.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/demo.sh [--installed]
+
+Installs what is missing, builds the package, launches one axis on the simulated rig, enables it,
+moves it 1000 steps forward and back by rosservice call, and shows what was commanded, what the
+pins did and where the axis is. Writes the pin trace to a file. Exit code 0: all of that agrees.
+
+  --installed  builds nothing: runs the package that scripts/test.sh has installed
+END
+}
+
+installed=
+case ${1:-} in
+  '') ;;
+  --installed) installed=1 ;;
+  -h | --help) usage && exit ;;
+  *) usage >&2 && exit 2 ;;
+esac
+
+# What config/a4988.yaml makes of it: 80 steps/mm.
+distance=0.0125
+steps=1000
+
+problems=0
+problem() {
+  say "  WRONG: $*"
+  problems=$((problems + 1))
+}
+
+# The value of a field in what rosservice or rostopic printed; of the only axis, where it's a list.
+field() { sed -n "s/^$2: *//p" <<<"$1" | head -n 1 | tr -d '[]'; }
+
+same_place() { awk -v a="$1" -v b="$2" 'BEGIN { exit !(a != "" && (a - b) ^ 2 < 1e-6 ^ 2) }'; }
+
+# Runs a ROS command, with a bound, and leaves what it printed in $answer.
+ask() {
+  answer=$(timeout --foreground 60 "$@" </dev/null 2>&1) || die "$* failed: $answer"
+}
+
+# Shows a service call as a person would type it, and what it answers.
+call() {
+  say "\$ rosservice call $1 \"$2\""
+  ask rosservice call "$1" "$2"
+  indent <<<"$answer"
+  [[ $(field "$answer" success) == True ]] || problem "refused"
+}
+
+# Moves by a distance [m] and looks whether service, pins and joint_states agree.
+move() {
+  local by=$1 goal=$2 goal_forward=$3 goal_backward=$4 forward backward violations place
+  say "" "Commanded: move by $by m, which is $steps steps, to $goal m"
+  call /stepdriver/x/move_to "{position: $by, relative: true, velocity: 0.0, wait: true}"
+  same_place "$(field "$answer" position)" "$goal" || problem "that isn't $goal m"
+
+  ask rosservice call /stepdriver/rig/report
+  forward=$(field "$answer" pulses_forward)
+  backward=$(field "$answer" pulses_backward)
+  violations=$(field "$answer" violations)
+  say "The pins:  $forward pulses forward and $backward backward so far, $violations violations" \
+    "           of the chip's timings (rosservice call /stepdriver/rig/report)"
+  [[ $forward == "$goal_forward" && $backward == "$goal_backward" ]] ||
+    problem "not $goal_forward forward and $goal_backward backward"
+  [[ $violations == 0 ]] || problem "$answer"
+
+  ask rostopic echo -n 1 /joint_states
+  place=$(field "$answer" position)
+  say "The axis:  at $place m (rostopic echo /joint_states)"
+  same_place "$place" "$goal" || problem "that isn't $goal m"
+}
+
+choose_build_folder
+install_packages core ros trace
+setup=$build/install
+if [[ -z $installed ]]; then
+  setup=$build/catkin/devel
+  rm -rf "$ROS_HOME/log"
+  say "Building (a minute or two the first time)"
+  quietly build build_catkin
+fi
+use_ros "$setup"
+
+trace=$build/demo/axis.vcd
+log=$build/demo/roslaunch.log
+mkdir -p "$build/demo"
+rm -f "$trace"
+
+say "\$ roslaunch stepdriver axis.launch sim:=true trace:=$trace"
+set -m
+roslaunch -p "$ros_port" stepdriver axis.launch sim:=true "trace:=$trace" \
+  >"$log" 2>&1 </dev/null &
+launch=$!
+set +m
+end_launch() {
+  [[ -z $launch ]] || end_group "$launch" 30
+  launch=
+}
+at_exit end_launch
+for ((i = 0; ; i++)); do
+  rosservice list </dev/null 2>/dev/null | grep -qxF /stepdriver/x/move_to && break
+  if ! kill -0 "$launch" 2>/dev/null || ((i == 60)); then
+    tail -n 40 "$log" >&2
+    die "the axis didn't come up (roslaunch's output is above)"
+  fi
+  sleep 0.5
+done
+
+say "" "Enabling the motor:"
+call /stepdriver/x/enable "data: true"
+move "$distance" "$distance" "$steps" 0
+move "-$distance" 0 "$steps" "$steps"
+
+# The node closes the trace when it ends.
+end_launch
+if grep -E 'process has died|escalating to SIGTERM' "$log" >&2; then
+  problem "the node didn't end well (see $log)"
+fi
+
+say "" "The pin trace: $trace"
+# compress: pauses longer than 1000 ns are shortened, else sigrok reads each nanosecond of them.
+look=(sigrok-cli -i "$trace" -I vcd:compress=1000 -P stepper_motor:step=step:dir=dir
+  -A stepper_motor=position)
+if [[ ! -s $trace ]]; then
+  problem "there is no trace"
+else
+  # It prints a position when the next step comes: so the farthest one while the axis stood there.
+  decoded=$("${look[@]}" </dev/null 2>"$build/log/sigrok.log" |
+    sed -n 's/^stepper_motor-1: \(-\?[0-9]*\) steps$/\1/p') || true
+  far=$(sort -n <<<"$decoded" | tail -n 1)
+  say "The stepper_motor decoder of sigrok-cli, which isn't ours, reads there: out to ${far:-no} steps"
+  [[ $far == "$steps" ]] || problem "that isn't $steps steps"
+  say "Look at it:" \
+    "    gtkwave $trace" \
+    "    pulseview -I vcd:downsample=100 -i $trace" \
+    "    ${look[*]}"
+fi
+
+((problems == 0)) || die "$problems thing(s) above went wrong"
+say "" "All of it agrees. To go on by hand, in each terminal first:" "    source $setup/setup.bash"

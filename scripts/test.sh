@@ -1,0 +1,172 @@
+#!/usr/bin/env bash
+# Installs, builds and runs every test. .ci/run calls it.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/test.sh [--lint] [--core] [--ros]
+
+Installs what is missing, builds, and runs the parts that are named; all of them by default.
+
+  --lint  clang-format, clang-tidy and shellcheck over the project's own files
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS
+  --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
+          read by sigrok-cli
+
+A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
+END
+}
+
+parts=()
+for argument; do
+  case $argument in
+    --lint | --core | --ros) parts+=("${argument#--}") ;;
+    -h | --help) usage && exit ;;
+    *) usage >&2 && exit 2 ;;
+  esac
+done
+((${#parts[@]} > 0)) || parts=(lint core ros)
+wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
+
+# ---- stages ----
+
+passed=0 failed=0 skipped=0 summary=''
+declare -A outcome
+
+conclude() {
+  outcome[$1]=$2
+  summary+=$(printf '%-12s %-8s %s' "$1" "$2" "$3")$'\n'
+}
+
+# stage NAME FUNCTION [NEEDED]: runs a function; not where the stage that it needs has failed.
+stage() {
+  local name=$1 function=$2 needed=${3:-} start=$SECONDS
+  if [[ -n $needed && ${outcome[$needed]:-} != passed ]]; then
+    skipped=$((skipped + 1))
+    conclude "$name" skipped "needs $needed"
+    return
+  fi
+  say "" "==== $name"
+  run "$function"
+  if ((run_status == 0)); then
+    passed=$((passed + 1))
+    conclude "$name" passed "$((SECONDS - start)) s"
+  else
+    failed=$((failed + 1))
+    conclude "$name" FAILED "$((SECONDS - start)) s"
+  fi
+}
+
+# The project's own files that match the given patterns, as paths in the checkout.
+own_files() {
+  local pattern names=()
+  if git -C "$root" rev-parse --is-inside-work-tree >/dev/null 2>&1; then
+    (cd "$root" && git ls-files --cached --others --exclude-standard -- "$@") |
+      while IFS= read -r name; do [[ ! -f $root/$name ]] || say "$name"; done
+  else
+    for pattern; do names+=(-o -name "$pattern"); done
+    (cd "$root" && find . -type d '(' -name build -o -name 'build-*' -o -name '.?*' ')' -prune \
+      -o -type f '(' "${names[@]:1}" ')' -print) | sed 's|^\./||' | sort
+  fi
+}
+
+check_format() {
+  own_files '*.cpp' '*.h' | (cd "$root" && xargs -d '\n' clang-format --dry-run -Werror)
+}
+
+check_shell() {
+  (cd "$root" && shellcheck -x scripts/*.sh .ci/run)
+}
+
+# Each file with the compile commands of the build that compiles it.
+check_tidy() {
+  local status=0
+  quietly tidy-configure configure_tidy
+  own_files '*.cpp' | grep -E '^(stepdriver_core|test/core)/' | tidy "$build/core" || status=1
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node)/' | tidy "$build/catkin" || status=1
+  return "$status"
+}
+configure_tidy() {
+  configure_core && configure_catkin &&
+    cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
+}
+tidy() {
+  sed "s|^|$src/|" | xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$1" \
+    --header-filter="^$src/(stepdriver_core|stepdriver_ros|test)/" 2>>"$build/log/tidy.log"
+}
+
+build_core() {
+  quietly core-build build_core_quietly
+}
+build_core_quietly() {
+  configure_core -DCMAKE_COMPILE_WARNING_AS_ERROR=ON &&
+    cmake --build "$build/core" -j "$jobs"
+}
+test_core() {
+  ctest --test-dir "$build/core" -j "$jobs" --timeout 300 --no-tests=error --output-on-failure
+}
+
+build_node() {
+  quietly node-build build_catkin &&
+    quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
+}
+test_node() {
+  ctest --test-dir "$build/catkin" --timeout 600 --no-tests=error --output-on-failure
+}
+
+# Nothing but the install space is on any path here.
+check_install() {
+  local share=$build/install/share/stepdriver launch_file
+  rm -rf "$build/install"
+  quietly install cmake --install "$build/catkin"
+  use_ros "$build/install"
+  [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
+  for launch_file in "$share"/launch/*.launch; do
+    say "${launch_file##*/}:"
+    roslaunch --files stepdriver "${launch_file##*/}" | indent
+  done
+  "$build/install/lib/stepdriver/stepdriver_node" --help >"$build/log/node-help.log" ||
+    die "stepdriver_node --help doesn't work"
+  if grep -rIl -e "$build/catkin" "$build/install"; then
+    die "these installed files refer to the build folder"
+  fi
+}
+
+check_trace() { bash "$root/scripts/demo.sh" --installed; }
+
+choose_build_folder
+rm -rf "$build/ros"
+install_packages core "${parts[@]}" "$(wants ros && echo trace)" "$(wants lint && echo ros)"
+
+if wants lint; then
+  stage shell check_shell
+  # Debian 12's clang says what the format is; another one formats some lines in its own way.
+  if [[ $(clang-format --version) == *' 14.'* ]]; then
+    stage format check_format
+  else
+    skipped=$((skipped + 2))
+    conclude format skipped "needs clang-format 14, which Debian 12 has"
+    conclude tidy skipped "needs clang-tidy 14, which Debian 12 has"
+  fi
+fi
+if wants core; then
+  stage core-build build_core
+  stage core-tests test_core core-build
+fi
+if wants ros; then
+  stage node-build build_node
+fi
+if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
+  stage tidy check_tidy
+fi
+if wants ros; then
+  stage node-tests test_node node-build
+  stage install check_install node-build
+  stage trace check_trace install
+fi
+
+say "" "$summary"
+say "$passed passed, $failed failed, $skipped skipped"
+((failed == 0))

@@ -1,0 +1,133 @@
+#!/usr/bin/env bash
+# Shows that the two commands work on a fresh machine: makes one, and runs them there.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/test_in_root.sh bookworm|trixie [--keep]
+
+Makes a clean root of that Debian with debootstrap (minbase, nothing else), copies the checkout
+into a folder of it whose path has a space, and runs scripts/demo.sh and scripts/test.sh there as
+root, without a terminal. Prints both exit codes, and is 0 where both are 0. Needs root.
+
+The base root is kept in ~/.cache/stepdriver/roots (STEPDRIVER_ROOTS names another folder) for
+the next time; the copy that is worked in is removed at the end.
+
+  --keep  doesn't remove it, and says where it is
+END
+}
+
+suite='' keep=
+for argument; do
+  case $argument in
+    bookworm | trixie) suite=$argument ;;
+    --keep) keep=1 ;;
+    -h | --help) usage && exit ;;
+    *) usage >&2 && exit 2 ;;
+  esac
+done
+[[ -n $suite ]] || { usage >&2 && exit 2; }
+(($(id -u) == 0)) || die "needs root, for debootstrap and chroot: sudo $0 $suite"
+command -v debootstrap >/dev/null || die "needs debootstrap: apt-get install debootstrap"
+
+# ---- the base ----
+
+# Where this machine's apt gets the suites of Debian from, or Debian's own address.
+mirror_of() {
+  local label=$1 default=$2 found
+  # shellcheck disable=SC2016
+  found=$(apt-get indextargets --format '$(LABEL) $(REPO_URI)' 2>/dev/null |
+    sed -n "s/^$label //p" | head -n 1) || true
+  printf '%s' "${found:-$default}"
+}
+
+# How this machine's apt reaches them: proxies, certificates, what it checks.
+apt_transport() {
+  apt-config dump | grep -E '^Acquire::(http|https|Check-|Retries|ForceIPv)' || true
+}
+
+roots=${STEPDRIVER_ROOTS:-${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/stepdriver/roots}
+mkdir -p "$roots"
+roots=$(cd "$roots" && pwd -P)
+base=$roots/$suite
+mirror=$(mirror_of Debian http://deb.debian.org/debian)
+security=$(mirror_of Debian-Security http://deb.debian.org/debian-security)
+
+if [[ ! -d $base ]]; then
+  say "Making $base from $mirror"
+  rm -rf "$base.new"
+  include=()
+  [[ $mirror != https* ]] || include=(--include=ca-certificates)
+  run debootstrap --variant=minbase "${include[@]}" "$suite" "$base.new" "$mirror" >"$base.log" 2>&1
+  ((run_status == 0)) || die "debootstrap failed; its output: $base.log"
+  mv "$base.new" "$base"
+fi
+
+# ---- the copy ----
+
+work=$(mktemp -d "$roots/$suite.XXXXXX")
+remove_work() {
+  if [[ -n $keep ]]; then
+    say "Kept: $work"
+  else
+    rm -rf --one-file-system "$work"
+  fi
+}
+at_exit remove_work
+say "Copying the checkout into a clean $suite in $work"
+cp -a "$base/." "$work/"
+cp -L /etc/resolv.conf "$work/etc/resolv.conf"
+printf '127.0.0.1 localhost\n' >"$work/etc/hosts"
+apt_transport >"$work/etc/apt/apt.conf.d/90host"
+cat >"$work/etc/apt/sources.list" <<END
+deb $mirror $suite main
+deb $mirror $suite-updates main
+deb $security $suite-security main
+END
+
+checkout="/home/new user/step driver"
+mkdir -p "$work$checkout"
+if git -C "$root" rev-parse --is-inside-work-tree >/dev/null 2>&1; then
+  (cd "$root" && git ls-files -z --cached --others --exclude-standard) |
+    while IFS= read -r -d '' name; do
+      [[ ! -e $root/$name ]] || printf '%s\0' "$name"
+    done | tar -C "$root" --null -T - -c
+else
+  tar -C "$root" --exclude=./build --exclude=./.git -c .
+fi | tar -C "$work$checkout" --no-same-owner -x
+
+# ---- the run ----
+
+# A mount and a process namespace of its own, where allowed: whatever it mounts or starts ends
+# with it.
+inside=(chroot "$work")
+if unshare --mount --pid --fork --kill-child true 2>/dev/null; then
+  # shellcheck disable=SC2016
+  inside=(unshare --mount --pid --fork --kill-child bash -c '
+    mount -t proc proc "$1/proc" && mount -t tmpfs tmpfs "$1/dev/shm" || true
+    exec chroot "$@"' in_root "$work")
+else
+  say "No namespaces here: going on without /proc and /dev/shm"
+fi
+
+in_root() {
+  "${inside[@]}" /usr/bin/env -i HOME=/root LANG=C.UTF-8 \
+    PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
+    ${http_proxy+http_proxy="$http_proxy"} ${https_proxy+https_proxy="$https_proxy"} \
+    ${no_proxy+no_proxy="$no_proxy"} "$@"
+}
+
+exit_codes=''
+worst=0
+for command in demo.sh test.sh; do
+  say "" "######## $suite: scripts/$command"
+  start=$SECONDS
+  run in_root bash "$checkout/scripts/$command"
+  exit_codes+=" $command exit code $run_status after $((SECONDS - start)) s;"
+  ((run_status == 0)) || worst=1
+done
+
+say "" "On a clean $suite:${exit_codes%;}"
+((worst == 0))

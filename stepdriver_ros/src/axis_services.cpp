@@ -1,0 +1,113 @@
+#include "axis_services.h"
+
+#include "answer.h"
+#include "text.h"
+
+namespace stepdriver::ros_node {
+
+template <typename Service>
+void AxisServices::advertise(const std::string& name, Handler<Service> handler,
+                             ros::CallbackQueue& queue) {
+  node_.setCallbackQueue(&queue);
+  servers_.push_back(node_.advertiseService(name, handler, this));
+}
+
+AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
+                           CallQueues& queues)
+    : axis_(axis), node_(node, axis.config().name) {
+  ros::CallbackQueue& own = queues.ofAxis(index);
+  advertise<MoveTo>("move_to", &AxisServices::moveTo, own);
+  advertise<MoveRounds>("move_rounds", &AxisServices::moveRounds, own);
+  advertise<Microstep>("microstep", &AxisServices::microstep, own);
+  advertise<SetPosition>("set_position", &AxisServices::setPosition, own);
+  advertise<std_srvs::SetBool>("enable", &AxisServices::enable, own);
+  advertise<std_srvs::SetBool>("sleep", &AxisServices::sleep, own);
+  advertise<std_srvs::Trigger>("reset", &AxisServices::reset, own);
+  advertise<std_srvs::Trigger>("stop", &AxisServices::stop, queues.control());
+}
+
+bool AxisServices::moveTo(MoveTo::Request& request, MoveTo::Response& response) {
+  response.position = axis_.state().position;
+  return answer(response, [&] {
+    const axis::Move move = axis_.moveTo(request.position, request.relative != 0, request.velocity);
+    answerMove(move, request.wait != 0, response);
+  });
+}
+
+bool AxisServices::moveRounds(MoveRounds::Request& request, MoveRounds::Response& response) {
+  response.position = axis_.state().position;
+  return answer(response, [&] {
+    const axis::Move move = axis_.moveRounds(request.rounds, request.velocity);
+    answerMove(move, request.wait != 0, response);
+  });
+}
+
+template <typename Response>
+void AxisServices::answerMove(const axis::Move& move, bool wait, Response& response) {
+  if (!wait) {
+    response.position = move.target;
+    response.duration = move.duration;
+    response.message = axis_.config().name + ": moves to " + numberText(move.target) + " " +
+                       unitOf(axis_.config().kind) + " in " + numberText(move.duration) + " s";
+    return;
+  }
+  const axis::MoveResult result = axis_.wait(move);
+  response.success = result.end == axis::MoveEnd::kReached;
+  response.message = result.message;
+  response.position = result.position;
+  response.duration = result.duration;
+}
+
+bool AxisServices::microstep(Microstep::Request& request, Microstep::Response& response) {
+  answer(response, [&] {
+    axis_.setMicrosteps(request.microsteps);
+    response.message = axis_.config().name + ": makes " + std::to_string(request.microsteps) +
+                       (request.microsteps == 1 ? " microstep" : " microsteps") + " per full step";
+  });
+  response.microsteps = axis_.state().microsteps;
+  return true;
+}
+
+bool AxisServices::setPosition(SetPosition::Request& request, SetPosition::Response& response) {
+  answer(response, [&] {
+    axis_.setPosition(request.position);
+    response.message = axis_.config().name + ": stands at " + numberText(request.position) + " " +
+                       unitOf(axis_.config().kind);
+  });
+  response.position = axis_.state().position;
+  return true;
+}
+
+bool AxisServices::enable(std_srvs::SetBool::Request& request,
+                          std_srvs::SetBool::Response& response) {
+  return answer(response, [&] {
+    axis_.enable(request.data != 0);
+    response.message = axis_.config().name + (request.data ? ": enabled" : ": disabled");
+  });
+}
+
+bool AxisServices::sleep(std_srvs::SetBool::Request& request,
+                         std_srvs::SetBool::Response& response) {
+  return answer(response, [&] {
+    axis_.sleep(request.data != 0);
+    response.message = axis_.config().name + (request.data ? ": asleep" : ": awake");
+  });
+}
+
+bool AxisServices::reset(std_srvs::Trigger::Request& /*request*/,
+                         std_srvs::Trigger::Response& response) {
+  return answer(response, [&] {
+    axis_.reset();
+    response.message = axis_.config().name + ": reset";
+  });
+}
+
+bool AxisServices::stop(std_srvs::Trigger::Request& /*request*/,
+                        std_srvs::Trigger::Response& response) {
+  return answer(response, [&] {
+    axis_.stop();
+    response.message = axis_.config().name + ": stops";
+  });
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,71 @@
+#include "bring_up.h"
+
+#include <ros/console.h>
+#include <ros/param.h>
+
+#include <string>
+#include <vector>
+
+#include "robot_description.h"
+#include "simulation.h"
+#include "stepdriver_core/error.h"
+#include "xmlrpc_value.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+/// @return the node's private parameters as one map, empty where there are none.
+axis::ConfigValue privateParameters(const ros::NodeHandle& private_node) {
+  XmlRpc::XmlRpcValue tree;
+  if (!ros::param::get(private_node.getNamespace(), tree)) return axis::ConfigValue::Map{};
+  return configValue(tree);
+}
+
+std::vector<LimitSources> applyDescriptionParameter(const ros::NodeHandle& node,
+                                                    std::vector<axis::AxisConfig>& axes,
+                                                    std::vector<ConfigIssue>& issues) {
+  std::string name;
+  XmlRpc::XmlRpcValue value;
+  if (!node.searchParam("robot_description", name) || !ros::param::get(name, value)) {
+    ROS_INFO("There is no robot_description: the limits are those of the axes' configuration");
+    return std::vector<LimitSources>(axes.size());
+  }
+  const axis::ConfigValue description = configValue(value);
+  const auto* urdf = description.as<std::string>();
+  if (urdf == nullptr) {
+    issues.push_back({name, "is " + description.shown() + ", but must be the XML of a URDF"});
+    return {};
+  }
+  return applyRobotDescription(*urdf, name, axes, issues);
+}
+
+}  // namespace
+
+NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node) {
+  std::vector<ConfigIssue> issues;
+  const std::string& name = private_node.getNamespace();
+  const axis::ConfigValue tree = privateParameters(private_node);
+  NodeConfig config = readNodeConfig(tree, name, issues);
+  // What depends on the axes can only be judged where they are right.
+  if (!issues.empty()) throw ConfigError(issues);
+  const auto sources = applyDescriptionParameter(node, config.axes, issues);
+  if (issues.empty()) {
+    checkSimulation(config.axes, config.simulation, name + "/simulation", issues);
+  }
+  if (!issues.empty()) throw ConfigError(issues);
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    ROS_INFO("%s", limitsText(config.axes[i], sources[i]).c_str());
+  }
+  return config;
+}
+
+std::unique_ptr<Simulation> makeSimulation(const NodeConfig& config, const std::string& node_name) {
+  try {
+    return std::make_unique<Simulation>(config.axes, config.simulation);
+  } catch (const Error& error) {
+    throw ConfigError(
+        {{node_name + "/simulation/trace", std::string("is wrong: ") + error.what()}});
+  }
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <ros/callback_queue.h>
+#include <ros/spinner.h>
+
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <vector>
+
+namespace stepdriver::ros_node {
+
+/// The queues of service calls and their threads, made so that a call that waits holds up no other.
+///
+/// Each axis has a queue of its own. Of its threads a waiting move takes one, as an axis moves once
+/// at a time, and a disable or a microstep change that waits for rest another; calls that find the
+/// rest taken wait no longer than a chip takes to wake or to be reset. What stops or recovers
+/// shares no thread with what may wait, and the emergency stop shares its thread with nothing.
+///
+/// Made and used by one thread; the queues themselves may be used by any.
+class CallQueues {
+ public:
+  /// The threads of an axis's queue.
+  static constexpr int kThreadsPerAxis = 4;
+
+  explicit CallQueues(std::size_t axes);
+
+  /// Calls that may take as long as a motion of this axis.
+  ros::CallbackQueue& ofAxis(std::size_t axis) { return axes_.at(axis); }
+  /// Calls that stop or recover, and all that answers at once.
+  ros::CallbackQueue& control() { return control_; }
+  ros::CallbackQueue& emergency() { return emergency_; }
+
+  /// Starts the threads; to be called when everything has been advertised.
+  void start();
+
+  /// Waits until every call has its answer, but not longer than the bound for calls that only
+  /// begin; then ends the threads.
+  void finish(std::chrono::milliseconds bound);
+
+ private:
+  bool allAnswered();
+
+  std::deque<ros::CallbackQueue> axes_;
+  ros::CallbackQueue control_;
+  ros::CallbackQueue emergency_;
+  std::vector<ros::AsyncSpinner> spinners_;
+};
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,49 @@
+#include "machine_services.h"
+
+#include <ros/console.h>
+
+#include <exception>
+
+#include "answer.h"
+
+namespace stepdriver::ros_node {
+
+MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& machine,
+                                 CallQueues& queues)
+    : node_(node), queues_(queues) {
+  advertise("stop", queues.control(), "all axes stop", [&machine] { machine.stop(); });
+  advertise("emergency_stop", queues.emergency(), "all axes are stopped; recover ends that",
+            [&machine] { machine.emergencyStop(); });
+  advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
+}
+
+void MachineServices::advertise(const std::string& name, ros::CallbackQueue& queue,
+                                const std::string& done, const std::function<void()>& action) {
+  using Service = std_srvs::Trigger;
+  const boost::function<bool(Service::Request&, Service::Response&)> handler =
+      [done, action](Service::Request& /*request*/, Service::Response& response) {
+        return answer(response, [&] {
+          action();
+          response.message = done;
+        });
+      };
+  node_.setCallbackQueue(&queue);
+  servers_.push_back(node_.advertiseService(name, handler));
+}
+
+void MachineServices::advertiseRig(Simulation& simulation) {
+  const boost::function<bool(RigReport::Request&, RigReport::Response&)> handler =
+      [&simulation](RigReport::Request& /*request*/, RigReport::Response& response) {
+        try {
+          response = simulation.report();
+        } catch (const std::exception& error) {
+          ROS_ERROR("%s", error.what());
+          return false;
+        }
+        return true;
+      };
+  node_.setCallbackQueue(&queues_.control());
+  servers_.push_back(node_.advertiseService("rig/report", handler));
+}
+
+}  // namespace stepdriver::ros_node

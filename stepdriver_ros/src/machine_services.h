@@ -1,0 +1,37 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/service_server.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/RigReport.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "call_queues.h"
+#include "simulation.h"
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+
+/// The services of the whole machine. They are called from any thread of their queues.
+class MachineServices {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues outlive the services.
+  MachineServices(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
+
+  /// Adds the report of the simulated rig. @param simulation outlives the services.
+  void advertiseRig(Simulation& simulation);
+
+ private:
+  void advertise(const std::string& name, ros::CallbackQueue& queue, const std::string& done,
+                 const std::function<void()>& action);
+
+  ros::NodeHandle node_;
+  CallQueues& queues_;
+  std::vector<ros::ServiceServer> servers_;
+};
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "simulation_config.h"
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+
+/// All parameters of the node.
+struct NodeConfig {
+  double joint_state_rate = 50.0;  ///< [Hz]
+  double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
+  SimulationConfig simulation;
+  std::vector<axis::AxisConfig> axes;
+};
+
+/// Reads the node's private parameters.
+///
+/// @code{.yaml}
+/// gpio: {backend: simulated}     # simulated or libgpiod
+/// joint_state_rate: 50.0         # [Hz] from 1 to 1000
+/// realtime: {max_lateness_ms: 5.0}
+/// simulation: {...}              # see readSimulation()
+/// axes: {...}                    # see axis::readAxes()
+/// @endcode
+///
+/// @param tree all of them, as one map.
+/// @param name the node's full name.
+/// @param issues everything that is wrong is added here.
+/// @return to be used only where no issue was added.
+NodeConfig readNodeConfig(const axis::ConfigValue& tree, const std::string& name,
+                          std::vector<ConfigIssue>& issues);
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,144 @@
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/master.h>
+#include <ros/node_handle.h>
+
+#include <cstdio>
+#include <deque>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "axis_services.h"
+#include "bring_up.h"
+#include "call_queues.h"
+#include "end_requests.h"
+#include "machine_services.h"
+#include "simulation.h"
+#include "state_publisher.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr int kExitOk = 0;
+constexpr int kExitConfig = 1;
+constexpr int kExitGpio = 2;
+constexpr int kExitUsage = 64;
+
+constexpr std::chrono::milliseconds kMasterPoll{200};
+constexpr std::chrono::milliseconds kPoll{1000};
+// For the calls that came in while the axes came to rest.
+constexpr std::chrono::milliseconds kLastAnswers{500};
+
+constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
+
+Drives the axes of the parameter ~axes by services, and publishes where they are.
+Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases the lines.
+
+  services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
+              ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
+              ~stop  ~emergency_stop  ~recover
+              ~rig/report (on the simulated rig)
+  topics      joint_states  ~endstops  ~axis_states
+  parameters  ~axes  ~gpio  ~joint_state_rate  ~realtime  ~simulation  robot_description
+
+Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written.
+Start it with: roslaunch stepdriver axis.launch
+)";
+
+/// @return false: the node was asked to end before there was a master.
+bool waitForMaster(EndRequests& end_requests) {
+  while (!ros::master::check()) {
+    ROS_WARN_ONCE("Waiting for the ROS master at %s", ros::master::getURI().c_str());
+    if (!end_requests.waitFor(kMasterPoll).empty()) return false;
+  }
+  return true;
+}
+
+/// Refuses new commands, decelerates, disables, and lets every client have its answer.
+void shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publisher) {
+  try {
+    machine.shutdown();
+  } catch (const Error& error) {
+    ROS_ERROR("%s", error.what());
+  }
+  queues.finish(kLastAnswers);
+  publisher.stop();
+}
+
+/// The node's life, once there is a master.
+void run(EndRequests& end_requests) {
+  ros::NodeHandle node;
+  ros::NodeHandle private_node("~");
+  end_requests.takeOverShutdownCall();
+
+  const NodeConfig config = readParameters(node, private_node);
+  const auto simulation = makeSimulation(config, private_node.getNamespace());
+  machine::MachineOptions options;
+  options.max_lateness = config.max_lateness;
+  machine::Machine machine(config.axes, simulation->backend(), simulation->clock(), options);
+
+  CallQueues queues(machine.axes().size());
+  // Subscribers to latched topics are served by a queue too.
+  node.setCallbackQueue(&queues.control());
+  private_node.setCallbackQueue(&queues.control());
+  StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
+  std::deque<AxisServices> axis_services;
+  for (std::size_t i = 0; i < machine.axes().size(); ++i) {
+    axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
+  }
+  MachineServices machine_services(private_node, machine, queues);
+  machine_services.advertiseRig(*simulation);
+  queues.start();
+  publisher.start();
+  ROS_INFO("Ready: %zu %s on the simulated rig; pulse thread: %s", machine.axes().size(),
+           machine.axes().size() == 1 ? "axis" : "axes", machine.figures().realtime.c_str());
+
+  std::string who;
+  while (who.empty()) who = end_requests.waitFor(kPoll);
+  ROS_INFO("Ending on %s", who.c_str());
+  shutDown(machine, queues, publisher);
+}
+
+int runOrExplain(EndRequests& end_requests) {
+  try {
+    run(end_requests);
+    return kExitOk;
+  } catch (const ConfigError& error) {
+    const std::size_t count = error.issues().size();
+    ROS_FATAL("Not started, no line was touched: %zu %s wrong in the parameters", count,
+              count == 1 ? "thing is" : "things are");
+    for (const ConfigIssue& issue : error.issues()) {
+      ROS_ERROR("%s %s", issue.key.c_str(), issue.message.c_str());
+    }
+    return kExitConfig;
+  } catch (const GpioError& error) {
+    ROS_FATAL("Not started: %s", error.what());
+    return kExitGpio;
+  } catch (const std::exception& error) {
+    ROS_FATAL("Not started: %s", error.what());
+    return kExitConfig;
+  }
+}
+
+}  // namespace
+}  // namespace stepdriver::ros_node
+
+int main(int argc, char** argv) {
+  namespace node = stepdriver::ros_node;
+  node::EndRequests end_requests;
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  if (arguments.size() > 1) {
+    const bool help = arguments[1] == "--help" || arguments[1] == "-h";
+    std::fputs(node::kUsage, help ? stdout : stderr);
+    return help ? node::kExitOk : node::kExitUsage;
+  }
+  ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
+  if (!node::waitForMaster(end_requests)) return node::kExitOk;
+  const int exit_code = node::runOrExplain(end_requests);
+  ros::shutdown();
+  return exit_code;
+}

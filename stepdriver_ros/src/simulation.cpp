@@ -1,0 +1,150 @@
+#include "simulation.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <utility>
+
+#include "stepdriver_core/sim/vcd_trace.h"
+#include "text.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+using axis::AxisConfig;
+using axis::Kind;
+
+constexpr double kPi = 3.14159265358979323846;
+// A switch that no parameter places stands this far outside of the soft limit,
+constexpr double kSwitchMargin = 2.0;  // [mm|deg]
+// or, where there is none, this far from the origin or from the other soft limit.
+constexpr double kFarLinear = 100.0;  // [mm]
+constexpr double kFarRotary = 360.0;  // [deg]
+
+/// The rig's unit, mm or degrees, in one of the axis's.
+double rigUnitsPerUnit(Kind kind) { return kind == Kind::kLinear ? 1000.0 : 180.0 / kPi; }
+
+struct SwitchPlaces {
+  double min = 0.0;  ///< [mm|deg]
+  double max = 0.0;
+};
+
+SwitchPlaces switchPlaces(const AxisConfig& axis, const SimulatedAxis& simulated) {
+  const double scale = rigUnitsPerUnit(axis.kind);
+  const double far = axis.kind == Kind::kLinear ? kFarLinear : kFarRotary;
+  SwitchPlaces places{-far, far};
+  if (axis.min_position) places.min = *axis.min_position * scale - kSwitchMargin;
+  if (axis.max_position) places.max = *axis.max_position * scale + kSwitchMargin;
+  if (!axis.min_position) places.min = std::min(places.min, places.max - 2 * far);
+  if (!axis.max_position) places.max = std::max(places.max, places.min + 2 * far);
+  places.min = simulated.min_switch.value_or(places.min);
+  places.max = simulated.max_switch.value_or(places.max);
+  return places;
+}
+
+sim::Wire wireOf(const axis::Pin& pin) { return {pin.line, pin.inverted}; }
+
+std::optional<sim::SwitchSpec> switchOf(const std::optional<axis::Endstop>& endstop,
+                                        const SimulatedAxis& simulated, double position) {
+  if (!endstop) return {};
+  sim::SwitchSpec spec;
+  spec.line = endstop->line;
+  spec.active_level = endstop->active_level;
+  spec.position = position;
+  spec.hysteresis = simulated.switch_hysteresis;
+  spec.bounces = simulated.bounces;
+  spec.bounce_ns = std::llround(simulated.bounce_ms * 1e6);
+  return spec;
+}
+
+sim::RigAxisSpec rigAxisOf(const AxisConfig& axis, const SimulatedAxis& simulated) {
+  sim::RigAxisSpec spec;
+  spec.name = axis.name;
+  spec.model = axis.driver;
+  spec.timing = axis.timing;
+  spec.step = wireOf(axis.pins.step);
+  spec.dir = wireOf(axis.pins.dir);
+  spec.enable = wireOf(axis.pins.enable);
+  spec.ms1 = wireOf(axis.pins.ms1);
+  spec.ms2 = wireOf(axis.pins.ms2);
+  spec.ms3 = wireOf(axis.pins.ms3);
+  spec.sleep = wireOf(axis.pins.sleep);
+  spec.reset = wireOf(axis.pins.reset);
+  spec.microsteps = axis.microsteps;
+  spec.full_step_travel = axis.microsteps / axis.steps_per_unit * rigUnitsPerUnit(axis.kind);
+  spec.start = simulated.start;
+  const SwitchPlaces places = switchPlaces(axis, simulated);
+  spec.min_switch = switchOf(axis.endstop_min, simulated, places.min);
+  spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);
+  return spec;
+}
+
+std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
+                                    const SimulationConfig& config) {
+  std::vector<sim::RigAxisSpec> rig;
+  rig.reserve(axes.size());
+  for (const AxisConfig& axis : axes) rig.push_back(rigAxisOf(axis, config.axes.at(axis.name)));
+  return rig;
+}
+
+std::shared_ptr<sim::PinTrace> traceTo(const std::string& path) {
+  if (path.empty()) return nullptr;
+  return std::make_shared<sim::VcdTrace>(path);
+}
+
+/// "2 short step high, 1 step while asleep"
+std::string kindsText(const sim::RigAxisReport& report) {
+  std::string text;
+  for (const auto& [violation, count] : report.violations) {
+    if (!text.empty()) text += ", ";
+    text += std::to_string(count) + " " + sim::nameOf(violation);
+  }
+  return text.empty() ? "none" : text;
+}
+
+}  // namespace
+
+void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config,
+                     const std::string& name, std::vector<ConfigIssue>& issues) {
+  for (const AxisConfig& axis : axes) {
+    if (!axis.endstop_min || !axis.endstop_max) continue;
+    const SwitchPlaces places = switchPlaces(axis, config.axes.at(axis.name));
+    if (places.min < places.max) continue;
+    issues.push_back(
+        {name + "/axes/" + axis.name, "has the min switch at " + numberText(places.min) +
+                                          ", but it must be below the max switch, which is at " +
+                                          numberText(places.max)});
+  }
+}
+
+Simulation::Simulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config)
+    : axes_(axes),
+      clock_(config.speed),
+      rig_(rigOf(axes, config), traceTo(config.trace)),
+      backend_(rig_, [this] { return clock_.now(); }) {
+  for (const AxisConfig& axis : axes) {
+    const SimulatedAxis& simulated = config.axes.at(axis.name);
+    rig_.setFaults(axis.name, simulated.faults);
+    if (simulated.fail_step_write_after) {
+      rig_.failWrites(axis.pins.step.line, *simulated.fail_step_write_after, EIO);
+    }
+  }
+}
+
+RigReport::Response Simulation::report() {
+  rig_.flushTrace();
+  RigReport::Response response;
+  for (const AxisConfig& axis : axes_) {
+    const sim::RigAxisReport report = rig_.report(axis.name);
+    response.name.push_back(axis.name);
+    response.pulses_forward.push_back(report.pulses_forward);
+    response.pulses_backward.push_back(report.pulses_backward);
+    response.carriage.push_back(report.carriage / rigUnitsPerUnit(axis.kind));
+    response.microsteps.push_back(report.microsteps);
+    response.violations.push_back(report.totalViolations());
+    response.violation_kinds.push_back(kindsText(report));
+  }
+  return response;
+}
+
+}  // namespace stepdriver::ros_node

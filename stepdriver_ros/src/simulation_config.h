@@ -1,0 +1,59 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/axis/config_reader.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::ros_node {
+
+/// How the rig of one axis is built, and what is wrong with it. Lengths are in mm on a linear axis,
+/// in degrees on a rotary one.
+struct SimulatedAxis {
+  double start = 0.0;                ///< [mm|deg] where the carriage stands at first
+  double switch_hysteresis = 0.0;    ///< [mm|deg]
+  int bounces = 0;                   ///< extra on-off pairs after each change of a switch
+  double bounce_ms = 0.2;            ///< [ms] from one bounce edge to the next
+  std::optional<double> min_switch;  ///< [mm|deg] place of the switch; none: outside the soft limit
+  std::optional<double> max_switch;
+  sim::RigFaults faults;
+  std::optional<int> fail_step_write_after;  ///< [writes] to STEP that work before all others fail
+};
+
+struct SimulationConfig {
+  double speed = 1.0;  ///< seconds of the rig per second; 0: as fast as it goes
+  std::string trace;   ///< path of the VCD file; empty: none
+  std::map<std::string, SimulatedAxis> axes;
+};
+
+/// Reads the map `simulation` of a node's parameters; every key is optional.
+///
+/// @code{.yaml}
+/// simulation:
+///   speed: 1.0                   # seconds of the rig per second; 0: as fast as it goes
+///   trace: /tmp/axis.vcd         # where the pin trace goes; default: nowhere
+///   axes:
+///     x:                         # `deg` in place of `mm` on a rotary axis
+///       start_mm: 0.0            # where the carriage stands at first
+///       min_switch_mm: -2.0      # default: 2 mm (2 degrees) outside the soft limit
+///       max_switch_mm: 202.0
+///       switch_hysteresis_mm: 0.0
+///       bounces: 0
+///       bounce_ms: 0.2
+///       min_stuck: none          # active, inactive or none
+///       max_stuck: none
+///       lose_every: 0            # every n-th step slips; 0: none
+///       fail_step_write_after: 1000   # writes to STEP; those after them fail. Default: none fails
+/// @endcode
+///
+/// @param reader of that map.
+/// @param axes the axes that are simulated.
+/// @param axes_are_right false: issues were found in them. Then what depends on them is not judged.
+SimulationConfig readSimulation(axis::ConfigReader reader,
+                                const std::vector<axis::AxisConfig>& axes, bool axes_are_right);
+
+}  // namespace stepdriver::ros_node

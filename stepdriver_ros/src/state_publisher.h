@@ -1,0 +1,64 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <sensor_msgs/JointState.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/Endstops.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+
+/// Publishes joint_states, ~endstops and ~axis_states, from a thread of its own: nothing that
+/// waits elsewhere slows it down. start() and stop() are called from one thread.
+class StatePublisher {
+ public:
+  /// @param node, private_node handles of the node, and of its private names.
+  /// @param machine outlives the publisher.
+  /// @param joint_state_rate [Hz]
+  StatePublisher(ros::NodeHandle node, ros::NodeHandle private_node,
+                 const machine::Machine& machine, double joint_state_rate);
+  ~StatePublisher();
+  StatePublisher(const StatePublisher&) = delete;
+  StatePublisher& operator=(const StatePublisher&) = delete;
+
+  void start();
+
+  /// Publishes everything a last time, and ends the thread.
+  void stop();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void run();
+  bool sleepUntil(Clock::time_point time);
+  void publishJointStates();
+  void publishEndstopsOnChange();
+  void publishAxisStates(bool only_on_change);
+
+  const machine::Machine& machine_;
+  const Clock::duration joint_state_period_;
+  ros::Publisher joint_state_publisher_;
+  ros::Publisher endstop_publisher_;
+  ros::Publisher axis_state_publisher_;
+
+  // Of the thread alone.
+  sensor_msgs::JointState joint_states_;
+  Endstops endstops_;
+  AxisStates axis_states_;
+  bool endstops_published_ = false;
+  bool endstops_unreadable_ = false;
+
+  std::mutex mutex_;
+  std::condition_variable stop_asked_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace stepdriver::ros_node

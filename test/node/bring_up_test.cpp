@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "support/node_under_test.h"
+#include "support/says.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct BadBringUp {
+  std::string name;
+  std::function<void(NodeUnderTest&)> spoil;
+  std::string parameter;  ///< below the node's name
+  std::vector<std::string> words;
+};
+
+template <typename Value>
+std::function<void(NodeUnderTest&)> setting(const std::string& key, const Value& value) {
+  return [key, value](NodeUnderTest& node) { node.set(key, value); };
+}
+
+std::function<void(NodeUnderTest&)> erasing(const std::string& key) {
+  return [key](NodeUnderTest& node) { node.erase(key); };
+}
+
+/// The line of the output with this parameter; empty: there is none.
+std::string lineWith(const std::string& output, const std::string& parameter) {
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find(parameter + " ") != std::string::npos) return line;
+  }
+  return {};
+}
+
+class BringUp : public testing::TestWithParam<BadBringUp> {};
+
+TEST_P(BringUp, IsRefusedWithParameterValueAndWhatIsAllowed) {
+  NodeUnderTest node;
+  const std::string trace = node.traced();
+  GetParam().spoil(node);
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 1) << node.process().output();
+  const std::string line = lineWith(node.process().output(), node.full(GetParam().parameter));
+  EXPECT_FALSE(line.empty()) << GetParam().parameter << " isn't in\n" << node.process().output();
+  for (const std::string& words : GetParam().words) expectSays(line, words);
+  EXPECT_FALSE(std::filesystem::exists(trace)) << "a line was touched";
+}
+
+const std::vector<BadBringUp> kBadBringUps = {
+    {"NoAxes", erasing("axes"), "axes", {"missing"}},
+    {"NoBackend", erasing("gpio"), "gpio/backend", {"missing", "simulated"}},
+    {"UnknownBackend",
+     setting("gpio/backend", "simulatd"),
+     "gpio/backend",
+     {"\"simulatd\"", "simulated", "libgpiod"}},
+    {"BackendThatIsNotBuilt",
+     setting("gpio/backend", "libgpiod"),
+     "gpio/backend",
+     {"not built into this version"}},
+    {"MissingDriver", erasing("axes/x/driver"), "axes/x/driver", {"missing", "a4988"}},
+    {"UnknownDriver",
+     setting("axes/x/driver", "a4989"),
+     "axes/x/driver",
+     {"\"a4989\"", "did you mean a4988"}},
+    {"MissingStepPin", erasing("axes/x/pins/step"), "axes/x/pins/step", {"missing"}},
+    {"PinUsedTwice", setting("axes/x/pins/dir", "x_step"), "axes/x/pins/dir", {"\"x_step\""}},
+    {"WrongType",
+     setting("axes/x/max_speed_mm_s", "fast"),
+     "axes/x/max_speed_mm_s",
+     {"\"fast\"", "number"}},
+    {"BooleanAsText",
+     setting("axes/x/enable_on_start", "false"),
+     "axes/x/enable_on_start",
+     {"true or false"}},
+    {"FractionalMicrosteps", setting("axes/x/microsteps", 16.5), "axes/x/microsteps", {"16.5"}},
+    {"UnknownMicrosteps", setting("axes/x/microsteps", 32), "axes/x/microsteps", {"32", "16"}},
+    {"NotANumber", setting("axes/x/max_speed_mm_s", kNaN), "axes/x/max_speed_mm_s", {"finite"}},
+    {"Infinite",
+     setting("axes/x/acceleration_mm_s2", kInfinity),
+     "axes/x/acceleration_mm_s2",
+     {"finite"}},
+    {"Zero", setting("axes/x/steps_per_mm", 0.0), "axes/x/steps_per_mm", {"above 0"}},
+    {"Negative",
+     setting("axes/x/acceleration_mm_s2", -500),
+     "axes/x/acceleration_mm_s2",
+     {"-500", "above 0"}},
+    {"TooFast", setting("axes/x/max_speed_mm_s", 1e6), "axes/x/max_speed_mm_s", {"steps/s"}},
+    {"MinAboveMax",
+     setting("axes/x/min_position_mm", 300),
+     "axes/x/min_position_mm",
+     {"300", "max_position_mm"}},
+    {"StepsPerRoundAgainstMicrosteps",
+     setting("axes/x/steps_per_round", 201),
+     "axes/x/steps_per_round",
+     {"201", "microsteps"}},
+    {"UnknownKey",
+     setting("axes/x/max_sped_mm_s", 1.0),
+     "axes/x/max_sped_mm_s",
+     {"did you mean max_speed_mm_s"}},
+    {"UnknownKeyOfTheNode",
+     setting("joint_state_rte", 50),
+     "joint_state_rte",
+     {"did you mean joint_state_rate"}},
+    {"RateOutOfRange", setting("joint_state_rate", 2000), "joint_state_rate", {"2000", "1000"}},
+    {"LatenessOfZero",
+     setting("realtime/max_lateness_ms", 0.0),
+     "realtime/max_lateness_ms",
+     {"above 0"}},
+    {"NegativeSimulationSpeed", setting("simulation/speed", -1), "simulation/speed", {"-1"}},
+    {"SimulatedAxisThatIsNone",
+     setting("simulation/axes/xx/bounces", 1),
+     "simulation/axes/xx",
+     {"did you mean x"}},
+    {"SimulationInTheWrongUnit",
+     setting("simulation/axes/x/start_deg", 1.0),
+     "simulation/axes/x/start_deg",
+     {"not known"}},
+    {"StuckInAnUnknownWay",
+     setting("simulation/axes/x/min_stuck", "on"),
+     "simulation/axes/x/min_stuck",
+     {"\"on\"", "active", "inactive", "none"}},
+    {"SwitchesTheWrongWayRound",
+     setting("simulation/axes/x/min_switch_mm", 500.0),
+     "simulation/axes/x",
+     {"500", "202"}},
+    {"AxesThatAreNoMap",
+     [](NodeUnderTest& node) {
+       node.erase("axes");
+       node.set("axes", "x");
+     },
+     "axes",
+     {"\"x\"", "map"}},
+    {"AxisNameThatRosDoesNotTake",
+     setting("axes/x-axis/driver", "a4988"),
+     "axes/x-axis",
+     {"letter"}},
+    {"TraceThatCannotBeWritten",
+     setting("simulation/trace", "/nowhere/at/all.vcd"),
+     "simulation/trace",
+     {"/nowhere/at/all.vcd"}},
+};
+
+INSTANTIATE_TEST_SUITE_P(With, BringUp, testing::ValuesIn(kBadBringUps),
+                         [](const auto& value) { return value.param.name; });
+
+TEST(BringUpWithManyMistakes, ListsThemAllAtOnce) {
+  NodeUnderTest node;
+  node.set("gpio/backend", "gpio");
+  node.set("joint_state_rate", "often");
+  node.set("axes/x/microsteps", 3);
+  node.set("axes/x/max_position_mm", -1.0);
+  node.set("axes/x/speed", 1.0);
+  node.set("simulation/axes/x/bounces", -1);
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 1) << node.process().output();
+  const std::string output = node.process().output();
+  for (const char* key : {"gpio/backend", "joint_state_rate", "axes/x/microsteps",
+                          "axes/x/min_position_mm", "axes/x/speed", "simulation/axes/x/bounces"}) {
+    EXPECT_FALSE(lineWith(output, node.full(key)).empty()) << key << " isn't in\n" << output;
+  }
+  expectSays(output, "6 things are wrong");
+}
+
+TEST(BringUpByHand, HelpExplainsAndUnknownArgumentsAreRefused) {
+  NodeProcess help({"--help"});
+  EXPECT_EQ(help.waitForExit(kBound).value_or(-1), 0);
+  expectSays(help.output(), "usage");
+  expectSays(help.output(), "~axis_states");
+  NodeProcess unknown({"--hlep"});
+  EXPECT_NE(unknown.waitForExit(kBound).value_or(0), 0);
+  expectSays(unknown.output(), "usage");
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

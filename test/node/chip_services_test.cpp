@@ -1,0 +1,210 @@
+#include <gtest/gtest.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/Microstep.h>
+#include <stepdriver/SetPosition.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/says.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std_srvs::SetBool::Response setBool(NodeUnderTest& node, const std::string& service, bool data) {
+  std_srvs::SetBool::Request request;
+  request.data = data;
+  return node.call<std_srvs::SetBool>(service, request);
+}
+
+Microstep::Response microstep(NodeUnderTest& node, int microsteps) {
+  Microstep::Request request;
+  request.microsteps = microsteps;
+  return node.call<Microstep>("x/microstep", request);
+}
+
+SetPosition::Response setPosition(NodeUnderTest& node, double position) {
+  SetPosition::Request request;
+  request.position = position;
+  return node.call<SetPosition>("x/set_position", request);
+}
+
+void makeTb6600(NodeUnderTest& node) {
+  node.erase("axes/x");
+  node.set("axes/x/driver", "tb6600");
+  node.set("axes/x/pins/step", "x_step");
+  node.set("axes/x/pins/dir", "x_dir");
+  node.set("axes/x/common_anode", true);
+  node.set("axes/x/microsteps", 8);
+  node.set("axes/x/steps_per_mm", 80.0);
+  node.set("axes/x/max_speed_mm_s", 50.0);
+  node.set("axes/x/acceleration_mm_s2", 500.0);
+}
+
+TEST(ChipServices, EnableAndDisableShowInTheStateAndInTheTrace) {
+  NodeUnderTest node;
+  node.set("axes/x/enable_on_start", false);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return !s.enabled.at(0); }));
+  EXPECT_TRUE(setBool(node, "x/enable", true).success);
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.enabled.at(0) != 0; }));
+  EXPECT_TRUE(setBool(node, "x/enable", true).success) << "enabling twice is no mistake";
+  EXPECT_TRUE(node.moveTo(0.01, true).success);
+  EXPECT_TRUE(setBool(node, "x/enable", false).success);
+  EXPECT_TRUE(states.waitForLatest(
+      [](const AxisStates& s) { return !s.enabled.at(0) && !s.position_valid.at(0); }));
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST(ChipServices, DisablingStopsAMoveFirst) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.2, false).success);
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 500; }));
+  EXPECT_TRUE(setBool(node, "x/enable", false).success);
+  const std::int64_t pulses = node.pulses();
+  EXPECT_LT(pulses, 16000);
+  const auto answer = node.moveTo(0.0, true);
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "disabled");
+  EXPECT_EQ(node.pulses(), pulses);
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST(ChipServices, SleepsAndWakes) {
+  NodeUnderTest node;
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(setBool(node, "x/sleep", true).success);
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.asleep.at(0) != 0; }));
+  EXPECT_TRUE(setBool(node, "x/sleep", false).success);
+  const auto answer = node.moveTo(0.01, true);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST(ChipServices, ResetTakesTheTrustInThePosition) {
+  NodeUnderTest node;
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(setPosition(node, 0.05).success);
+  EXPECT_TRUE(
+      states.waitForLatest([](const AxisStates& s) { return s.position_valid.at(0) != 0; }));
+  const auto answer = node.call<std_srvs::Trigger>("x/reset");
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return !s.position_valid.at(0); }));
+  EXPECT_TRUE(node.moveTo(0.06, true).success);
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST(ChipServices, ChangesMicrostepsAndKeepsThePosition) {
+  NodeUnderTest node;
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.01, true).success);  // 800 steps: 50 full steps
+  const auto answer = microstep(node, 4);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_EQ(answer.microsteps, 4);
+  EXPECT_TRUE(node.moveTo(0.02, true).success);
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward.at(0), 800 + 200);
+  EXPECT_EQ(report.microsteps.at(0), 4);
+  EXPECT_NEAR(report.carriage.at(0), 0.02, 1e-9);
+  EXPECT_EQ(report.violations.at(0), 0) << report.violation_kinds.at(0);
+}
+
+TEST(ChipServices, RefusesMicrostepsThatTheChipHasNot) {
+  NodeUnderTest node;
+  node.start();
+  for (const int unknown : {0, -1, 3, 32, 256, std::numeric_limits<int>::max()}) {
+    const auto answer = microstep(node, unknown);
+    EXPECT_FALSE(answer.success) << unknown;
+    EXPECT_FALSE(answer.message.empty());
+    EXPECT_EQ(answer.microsteps, 16);
+  }
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST(ChipServices, RefusesMicrostepsThatHaveNoPlaceHere) {
+  NodeUnderTest node;
+  node.start();
+  EXPECT_TRUE(node.moveTo(3.0 / 80000.0, true).success);
+  const auto answer = microstep(node, 1);
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "align_on_microstep_change");
+  EXPECT_EQ(answer.microsteps, 16);
+  EXPECT_EQ(node.pulses(), 3);
+}
+
+TEST(ChipServices, RefusesMicrostepsOfADipSwitchedModuleWithTheReason) {
+  NodeUnderTest node;
+  makeTb6600(node);
+  node.start();
+  const auto answer = microstep(node, 16);
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "switches");
+  EXPECT_EQ(answer.microsteps, 8);
+}
+
+TEST(ChipServices, RefusesWhatIsNotWired) {
+  NodeUnderTest node;
+  makeTb6600(node);
+  node.start();
+  EXPECT_FALSE(setBool(node, "x/enable", true).success);
+  EXPECT_FALSE(setBool(node, "x/sleep", true).success);
+  const auto answer = node.call<std_srvs::Trigger>("x/reset");
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "RESET");
+}
+
+TEST(ChipServices, DeclaresThePositionAndMovesFromThere) {
+  NodeUnderTest node;
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  const auto answer = setPosition(node, 0.1);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_NEAR(answer.position, 0.1, 1e-12);
+  EXPECT_TRUE(
+      states.waitForLatest([](const AxisStates& s) { return s.position_valid.at(0) != 0; }));
+  EXPECT_EQ(node.pulses(), 0);
+  EXPECT_TRUE(node.moveTo(0.101, true).success);
+  EXPECT_EQ(node.pulses(), 80);
+}
+
+TEST(ChipServices, RefusesPositionsThatCannotBe) {
+  NodeUnderTest node;
+  node.start();
+  for (const double bad : {kNaN, kInfinity, -kInfinity, -0.01, 0.3}) {
+    const auto answer = setPosition(node, bad);
+    EXPECT_FALSE(answer.success) << bad;
+    EXPECT_FALSE(answer.message.empty());
+    EXPECT_EQ(answer.position, 0.0);
+  }
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST(ChipServices, RefusesAllThatNeedsRestWhileMoving) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.1, false).success);
+  expectSays(setBool(node, "x/sleep", true).message, "busy");
+  expectSays(node.call<std_srvs::Trigger>("x/reset").message, "busy");
+  expectSays(microstep(node, 8).message, "busy");
+  expectSays(setPosition(node, 0.0).message, "busy");
+  EXPECT_TRUE(waitUntil([&] { return node.pulses() == 8000; }));
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

@@ -1,0 +1,144 @@
+#include <gtest/gtest.h>
+#include <ros/master.h>
+#include <ros/network.h>
+#include <ros/this_node.h>
+#include <stepdriver/AxisStates.h>
+#include <xmlrpcpp/XmlRpcClient.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <future>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/says.h"
+#include "support/vcd_reader.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+/// What `rosnode kill` does.
+void rosnodeKill(const std::string& node) {
+  XmlRpc::XmlRpcValue request;
+  request[0] = ros::this_node::getName();
+  request[1] = node;
+  XmlRpc::XmlRpcValue response;
+  XmlRpc::XmlRpcValue uri;
+  ASSERT_TRUE(ros::master::execute("lookupNode", request, response, uri, false));
+  std::string host;
+  std::uint32_t port = 0;
+  ASSERT_TRUE(ros::network::splitURI(static_cast<std::string&>(uri), host, port));
+  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+  request[1] = "asked by a test";
+  ASSERT_TRUE(client.execute("shutdown", request, response));
+}
+
+void end(NodeUnderTest& node, const std::string& how) {
+  if (how == "SIGINT") node.process().signal(SIGINT);
+  if (how == "SIGTERM") node.process().signal(SIGTERM);
+  if (how == "kill") rosnodeKill(node.name());
+}
+
+class Ending : public testing::TestWithParam<std::string> {};
+
+TEST_P(Ending, DuringAMoveDeceleratesDisablesAndAnswersTheWaitingClient) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  const std::string trace = node.traced();
+  node.start();
+  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(0.2, true); });
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 4000; }));
+
+  const auto begin = std::chrono::steady_clock::now();
+  end(node, GetParam());
+  const auto exit_code = node.process().waitForExit(kBound);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  ASSERT_TRUE(exit_code) << "it still runs";
+  EXPECT_EQ(*exit_code, 0) << node.process().output();
+  EXPECT_LT(took.count(), 2.0 + 0.1 / 0.5) << "2 s plus the stopping time";
+
+  const auto answer = waiting.get();
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "shut down");
+
+  auto pins = readVcd(trace);
+  std::remove(trace.c_str());
+  EXPECT_FALSE(pins["x/step"].last());
+  EXPECT_TRUE(pins["x/enable"].last()) << "ENABLE is active low: high is disabled";
+  const std::int64_t steps = pins["x/step"].changesTo(true);
+  EXPECT_EQ(steps, std::llround(answer.position * 80000.0));
+  EXPECT_GT(steps, 4000);
+  EXPECT_LT(steps, 16000);
+  // Decelerated: the last two steps of a ramp of 40,000 steps/s^2 are milliseconds apart.
+  const auto& edges = pins["x/step"].edges;
+  EXPECT_GT(edges[edges.size() - 2].time_ns - edges[edges.size() - 4].time_ns, 1'000'000);
+  EXPECT_GE(pins["x/enable"].lastEdgeTime(), pins["x/step"].lastEdgeTime());
+}
+
+TEST_P(Ending, AtRestIsQuickAndDisables) {
+  NodeUnderTest node;
+  const std::string trace = node.traced();
+  node.start();
+  const auto begin = std::chrono::steady_clock::now();
+  end(node, GetParam());
+  const auto exit_code = node.process().waitForExit(kBound);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  ASSERT_TRUE(exit_code) << "it still runs";
+  EXPECT_EQ(*exit_code, 0) << node.process().output();
+  EXPECT_LT(took.count(), 2.0);
+  auto pins = readVcd(trace);
+  std::remove(trace.c_str());
+  EXPECT_TRUE(pins["x/enable"].last());
+  EXPECT_EQ(pins["x/step"].changesTo(true), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(How, Ending, testing::Values("SIGINT", "SIGTERM", "kill"),
+                         [](const auto& value) { return value.param; });
+
+TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.set("axes/x/deceleration_mm_s2", 100.0);  // a second to stop
+  node.set("axes/y/driver", "tb6600");
+  node.set("axes/y/pins/step", "y_step");
+  node.set("axes/y/pins/dir", "y_dir");
+  node.set("axes/y/microsteps", 8);
+  node.set("axes/y/steps_per_mm", 80.0);
+  node.set("axes/y/max_speed_mm_s", 50.0);
+  node.set("axes/y/acceleration_mm_s2", 500.0);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(node.moveTo(0.2, false).success);
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 4000; }));
+  node.process().signal(SIGTERM);
+  // A stop shows in the target, which moves to where the axis comes to rest.
+  ASSERT_TRUE(states.waitFor(
+      [](const AxisStates& s) { return s.moving.at(0) != 0 && s.target.at(0) < 0.199; }));
+  MoveTo::Request request;
+  request.position = 0.01;
+  const auto answer = node.call<MoveTo>("y/move_to", request);
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "shut down");
+  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+}
+
+TEST(EndingEnabled, LeavesTheMotorOnWhereConfiguredSo) {
+  NodeUnderTest node;
+  node.set("axes/x/disable_on_shutdown", false);
+  const std::string trace = node.traced();
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.001, true).success);
+  end(node, "SIGTERM");
+  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+  auto pins = readVcd(trace);
+  std::remove(trace.c_str());
+  EXPECT_FALSE(pins["x/enable"].last()) << "ENABLE is active low: low is enabled";
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

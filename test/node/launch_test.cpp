@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+#include <ros/master.h>
+#include <ros/service.h>
+#include <sensor_msgs/JointState.h>
+#include <std_srvs/SetBool.h>
+#include <stepdriver/MoveTo.h>
+#include <stepdriver/RigReport.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/recorder.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+using sensor_msgs::JointState;
+
+template <typename Service>
+typename Service::Response call(const std::string& name,
+                                const typename Service::Request& request = {}) {
+  EXPECT_TRUE(ros::service::waitForService(name, ros::Duration(kBound.count())));
+  Service call;
+  call.request = request;
+  EXPECT_TRUE(ros::service::call(name, call)) << name << " doesn't answer";
+  return call.response;
+}
+
+/// Enables an axis, moves it, and looks whether its pins agree.
+void expectMoves(const std::string& node, const std::string& axis, double position,
+                 std::int64_t pulses, std::size_t index = 0) {
+  std_srvs::SetBool::Request on;
+  on.data = true;
+  const auto enabled = call<std_srvs::SetBool>(node + "/" + axis + "/enable", on);
+  EXPECT_TRUE(enabled.success) << enabled.message;
+  MoveTo::Request request;
+  request.position = position;
+  request.wait = true;
+  const auto answer = call<MoveTo>(node + "/" + axis + "/move_to", request);
+  EXPECT_TRUE(answer.success) << answer.message;
+  const auto report = call<RigReport>(node + "/rig/report");
+  EXPECT_EQ(report.name.at(index), axis);
+  EXPECT_EQ(report.pulses_forward.at(index), pulses);
+  EXPECT_NEAR(report.carriage.at(index), position, 1e-4);
+  EXPECT_EQ(report.violations.at(index), 0) << report.violation_kinds.at(index);
+}
+
+TEST(Launch, BringsUpEachExampleWithItsOwnScale) {
+  expectMoves("/left/stepdriver", "x", 0.01, 800);
+  expectMoves("/right/motor", "x", 0.5, std::llround(0.5 * 9600 / (2 * std::acos(-1.0))));
+  expectMoves("/screw/stepdriver", "x", 0.01, 8000);
+  expectMoves("/module/stepdriver", "x", 0.01, 3200);
+}
+
+TEST(Launch, KeepsNodesInNamespacesApart) {
+  const Recorder<JointState> left(std::string("/left/joint_states"));
+  const Recorder<JointState> both(std::string("/both/joint_states"));
+  ASSERT_TRUE(waitUntil([&] { return left.count() > 0 && both.count() > 0; }));
+  EXPECT_EQ(left.messages().back().name, std::vector<std::string>{"x_joint"});
+  EXPECT_EQ(both.messages().back().name, (std::vector<std::string>{"r_joint", "x_joint"}));
+
+  const auto before = call<RigReport>("/both/stepdriver/rig/report");
+  MoveTo::Request request;
+  request.position = 0.005;
+  request.relative = true;
+  request.wait = true;
+  std_srvs::SetBool::Request on;
+  on.data = true;
+  EXPECT_TRUE(call<std_srvs::SetBool>("/left/stepdriver/x/enable", on).success);
+  EXPECT_TRUE(call<MoveTo>("/left/stepdriver/x/move_to", request).success);
+  const auto after = call<RigReport>("/both/stepdriver/rig/report");
+  EXPECT_EQ(after.pulses_forward, before.pulses_forward);
+}
+
+TEST(Launch, BringsUpTwoAxesThatMoveAtTheSameTime) {
+  const std::string node = "/both/stepdriver";
+  std_srvs::SetBool::Request on;
+  on.data = true;
+  for (const char* axis : {"x", "r"}) {
+    EXPECT_TRUE(call<std_srvs::SetBool>(node + "/" + axis + "/enable", on).success);
+  }
+  MoveTo::Request request;
+  request.position = 0.05;
+  EXPECT_TRUE(call<MoveTo>(node + "/x/move_to", request).success);
+  request.position = 1.0;
+  EXPECT_TRUE(call<MoveTo>(node + "/r/move_to", request).success);
+  const Recorder<JointState> states(std::string("/both/joint_states"));
+  EXPECT_TRUE(states.waitForLatest([](const JointState& s) {
+    return std::abs(s.position.at(0) - 1.0) < 1e-3 && std::abs(s.position.at(1) - 0.05) < 1e-4;
+  }));
+}
+
+TEST(Launch, StartsARobotStatePublisher) {
+  EXPECT_TRUE(waitUntil([] {
+    ros::master::V_TopicInfo topics;
+    ros::master::getTopics(topics);
+    for (const auto& topic : topics) {
+      if (topic.name == "/tf") return true;
+    }
+    return false;
+  }));
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

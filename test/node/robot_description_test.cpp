@@ -1,0 +1,148 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "support/node_under_test.h"
+#include "support/says.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+/// A robot of one joint, x_joint.
+std::string robot(const std::string& type, const std::string& limit) {
+  return "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"x_joint\" type=\"" +
+         type + "\"><parent link=\"a\"/><child link=\"b\"/><axis xyz=\"1 0 0\"/>" + limit +
+         "</joint></robot>";
+}
+
+const char* const kTighter = R"(<limit lower="0.02" upper="0.05" velocity="0.05" effort="1"/>)";
+const char* const kLooser = R"(<limit lower="-9" upper="9" velocity="9" effort="1"/>)";
+
+/// An axis in degrees in place of the linear one.
+void makeRotary(NodeUnderTest& node) {
+  node.erase("axes/x");
+  node.set("axes/x/driver", "drv8825");
+  node.set("axes/x/joint", "x_joint");
+  node.set("axes/x/pins/step", "x_step");
+  node.set("axes/x/pins/dir", "x_dir");
+  node.set("axes/x/pins/enable", "x_enable");
+  node.set("axes/x/microsteps", 16);
+  node.set("axes/x/full_steps_per_round", 200);
+  node.set("axes/x/max_speed_deg_s", 180.0);
+  node.set("axes/x/acceleration_deg_s2", 360.0);
+  node.set("axes/x/enable_on_start", true);
+}
+
+TEST(RobotDescription, ThatIsAbsentIsSaidAndNoMistake) {
+  NodeUnderTest node;
+  node.start();
+  expectSays(node.process().output(), "no robot_description");
+}
+
+TEST(RobotDescription, TightensTheLimitsAndSaysWhereTheyCameFrom) {
+  NodeUnderTest node;
+  node.describe(robot("prismatic", kTighter));
+  node.start();
+  expectSays(node.process().output(), "min position 0.02 m (joint)");
+  expectSays(node.process().output(), "max position 0.05 m (joint)");
+  expectSays(node.process().output(), "speed 0.05 m/s (joint)");
+  EXPECT_FALSE(node.moveTo(0.06, true).success);
+  EXPECT_FALSE(node.moveTo(0.01, true).success);
+  EXPECT_FALSE(node.moveTo(0.05, true, 0.06).success);
+  EXPECT_EQ(node.pulses(), 0);
+  const auto answer = node.moveTo(0.05, true);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_GT(answer.duration, 1.0) << "0.05 m at 0.05 m/s";
+}
+
+TEST(RobotDescription, ThatIsLooserLeavesTheLimitsOfTheAxis) {
+  NodeUnderTest node;
+  node.describe(robot("prismatic", kLooser));
+  node.start();
+  expectSays(node.process().output(), "min position 0 m (axis)");
+  expectSays(node.process().output(), "max position 0.2 m (axis)");
+  expectSays(node.process().output(), "speed 0.1 m/s (axis)");
+  EXPECT_FALSE(node.moveTo(0.3, true).success);
+}
+
+TEST(RobotDescription, LimitsARevoluteJoint) {
+  NodeUnderTest node;
+  makeRotary(node);
+  node.describe(robot("revolute", R"(<limit lower="-1" upper="1" velocity="2" effort="1"/>)"));
+  node.start();
+  expectSays(node.process().output(), "min position -1 rad (joint)");
+  expectSays(node.process().output(), "speed 2 rad/s (joint)");
+  EXPECT_FALSE(node.moveTo(1.1, true).success);
+  EXPECT_TRUE(node.moveTo(1.0, true).success);
+}
+
+TEST(RobotDescription, LeavesAContinuousJointWithoutPositionLimits) {
+  NodeUnderTest node;
+  makeRotary(node);
+  node.describe(robot("continuous", ""));
+  node.start();
+  expectSays(node.process().output(), "max position without limit");
+  EXPECT_TRUE(node.moveTo(10.0, true).success);
+}
+
+struct BadDescription {
+  std::string name;
+  bool rotary;
+  std::string urdf;
+  std::string words;
+};
+
+class BadRobotDescription : public testing::TestWithParam<BadDescription> {};
+
+TEST_P(BadRobotDescription, IsAReasonNotToStart) {
+  NodeUnderTest node;
+  if (GetParam().rotary) makeRotary(node);
+  node.describe(GetParam().urdf);
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 1) << node.process().output();
+  expectSays(node.process().output(), node.beside("robot_description") + " ");
+  expectSays(node.process().output(), GetParam().words);
+}
+
+const std::vector<BadDescription> kBadDescriptions = {
+    {"Empty", false, "", "can't be read as a URDF"},
+    {"NoXml", false, "robot", "can't be read as a URDF"},
+    {"Unfinished", false, "<robot name=\"r\"><link", "can't be read as a URDF"},
+    {"PrismaticWithoutLimit", false, robot("prismatic", ""), "joint without <limit"},
+    {"RevoluteWithoutLimit", true, robot("revolute", ""), "joint without <limit"},
+    {"WithoutTheJoint", false, "<robot name=\"r\"><link name=\"a\"/></robot>",
+     "no joint \"x_joint\""},
+    {"Fixed", false, robot("fixed", ""), "is fixed, but must be prismatic"},
+    {"Floating", true, robot("floating", ""), "is floating, but must be revolute or continuous"},
+    {"RevoluteInMm", false, robot("revolute", kLooser), "is revolute, but must be prismatic"},
+    {"ContinuousInMm", false, robot("continuous", ""), "is continuous, but must be prismatic"},
+    {"PrismaticInDegrees", true, robot("prismatic", kLooser),
+     "is prismatic, but must be revolute or continuous"},
+    {"LowerAboveUpper", false,
+     robot("prismatic", R"(<limit lower="0.1" upper="0.05" velocity="1" effort="1"/>)"),
+     "lower=0.1 and upper=0.05"},
+    {"NoBounds", false, robot("prismatic", R"(<limit velocity="1" effort="1"/>)"),
+     "where one is missing it is 0"},
+    {"NoVelocity", false,
+     robot("prismatic", R"(<limit lower="0" upper="0.1" velocity="0" effort="1"/>)"),
+     "velocity limit 0"},
+    {"ElsewhereThanTheAxis", false,
+     robot("prismatic", R"(<limit lower="1" upper="2" velocity="1" effort="1"/>)"),
+     "leaves nothing of the axis's own range"},
+};
+
+INSTANTIATE_TEST_SUITE_P(That, BadRobotDescription, testing::ValuesIn(kBadDescriptions),
+                         [](const auto& value) { return "is" + value.param.name; });
+
+TEST(RobotDescription, OfAWrongTypeIsAReasonNotToStart) {
+  NodeUnderTest node;
+  ros::param::set(node.beside("robot_description"), 5);
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 1) << node.process().output();
+  expectSays(node.process().output(), "must be the XML of a URDF");
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

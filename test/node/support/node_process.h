@@ -1,0 +1,41 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace stepdriver::node_test {
+
+/// A running stepdriver_node, and all that it prints. Killed at the end where it still runs.
+class NodeProcess {
+ public:
+  explicit NodeProcess(const std::vector<std::string>& arguments);
+  ~NodeProcess();
+  NodeProcess(const NodeProcess&) = delete;
+  NodeProcess& operator=(const NodeProcess&) = delete;
+
+  void signal(int number) const;
+
+  /// @return the exit code, 128 + the signal's number where a signal ended it; none where it still
+  ///   runs after this time.
+  std::optional<int> waitForExit(std::chrono::duration<double> bound);
+
+  /// Both of its streams; complete after waitForExit().
+  std::string output();
+
+ private:
+  void readOutput(int stream);
+
+  pid_t pid_ = -1;
+  std::optional<int> exit_code_;
+  std::mutex mutex_;
+  std::string output_;
+  std::thread reader_;
+};
+
+}  // namespace stepdriver::node_test

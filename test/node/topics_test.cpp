@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+#include <sensor_msgs/JointState.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/Endstops.h>
+#include <stepdriver/Microstep.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <string>
+#include <vector>
+
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+using sensor_msgs::JointState;
+
+TEST(JointStates, KeepTheirRateWhileClientsWait) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const Recorder<JointState> joint_states(node.beside("joint_states"));
+  ASSERT_TRUE(waitUntil([&] { return joint_states.count() > 0; }));
+  const std::size_t before = joint_states.count();
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(node.moveTo(0.2, true).success);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  const auto count = static_cast<double>(joint_states.count() - before);
+  EXPECT_GT(took.count(), 2.0) << "0.2 m at 0.1 m/s";
+  EXPECT_GT(count, 0.6 * 50.0 * took.count());
+  EXPECT_LT(count, 1.2 * 50.0 * took.count());
+}
+
+TEST(JointStates, ComeAtTheConfiguredRate) {
+  NodeUnderTest node;
+  node.set("joint_state_rate", 200);
+  node.start();
+  const Recorder<JointState> joint_states(node.beside("joint_states"));
+  ASSERT_TRUE(waitUntil([&] { return joint_states.count() >= 200; }));
+  const auto messages = joint_states.messages();
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < messages.size(); ++i) {
+    gaps.push_back((messages[i].header.stamp - messages[i - 1].header.stamp).toSec());
+  }
+  std::nth_element(gaps.begin(), gaps.begin() + gaps.size() / 2, gaps.end());
+  EXPECT_NEAR(gaps[gaps.size() / 2], 0.005, 0.0015);
+}
+
+TEST(JointStates, ShowJointPositionAndActualVelocity) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const Recorder<JointState> joint_states(node.beside("joint_states"));
+  EXPECT_TRUE(node.moveTo(0.1, true).success);
+  EXPECT_TRUE(joint_states.waitForLatest([](const JointState& state) {
+    return std::abs(state.position.at(0) - 0.1) < 1e-9 && state.velocity.at(0) == 0.0;
+  }));
+  double fastest = 0.0;
+  double last = 0.0;
+  for (const JointState& state : joint_states.messages()) {
+    ASSERT_EQ(state.name, std::vector<std::string>{"x_joint"});
+    EXPECT_GE(state.position.at(0), last) << "it went back";
+    last = state.position.at(0);
+    fastest = std::max(fastest, state.velocity.at(0));
+  }
+  EXPECT_NEAR(fastest, 0.1, 0.002);
+}
+
+TEST(LatchedTopics, ReachALateSubscriber) {
+  NodeUnderTest node;
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.01, true).success);
+  const Recorder<Endstops> endstops(node.full("endstops"));
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  ASSERT_TRUE(endstops.waitFor([](const Endstops&) { return true; }));
+  const Endstops first = endstops.messages().front();
+  EXPECT_EQ(first.name, std::vector<std::string>{"x"});
+  EXPECT_EQ(first.min.at(0), 0);
+  EXPECT_EQ(first.max.at(0), 0);
+  EXPECT_FALSE(first.header.stamp.isZero());
+  ASSERT_TRUE(states.waitForLatest([](const AxisStates& state) {
+    return state.name.at(0) == "x" && state.enabled.at(0) != 0 && state.moving.at(0) == 0 &&
+           state.homed.at(0) == 0 && state.microsteps.at(0) == 16 &&
+           std::abs(state.position.at(0) - 0.01) < 1e-9 && state.fault.at(0).empty();
+  }));
+}
+
+TEST(LatchedTopics, ReadFalseWhereThereIsNoSwitch) {
+  NodeUnderTest node;
+  node.erase("axes/x/endstops");
+  node.start();
+  const Recorder<Endstops> endstops(node.full("endstops"));
+  ASSERT_TRUE(endstops.waitFor([](const Endstops& e) { return e.name.size() == 1; }));
+  EXPECT_EQ(endstops.messages().front().min.at(0), 0);
+  EXPECT_EQ(endstops.messages().front().max.at(0), 0);
+}
+
+TEST(AxisStatesTopic, ShowsAMoveUnderWay) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(node.moveTo(0.1, true).success);
+  EXPECT_TRUE(states.waitFor([](const AxisStates& s) {
+    return s.moving.at(0) != 0 && std::abs(s.target.at(0) - 0.1) < 1e-9 && s.velocity.at(0) > 0.0;
+  }));
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) {
+    return s.moving.at(0) == 0 && std::abs(s.position.at(0) - 0.1) < 1e-9 &&
+           std::abs(s.target.at(0) - 0.1) < 1e-9;
+  }));
+}
+
+TEST(WaitingClients, HoldUpNoOtherCall) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(0.2, true); });
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 100; }));
+  // Each of these has its answer long before the move ends, at 2.2 s.
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_FALSE(node.moveTo(0.1, true).success);
+    Microstep::Request request;
+    request.microsteps = 8;
+    EXPECT_FALSE(node.call<Microstep>("x/microstep", request).success);
+    EXPECT_TRUE(node.call<std_srvs::Trigger>("recover").success);
+  }
+  EXPECT_NE(waiting.wait_for(std::chrono::seconds(0)), std::future_status::ready)
+      << "the calls took as long as the move";
+  EXPECT_TRUE(waiting.get().success);
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
