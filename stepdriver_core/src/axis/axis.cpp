@@ -191,6 +191,7 @@ void Axis::recover() {
   axis.harvest();
   if (axis.fault.empty()) return;
   axis.restorePins();
+  axis.resetFaultyChip();
   axis.fault.clear();
 }
 

@@ -6,6 +6,12 @@
 #include <utility>
 
 namespace stepdriver::axis {
+namespace {
+
+constexpr const char* kChipFault =
+    "the driver chip reports over-current or over-temperature on nFAULT";
+
+}  // namespace
 
 Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& own_lines,
                  gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver)
@@ -28,6 +34,13 @@ pulse::ChannelState Axis::Impl::harvest() {
     fault = "a GPIO line failed: " + std::string(std::strerror(state.error));
     position_valid = false;
     pins_doubtful_ = true;
+  }
+  if (state.chip_faults != chip_faults_seen_) {
+    chip_faults_seen_ = state.chip_faults;
+    if (!asleep) {
+      fault = kChipFault;
+      position_valid = false;
+    }
   }
   if (state.ended != ended_seen_) {
     ended_seen_ = state.ended;
@@ -78,6 +91,7 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
       result.end = MoveEnd::kEmergencyStop;
       why = "emergency stop";
       break;
+    case pulse::EndReason::kChipFault:
     case pulse::EndReason::kTooLate:
     case pulse::EndReason::kLineError:
       result.end = MoveEnd::kFault;

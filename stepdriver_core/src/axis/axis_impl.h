@@ -44,6 +44,7 @@ class Axis::Impl {
   void restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
   void writePins(const pulse::PinSequence& sequence, std::optional<std::int64_t> count = {});
   void restorePins();
+  void resetFaultyChip();
 
   // Microstep modes.
   void refuseMicrosteps(int wanted);
@@ -91,6 +92,7 @@ class Axis::Impl {
   std::uint64_t moves_ = 0;
   std::uint64_t ended_seen_ = 0;
   std::uint64_t line_errors_seen_ = 0;
+  std::uint64_t chip_faults_seen_ = 0;
   bool pins_doubtful_ = false;  // a write failed: they may be as wanted or not
   int mode_failed_ = 0;         // the mode whose pins could not all be written; 0: none
 };

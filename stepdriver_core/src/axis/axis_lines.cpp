@@ -10,9 +10,9 @@ AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest
     outputs.push_back({pin.line, chip_level != pin.inverted, keep});
     return static_cast<int>(outputs.size()) - 1;
   };
-  const auto input = [&inputs](const std::optional<Endstop>& endstop) {
-    if (!endstop) return -1;
-    inputs.push_back({endstop->line});
+  const auto input = [&inputs](const auto& pin) {
+    if (!pin) return -1;
+    inputs.push_back({pin->line, pin->bias, true});
     return static_cast<int>(inputs.size()) - 1;
   };
 
@@ -31,6 +31,7 @@ AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest
   lines.step = output(pins.step, !chip.step_active, false);
   lines.endstop_min = input(config.endstop_min);
   lines.endstop_max = input(config.endstop_max);
+  lines.fault = input(config.fault);
   return lines;
 }
 
@@ -45,6 +46,7 @@ pulse::ChannelConfig channelConfig(const AxisConfig& config, const AxisLines& li
   if (config.endstop_max) {
     channel.endstop_max = pulse::Signal{lines.endstop_max, config.endstop_max->active_level};
   }
+  if (config.fault) channel.fault = pulse::Signal{lines.fault, false};
   channel.step_high = config.timing.step_high_ns;
   channel.step_low = config.timing.step_low_ns;
   channel.dir_setup = config.timing.dir_setup_ns;

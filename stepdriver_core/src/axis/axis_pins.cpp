@@ -35,4 +35,28 @@ void Axis::Impl::restorePins() {
   pins_doubtful_ = false;
 }
 
+void Axis::Impl::resetFaultyChip() {
+  if (!config.fault || asleep) return;
+  const auto faulty = [this] {
+    const int level = lines.read(axis_lines.fault);
+    if (level < 0) {
+      throw GpioError(config.name + ": the fault line " + config.fault->line +
+                      " can't be read: " + std::strerror(-level));
+    }
+    return level == 0;
+  };
+  if (!faulty()) return;
+  if (pins.hasReset()) {
+    writePins(pins.reset());
+    position_valid = false;
+    home_count = harvest().count;
+    driver.waitFor(
+        [this] { return driver.clock().now() >= driver.engine().channel(channel).ready; });
+  }
+  if (faulty()) {
+    refuse(std::string("the driver chip still reports a fault on nFAULT") +
+           (pins.hasReset() ? "" : "; RESET isn't wired, so only its power ends that"));
+  }
+}
+
 }  // namespace stepdriver::axis

@@ -99,7 +99,7 @@ class AxesReader {
     config.microsteps = context.microsteps.value_or(1);
     config.timing = context.timing.value_or(chip::Timing{});
     config.joint = readJoint(name, axis);
-    config.pins = readPins(axis, chip, used_);
+    readPins(axis, chip, config, used_);
     readEndstops(axis, config, used_);
     readMotion(axis, context, config);
     config.enable_on_start = axis.boolean("enable_on_start", config.enable_on_start);

@@ -51,6 +51,14 @@ std::optional<std::string> readLine(ConfigReader& reader, const std::string& key
   return line;
 }
 
+gpio::Bias readBias(ConfigReader& reader, const std::string& key) {
+  static const std::map<std::string, gpio::Bias> biases = {{"as_is", gpio::Bias::kAsIs},
+                                                           {"pull_up", gpio::Bias::kPullUp},
+                                                           {"pull_down", gpio::Bias::kPullDown},
+                                                           {"disabled", gpio::Bias::kDisabled}};
+  return biases.at(reader.oneOf(key, {"as_is", "pull_up", "pull_down", "disabled"}, "as_is"));
+}
+
 /// Why the chip has no such pin; empty where it has.
 std::string whyMissing(const chip::Chip& chip, const PinName& name) {
   if (isMicrostepPin(name) && chip.modes.empty()) {
@@ -68,13 +76,15 @@ class PinsReader {
   PinsReader(ConfigReader& axis, const chip::Chip* chip, UsedLines& used)
       : axis_(axis), chip_(chip), used_(used), reader_(axis.map("pins")) {}
 
-  Pins read() {
+  void read(AxisConfig& config) {
     for (const PinName& name : kPinNames) readPin(name);
+    readFaultPin();
     reader_.rejectUnknown();
     checkMicrostepPins();
     const bool common_anode = readCommonAnode();
     readInversions(common_anode);
-    return pins_;
+    config.pins = pins_;
+    config.fault = fault_;
   }
 
  private:
@@ -106,6 +116,26 @@ class PinsReader {
     const auto presence = isRequired(name) ? Presence::kRequired : Presence::kOptional;
     const auto line = readLine(reader_, alias ? name.drv8825_key : name.key, presence, used_);
     (pins_.*name.pin).line = line.value_or("");
+  }
+
+  void readFaultPin() {
+    reader_.allow("fault");
+    const gpio::Bias bias = readBias(axis_, "fault_bias");
+    if (!reader_.has("fault")) {
+      if (axis_.has("fault_bias")) {
+        axis_.issue("fault_bias",
+                    "is " + axis_.shown("fault_bias") + ", but pins/fault is missing");
+      }
+      return;
+    }
+    if (chip_ != nullptr && !chip_->has_fault) {
+      reader_.issue("fault", "is " + reader_.shown("fault") + ", but the " + chip_->title +
+                                 " has no fault pin");
+      return;
+    }
+    if (const auto line = readLine(reader_, "fault", Presence::kOptional, used_)) {
+      fault_ = FaultPin{*line, bias};
+    }
   }
 
   void refuse(const PinName& name, const std::string& why) {
@@ -190,6 +220,7 @@ class PinsReader {
   UsedLines& used_;
   ConfigReader reader_;
   Pins pins_;
+  std::optional<FaultPin> fault_;
 };
 
 std::optional<Endstop> readEndstop(ConfigReader& endstops, const std::string& key,
@@ -199,6 +230,7 @@ std::optional<Endstop> readEndstop(ConfigReader& endstops, const std::string& ke
   Endstop endstop;
   endstop.line = readLine(reader, "pin", Presence::kRequired, used).value_or("");
   endstop.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
+  endstop.bias = readBias(reader, "bias");
   reader.rejectUnknown();
   return endstop;
 }
@@ -212,8 +244,8 @@ void UsedLines::add(const std::string& key, const std::string& line) {
                               " already, and each pin needs a line of its own"});
 }
 
-Pins readPins(ConfigReader& axis, const chip::Chip* chip, UsedLines& used) {
-  return PinsReader(axis, chip, used).read();
+void readPins(ConfigReader& axis, const chip::Chip* chip, AxisConfig& config, UsedLines& used) {
+  PinsReader(axis, chip, used).read(config);
 }
 
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used) {

@@ -21,10 +21,10 @@ class UsedLines {
   std::map<std::string, std::string> users_;  ///< line -> key
 };
 
-/// Reads `pins`, `invert` and `common_anode`.
+/// Reads `pins`, `fault_bias`, `invert` and `common_anode`.
 ///
 /// @param chip nullptr where it isn't known; then what depends on it is let pass.
-Pins readPins(ConfigReader& axis, const chip::Chip* chip, UsedLines& used);
+void readPins(ConfigReader& axis, const chip::Chip* chip, AxisConfig& config, UsedLines& used);
 
 /// Reads `endstops`.
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used);

@@ -38,6 +38,7 @@ Chip a4988() {
   chip.microsteps = {1, 2, 4, 8, 16};
   chip.has_sleep = true;
   chip.has_reset = true;
+  chip.has_fault = false;
   chip.counts_while_disabled = true;
   chip.step_active = kHigh;
   chip.enable_on = kLow;
@@ -67,6 +68,7 @@ Chip drv8825() {
   chip.microsteps = {1, 2, 4, 8, 16, 32};
   chip.has_sleep = true;
   chip.has_reset = true;
+  chip.has_fault = true;
   chip.counts_while_disabled = false;
   chip.step_active = kHigh;
   chip.enable_on = kLow;
@@ -90,6 +92,7 @@ Chip tb6600() {
   chip.microsteps = {1, 2, 4, 8, 16, 32};
   chip.has_sleep = false;
   chip.has_reset = false;
+  chip.has_fault = false;
   chip.counts_while_disabled = false;
   chip.step_active = kHigh;
   chip.enable_on = kLow;  // ENA lights an LED, and the lit LED frees the motor

@@ -1,8 +1,11 @@
 #include "stepdriver_core/machine/machine.h"
 
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <functional>
+#include <thread>
 #include <utility>
 
 #include "stepdriver_core/axis/axis_lines.h"
@@ -12,6 +15,8 @@
 
 namespace stepdriver::machine {
 namespace {
+
+constexpr std::int64_t kInputPeriodNs = 100'000'000;
 
 pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 
@@ -38,6 +43,7 @@ class Machine::Impl {
                                                    *lines_, *driver_));
     }
     for (const auto& axis : axes_) axis->bringUp();
+    if (options.threaded && !inputs.empty()) watcher_ = std::thread([this] { watchInputs(); });
   }
 
   ~Impl() {
@@ -45,6 +51,7 @@ class Machine::Impl {
       shutdown();
     } catch (const Error&) {  // NOLINT(bugprone-empty-catch): told to whoever calls shutdown()
     }
+    stopWatching();
     driver_->stop();
   }
 
@@ -52,6 +59,25 @@ class Machine::Impl {
     if (shut_.exchange(true)) return;
     for (const auto& axis : axes_) axis->close("the machine was shut down");
     forAll([](axis::Axis& axis) { axis.shutDown(); });
+  }
+
+  // An edge is only a wake-up: the engine reads the levels. One that was lost, or a chip that was
+  // waking when it came, is made good by asking again after a while.
+  void watchInputs() {
+    std::array<gpio::EdgeEvent, 16> events{};
+    while (!watching_ended_) {
+      const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
+      // Where waiting fails, a chip was unplugged, say, reading will fail too, and say so.
+      if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
+      engine_->inputsChanged();
+    }
+  }
+
+  void stopWatching() {
+    if (!watcher_.joinable()) return;
+    watching_ended_ = true;
+    lines_->interrupt();
+    watcher_.join();
   }
 
   // Does it for each axis, whatever happens to the others, and then tells all that went wrong.
@@ -73,6 +99,8 @@ class Machine::Impl {
   std::unique_ptr<pulse::PulseDriver> driver_;
   std::vector<std::unique_ptr<axis::Axis>> axes_;
   std::atomic<bool> shut_{false};
+  std::atomic<bool> watching_ended_{false};
+  std::thread watcher_;
 };
 
 Machine::Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,

@@ -18,6 +18,11 @@ bool PulseEngine::post(const Command& command) {
   return true;
 }
 
+void PulseEngine::inputsChanged() {
+  inputs_changed_.store(true, std::memory_order_release);
+  clock_.wake();
+}
+
 void PulseEngine::emergencyStop() {
   emergency_.store(true, std::memory_order_release);
   clock_.wake();
@@ -34,6 +39,7 @@ Nanoseconds PulseEngine::serve() {
   for (;;) {
     const Nanoseconds now = clock_.now();
     if (emergencyStopped()) stopAll(now);
+    if (inputs_changed_.exchange(false, std::memory_order_acquire)) readInputs(now);
     meetLateness(now);
     writeSteps(now);
     scheduleAll();
@@ -111,6 +117,7 @@ void PulseEngine::startPins(Channel& channel, const Command& command, Nanosecond
   channel.pin = 0;
   channel.pins_serial = command.serial;
   channel.pins_count = command.count;
+  channel.faulty = false;  // to be read anew when the pins have done what they do
   channel.pin_due = now;
   if (channel.state.pulses != 0) {
     channel.pin_due = std::max(now, channel.rose + channel.config.mode_hold);
@@ -132,6 +139,26 @@ void PulseEngine::stopAll(Nanoseconds now) {
   for (Channel& channel : channels_) {
     if (channel.profile != nullptr) end(channel, EndReason::kEmergencyStop, now);
   }
+}
+
+void PulseEngine::readInputs(Nanoseconds now) {
+  for (Channel& channel : channels_) {
+    if (channel.config.fault) readFault(channel, now);
+    if (channel.next) mayStep(channel, now);
+  }
+}
+
+void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
+  // While its pins change, and while it wakes, a chip's fault line means nothing.
+  if (channel.pins_serial != 0 || now < channel.state.ready) return;
+  const int level = lines_.read(channel.config.fault->line);
+  const bool faulty = level < 0 || (level != 0) == channel.config.fault->active;
+  if (faulty && !channel.faulty) {
+    if (level >= 0) ++channel.state.chip_faults;
+    end(channel, level < 0 ? EndReason::kLineError : EndReason::kChipFault, now,
+        level < 0 ? -level : 0);
+  }
+  channel.faulty = faulty;
 }
 
 void PulseEngine::meetLateness(Nanoseconds now) {

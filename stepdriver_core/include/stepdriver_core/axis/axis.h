@@ -94,7 +94,11 @@ class Axis {
   /// @throw GpioError
   void bringUp();
 
-  /// Ends a latched fault; the axis stands as it is. @throw GpioError where a line still fails.
+  /// Ends a latched fault; the axis stands as it is. A chip with a fault line is reset for that,
+  /// where RESET is wired.
+  ///
+  /// @throw GpioError where a line still fails. @throw Refused where the chip still reports a
+  /// fault.
   void recover();
 
   /// Latches the fault of an emergency stop that the engine has been told of.

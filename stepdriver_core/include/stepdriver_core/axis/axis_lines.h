@@ -19,6 +19,7 @@ struct AxisLines {
   int reset = -1;
   int endstop_min = -1;
   int endstop_max = -1;
+  int fault = -1;
 };
 
 /// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and

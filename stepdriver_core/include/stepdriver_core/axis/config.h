@@ -4,6 +4,7 @@
 #include <string>
 
 #include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/gpio/lines.h"
 
 namespace stepdriver::axis {
 
@@ -27,6 +28,13 @@ struct Pins {
 struct Endstop {
   std::string line;
   bool active_level = false;  ///< level of the line while the switch is pressed
+  gpio::Bias bias = gpio::Bias::kAsIs;
+};
+
+/// The chip's nFAULT: an open drain that is pulled low at over-current or over-temperature.
+struct FaultPin {
+  std::string line;
+  gpio::Bias bias = gpio::Bias::kAsIs;
 };
 
 /// All that an axis needs to know, checked by readAxes(). A unit is m on a linear axis, rad on a
@@ -52,6 +60,7 @@ struct AxisConfig {
 
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
+  std::optional<FaultPin> fault;
 
   bool enable_on_start = false;
   bool disable_on_shutdown = true;

@@ -47,6 +47,7 @@ struct Chip {
   std::vector<int> microsteps;  ///< what it can be set to, by pins or by switches
   bool has_sleep;
   bool has_reset;
+  bool has_fault;              ///< nFAULT: open drain, low at a fault, latched until RESET
   bool counts_while_disabled;  ///< STEP moves the translator although the outputs are off
   bool step_active;            ///< level of STEP after its active edge
   bool enable_on;              ///< level of ENABLE that energizes the motor

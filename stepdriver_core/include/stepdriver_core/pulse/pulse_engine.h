@@ -28,6 +28,7 @@ struct ChannelConfig {
   Signal dir;  ///< active: forward, the count rises
   std::optional<Signal> endstop_min;
   std::optional<Signal> endstop_max;
+  std::optional<Signal> fault;  ///< an input of the chip's, active: it has switched its outputs off
   Nanoseconds step_high = 0;
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;
@@ -76,6 +77,7 @@ enum class EndReason {
   kEndstopMin,
   kEndstopMax,
   kEmergencyStop,
+  kChipFault,  ///< the chip's fault line became active
   kTooLate,    ///< a pulse came too late to go on at this speed
   kLineError,  ///< a line could not be written or read
 };
@@ -95,9 +97,9 @@ struct ChannelState {
   Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
   std::uint64_t pins_done = 0;    ///< serial of the last kPins that was carried out
   std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `error`
-  std::uint64_t line_errors =
-      0;                  ///< lines that could not be written or read, the last with `error`
-  Nanoseconds ready = 0;  ///< clock time before which no step goes out
+  std::uint64_t chip_faults = 0;  ///< times that the fault line became active
+  std::uint64_t line_errors = 0;  ///< failed writes and reads, the last with `error`
+  Nanoseconds ready = 0;          ///< clock time before which no step goes out
 };
 
 struct EngineState {
@@ -134,6 +136,10 @@ class PulseEngine {
   /// @return false where the mailbox is full.
   bool post(const Command& command);
 
+  /// Some input may have changed: the engine reads what matters and acts on it. It may be told too
+  /// often; what it isn't told of it sees before the next step, where that depends on it.
+  void inputsChanged();
+
   void emergencyStop();
   void clearEmergencyStop();
   bool emergencyStopped() const { return emergency_.load(std::memory_order_acquire); }
@@ -166,6 +172,7 @@ class PulseEngine {
     Nanoseconds rose = 0;
     Nanoseconds fell = 0;
     Nanoseconds turned = 0;
+    bool faulty = false;   // as the fault line read last
     bool running = false;  // the motion under way has made a step
     bool high = false;     // the pulse is out
     int direction = -1;    // as the DIR line has it
@@ -186,6 +193,8 @@ class PulseEngine {
   void adopt(Channel& channel, const motion::Profile& profile, std::uint64_t serial);
 
   void stopAll(Nanoseconds now);
+  void readInputs(Nanoseconds now);
+  void readFault(Channel& channel, Nanoseconds now);
   void meetLateness(Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
   void writeSteps(Nanoseconds now);
@@ -207,6 +216,7 @@ class PulseEngine {
   std::vector<Channel*> writers_;
   Mailbox<Command, 64> mail_;
   std::atomic<bool> emergency_{false};
+  std::atomic<bool> inputs_changed_{false};
   EngineState state_;
   Snapshot<EngineState> figures_;
 };
