@@ -95,9 +95,8 @@ struct ChannelState {
   Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
   std::uint64_t pins_done = 0;    ///< serial of the last kPins that was carried out
   std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `error`
-  std::uint64_t line_errors =
-      0;                  ///< lines that could not be written or read, the last with `error`
-  Nanoseconds ready = 0;  ///< clock time before which no step goes out
+  std::uint64_t line_errors = 0;  ///< failed writes and reads, the last with `error`
+  Nanoseconds ready = 0;          ///< clock time before which no step goes out
 };
 
 struct EngineState {
