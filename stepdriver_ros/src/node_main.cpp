@@ -58,22 +58,25 @@ bool waitForMaster(EndRequests& end_requests) {
 }
 
 /// Refuses new commands, decelerates, disables, and lets every client have its answer.
-void shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publisher) {
+///
+/// @return the exit code.
+int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publisher) {
+  int exit_code = kExitOk;
   try {
     machine.shutdown();
   } catch (const Error& error) {
-    ROS_ERROR("%s", error.what());
+    ROS_ERROR("Not all could be disabled: %s", error.what());
+    exit_code = kExitGpio;
   }
   queues.finish(kLastAnswers);
   publisher.stop();
+  return exit_code;
 }
 
 /// The node's life, once there is a master.
-void run(EndRequests& end_requests) {
-  ros::NodeHandle node;
-  ros::NodeHandle private_node("~");
-  end_requests.takeOverShutdownCall();
-
+///
+/// @return the exit code.
+int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_requests) {
   const NodeConfig config = readParameters(node, private_node);
   const auto simulation = makeSimulation(config, private_node.getNamespace());
   machine::MachineOptions options;
@@ -99,13 +102,17 @@ void run(EndRequests& end_requests) {
   std::string who;
   while (who.empty()) who = end_requests.waitFor(kPoll);
   ROS_INFO("Ending on %s", who.c_str());
-  shutDown(machine, queues, publisher);
+  return shutDown(machine, queues, publisher);
 }
 
 int runOrExplain(EndRequests& end_requests) {
+  // With the last of its handles roscpp shuts down, and takes the console with it: these live on
+  // until everything has been said.
+  const ros::NodeHandle node;
+  const ros::NodeHandle private_node("~");
+  end_requests.takeOverShutdownCall();
   try {
-    run(end_requests);
-    return kExitOk;
+    return run(node, private_node, end_requests);
   } catch (const ConfigError& error) {
     const std::size_t count = error.issues().size();
     ROS_FATAL("Not started, no line was touched: %zu %s wrong in the parameters", count,
@@ -129,6 +136,8 @@ int runOrExplain(EndRequests& end_requests) {
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
   node::EndRequests end_requests;
+  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
   std::vector<std::string> arguments;
   ros::removeROSArgs(argc, argv, arguments);
   if (arguments.size() > 1) {

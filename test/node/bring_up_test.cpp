@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <ostream>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -24,6 +25,10 @@ struct BadBringUp {
   std::string parameter;  ///< below the node's name
   std::vector<std::string> words;
 };
+
+void PrintTo(const BadBringUp& bad, std::ostream* out) {  // NOLINT: GoogleTest's name for it
+  *out << bad.name;
+}
 
 template <typename Value>
 std::function<void(NodeUnderTest&)> setting(const std::string& key, const Value& value) {
@@ -142,7 +147,12 @@ const std::vector<BadBringUp> kBadBringUps = {
      "axes",
      {"\"x\"", "map"}},
     {"AxisNameThatRosDoesNotTake",
-     setting("axes/x-axis/driver", "a4988"),
+     [](NodeUnderTest& node) {
+       // The way of a YAML file, which may name anything.
+       XmlRpc::XmlRpcValue axes;
+       axes["x-axis"]["driver"] = "a4988";
+       node.set("axes", axes);
+     },
      "axes/x-axis",
      {"letter"}},
     {"TraceThatCannotBeWritten",

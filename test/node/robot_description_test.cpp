@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -93,6 +94,10 @@ struct BadDescription {
   std::string urdf;
   std::string words;
 };
+
+void PrintTo(const BadDescription& bad, std::ostream* out) {  // NOLINT: GoogleTest's name for it
+  *out << bad.name;
+}
 
 class BadRobotDescription : public testing::TestWithParam<BadDescription> {};
 

@@ -55,8 +55,8 @@ NodeUnderTest::~NodeUnderTest() {
 void NodeUnderTest::erase(const std::string& key) { ros::param::del(full(key)); }
 
 std::string NodeUnderTest::traced() {
-  const auto folder = std::filesystem::temp_directory_path();
-  const std::string file = folder / (testName() + "_" + std::to_string(getpid()) + ".vcd");
+  std::string file = std::filesystem::temp_directory_path() /
+                     (testName() + "_" + std::to_string(getpid()) + ".vcd");
   std::filesystem::remove(file);
   set("simulation/trace", file);
   return file;

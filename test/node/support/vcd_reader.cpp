@@ -29,7 +29,7 @@ std::map<std::string, Waveform> readVcd(const std::string& path) {
       std::string id;
       std::string variable;
       words >> type >> width >> id >> variable;
-      names[id] = scope + "/" + variable;
+      names[id] = std::string(scope).append("/").append(variable);
     } else if (!first.empty() && first[0] == '#') {
       time = std::stoll(first.substr(1));
     } else if (!first.empty() && (first[0] == '0' || first[0] == '1')) {
