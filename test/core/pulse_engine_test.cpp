@@ -43,6 +43,12 @@ class RecordingLines : public gpio::Lines {
 
   int read(int input) noexcept override { return inputs[input]; }
 
+  int waitForEdges(std::int64_t /*timeout_ns*/, gpio::EdgeEvent* /*events*/,
+                   std::size_t /*capacity*/) noexcept override {
+    return -ENOTSUP;
+  }
+  void interrupt() noexcept override {}
+
   std::vector<Nanoseconds> rises(int line) const {
     std::vector<Nanoseconds> times;
     for (const Edge& edge : edges) {

@@ -146,5 +146,23 @@ TEST(RigSwitch, SharesALineWithAnother) {
   EXPECT_FALSE(bench.pulse(5).reads("x.both"));
 }
 
+TEST(RigSwitch, TellsWhoWatchesItsLineOfEachChangeOnce) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.max_switch->bounces = 3;
+  spec.max_switch->bounce_ns = 1'000'000'000;
+  HandRig bench(spec);
+  bench.ready().pulse(4);
+  std::vector<bool> told;
+  bench.rig.watchInput("x.max", [&](bool level, std::int64_t) { told.push_back(level); });
+  EXPECT_EQ(told, std::vector<bool>{}) << "nothing has changed yet";
+  bench.pulse(3);
+  EXPECT_EQ(told, std::vector<bool>{true}) << "of the press, and not of the bounces after it";
+  bench.direction(false).pulse(3);
+  EXPECT_EQ(told, (std::vector<bool>{true, false}));
+  bench.rig.watchInput("x.max", nullptr);
+  bench.direction(true).pulse(3);
+  EXPECT_EQ(told.size(), 2U) << "told after the watch has ended";
+}
+
 }  // namespace
 }  // namespace stepdriver::sim

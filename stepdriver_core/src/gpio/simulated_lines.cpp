@@ -4,9 +4,12 @@
 #include <unordered_map>
 #include <utility>
 
+#include "edge_queue.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::gpio {
+
+void Board::watchInput(const std::string& /*line*/, EdgeListener /*listener*/) {}
 
 struct SimulatedBackend::Shared {
   Shared(Board& wired_board, TimeSource time_source)
@@ -25,6 +28,12 @@ class SimulatedBackend::HeldLines : public Lines {
       : shared_(std::move(shared)), inputs_(inputs) {
     outputs_.reserve(outputs.size());
     for (const OutputRequest& output : outputs) outputs_.push_back({output, output.safe_level});
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      if (!inputs[i].edges) continue;
+      shared_->board.watchInput(inputs[i].line, [this, i](bool level, std::int64_t time_ns) {
+        edges_.add({static_cast<int>(i), level, time_ns});
+      });
+    }
   }
 
   ~HeldLines() override {
@@ -37,7 +46,10 @@ class SimulatedBackend::HeldLines : public Lines {
       shared_->board.onRelease(output.request.line, time_ns);
       shared_->held.erase(output.request.line);
     }
-    for (const InputRequest& input : inputs_) shared_->held.erase(input.line);
+    for (const InputRequest& input : inputs_) {
+      if (input.edges) shared_->board.watchInput(input.line, nullptr);
+      shared_->held.erase(input.line);
+    }
   }
 
   int write(const LineWrite* writes, std::size_t count) noexcept override {
@@ -60,6 +72,13 @@ class SimulatedBackend::HeldLines : public Lines {
     const std::string& line = inputs_[static_cast<std::size_t>(input)].line;
     return shared_->board.inputLevel(line, shared_->now()) ? 1 : 0;
   }
+
+  int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
+                   std::size_t capacity) noexcept override {
+    return capacity == 0 ? -EINVAL : edges_.take(timeout_ns, events, capacity);
+  }
+
+  void interrupt() noexcept override { edges_.interrupt(); }
 
  private:
   struct Output {
@@ -85,6 +104,7 @@ class SimulatedBackend::HeldLines : public Lines {
   const std::shared_ptr<Shared> shared_;
   std::vector<Output> outputs_;
   const std::vector<InputRequest> inputs_;
+  EdgeQueue edges_;
 };
 
 SimulatedBackend::SimulatedBackend(Board& board, TimeSource now)

@@ -43,6 +43,35 @@ class Rig::Impl {
     return latest_ns;
   }
 
+  /// The level of an input by what each of its switches is.
+  template <typename Active>
+  bool levelOf(const std::string& line, const Active& active) const {
+    const auto contacts = inputs.find(line);
+    if (contacts == inputs.end()) return false;
+    const auto& all = contacts->second;
+    const auto first = std::find_if(all.begin(), all.end(), active);
+    return first != all.end() ? (*first)->spec().active_level : !all.front()->spec().active_level;
+  }
+
+  bool settledLevelOf(const std::string& line) const {
+    return levelOf(line, [](const SwitchModel* contact) { return contact->settled(); });
+  }
+
+  /// Tells the trace and whoever watches what switches did just now.
+  void switchesMoved(std::int64_t time_ns) {
+    feed.switchesMoved(time_ns);
+    for (auto& [line, watch] : watches) {
+      const bool level = settledLevelOf(line);
+      if (level == watch.level) continue;
+      watch.level = level;
+      watch.listener(level, time_ns);
+    }
+  }
+
+  struct Watch {
+    gpio::EdgeListener listener;
+    bool level;
+  };
   struct PinOnLine {
     RigAxis* axis;
     Pin pin;
@@ -59,6 +88,7 @@ class Rig::Impl {
   std::unordered_map<std::string, std::vector<PinOnLine>> outputs;
   std::unordered_map<std::string, std::vector<const SwitchModel*>> inputs;
   std::unordered_map<std::string, WriteFault> write_faults;
+  std::unordered_map<std::string, Watch> watches;
   std::int64_t latest_ns = kForEver;
 
  private:
@@ -99,7 +129,7 @@ std::vector<std::string> Rig::axes() const {
 void Rig::setFaults(const std::string& axis, const RigFaults& faults) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   impl_->axisOf(axis).setFaults(faults);
-  impl_->feed.switchesMoved(impl_->latest_ns);
+  impl_->switchesMoved(impl_->latest_ns);
 }
 
 void Rig::failWrites(const std::string& line, std::int64_t writes, int error) {
@@ -116,7 +146,7 @@ void Rig::placeCarriage(const std::string& axis, double position, std::int64_t t
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
   impl_->axisOf(axis).placeCarriage(position, now_ns);
-  impl_->feed.switchesMoved(now_ns);
+  impl_->switchesMoved(now_ns);
 }
 
 void Rig::flushTrace() {
@@ -133,7 +163,7 @@ void Rig::onRequest(const std::string& line, bool level, std::int64_t time_ns) {
     impl_->feed.settle(pin.trace_pin, level, now_ns);
     pin.axis->request(pin.pin, level, now_ns);
   }
-  impl_->feed.switchesMoved(now_ns);
+  impl_->switchesMoved(now_ns);
 }
 
 void Rig::onEdge(const std::string& line, bool level, std::int64_t time_ns) {
@@ -145,7 +175,7 @@ void Rig::onEdge(const std::string& line, bool level, std::int64_t time_ns) {
     impl_->feed.edge(pin.trace_pin, level, now_ns);
     pin.axis->edge(pin.pin, level, now_ns);
   }
-  impl_->feed.switchesMoved(now_ns);
+  impl_->switchesMoved(now_ns);
 }
 
 void Rig::onRelease(const std::string& /*line*/, std::int64_t time_ns) {
@@ -156,12 +186,17 @@ void Rig::onRelease(const std::string& /*line*/, std::int64_t time_ns) {
 bool Rig::inputLevel(const std::string& line, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  const auto contacts = impl_->inputs.find(line);
-  if (contacts == impl_->inputs.end()) return false;
-  const auto active = [now_ns](const SwitchModel* contact) { return contact->active(now_ns); };
-  const auto& all = contacts->second;
-  const auto first = std::find_if(all.begin(), all.end(), active);
-  return (first != all.end() ? *first : all.front())->level(now_ns);
+  return impl_->levelOf(line,
+                        [now_ns](const SwitchModel* contact) { return contact->active(now_ns); });
+}
+
+void Rig::watchInput(const std::string& line, gpio::EdgeListener listener) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  if (listener) {
+    impl_->watches[line] = {std::move(listener), impl_->settledLevelOf(line)};
+  } else {
+    impl_->watches.erase(line);
+  }
 }
 
 int Rig::writeFault(const std::string& line, std::int64_t /*time_ns*/) {

@@ -26,6 +26,9 @@ class SwitchModel {
   /// As its line reads.
   bool active(std::int64_t time_ns) const;
 
+  /// As its line reads when the contact has bounced out.
+  bool settled() const { return stuck_.value_or(pressed_); }
+
   /// The level that it gives its line.
   bool level(std::int64_t time_ns) const { return active(time_ns) == spec_.active_level; }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,15 +17,28 @@ struct OutputRequest {
   bool keep_on_release;  ///< leave the last level instead of driving the safe one before release
 };
 
+/// What the chip pulls an input to while nothing drives it.
+enum class Bias { kAsIs, kPullUp, kPullDown, kDisabled };
+
 /// A line that is read.
 struct InputRequest {
   std::string line;
+  Bias bias = Bias::kAsIs;  ///< refused where the library or the kernel can't set one
+  bool edges = false;       ///< its edges end Lines::waitForEdges()
 };
 
 /// An output, by its index in the request, and the level that it is to have.
 struct LineWrite {
   int output;
   bool level;
+};
+
+/// An edge of an input. It is a wake-up and a time: edges may be lost, doubled or late, so that
+/// only read() tells the level.
+struct EdgeEvent {
+  int input;             ///< by its index in the request
+  bool level;            ///< right after the edge, as the event tells it: a hint
+  std::int64_t time_ns;  ///< CLOCK_MONOTONIC, as the kernel stamped it; on simulated lines, theirs
 };
 
 /// The lines of one request, held until destruction.
@@ -50,6 +64,18 @@ class Lines {
 
   /// @return the level of an input, by its index in the request (0 or 1), or -errno.
   [[nodiscard]] virtual int read(int input) noexcept = 0;
+
+  /// Waits for edges of the inputs that were requested with them. For one thread that watches, and
+  /// never the pulse thread.
+  ///
+  /// @param timeout_ns on CLOCK_MONOTONIC, on simulated lines too; negative: no time-out.
+  /// @param capacity of `events`, above 0. Edges that don't fit are told by the next call.
+  /// @return the number of events; 0 after the time-out, an interrupt() or a signal; or -errno.
+  [[nodiscard]] virtual int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
+                                         std::size_t capacity) noexcept = 0;
+
+  /// Ends the waitForEdges() under way in another thread, or else the next one.
+  virtual void interrupt() noexcept = 0;
 };
 
 /// Where lines come from.

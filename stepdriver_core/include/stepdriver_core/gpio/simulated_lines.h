@@ -11,6 +11,9 @@
 
 namespace stepdriver::gpio {
 
+/// Is told of an input's edge: the level right after it and its time. It must not call the board.
+using EdgeListener = std::function<void(bool level, std::int64_t time_ns)>;
+
 /// What is wired to simulated lines: it sees every change of an output and decides every input.
 ///
 /// The calls come one at a time, in the order of the changes, from whichever thread writes.
@@ -35,12 +38,18 @@ class Board {
   ///
   /// @return 0, or the errno with which the write fails; then all lines of it keep their levels.
   virtual int writeFault(const std::string& line, std::int64_t time_ns) = 0;
+
+  /// From now on the board tells this listener of the input's edges; an empty one ends that, and
+  /// when this returns the earlier one isn't called any more. A board that doesn't know when its
+  /// inputs change leaves it at that: waiting for edges then ends with the time-out.
+  virtual void watchInput(const std::string& line, EdgeListener listener);
 };
 
 /// Simulated lines: any name is a line, each can be held once; a Board is wired to them.
 ///
 /// Lines of one write change at the same time, and the board sees them in the order of the write.
-/// A write or a read of an index that the request doesn't have fails with EINVAL.
+/// A write or a read of an index that the request doesn't have fails with EINVAL. A bias changes
+/// nothing: the board decides what an input reads.
 class SimulatedBackend : public Backend {
  public:
   /// Nanoseconds on the clock that edges are stamped with.

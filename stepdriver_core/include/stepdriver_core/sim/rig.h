@@ -105,6 +105,8 @@ struct RigFaults {
 /// is so from that time on. A released line keeps its level; a later request is an edge where its
 /// level is another one. Lines that no axis knows are ignored, unknown inputs read low. A line may
 /// go to several pins and axes; switches that share a line read active where any of them does.
+/// Who watches a switch is told when the carriage or a fault changes its line, not of the bounces
+/// after that.
 ///
 /// All calls are safe from any thread. Times that fall back are taken as the latest one so far.
 class Rig : public gpio::Board {
@@ -144,6 +146,7 @@ class Rig : public gpio::Board {
   void onRelease(const std::string& line, std::int64_t time_ns) override;
   bool inputLevel(const std::string& line, std::int64_t time_ns) override;
   int writeFault(const std::string& line, std::int64_t time_ns) override;
+  void watchInput(const std::string& line, gpio::EdgeListener listener) override;
 
  private:
   class Impl;

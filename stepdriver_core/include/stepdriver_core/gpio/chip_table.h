@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/gpio/lines.h"
+
+/// The GPIO chips of a machine as plain data, and how the names of lines are found in it.
+namespace stepdriver::gpio {
+
+struct LineInfo {
+  std::string name;      ///< the kernel's name of the line; most have none
+  bool used = false;     ///< held by a program or by the kernel
+  std::string consumer;  ///< who holds it, as it calls itself; may be empty
+};
+
+struct ChipInfo {
+  std::string name;             ///< `gpiochip0`; may change from one boot to the next
+  std::string label;            ///< as `pinctrl-bcm2711`: stays
+  int error = 0;                ///< errno with which it couldn't be opened or read; then no lines
+  std::vector<LineInfo> lines;  ///< by offset
+};
+
+/// A line by where it is.
+struct LineAddress {
+  std::size_t chip;  ///< index in the table
+  unsigned offset;
+
+  bool operator==(const LineAddress& other) const {
+    return chip == other.chip && offset == other.offset;
+  }
+};
+
+/// Finds a line: `chip:offset`, `label:offset`, or the kernel's name of the line. A chip's name
+/// goes before a label, and both go before the name of a line that happens to look like that.
+///
+/// @throw GpioError where there is no such chip or line, where several have that label or name, or
+///   where the offset is beyond the chip's lines; it says which there are.
+LineAddress findLine(const std::vector<ChipInfo>& chips, const std::string& line);
+
+/// The lines of a request, outputs first.
+///
+/// @throw GpioError as findLine(), where two names are one line, and where one is in use.
+std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
+                                   const std::vector<OutputRequest>& outputs,
+                                   const std::vector<InputRequest>& inputs);
+
+/// A line as messages name it: `ENABLE_X (gpiochip0:17, pinctrl-bcm2711)`.
+std::string describe(const std::vector<ChipInfo>& chips, const std::string& line,
+                     LineAddress address);
+
+/// Who holds a line, and what to do about it; reads on from the line's description.
+std::string busyText(const LineInfo& line);
+
+/// An errno in words: `EACCES, permission denied`.
+std::string errorText(int error);
+
+/// What to do about an errno that has to do with rights; empty for others.
+std::string remedyFor(int error);
+
+}  // namespace stepdriver::gpio

@@ -1,0 +1,204 @@
+#include "stepdriver_core/gpio/chip_table.h"
+
+#include <cerrno>
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::gpio {
+namespace {
+
+/// The two halves of `chip:offset`.
+struct Place {
+  std::string chip;
+  unsigned long offset;
+};
+
+/// Labels may have colons too: the last one counts.
+std::optional<Place> placeIn(const std::string& line) {
+  const auto colon = line.rfind(':');
+  if (colon == std::string::npos || colon == 0 || colon + 1 == line.size()) return {};
+  const std::string offset = line.substr(colon + 1);
+  if (offset.find_first_not_of("0123456789") != std::string::npos) return {};
+  return Place{line.substr(0, colon), std::strtoul(offset.c_str(), nullptr, 10)};
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string labelOf(const ChipInfo& chip) {
+  return chip.label.empty() ? "no label" : '"' + chip.label + '"';
+}
+
+/// What there is instead; with what couldn't be looked at, since it may be there.
+std::string whatThereIs(const std::vector<ChipInfo>& chips) {
+  if (chips.empty()) return " This machine has no GPIO chip (no /dev/gpiochip*).";
+  std::vector<std::string> found;
+  std::string hidden;
+  for (const ChipInfo& chip : chips) {
+    if (chip.error == 0) {
+      found.push_back(chip.name + " (" + labelOf(chip) + ", " + std::to_string(chip.lines.size()) +
+                      " lines)");
+    } else {
+      hidden += " " + chip.name + " couldn't be opened: " + errorText(chip.error) + "." +
+                remedyFor(chip.error);
+    }
+  }
+  return (found.empty() ? "" : " There are: " + joined(found) + ".") + hidden;
+}
+
+LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const std::string& line,
+                   unsigned long offset) {
+  const ChipInfo& chip = chips[index];
+  if (chip.error != 0) {
+    throw GpioError("Line " + line + ": " + chip.name +
+                    " can't be opened: " + errorText(chip.error) + "." + remedyFor(chip.error));
+  }
+  if (offset >= chip.lines.size()) {
+    throw GpioError("Line " + line + ": " + chip.name + " (" + labelOf(chip) + ") has " +
+                    std::to_string(chip.lines.size()) +
+                    " lines, counted from 0: there is no line " + std::to_string(offset) + ".");
+  }
+  return {index, static_cast<unsigned>(offset)};
+}
+
+/// The chips that a predicate is true for.
+template <typename Predicate>
+std::vector<std::size_t> chipsThat(const std::vector<ChipInfo>& chips, const Predicate& predicate) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < chips.size(); ++i) {
+    if (predicate(chips[i])) found.push_back(i);
+  }
+  return found;
+}
+
+std::vector<LineAddress> linesNamed(const std::vector<ChipInfo>& chips, const std::string& name) {
+  std::vector<LineAddress> found;
+  for (std::size_t i = 0; i < chips.size(); ++i) {
+    for (std::size_t offset = 0; offset < chips[i].lines.size(); ++offset) {
+      if (chips[i].lines[offset].name == name) found.push_back({i, static_cast<unsigned>(offset)});
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+LineAddress findLine(const std::vector<ChipInfo>& chips, const std::string& line) {
+  const auto place = placeIn(line);
+  if (place) {
+    auto found = chipsThat(chips, [&](const ChipInfo& chip) { return chip.name == place->chip; });
+    if (found.empty()) {
+      found = chipsThat(chips, [&](const ChipInfo& chip) { return chip.label == place->chip; });
+    }
+    if (found.size() == 1) return lineOf(chips, found.front(), line, place->offset);
+    if (found.size() > 1) {
+      std::vector<std::string> names;
+      for (const std::size_t i : found) names.push_back(chips[i].name);
+      throw GpioError("Line " + line + ": several chips have the label " + place->chip + ": " +
+                      joined(names) + ". Name the chip instead.");
+    }
+  }
+  const auto found = linesNamed(chips, line);
+  if (found.size() == 1) return found.front();
+  if (found.size() > 1) {
+    std::vector<std::string> places;
+    for (const LineAddress& address : found) {
+      places.push_back(chips[address.chip].name + ":" + std::to_string(address.offset));
+    }
+    throw GpioError("Line " + line + ": several lines have that name: " + joined(places) +
+                    ". Name the one that is meant as chip:offset.");
+  }
+  if (place) {
+    throw GpioError("Line " + line + ": there is no chip with the name or label " + place->chip +
+                    "." + whatThereIs(chips));
+  }
+  throw GpioError("Line " + line + ": no chip has a line of that name." + whatThereIs(chips) +
+                  " The command gpioinfo lists the names of lines; chip:offset always works.");
+}
+
+std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
+                                   const std::vector<OutputRequest>& outputs,
+                                   const std::vector<InputRequest>& inputs) {
+  std::vector<LineAddress> addresses;
+  std::map<std::pair<std::size_t, unsigned>, std::string> taken;  // -> by which name
+  const auto add = [&](const std::string& line) {
+    const LineAddress address = findLine(chips, line);
+    const auto twin = taken.emplace(std::make_pair(address.chip, address.offset), line);
+    if (!twin.second) {
+      throw GpioError("Line " + describe(chips, line, address) +
+                      " is named twice in one request, here and as " + twin.first->second +
+                      ". Each pin needs a line of its own.");
+    }
+    addresses.push_back(address);
+  };
+  for (const OutputRequest& output : outputs) add(output.line);
+  for (const InputRequest& input : inputs) add(input.line);
+
+  std::size_t next = 0;
+  const auto check = [&](const std::string& line) {
+    const LineAddress address = addresses[next++];
+    const LineInfo& info = chips[address.chip].lines[address.offset];
+    if (info.used) throw GpioError("Line " + describe(chips, line, address) + busyText(info));
+  };
+  for (const OutputRequest& output : outputs) check(output.line);
+  for (const InputRequest& input : inputs) check(input.line);
+  return addresses;
+}
+
+std::string describe(const std::vector<ChipInfo>& chips, const std::string& line,
+                     LineAddress address) {
+  const ChipInfo& chip = chips[address.chip];
+  const std::string place = chip.name + ":" + std::to_string(address.offset);
+  const std::string& name = chip.lines[address.offset].name;
+  std::vector<std::string> more;
+  if (line != place) more.push_back(place);
+  if (!chip.label.empty()) more.push_back("chip " + labelOf(chip));
+  if (!name.empty() && name != line) more.push_back("line \"" + name + '"');
+  return more.empty() ? line : line + " (" + joined(more) + ")";
+}
+
+std::string busyText(const LineInfo& line) {
+  const std::string busy = " is busy (" + errorText(EBUSY) + "): it is held by ";
+  if (line.consumer.empty()) {
+    return busy +
+           "the kernel, perhaps as a pin with another function. Name another line, or free "
+           "it in the device tree (config.txt on a Raspberry Pi).";
+  }
+  return busy + '"' + line.consumer + "\". Stop that program or driver, or name another line.";
+}
+
+std::string errorText(int error) {
+  static const std::map<int, const char*> kWords = {
+      {EACCES, "EACCES, permission denied"},
+      {EBUSY, "EBUSY, device or resource busy"},
+      {EINVAL, "EINVAL, invalid argument"},
+      {EIO, "EIO, input/output error"},
+      {EMFILE, "EMFILE, too many open files"},
+      {ENODEV, "ENODEV, no such device: the chip was removed"},
+      {ENOMEM, "ENOMEM, out of memory"},
+      {ENOTTY, "ENOTTY, the kernel doesn't know this call"},
+      {ENXIO, "ENXIO, the line has no interrupt"},
+      {EPERM, "EPERM, operation not permitted"},
+      {ETIMEDOUT, "ETIMEDOUT, the chip doesn't answer"},
+      {524, "ENOTSUPP, the chip's driver can't do this"},
+  };
+  const auto words = kWords.find(error);
+  if (words != kWords.end()) return words->second;
+  return "errno " + std::to_string(error) + ", " + std::generic_category().message(error);
+}
+
+std::string remedyFor(int error) {
+  if (error != EACCES && error != EPERM) return "";
+  return " Install config/udev/60-stepdriver-gpio.rules (it says how) and become a member of the "
+         "group gpio: sudo usermod -aG gpio $USER, then log in again.";
+}
+
+}  // namespace stepdriver::gpio

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "gpiod_calls.h"
+#include "priority_mutex.h"
+#include "stepdriver_core/gpio/lines.h"
+
+struct pollfd;
+
+namespace stepdriver::gpio::gpiod {
+
+/// The outputs that are on one chip, in one request of the kernel.
+struct OutputGroup {
+  std::unique_ptr<Outputs> request;
+  LineBits levels = 0;    // as they were last set
+  PriorityMutex mutex{};  // of both
+};
+
+/// The inputs that are on one chip.
+struct InputGroup {
+  std::unique_ptr<Inputs> request;
+  std::vector<int> inputs;  // index in the whole request by the one in this
+  PriorityMutex mutex{};    // of the request
+};
+
+/// Where a line of the whole request is.
+struct Seat {
+  std::size_t group;
+  std::size_t index;
+};
+
+struct OutputSeat {
+  Seat seat;
+  bool safe_level;
+  bool keep_on_release;
+};
+
+/// Lines that were requested, whatever the version of libgpiod.
+class HeldLines : public Lines {
+ public:
+  /// What it is made of. In the order in which it must not go: lines before their chips.
+  struct Parts {
+    std::vector<std::unique_ptr<Chip>> chips;
+    std::vector<std::unique_ptr<InputGroup>> input_groups;
+    std::vector<std::unique_ptr<OutputGroup>> output_groups;
+    std::vector<OutputSeat> outputs;
+    std::vector<Seat> inputs;
+  };
+
+  /// @throw std::system_error where the kernel has no eventfd left.
+  explicit HeldLines(Parts&& parts);
+  ~HeldLines() override;
+
+  int write(const LineWrite* writes, std::size_t count) noexcept override;
+  int read(int input) noexcept override;
+  int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
+                   std::size_t capacity) noexcept override;
+  void interrupt() noexcept override;
+
+ private:
+  struct EdgeSource {
+    InputGroup* group;
+    std::size_t fd;  // index among the group's
+  };
+
+  /// Sets those of the writes that are on the same chip as the first.
+  int writeGroup(const LineWrite* writes, std::size_t count) noexcept;
+  const Seat& seatOf(const LineWrite& write) const noexcept;
+  static int takeEdges(const EdgeSource& source, EdgeEvent* events, std::size_t capacity) noexcept;
+
+  Parts parts_;
+  int interrupt_fd_;
+  std::vector<pollfd> polled_;  // the interrupt's, then one for each source
+  std::vector<EdgeSource> sources_;
+};
+
+}  // namespace stepdriver::gpio::gpiod
