@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -137,6 +138,38 @@ TEST(AxisChip, MovesToTheNearestCommonPositionWhereThatIsWanted) {
   EXPECT_EQ(bench.pulses(), 150);
   EXPECT_NEAR(bench.report().carriage, 0.0, 1e-9);
   EXPECT_EQ(violationsOf(bench.report()), "");
+}
+
+TEST(AxisChip, StopsAtAFaultOfTheChipAndResetsItToRecover) {
+  for (const bool reset_wired : {true, false}) {
+    axis::AxisConfig config = linearAxis("x", chip::Model::kDrv8825);
+    config.fault = axis::FaultPin{"x.fault", gpio::Bias::kPullUp};
+    if (!reset_wired) config.pins.reset.line.clear();
+    Bench bench({config}, true, 1.0);
+    axis::Axis& x = bench.axis();
+    x.setPosition(0.0);
+    const axis::Move move = x.moveTo(0.09);
+    while (bench.pulses() < 100) std::this_thread::yield();
+    sim::RigFaults faults;
+    faults.chip_fault = true;
+    bench.rig.setFaults("x", faults);
+    const axis::MoveResult result = x.wait(move);
+    EXPECT_EQ(result.end, axis::MoveEnd::kFault);
+    EXPECT_NE(result.message.find("nFAULT"), std::string::npos) << result.message;
+    EXPECT_LT(bench.pulses(), 7200);
+    EXPECT_DOUBLE_EQ(x.state().position, static_cast<double>(bench.pulses()) / 80'000.0);
+    EXPECT_FALSE(x.state().position_valid);
+    EXPECT_REFUSED(x.moveTo(0.0), "nFAULT");
+    if (reset_wired) {
+      x.recover();
+      EXPECT_EQ(x.state().fault, "");
+      EXPECT_EQ(bench.move(0.0).end, axis::MoveEnd::kReached);
+      EXPECT_EQ(bench.pulses(), 0);
+    } else {
+      EXPECT_REFUSED(x.recover(), "RESET isn't wired");
+    }
+    EXPECT_EQ(violationsOf(bench.report()), "");
+  }
 }
 
 TEST(AxisChip, CountsTheTranslatorFromHomeAfterAReset) {

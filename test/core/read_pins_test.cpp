@@ -138,12 +138,37 @@ TEST(ReadPins, ChecksTheEndstops) {
                {{"endstops/min/active_level", "hihg",
                  "is \"hihg\", but must be low or high; did you mean high?"},
                 {"endstops/min/active_level", 0, "is 0 (an integer), but must be low or high"},
-                {"endstops/min/pull", "up", "is not known; known here: active_level and pin"},
+                {"endstops/min/pull", "up", "is not known; known here: active_level, bias and pin"},
                 {"endstops/mid", "A", "is not known; did you mean min?"},
                 {"endstops/max", "A", "is \"A\" (a string), but must be a map"}});
   expectMissing(
       axis, {{"endstops/min/active_level", "low or high"},
              {"endstops/min/pin", "a line: chip:offset, as \"gpiochip0:17\", or a line's name"}});
+}
+
+TEST(ReadPins, ReadsTheFaultPinOfAChipThatHasOne) {
+  ConfigValue axis = linearAxis();
+  put(axis, "driver", "drv8825");
+  put(axis, "pins/fault", "GPIO4");
+  put(axis, "fault_bias", "pull_up");
+  put(axis, "endstops/min", mapOf({{"pin", "A"}, {"active_level", "high"}, {"bias", "pull_down"}}));
+  const AxisConfig config = readX(axis);
+  ASSERT_TRUE(config.fault);
+  EXPECT_EQ(config.fault->line, "GPIO4");
+  EXPECT_EQ(config.fault->bias, gpio::Bias::kPullUp);
+  ASSERT_TRUE(config.endstop_min);
+  EXPECT_EQ(config.endstop_min->bias, gpio::Bias::kPullDown);
+
+  put(axis, "driver", "a4988");
+  EXPECT_EQ(issuesOfX(axis), Lines{"/axes/x/pins/fault: is \"GPIO4\", but the A4988 has no "
+                                   "fault pin"});
+}
+
+TEST(ReadPins, RefusesABiasOfNothing) {
+  ConfigValue axis = linearAxis();
+  put(axis, "fault_bias", "pull_up");
+  EXPECT_EQ(issuesOfX(axis), Lines{"/axes/x/fault_bias: is \"pull_up\", but pins/fault is "
+                                   "missing"});
 }
 
 TEST(ReadPins, UsesEachLineOnce) {

@@ -40,6 +40,7 @@ class ChipModel {
   /// The level of the pin's line.
   bool lineLevel(Pin pin) const { return at(pin).level != at(pin).inverted; }
   bool energized() const { return enabled() && awake() && !inReset(); }
+  bool inReset() const { return chip_.has_reset && at(Pin::kReset).level == chip_.reset_held; }
   std::int64_t translator() const { return translator_; }
   int microsteps() const { return microsteps_; }
   int finest() const { return finest_; }
@@ -59,7 +60,6 @@ class ChipModel {
   const PinState& at(Pin pin) const { return pins_[static_cast<std::size_t>(pin)]; }
   bool enabled() const { return at(Pin::kEnable).level == chip_.enable_on; }
   bool awake() const { return !chip_.has_sleep || at(Pin::kSleep).level != chip_.sleep_asleep; }
-  bool inReset() const { return chip_.has_reset && at(Pin::kReset).level == chip_.reset_held; }
 
   bool idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const;
   std::optional<int> decodedMicrosteps() const;

@@ -100,13 +100,15 @@ class Rig::Impl {
       const TracePin trace_pin{axis.spec().name, nameOf(pin)};
       outputs[line].push_back({&axis, pin, feed.addPin(trace_pin, axis.chip().lineLevel(pin))});
     }
-    for (const Side side : {Side::kMin, Side::kMax}) {
-      const SwitchModel* const contact = axis.switchAt(side);
-      if (contact == nullptr || contact->spec().line.empty()) continue;
-      inputs[contact->spec().line].push_back(contact);
-      feed.addSwitch({axis.spec().name, side == Side::kMin ? "endstop_min" : "endstop_max"},
-                     contact);
-    }
+    wire(axis, axis.switchAt(Side::kMin), "endstop_min");
+    wire(axis, axis.switchAt(Side::kMax), "endstop_max");
+    wire(axis, axis.faultContact(), "fault");
+  }
+
+  void wire(const RigAxis& axis, const SwitchModel* contact, const char* variable) {
+    if (contact == nullptr || contact->spec().line.empty()) return;
+    inputs[contact->spec().line].push_back(contact);
+    feed.addSwitch({axis.spec().name, variable}, contact);
   }
 };
 

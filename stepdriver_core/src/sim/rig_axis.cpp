@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -23,6 +24,15 @@ const RigAxisSpec& checked(const RigAxisSpec& spec) {
   return spec;
 }
 
+// The open drain of nFAULT is a contact that no carriage presses.
+std::optional<SwitchModel> madeFaultContact(const std::string& line) {
+  if (line.empty()) return std::nullopt;
+  SwitchSpec spec;
+  spec.line = line;
+  spec.position = std::numeric_limits<double>::infinity();
+  return SwitchModel(spec, Side::kMax, 0.0);
+}
+
 std::optional<SwitchModel> madeSwitch(const std::optional<SwitchSpec>& spec, Side side,
                                       double carriage) {
   if (!spec) return std::nullopt;
@@ -36,7 +46,8 @@ RigAxis::RigAxis(const RigAxisSpec& spec)
       chip_(spec_),
       energized_(chip_.energized()),
       min_switch_(madeSwitch(spec_.min_switch, Side::kMin, spec_.start)),
-      max_switch_(madeSwitch(spec_.max_switch, Side::kMax, spec_.start)) {}
+      max_switch_(madeSwitch(spec_.max_switch, Side::kMax, spec_.start)),
+      fault_(madeFaultContact(spec_.fault_line)) {}
 
 const SwitchModel* RigAxis::switchAt(Side side) const {
   const std::optional<SwitchModel>& model = side == Side::kMin ? min_switch_ : max_switch_;
@@ -52,8 +63,9 @@ void RigAxis::edge(Pin pin, bool line_level, std::int64_t time_ns) {
 }
 
 void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns) {
+  if (chip_.inReset()) setChipFault(false);
   const bool was_energized = energized_;
-  energized_ = chip_.energized();
+  energized_ = chip_.energized() && !chip_fault_;
   if (pulse) takePulse(*pulse, time_ns);
   if (energized_ && !was_energized) snapRotor();
   if (energized_) moveSwitches(time_ns);
@@ -93,6 +105,13 @@ void RigAxis::setFaults(const RigFaults& faults) {
   motor_steps_ = 0;
   if (min_switch_) min_switch_->stick(faults.min_stuck);
   if (max_switch_) max_switch_->stick(faults.max_stuck);
+  if (faults.chip_fault) setChipFault(true);
+}
+
+void RigAxis::setChipFault(bool faulty) {
+  chip_fault_ = faulty;
+  if (faulty) energized_ = false;
+  if (fault_) fault_->stick(faulty ? std::optional<bool>(true) : std::nullopt);
 }
 
 void RigAxis::placeCarriage(double position, std::int64_t time_ns) {

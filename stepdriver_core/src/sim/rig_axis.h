@@ -23,6 +23,8 @@ class RigAxis {
 
   void request(Pin pin, bool line_level, std::int64_t time_ns);
   void edge(Pin pin, bool line_level, std::int64_t time_ns);
+  /// The contact that pulls the fault line low; nullptr where that isn't wired.
+  const SwitchModel* faultContact() const { return fault_ ? &*fault_ : nullptr; }
   void setFaults(const RigFaults& faults);
   void placeCarriage(double position, std::int64_t time_ns);
   RigAxisReport report(std::int64_t time_ns) const;
@@ -31,6 +33,7 @@ class RigAxis {
   double carriage() const;
   void follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns);
   void takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns);
+  void setChipFault(bool faulty);
   void snapRotor();
   void moveSwitches(std::int64_t time_ns);
 
@@ -43,7 +46,9 @@ class RigAxis {
   std::int64_t pulses_forward_ = 0;
   std::int64_t pulses_backward_ = 0;
   RigFaults faults_;
+  bool chip_fault_ = false;  // latched
   std::optional<SwitchModel> min_switch_, max_switch_;
+  std::optional<SwitchModel> fault_;
 };
 
 }  // namespace stepdriver::sim

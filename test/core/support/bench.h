@@ -70,6 +70,7 @@ inline sim::RigAxisSpec rigAxis(const axis::AxisConfig& config) {
     spec_of->hysteresis = 0.2;
     return spec_of;
   };
+  if (config.fault) spec.fault_line = config.fault->line;
   spec.min_switch = endstop(config.endstop_min, -100.0);
   spec.max_switch = endstop(config.endstop_max, 100.0);
   return spec;

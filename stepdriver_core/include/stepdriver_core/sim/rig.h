@@ -45,6 +45,7 @@ struct RigAxisSpec {
   double full_step_travel = 0.0;  ///< [mm|deg] that the carriage moves for a full step; above 0
   double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
   std::optional<SwitchSpec> min_switch, max_switch;
+  std::string fault_line;  ///< the chip's nFAULT, with a pull-up; empty: not wired
 };
 
 /// Everything that the chip must never see. One edge may be several of them. A time that is exactly
@@ -90,6 +91,7 @@ struct RigFaults {
   std::optional<bool> max_stuck;
   std::int64_t lose_every = 0;  ///< every n-th step of the motor, counted from setFaults() on,
                                 ///< slips: the carriage stays behind for good; 0: none
+  bool chip_fault = false;      ///< over-current: outputs off and nFAULT low until RESET
 };
 
 /// The model of an axis. STEP's active edge moves the translator to the next place that the mode
