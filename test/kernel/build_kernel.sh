@@ -105,21 +105,28 @@ build() {
     return 1
   fi
   make ARCH=um -j"$(nproc)" linux
-  strip -o "$place/linux.new" linux
+  strip linux
 }
 
-printf 'Building the test kernel from %s %s. Its log: %s\n' \
-  "$package" "$version" "$place/build.log" >&2
+printf 'Building the test kernel from %s %s in some minutes; log: %s\n' \
+  "$package" "$version" "$tree/build.log" >&2
 # The build has a process group of its own, which ends with this script; in the background `set -e`
 # holds inside it.
 set -m
-(set -e; build) >"$place/build.log" 2>&1 </dev/null {lock}>&- &
+(set -e; build) >"$tree/build.log" 2>&1 </dev/null {lock}>&- &
 builder=$!
 set +m
 trap 'kill -TERM -- "-$builder" 2>/dev/null || true; rm -rf "$tree"' EXIT
-if ! wait "$builder"; then
+status=0
+wait "$builder" || status=$?
+# Again: a cache may be emptied at any time.
+mkdir -p "$place"
+cp "$tree/build.log" "$place/build.log"
+if ((status != 0)); then
   tail -n 40 "$place/build.log" >&2
   die "the kernel couldn't be built; all of its output: $place/build.log"
 fi
+# At once or not at all, also for one who doesn't look at the lock.
+cp "$tree/linux" "$place/linux.new"
 mv "$place/linux.new" "$place/linux"
 printf '%s\n' "$place/linux"
