@@ -5,6 +5,7 @@
 #include <fstream>
 #include <istream>
 #include <sstream>
+#include <string_view>
 
 #include "stepdriver_core/error.h"
 
@@ -75,7 +76,7 @@ void KernelTrace::readChip(const std::string& text) {
 // "  program-37  [000] .....  1.717255808: gpio_value: 497 set 1": the program's name may have
 // blanks in it, so it is read from the event's name on, and back.
 void KernelTrace::readEvent(const std::string& text) {
-  static const std::string kEvent = ": gpio_value: ";
+  constexpr std::string_view kEvent = ": gpio_value: ";
   const std::size_t event = text.rfind(kEvent);
   const std::size_t blank = event == std::string::npos ? event : text.rfind(' ', event);
   if (blank == std::string::npos) throw Error("not an event: " + text);

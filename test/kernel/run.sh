@@ -106,7 +106,10 @@ machine='' waiting=''
 finish() {
   local status=$?
   trap '' INT TERM HUP
-  [[ -z $machine ]] || kill -KILL -- "-$machine" 2>/dev/null || true
+  if [[ -n $machine ]]; then
+    kill -KILL -- "-$machine" 2>/dev/null || true
+    wait "$machine" 2>/dev/null || true
+  fi
   [[ -z $waiting ]] || kill "$waiting" 2>/dev/null || true
   rm -rf "$work"
   exit "$status"
