@@ -23,7 +23,7 @@ die() {
 tracing=/sys/kernel/tracing
 [[ -d $tracing/events/gpio ]] || die "this kernel has no gpio tracepoints in $tracing"
 
-# Each write of a line takes 28 bytes: there is room for more than a million of them.
+# 32 bytes for each write of a line: there is room for a million of them.
 start() {
   echo 0 >"$tracing/tracing_on"
   echo mono >"$tracing/trace_clock"
@@ -82,7 +82,7 @@ stop() {
   echo 0 >"$tracing/options/raw"
   { chips && in_nanoseconds "$times" <"$tracing/trace"; } >"$file" ||
     die "the trace couldn't be written to $file"
-  ((lost == 0)) || die "the kernel dropped $lost events: the trace in $file is incomplete"
+  ((lost == 0)) || die "the kernel dropped $lost events: there is room for a million"
 }
 
 case "${1:-} $#" in

@@ -14,8 +14,10 @@ standard input, and its output where this one's goes. Ends with the command's ex
   --chip NAME:LABEL:LINES[:OFFSET=LINE_NAME,...]
                   makes a GPIO chip before; may be given several times (see gpio_sim.sh)
   --trace FILE    writes there what happened to the lines (see gpio_trace.sh, trace_to_vcd)
-  --time-travel   virtual time: sleeping takes none, calculating takes none, and every run has the
-                  same times. Not for ROS: where a thread polls, the time doesn't go on
+  --time-travel   virtual time: sleeping takes none of the real one, calculating none of the virtual
+                  one, and every run has the same times. Only reading the clock takes 256 ns, and
+                  each event of a trace reads it. Not for ROS: where a thread polls without reading
+                  the clock, the time doesn't go on
   --tmpfs FOLDER  an empty one in its place, inside only; may be given several times
   --directory DIR working directory in place of this one
   --memory MB     of the machine, 512 by default
