@@ -173,7 +173,7 @@ wait "$copy_out" "$copy_err" || true
 
 show_console() {
   echo "run.sh: the last of the kernel's own messages:" >&2
-  tail -n 30 "$work/console" | tr -d '\r' | sed 's/^/    /' >&2
+  tail -n 30 "$work/console" | tr -d '\r' | awk '{ print "    " $0 }' >&2
 }
 
 verdict=
@@ -182,14 +182,12 @@ case $verdict in
   'exit '*) ;;
   'error '*) fail 125 "${verdict#error }" ;;
   *)
-    if [[ $ended != "$group" ]]; then
-      show_console
-      fail 124 "the machine was ended after $timeout s: the command didn't"
+    # It looks at the machine before anything else.
+    if [[ -n $check ]] && ! grep -q 'PROT_EXEC mmap in .*OK' "$work/console"; then
+      fail 77 "User-Mode Linux can't run on this machine: $(tail -n 2 "$work/console" | tr -s '\r\n' ' ')"
     fi
     show_console
-    if [[ -n $check ]] && ! grep -q 'PROT_EXEC mmap in .*OK' "$work/console"; then
-      fail 77 "User-Mode Linux can't run on this machine; the reason is above"
-    fi
+    [[ $ended == "$group" ]] || fail 124 "the machine was ended after $timeout s: the command didn't"
     fail 125 "the kernel died"
     ;;
 esac
