@@ -1,0 +1,202 @@
+#!/usr/bin/env bash
+# Shows that the rig works, with libgpiod's own tools: what a test on it relies on.
+set -euo pipefail
+
+usage() {
+  cat <<'END_OF_USAGE'
+usage: test/kernel/rig_test.sh TRACE_TO_VCD
+
+TRACE_TO_VCD is the program that CMake builds from trace_to_vcd.cpp. Exit status 0: all passed;
+77: this machine can't run the test kernel.
+END_OF_USAGE
+}
+
+here=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd -P)
+this=$here/$(basename "${BASH_SOURCE[0]}")
+
+# ---- inside: each is a command that run.sh runs ----
+
+fail() {
+  printf 'FAILED: %s\n' "$*" >&2
+  exit 1
+}
+
+# until_true SECONDS COMMAND...
+until_true() {
+  local end=$((SECONDS + $1))
+  shift
+  until "$@"; do
+    ((SECONDS < end)) || fail "didn't come true: $*"
+    sleep 0.02
+  done
+}
+
+# The tools of libgpiod 1 and 2 take other arguments.
+libgpiod_1() { [[ $(gpiodetect --version) == *' v1.'* ]]; }
+
+# Sets lines, OFFSET=VALUE, and holds them until it is told to end.
+hold_lines() {
+  local chip=$1
+  shift
+  if libgpiod_1; then exec gpioset --mode=signal "$chip" "$@"; else exec gpioset -c "$chip" "$@"; fi
+}
+set_once() {
+  local chip=$1
+  shift
+  if libgpiod_1; then gpioset "$chip" "$@"; else gpioset -t 0 -c "$chip" "$@"; fi
+}
+wait_for_edge() {
+  if libgpiod_1; then exec gpiomon -n 1 -r "$1" "$2"; else exec gpiomon -n 1 -e rising -c "$1" "$2"; fi
+}
+level_of() {
+  if libgpiod_1; then gpioget "$1" "$2"; else gpioget --numeric -c "$1" "$2"; fi
+}
+
+has_level() { [[ $("$GPIO_SIM" value "$1" "$2") == "$3" ]]; }
+is_held_by() { gpioinfo | grep -E "$1" >/dev/null; }
+
+inside_lines() {
+  local holder watcher
+  gpioinfo | grep -F X_STEP >/dev/null || fail "libgpiod doesn't see the line's name"
+
+  hold_lines rig 1=1 2=0 3=1 &
+  holder=$!
+  until_true 10 has_level rig 1 1
+  until_true 10 has_level rig 3 1
+  has_level rig 2 0 || fail "line 2 isn't low"
+  kill "$holder"
+  wait "$holder" || true
+
+  [[ $(level_of ends 2) == 0 ]] || fail "the endstop is pressed from the start"
+  wait_for_edge ends 2 >"$1" &
+  watcher=$!
+  until_true 10 is_held_by gpiomon
+  "$GPIO_SIM" pull ends 2 up
+  wait "$watcher"
+  grep -i rising "$1" >/dev/null || fail "the edge was not a rising one: $(cat "$1")"
+  [[ $(level_of ends 2) == 1 ]] || fail "the pressed endstop reads low"
+  "$GPIO_SIM" pull ends 2 down
+  [[ $(level_of ends 2) == 0 ]] || fail "the released endstop reads high"
+}
+
+inside_unplugged() {
+  "$GPIO_SIM" remove rig
+  ! is_held_by X_STEP || fail "the chip is still there"
+  is_held_by X_MIN || fail "the other chip went too"
+}
+
+inside_toggles() {
+  set_once rig 1=0
+  sleep 100
+  set_once rig 1=1
+  sleep 100
+  set_once rig 1=0
+}
+
+# ---- outside ----
+
+chips=(--chip 'motors:rig:16:1=X_STEP,2=X_DIR' --chip 'switches:ends:8:2=X_MIN')
+rig() { bash "$here/run.sh" "$@"; }
+
+passes_the_exit_status() {
+  local status=0
+  rig -- bash -c 'exit 7' || status=$?
+  ((status == 7)) || fail "exit status $status, not 7"
+}
+
+passes_the_output_unchanged() {
+  rig -- seq 200000 | cmp - <(seq 200000)
+  [[ $(rig -- bash -c 'echo out; echo err >&2' 2>/dev/null) == out ]]
+}
+
+passes_environment_and_arguments() {
+  local value='a  b
+c' got
+  # shellcheck disable=SC2016
+  got=$(VALUE=$value rig --directory / -- bash -c 'printf "%s|%s|%s" "$VALUE" "$1" "$PWD"' - "x 'y")
+  [[ $got == "$value|x 'y|/" ]] || fail "got: $got"
+}
+
+ends_a_command_that_hangs() {
+  local status=0
+  rig --timeout 2 -- sleep 1000 2>"$scratch/errors" || status=$?
+  ((status == 124)) || fail "exit status $status, not 124"
+  grep -q 'ended after 2 s' "$scratch/errors" || fail "no message: $(cat "$scratch/errors")"
+}
+
+says_that_the_kernel_died() {
+  local status=0
+  # shellcheck disable=SC2016
+  rig --memory 64 -- bash -c 'echo 1 >/proc/sys/vm/panic_on_oom; x=xxxxxxxx; while :; do x=$x$x; done' \
+    2>"$scratch/errors" || status=$?
+  ((status == 125)) || fail "exit status $status, not 125"
+  grep -q 'the kernel died' "$scratch/errors" || fail "no message: $(cat "$scratch/errors")"
+}
+
+drives_and_reads_lines_of_two_chips() {
+  rig "${chips[@]}" --trace "$scratch/lines" -- bash "$this" --inside lines "$scratch/edge"
+  "$trace_to_vcd" "$scratch/lines" "$scratch/lines.vcd" x.step=rig:1 x.dir=rig:2 x.endstop_min=ends:2
+  sed -n '/^\$var/p; /^\$dumpvars/,$p' "$scratch/lines.vcd" | sed 's/^#[1-9].*/#/' >"$scratch/shape"
+  cmp "$scratch/shape" - <<'END_OF_SHAPE' || fail "$(cat "$scratch/lines.vcd")"
+$var wire 1 a step $end
+$var wire 1 b dir $end
+$var wire 1 c endstop_min $end
+$dumpvars
+1a
+0b
+0c
+$end
+#
+1c
+#
+0c
+#
+END_OF_SHAPE
+}
+
+takes_a_chip_away() { rig "${chips[@]}" -- bash "$this" --inside unplugged; }
+
+virtual_time_is_exact_and_repeats() {
+  local run step
+  for run in 1 2; do
+    rig "${chips[@]}" --time-travel --timeout 60 --trace "$scratch/virtual$run" -- \
+      bash "$this" --inside toggles
+    "$trace_to_vcd" "$scratch/virtual$run" "$scratch/virtual$run.vcd" x.step=rig:1
+  done
+  cmp "$scratch/virtual1.vcd" "$scratch/virtual2.vcd"
+  # Calculating takes no time: what comes on top of the 100 s are the reads of the clock.
+  step=$(sed -n 's/^#\(1[0-9]*\)$/\1/p' "$scratch/virtual1.vcd" | head -n 1)
+  ((step >= 100000000000 && step < 100010000000)) || fail "100 s of sleep took $step ns"
+}
+
+# ---- all of it ----
+
+case "${1:-}" in
+  --inside)
+    what=$2
+    shift 2
+    "inside_$what" "$@"
+    exit
+    ;;
+  -h | --help) usage && exit ;;
+esac
+(($# == 1)) || { usage >&2 && exit 2; }
+trace_to_vcd=$(realpath "$1")
+
+rig --check || exit
+scratch=$(mktemp -d /var/tmp/stepdriver-rig-test.XXXXXX)
+trap 'rm -rf "$scratch"' EXIT
+
+failed=0
+for test in passes_the_exit_status passes_the_output_unchanged passes_environment_and_arguments \
+  ends_a_command_that_hangs says_that_the_kernel_died drives_and_reads_lines_of_two_chips \
+  takes_a_chip_away virtual_time_is_exact_and_repeats; do
+  start=$EPOCHREALTIME status=0
+  # In the background `set -e` holds inside it.
+  (set -e; "$test") &
+  wait $! || status=$?
+  took=$((${EPOCHREALTIME/./} - ${start/./}))
+  printf '%-6s %5d ms  %s\n' "$( ((status == 0)) && echo ok || echo FAILED)" $((took / 1000)) "$test"
+  ((status == 0)) || failed=$((failed + 1))
+done
+((failed == 0))

@@ -1,0 +1,59 @@
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "kernel_trace.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/sim/vcd_trace.h"
+
+namespace {
+
+constexpr const char kUsage[] =
+    "usage: trace_to_vcd TRACE VCD AXIS.PIN=LINE...\n"
+    "\n"
+    "Writes what the kernel did to its GPIO lines (TRACE: what `run.sh --trace` or gpio_trace.sh\n"
+    "recorded) to a VCD file, in the form of the simulated rig's trace.\n"
+    "\n"
+    "AXIS.PIN  scope and variable in the VCD file: x.step\n"
+    "LINE      chip:offset, with the chip's label, or the number that the kernel has for the line\n"
+    "\n"
+    "Time 0 is the first event of any of these lines. Times are those at which the kernel called\n"
+    "the chip's driver, in nanoseconds.\n";
+
+stepdriver::kernel::TracedPin tracedPin(const std::string& text,
+                                        const stepdriver::kernel::KernelTrace& trace) {
+  const std::size_t equals = text.find('=');
+  const std::size_t point = text.rfind('.', equals);
+  if (equals == std::string::npos || point == std::string::npos || point == 0 ||
+      point + 1 == equals)
+    throw stepdriver::Error(text + " isn't AXIS.PIN=LINE.");
+  return {{text.substr(0, point), text.substr(point + 1, equals - point - 1)},
+          trace.line(text.substr(equals + 1))};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (arguments.size() == 1 && (arguments[0] == "--help" || arguments[0] == "-h")) {
+    std::fputs(kUsage, stdout);
+    return 0;
+  }
+  if (arguments.size() < 3) {
+    std::fputs(kUsage, stderr);
+    return 2;
+  }
+  try {
+    const auto trace = stepdriver::kernel::KernelTrace::fromFile(arguments[0]);
+    std::vector<stepdriver::kernel::TracedPin> pins;
+    for (std::size_t i = 2; i < arguments.size(); ++i)
+      pins.push_back(tracedPin(arguments[i], trace));
+    stepdriver::sim::VcdTrace vcd(arguments[1]);
+    copyTo(vcd, trace, pins);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "trace_to_vcd: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
