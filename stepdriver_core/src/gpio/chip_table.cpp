@@ -15,7 +15,7 @@ namespace {
 /// The two halves of `chip:offset`.
 struct Place {
   std::string chip;
-  unsigned long offset;
+  std::string offset;  // digits
 };
 
 /// Labels may have colons too: the last one counts.
@@ -24,7 +24,7 @@ std::optional<Place> placeIn(const std::string& line) {
   if (colon == std::string::npos || colon == 0 || colon + 1 == line.size()) return {};
   const std::string offset = line.substr(colon + 1);
   if (offset.find_first_not_of("0123456789") != std::string::npos) return {};
-  return Place{line.substr(0, colon), std::strtoul(offset.c_str(), nullptr, 10)};
+  return Place{line.substr(0, colon), offset};
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -55,8 +55,9 @@ std::string whatThereIs(const std::vector<ChipInfo>& chips) {
 }
 
 LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const std::string& line,
-                   unsigned long offset) {
+                   const std::string& digits) {
   const ChipInfo& chip = chips[index];
+  const unsigned long offset = std::strtoul(digits.c_str(), nullptr, 10);
   if (chip.error != 0) {
     throw GpioError("Line " + line + ": " + chip.name +
                     " can't be opened: " + errorText(chip.error) + "." + remedyFor(chip.error));
@@ -64,7 +65,7 @@ LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const 
   if (offset >= chip.lines.size()) {
     throw GpioError("Line " + line + ": " + chip.name + " (" + labelOf(chip) + ") has " +
                     std::to_string(chip.lines.size()) +
-                    " lines, counted from 0: there is no line " + std::to_string(offset) + ".");
+                    " lines, counted from 0: there is no line " + digits + ".");
   }
   return {index, static_cast<unsigned>(offset)};
 }
