@@ -194,6 +194,7 @@ TEST_F(LibgpiodOnGpioSim, TakeAllLinesOfAChipInOneRequest) {
 TEST_F(LibgpiodOnGpioSim, RefuseMoreLinesThanTheKernelGives) {
   const GpioSimChip large("large", "large", 70);
   std::vector<OutputRequest> outputs;
+  outputs.reserve(65);
   for (int i = 0; i < 65; ++i) outputs.push_back({"large:" + std::to_string(i), false, false});
   EXPECT_EQ(textOf(outputs, {}),
             large.name() +

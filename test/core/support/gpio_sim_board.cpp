@@ -43,12 +43,11 @@ class OutputTrace {
 
   /// What was set since the last call, by the kernel's number of the line.
   std::vector<std::pair<int, bool>> take() {
-    static const std::regex kSet(" gpio_value: ([0-9]+) set ([01])");
     std::vector<std::pair<int, bool>> sets;
     std::ifstream trace(folder_ + "/trace");
     std::smatch match;
     for (std::string text; std::getline(trace, text);) {
-      if (!std::regex_search(text, match, kSet)) continue;
+      if (!std::regex_search(text, match, set_)) continue;
       sets.emplace_back(std::stoi(match[1]), match[2] == "1");
     }
     std::ofstream(folder_ + "/trace") << std::flush;  // opening it for writing empties it
@@ -56,6 +55,7 @@ class OutputTrace {
   }
 
  private:
+  const std::regex set_{" gpio_value: ([0-9]+) set ([01])"};
   const std::string folder_ = std::string(kTracing) + "/instances/gpio_sim_board";
   bool there_ = false;
 };
