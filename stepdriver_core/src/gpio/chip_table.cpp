@@ -1,7 +1,9 @@
 #include "stepdriver_core/gpio/chip_table.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <system_error>
@@ -12,10 +14,31 @@
 namespace stepdriver::gpio {
 namespace {
 
+struct ErrorWords {
+  int error;
+  const char* words;
+};
+
+/// What the calls of GPIO lines fail with; 524 is the kernel's own and has no name outside.
+constexpr ErrorWords kErrors[] = {
+    {EACCES, "EACCES, permission denied"},
+    {EBUSY, "EBUSY, device or resource busy"},
+    {EINVAL, "EINVAL, invalid argument"},
+    {EIO, "EIO, input/output error"},
+    {EMFILE, "EMFILE, too many open files"},
+    {ENODEV, "ENODEV, no such device: the chip was removed"},
+    {ENOMEM, "ENOMEM, out of memory"},
+    {ENOTTY, "ENOTTY, the kernel doesn't know this call"},
+    {ENXIO, "ENXIO, the line has no interrupt"},
+    {EPERM, "EPERM, operation not permitted"},
+    {ETIMEDOUT, "ETIMEDOUT, the chip doesn't answer"},
+    {524, "ENOTSUPP, the chip's driver can't do this"},
+};
+
 /// The two halves of `chip:offset`.
 struct Place {
   std::string chip;
-  unsigned long offset;
+  std::string offset;  // digits
 };
 
 /// Labels may have colons too: the last one counts.
@@ -24,13 +47,12 @@ std::optional<Place> placeIn(const std::string& line) {
   if (colon == std::string::npos || colon == 0 || colon + 1 == line.size()) return {};
   const std::string offset = line.substr(colon + 1);
   if (offset.find_first_not_of("0123456789") != std::string::npos) return {};
-  return Place{line.substr(0, colon), std::strtoul(offset.c_str(), nullptr, 10)};
+  return Place{line.substr(0, colon), offset};
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
+/// Makes `a, b` of `a`.
+void append(std::string& list, const std::string& word) {
+  list += (list.empty() ? "" : ", ") + word;
 }
 
 std::string labelOf(const ChipInfo& chip) {
@@ -40,23 +62,24 @@ std::string labelOf(const ChipInfo& chip) {
 /// What there is instead; with what couldn't be looked at, since it may be there.
 std::string whatThereIs(const std::vector<ChipInfo>& chips) {
   if (chips.empty()) return " This machine has no GPIO chip (no /dev/gpiochip*).";
-  std::vector<std::string> found;
+  std::string found;
   std::string hidden;
   for (const ChipInfo& chip : chips) {
     if (chip.error == 0) {
-      found.push_back(chip.name + " (" + labelOf(chip) + ", " + std::to_string(chip.lines.size()) +
-                      " lines)");
+      append(found, chip.name + " (" + labelOf(chip) + ", " + std::to_string(chip.lines.size()) +
+                        " lines)");
     } else {
       hidden += " " + chip.name + " couldn't be opened: " + errorText(chip.error) + "." +
                 remedyFor(chip.error);
     }
   }
-  return (found.empty() ? "" : " There are: " + joined(found) + ".") + hidden;
+  return (found.empty() ? "" : " There are: " + found + ".") + hidden;
 }
 
 LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const std::string& line,
-                   unsigned long offset) {
+                   const std::string& digits) {
   const ChipInfo& chip = chips[index];
+  const unsigned long offset = std::strtoul(digits.c_str(), nullptr, 10);
   if (chip.error != 0) {
     throw GpioError("Line " + line + ": " + chip.name +
                     " can't be opened: " + errorText(chip.error) + "." + remedyFor(chip.error));
@@ -64,7 +87,7 @@ LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const 
   if (offset >= chip.lines.size()) {
     throw GpioError("Line " + line + ": " + chip.name + " (" + labelOf(chip) + ") has " +
                     std::to_string(chip.lines.size()) +
-                    " lines, counted from 0: there is no line " + std::to_string(offset) + ".");
+                    " lines, counted from 0: there is no line " + digits + ".");
   }
   return {index, static_cast<unsigned>(offset)};
 }
@@ -100,20 +123,20 @@ LineAddress findLine(const std::vector<ChipInfo>& chips, const std::string& line
     }
     if (found.size() == 1) return lineOf(chips, found.front(), line, place->offset);
     if (found.size() > 1) {
-      std::vector<std::string> names;
-      for (const std::size_t i : found) names.push_back(chips[i].name);
+      std::string names;
+      for (const std::size_t i : found) append(names, chips[i].name);
       throw GpioError("Line " + line + ": several chips have the label " + place->chip + ": " +
-                      joined(names) + ". Name the chip instead.");
+                      names + ". Name the chip instead.");
     }
   }
   const auto found = linesNamed(chips, line);
   if (found.size() == 1) return found.front();
   if (found.size() > 1) {
-    std::vector<std::string> places;
+    std::string places;
     for (const LineAddress& address : found) {
-      places.push_back(chips[address.chip].name + ":" + std::to_string(address.offset));
+      append(places, chips[address.chip].name + ":" + std::to_string(address.offset));
     }
-    throw GpioError("Line " + line + ": several lines have that name: " + joined(places) +
+    throw GpioError("Line " + line + ": several lines have that name: " + places +
                     ". Name the one that is meant as chip:offset.");
   }
   if (place) {
@@ -158,11 +181,11 @@ std::string describe(const std::vector<ChipInfo>& chips, const std::string& line
   const ChipInfo& chip = chips[address.chip];
   const std::string place = chip.name + ":" + std::to_string(address.offset);
   const std::string& name = chip.lines[address.offset].name;
-  std::vector<std::string> more;
-  if (line != place) more.push_back(place);
-  if (!chip.label.empty()) more.push_back("chip " + labelOf(chip));
-  if (!name.empty() && name != line) more.push_back("line \"" + name + '"');
-  return more.empty() ? line : line + " (" + joined(more) + ")";
+  std::string more;
+  if (line != place) append(more, place);
+  if (!chip.label.empty()) append(more, "chip " + labelOf(chip));
+  if (!name.empty() && name != line) append(more, "line \"" + name + '"');
+  return more.empty() ? line : line + " (" + more + ")";
 }
 
 std::string busyText(const LineInfo& line) {
@@ -176,22 +199,9 @@ std::string busyText(const LineInfo& line) {
 }
 
 std::string errorText(int error) {
-  static const std::map<int, const char*> kWords = {
-      {EACCES, "EACCES, permission denied"},
-      {EBUSY, "EBUSY, device or resource busy"},
-      {EINVAL, "EINVAL, invalid argument"},
-      {EIO, "EIO, input/output error"},
-      {EMFILE, "EMFILE, too many open files"},
-      {ENODEV, "ENODEV, no such device: the chip was removed"},
-      {ENOMEM, "ENOMEM, out of memory"},
-      {ENOTTY, "ENOTTY, the kernel doesn't know this call"},
-      {ENXIO, "ENXIO, the line has no interrupt"},
-      {EPERM, "EPERM, operation not permitted"},
-      {ETIMEDOUT, "ETIMEDOUT, the chip doesn't answer"},
-      {524, "ENOTSUPP, the chip's driver can't do this"},
-  };
-  const auto words = kWords.find(error);
-  if (words != kWords.end()) return words->second;
+  const auto named = std::find_if(std::begin(kErrors), std::end(kErrors),
+                                  [error](const ErrorWords& each) { return each.error == error; });
+  if (named != std::end(kErrors)) return named->words;
   return "errno " + std::to_string(error) + ", " + std::generic_category().message(error);
 }
 

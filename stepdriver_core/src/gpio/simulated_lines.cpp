@@ -9,6 +9,7 @@
 
 namespace stepdriver::gpio {
 
+// NOLINTNEXTLINE(performance-unnecessary-value-param): a board that knows its edges keeps it
 void Board::watchInput(const std::string& /*line*/, EdgeListener /*listener*/) {}
 
 struct SimulatedBackend::Shared {

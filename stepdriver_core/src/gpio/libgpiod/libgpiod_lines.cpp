@@ -57,7 +57,9 @@ class Requester {
 
   void takeInputs() {
     parts_.inputs.resize(inputs_.size());
-    for (const auto& [chip, members] : byChip("inputs", outputs_.size(), inputs_.size())) {
+    for (const auto& entry : byChip("inputs", outputs_.size(), inputs_.size())) {
+      const std::size_t chip = entry.first;
+      const std::vector<std::size_t>& members = entry.second;
       std::vector<gpiod::InputLine> lines;
       auto group = std::make_unique<gpiod::InputGroup>();
       for (const std::size_t i : members) {
@@ -76,7 +78,9 @@ class Requester {
 
   void takeOutputs() {
     parts_.outputs.resize(outputs_.size());
-    for (const auto& [chip, members] : byChip("outputs", 0, outputs_.size())) {
+    for (const auto& entry : byChip("outputs", 0, outputs_.size())) {
+      const std::size_t chip = entry.first;
+      const std::vector<std::size_t>& members = entry.second;
       std::vector<gpiod::OutputLine> lines;
       auto group = std::make_unique<gpiod::OutputGroup>();
       for (const std::size_t i : members) {
@@ -131,7 +135,7 @@ class Requester {
 
   std::string outputRefusal(std::size_t i, int error) {
     std::string reason;
-    if (error == EIO || error == EINVAL || error == EPERM) {
+    if (error == EIO || error == EINVAL) {
       reason = " It may be that this line can only be read: use another one.";
     }
     return refusal("output", outputs_[i].line, addresses_[i], error, reason);

@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Has libgpiod 2 beside the system's libgpiod 1, for builds and tests with both.
+set -euo pipefail
+
+usage() {
+  cat <<'END'
+usage: scripts/libgpiod2.sh [-h]
+
+Unpacks Debian's libgpiod 2 from the backports of this Debian into a folder beside the system, and
+prints that folder: the STEPDRIVER_GPIOD_ROOT of a build.
+
+    cmake -S stepdriver_core -B build/gpiod2 -DSTEPDRIVER_GPIOD=2 \
+      -DSTEPDRIVER_GPIOD_ROOT="$(scripts/libgpiod2.sh)"
+
+Where the system's own libgpiod is version 2 it prints an empty line: then there is nothing to
+name. Nothing is installed, and apt's own lists and sources stay as they are. The folder is kept in
+~/.cache/stepdriver/libgpiod2 (or $XDG_CACHE_HOME/stepdriver/libgpiod2), one for each version; it is
+looked for there first. Exit status 77, and the reason, where it can't be had.
+END
+}
+case ${1:-} in
+  '') ;;
+  -h | --help) usage && exit ;;
+  *) usage >&2 && exit 2 ;;
+esac
+
+export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH" LC_ALL=C.UTF-8
+missing() {
+  printf 'libgpiod2.sh: libgpiod 2 cannot be had: %s\n' "$*" >&2
+  exit 77
+}
+
+if grep -qs gpiod_api_version /usr/include/gpiod.h; then
+  echo
+  exit
+fi
+
+cache=${XDG_CACHE_HOME:-${HOME:?}/.cache}/stepdriver/libgpiod2
+mkdir -p "$cache"
+cache=$(cd "$cache" && pwd -P)
+newest() { find "$cache" -mindepth 1 -maxdepth 1 -type d -name '[0-9]*' | sort -V | tail -n 1; }
+found=$(newest)
+if [[ -n $found ]]; then
+  printf '%s\n' "$found"
+  exit
+fi
+
+# ---- where from ----
+
+for tool in apt-get apt-cache dpkg-deb; do
+  command -v "$tool" >/dev/null || missing "there is no $tool: this isn't a Debian"
+done
+# shellcheck disable=SC1091
+suite=$(. /etc/os-release && [[ ${ID:-} == debian ]] && printf '%s' "${VERSION_CODENAME:-}") ||
+  missing "this isn't a Debian"
+[[ -n $suite ]] || missing "/etc/os-release names no suite of Debian"
+# shellcheck disable=SC2016
+mirror=$(apt-get indextargets --format '$(LABEL) $(REPO_URI)' 2>/dev/null |
+  sed -n 's/^Debian //p' | head -n 1) || true
+mirror=${mirror:-http://deb.debian.org/debian}
+keys=/usr/share/keyrings/debian-archive-keyring.gpg
+[[ -r $keys ]] || missing "there is no $keys: install debian-archive-keyring"
+
+# ---- the download: apt with lists and sources of its own ----
+
+work=$(mktemp -d "$cache/.new.XXXXXX")
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$work"/{lists,cache/archives}/partial "$work"/{root,debs,none}
+: >"$work/status"
+echo "deb [signed-by=$keys] ${mirror%/} $suite-backports main" >"$work/sources.list"
+apt=(-o Dir::State="$work" -o Dir::State::lists="$work/lists" -o Dir::State::status="$work/status"
+  -o Dir::Cache="$work/cache" -o Dir::Etc::sourcelist="$work/sources.list"
+  -o Dir::Etc::sourceparts="$work/none" -o APT::Update::Error-Mode=any)
+# apt's own user couldn't read the folder of whoever calls.
+(($(id -u) != 0)) || apt+=(-o APT::Sandbox::User=root)
+
+apt-get "${apt[@]}" -q update >"$work/log" 2>&1 ||
+  missing "$mirror $suite-backports doesn't answer: $(grep -m 1 '^[EW]:' "$work/log" || true)"
+version=$(apt-cache "${apt[@]}" policy libgpiod-dev | sed -n 's/^ *Candidate: *//p')
+[[ $version == 2.* ]] || missing "$suite-backports has libgpiod-dev ${version:-in no version}"
+(cd "$work/debs" && apt-get "${apt[@]}" -q download libgpiod-dev libgpiod3) >"$work/log" 2>&1 ||
+  missing "the download failed: $(grep -m 1 '^E:' "$work/log" || true)"
+for package in "$work"/debs/*.deb; do dpkg-deb -x "$package" "$work/root"; done
+grep -qs gpiod_api_version "$work/root/usr/include/gpiod.h" ||
+  missing "the package libgpiod-dev $version has no gpiod.h of version 2"
+
+# Another run may have been first: then its folder stays.
+mv -T "$work/root" "$cache/$version" 2>/dev/null || true
+newest
