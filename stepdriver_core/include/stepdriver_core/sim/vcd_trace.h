@@ -13,8 +13,8 @@ namespace stepdriver::sim {
 /// which GTKWave, PulseView and sigrok-cli open. A last time stamp, 1 us after the last edge,
 /// closes the file: without it viewers leave the last levels out.
 ///
-/// Each axis is a scope, and its pins are named as TracePin says. sigrok up to 0.5 drops the scopes:
-/// of several axes it shows pins of one name.
+/// Each axis is a scope, and its pins are named as TracePin says. sigrok up to 0.5 drops the
+/// scopes: of several axes it shows pins of one name.
 ///
 /// The same edges make the same file: there is no date in it. Edges are buffered; the file is
 /// complete up to the last edge after flush() and after destruction.
