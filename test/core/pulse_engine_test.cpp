@@ -81,7 +81,7 @@ class PulseEngineTest : public testing::Test {
     return config;
   }
 
-  void make(std::vector<ChannelConfig> channels, Nanoseconds max_lateness = 5'000'000) {
+  void make(const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness = 5'000'000) {
     engine = std::make_unique<PulseEngine>(lines, clock, channels, max_lateness);
   }
 

@@ -18,12 +18,13 @@ namespace stepdriver::sim {
 namespace {
 
 class VcdTraceTest : public testing::Test {
- protected:
+ public:
   VcdTraceTest()
       : path_(testing::TempDir() + "stepdriver_" +
               testing::UnitTest::GetInstance()->current_test_info()->name() + ".vcd") {}
   ~VcdTraceTest() override { std::remove(path_.c_str()); }
 
+ protected:
   std::string text() const {
     std::ifstream file(path_);
     std::ostringstream all;

@@ -54,8 +54,8 @@ Profile planTrapezoid(std::int64_t start_ns, std::int64_t from, std::int64_t to,
                       sign * limits.acceleration, 0.0});
   }
   if (cruise.hi > 0.0) {
-    pieces.push_back(
-        {cruise / DoubleDouble(peak), fromInteger(from) + signed_length(up), sign * peak, 0.0, 0.0});
+    pieces.push_back({cruise / DoubleDouble(peak), fromInteger(from) + signed_length(up),
+                      sign * peak, 0.0, 0.0});
   }
   if (peak > start) {
     pieces.push_back({rampTime(start, peak, limits.deceleration),

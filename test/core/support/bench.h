@@ -83,11 +83,11 @@ class Bench {
                  double speed = 0.0)
       : Bench(axes, rigAxes(axes), threaded, speed) {}
 
-  Bench(const std::vector<axis::AxisConfig>& axes, std::vector<sim::RigAxisSpec> rig_axes,
+  Bench(const std::vector<axis::AxisConfig>& axes, const std::vector<sim::RigAxisSpec>& rig_axes,
         bool threaded = false, double speed = 0.0)
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
-        rig(std::move(rig_axes), trace),
+        rig(rig_axes, trace),
         backend(rig, [this] { return clock.now(); }) {
     machine::MachineOptions options;
     options.threaded = threaded;
@@ -96,6 +96,7 @@ class Bench {
 
   static std::vector<sim::RigAxisSpec> rigAxes(const std::vector<axis::AxisConfig>& axes) {
     std::vector<sim::RigAxisSpec> specs;
+    specs.reserve(axes.size());
     for (const axis::AxisConfig& config : axes) specs.push_back(rigAxis(config));
     return specs;
   }
