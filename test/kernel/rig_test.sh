@@ -31,25 +31,34 @@ until_true() {
   done
 }
 
-# The tools of libgpiod 1 and 2 take other arguments.
+# The tools of libgpiod 2 don't know labels.
+chip_of() { basename "$("$GPIO_SIM" path "$1")"; }
+
+# Those of 1 and 2 take other arguments.
 libgpiod_1() { [[ $(gpiodetect --version) == *' v1.'* ]]; }
 
 # Sets lines, OFFSET=VALUE, and holds them until it is told to end.
 hold_lines() {
-  local chip=$1
+  local chip
+  chip=$(chip_of "$1")
   shift
   if libgpiod_1; then exec gpioset --mode=signal "$chip" "$@"; else exec gpioset -c "$chip" "$@"; fi
 }
 set_once() {
-  local chip=$1
+  local chip
+  chip=$(chip_of "$1")
   shift
   if libgpiod_1; then gpioset "$chip" "$@"; else gpioset -t 0 -c "$chip" "$@"; fi
 }
 wait_for_edge() {
-  if libgpiod_1; then exec gpiomon -n 1 -r "$1" "$2"; else exec gpiomon -n 1 -e rising -c "$1" "$2"; fi
+  local chip
+  chip=$(chip_of "$1")
+  if libgpiod_1; then exec gpiomon -n 1 -r "$chip" "$2"; else exec gpiomon -n 1 -e rising -c "$chip" "$2"; fi
 }
 level_of() {
-  if libgpiod_1; then gpioget "$1" "$2"; else gpioget --numeric -c "$1" "$2"; fi
+  local chip
+  chip=$(chip_of "$1")
+  if libgpiod_1; then gpioget "$chip" "$2"; else gpioget --numeric -c "$chip" "$2"; fi
 }
 
 has_level() { [[ $("$GPIO_SIM" value "$1" "$2") == "$3" ]]; }
