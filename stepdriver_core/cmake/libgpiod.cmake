@@ -52,13 +52,15 @@ if(STEPDRIVER_GPIOD MATCHES "^[12]$" AND NOT STEPDRIVER_GPIOD EQUAL gpiod_major)
 endif()
 
 set(gpiod_folder ${CMAKE_CURRENT_SOURCE_DIR}/src/gpio/libgpiod)
+# It calls no libgpiod itself, and so its test runs everywhere.
+set(gpiod_sources ${gpiod_folder}/held_lines.cpp)
 if(gpiod_major)
-  foreach(name held_lines libgpiod_lines open_chips gpiod${gpiod_major})
+  foreach(name libgpiod_lines open_chips gpiod${gpiod_major})
     list(APPEND gpiod_sources ${gpiod_folder}/${name}.cpp)
   endforeach()
   message(STATUS "GPIO lines: libgpiod ${gpiod_major} (${gpiod_library}) and simulated")
 else()
-  set(gpiod_sources ${gpiod_folder}/without.cpp)
+  list(APPEND gpiod_sources ${gpiod_folder}/without.cpp)
   message(STATUS "GPIO lines: simulated only (STEPDRIVER_GPIOD is ${STEPDRIVER_GPIOD}; "
     "libgpiod-dev would add the real ones)")
 endif()
