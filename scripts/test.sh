@@ -6,12 +6,14 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test.sh [--lint] [--core] [--ros]
+usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
 
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS
+  --kernel  the GPIO backends on a kernel of their own with simulated GPIO chips (test/kernel), with
+          each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
           read by sigrok-cli
 
@@ -22,18 +24,25 @@ END
 parts=()
 for argument; do
   case $argument in
-    --lint | --core | --ros) parts+=("${argument#--}") ;;
+    --lint | --core | --kernel | --ros) parts+=("${argument#--}") ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
 done
-((${#parts[@]} > 0)) || parts=(lint core ros)
+((${#parts[@]} > 0)) || parts=(lint core kernel ros)
 wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
+! wants kernel || wants core || parts+=(core)
 
 # ---- stages ----
 
 passed=0 failed=0 skipped=0 summary=''
 declare -A outcome
+# A stage that can't run here ends with this status, and its reason in log/skipped.
+skip_status=77
+skip() {
+  say "$*" >"$build/log/skipped"
+  exit "$skip_status"
+}
 
 conclude() {
   outcome[$1]=$2
@@ -53,6 +62,9 @@ stage() {
   if ((run_status == 0)); then
     passed=$((passed + 1))
     conclude "$name" passed "$((SECONDS - start)) s"
+  elif ((run_status == skip_status)); then
+    skipped=$((skipped + 1))
+    conclude "$name" skipped "$(tail -n 1 "$build/log/skipped")"
   else
     failed=$((failed + 1))
     conclude "$name" FAILED "$((SECONDS - start)) s"
@@ -77,16 +89,24 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh .ci/run)
 }
 
-# Each file with the compile commands of the build that compiles it.
+# Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
+# is the one to the version that is installed.
 check_tidy() {
   local status=0
   quietly tidy-configure configure_tidy
-  own_files '*.cpp' | grep -E '^(stepdriver_core|test/core)/' | tidy "$build/core" || status=1
+  own_files '*.cpp' | grep -E '^(stepdriver_core|test/core|test/kernel)/' | compiled_by "$build/core" |
+    tidy "$build/core" || status=1
   own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node)/' | tidy "$build/catkin" || status=1
   return "$status"
+}
+compiled_by() {
+  local name
+  while IFS= read -r name; do
+    ! grep -qF "\"file\": \"$src/$name\"" "$1/compile_commands.json" || say "$name"
+  done
 }
 configure_tidy() {
   configure_core && configure_catkin &&
@@ -106,6 +126,38 @@ build_core_quietly() {
 }
 test_core() {
   ctest --test-dir "$build/core" -j "$jobs" --timeout 300 --no-tests=error --output-on-failure
+}
+
+test_kernel() {
+  local reason status=0
+  say "Building the kernel (about five minutes the first time)"
+  reason=$(bash "$src/test/kernel/run.sh" --check 2>&1) || status=$?
+  ((status != skip_status)) || skip "$reason"
+  ((status == 0)) || die "$reason"
+  bash "$src/test/kernel/rig_test.sh" "$build/core/test/kernel/trace_to_vcd"
+  test_lines_in_kernel "$build/core"
+}
+test_lines_in_kernel() {
+  local test
+  for test in lines_conformance_test libgpiod_lines_test; do
+    STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 -- "$1/test/core/$test"
+  done
+}
+
+# The same with libgpiod 2 where the system's is 1.
+test_kernel_gpiod2() {
+  local unpacked status=0
+  unpacked=$(bash "$src/scripts/libgpiod2.sh" 2>"$build/log/libgpiod2.log") || status=$?
+  ((status != skip_status)) || skip "$(<"$build/log/libgpiod2.log")"
+  ((status == 0)) || die "$(<"$build/log/libgpiod2.log")"
+  [[ -n $unpacked ]] || skip "this Debian's own libgpiod is 2"
+  build_gpiod2() {
+    cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DSTEPDRIVER_GPIOD=2 \
+      -DSTEPDRIVER_GPIOD_ROOT="$unpacked" &&
+      cmake --build "$build/gpiod2" -j "$jobs" --target lines_conformance_test libgpiod_lines_test
+  }
+  quietly gpiod2-build build_gpiod2
+  test_lines_in_kernel "$build/gpiod2"
 }
 
 build_node() {
@@ -154,6 +206,10 @@ fi
 if wants core; then
   stage core-build build_core
   stage core-tests test_core core-build
+fi
+if wants kernel; then
+  stage kernel test_kernel core-build
+  stage kernel-gpiod2 test_kernel_gpiod2 kernel
 fi
 if wants ros; then
   stage node-build build_node
