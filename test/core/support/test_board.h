@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,11 @@ struct TestBoardKind {
   std::string (*missing)();  ///< why there can't be one here; empty where there can
   std::unique_ptr<TestBoard> (*make)();
 };
+
+/// As GoogleTest shows it.
+inline void PrintTo(const TestBoardKind& kind, std::ostream* out) {  // NOLINT: GoogleTest's name
+  *out << kind.name;
+}
 
 TestBoardKind simulatedBoard();
 TestBoardKind gpioSimBoard();
