@@ -151,13 +151,13 @@ test_kernel_gpiod2() {
   ((status != skip_status)) || skip "$(<"$build/log/libgpiod2.log")"
   ((status == 0)) || die "$(<"$build/log/libgpiod2.log")"
   [[ -n $unpacked ]] || skip "this Debian's own libgpiod is 2"
-  build_gpiod2() {
-    cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DSTEPDRIVER_GPIOD=2 \
-      -DSTEPDRIVER_GPIOD_ROOT="$unpacked" &&
-      cmake --build "$build/gpiod2" -j "$jobs" --target lines_conformance_test libgpiod_lines_test
-  }
-  quietly gpiod2-build build_gpiod2
+  quietly gpiod2-build build_gpiod2 "$unpacked"
   test_lines_in_kernel "$build/gpiod2"
+}
+build_gpiod2() {
+  cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DSTEPDRIVER_GPIOD=2 \
+    -DSTEPDRIVER_GPIOD_ROOT="$1" &&
+    cmake --build "$build/gpiod2" -j "$jobs" --target lines_conformance_test libgpiod_lines_test
 }
 
 build_node() {
