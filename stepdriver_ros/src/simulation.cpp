@@ -73,6 +73,7 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& axis, const SimulatedAxis& simulate
   spec.microsteps = axis.microsteps;
   spec.full_step_travel = axis.microsteps / axis.steps_per_unit * rigUnitsPerUnit(axis.kind);
   spec.start = simulated.start;
+  if (axis.fault) spec.fault_line = axis.fault->line;
   const SwitchPlaces places = switchPlaces(axis, simulated);
   spec.min_switch = switchOf(axis.endstop_min, simulated, places.min);
   spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);

@@ -34,6 +34,10 @@ class SimulatedAxisReader {
     axis.faults.min_stuck = stuck("min_stuck");
     axis.faults.max_stuck = stuck("max_stuck");
     axis.faults.lose_every = reader_.integer("lose_every", 0, kMostWrites, 0);
+    if (const auto steps =
+            reader_.findInteger("chip_fault_after", 0, kMostWrites, Presence::kOptional)) {
+      axis.faults.chip_fault_after = *steps;
+    }
     axis.fail_step_write_after =
         reader_.findInteger("fail_step_write_after", 0, kMostWrites, Presence::kOptional);
     reader_.rejectUnknown();

@@ -47,6 +47,7 @@ struct SimulationConfig {
 ///       min_stuck: none          # active, inactive or none
 ///       max_stuck: none
 ///       lose_every: 0            # every n-th step slips; 0: none
+///       chip_fault_after: 1000        # steps of the motor; then the chip reports over-current
 ///       fail_step_write_after: 1000   # writes to STEP; those after them fail. Default: none fails
 /// @endcode
 ///

@@ -2,7 +2,6 @@
 
 #include <cerrno>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -148,12 +147,10 @@ TEST(AxisChip, StopsAtAFaultOfTheChipAndResetsItToRecover) {
     Bench bench({config}, true, 1.0);
     axis::Axis& x = bench.axis();
     x.setPosition(0.0);
-    const axis::Move move = x.moveTo(0.09);
-    while (bench.pulses() < 100) std::this_thread::yield();
     sim::RigFaults faults;
-    faults.chip_fault = true;
+    faults.chip_fault_after = 100;
     bench.rig.setFaults("x", faults);
-    const axis::MoveResult result = x.wait(move);
+    const axis::MoveResult result = x.wait(x.moveTo(0.09));
     EXPECT_EQ(result.end, axis::MoveEnd::kFault);
     EXPECT_NE(result.message.find("nFAULT"), std::string::npos) << result.message;
     EXPECT_LT(bench.pulses(), 7200);

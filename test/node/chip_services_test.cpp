@@ -3,6 +3,7 @@
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Microstep.h>
+#include <stepdriver/MoveTo.h>
 #include <stepdriver/SetPosition.h>
 
 #include <cmath>
@@ -48,6 +49,26 @@ void makeTb6600(NodeUnderTest& node) {
   node.set("axes/x/steps_per_mm", 80.0);
   node.set("axes/x/max_speed_mm_s", 50.0);
   node.set("axes/x/acceleration_mm_s2", 500.0);
+}
+
+TEST(ChipServices, AFaultOfTheChipEndsAMoveAndRecoverResetsTheChip) {
+  NodeUnderTest node;
+  node.set("axes/x/driver", "drv8825");
+  node.set("axes/x/pins/fault", "x_fault");
+  node.set("simulation/axes/x/chip_fault_after", 100);
+  node.start();
+  MoveTo::Request request;
+  request.position = 0.05;
+  request.wait = true;
+  const auto failed = node.call<MoveTo>("x/move_to", request);
+  EXPECT_FALSE(failed.success);
+  expectSays(failed.message, "nFAULT");
+  const auto refused = node.call<MoveTo>("x/move_to", request);
+  EXPECT_FALSE(refused.success);
+  expectSays(refused.message, "recover");
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("recover").success);
+  const auto moved = node.call<MoveTo>("x/move_to", request);
+  EXPECT_TRUE(moved.success) << moved.message;
 }
 
 TEST(ChipServices, EnableAndDisableShowInTheStateAndInTheTrace) {

@@ -82,6 +82,7 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   // The loss is in the coupling, not in the rotor: the rotor then still agrees with the translator,
   // and the lost steps stay lost when the current is switched.
   if (faults_.lose_every > 0 && motor_steps_ % faults_.lose_every == 0) slipped_ += pulse.moved;
+  if (faults_.chip_fault_after == motor_steps_) setChipFault(true);
 }
 
 void RigAxis::snapRotor() {
@@ -105,7 +106,7 @@ void RigAxis::setFaults(const RigFaults& faults) {
   motor_steps_ = 0;
   if (min_switch_) min_switch_->stick(faults.min_stuck);
   if (max_switch_) max_switch_->stick(faults.max_stuck);
-  if (faults.chip_fault) setChipFault(true);
+  if (faults.chip_fault_after == 0) setChipFault(true);
 }
 
 void RigAxis::setChipFault(bool faulty) {

@@ -91,7 +91,9 @@ struct RigFaults {
   std::optional<bool> max_stuck;
   std::int64_t lose_every = 0;  ///< every n-th step of the motor, counted from setFaults() on,
                                 ///< slips: the carriage stays behind for good; 0: none
-  bool chip_fault = false;      ///< over-current: outputs off and nFAULT low until RESET
+  /// Over-current after this many steps of the motor, counted from setFaults() on: outputs off and
+  /// nFAULT low until RESET.
+  std::optional<std::int64_t> chip_fault_after;
 };
 
 /// The model of an axis. STEP's active edge moves the translator to the next place that the mode
