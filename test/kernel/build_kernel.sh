@@ -68,7 +68,7 @@ for tool in bc bison flex gcc make xz; do
   command -v "$tool" >/dev/null || missing+=("$tool")
 done
 ((${#missing[@]} == 0)) ||
-  die "not here: ${missing[*]}. Install what stands in $here/packages.txt"
+  die "not here: ${missing[*]}. Install the group [kernel] of scripts/packages.txt"
 
 # ---- the build ----
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "support/call_service.h"
 #include "support/recorder.h"
 #include "support/wait.h"
 
@@ -24,7 +25,7 @@ typename Service::Response call(const std::string& name,
   EXPECT_TRUE(ros::service::waitForService(name, ros::Duration(kBound.count())));
   Service call;
   call.request = request;
-  EXPECT_TRUE(ros::service::call(name, call)) << name << " doesn't answer";
+  EXPECT_TRUE(callService(name, call)) << name << " doesn't answer";
   return call.response;
 }
 

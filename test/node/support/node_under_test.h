@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <ros/param.h>
-#include <ros/service.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/RigReport.h>
 
@@ -10,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "support/call_service.h"
 #include "support/node_process.h"
 
 namespace stepdriver::node_test {
@@ -54,7 +54,7 @@ class NodeUnderTest {
                                   const typename Service::Request& request = {}) {
     Service call;
     call.request = request;
-    EXPECT_TRUE(ros::service::call(full(service), call)) << service << " doesn't answer";
+    EXPECT_TRUE(callService(full(service), call)) << service << " doesn't answer";
     return call.response;
   }
 
