@@ -75,6 +75,7 @@ bool PulseEngine::isFast(const Channel& channel) {
 // ---- orders ----
 
 void PulseEngine::takeMail(Nanoseconds now) {
+  if (mail_.front() == nullptr) return;
   while (const Command* command = mail_.front()) {
     Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
     if (command->kind == Command::Kind::kFollow) {
@@ -85,8 +86,9 @@ void PulseEngine::takeMail(Nanoseconds now) {
     channel.state.taken = command->serial;
     channel.published.store(channel.state);
     mail_.pop();
-    schedule(channel);
   }
+  // All of them: an order may slide the timeline, and then no step may go out by its old time.
+  scheduleAll();
 }
 
 void PulseEngine::follow(Channel& channel, const Command& command, Nanoseconds now) {
@@ -128,6 +130,10 @@ void PulseEngine::adopt(Channel& channel, const motion::Profile& profile, std::u
   channel.profile = &profile;
   channel.finder = motion::StepFinder(profile, channel.state.count);
   channel.state.following = serial;
+  pullNext(channel);
+}
+
+void PulseEngine::pullNext(Channel& channel) {
   motion::Step step;
   channel.next.reset();
   if (channel.finder.next(step)) channel.next = step;
@@ -233,9 +239,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
       channel->running = true;
       ++state_.pulses;
       channel->last_planned = channel->next->time_ns;
-      motion::Step step;
-      channel->next.reset();
-      if (channel->finder.next(step)) channel->next = step;
+      pullNext(*channel);
       channel->published.store(channel->state);
     }
   }

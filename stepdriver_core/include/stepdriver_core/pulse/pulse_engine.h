@@ -191,6 +191,7 @@ class PulseEngine {
   void follow(Channel& channel, const Command& command, Nanoseconds now);
   void startPins(Channel& channel, const Command& command, Nanoseconds now);
   void adopt(Channel& channel, const motion::Profile& profile, std::uint64_t serial);
+  static void pullNext(Channel& channel);
 
   void stopAll(Nanoseconds now);
   void readInputs(Nanoseconds now);
