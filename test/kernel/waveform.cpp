@@ -156,6 +156,19 @@ std::string textOf(const Violation& violation) {
 
 }  // namespace
 
+WiredAxis wiredAxis(const axis::AxisConfig& config, const KernelTrace& trace) {
+  const auto wired = [&trace](const axis::Pin& pin) {
+    return WiredPin{trace.line(pin.line), pin.inverted};
+  };
+  WiredAxis axis;
+  axis.driver = config.driver;
+  axis.timing = config.timing;
+  axis.step = wired(config.pins.step);
+  axis.dir = wired(config.pins.dir);
+  if (config.pins.enable.wired()) axis.enable = wired(config.pins.enable);
+  return axis;
+}
+
 const char* nameOf(Rule rule) {
   switch (rule) {
     case Rule::kStepHigh:

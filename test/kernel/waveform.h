@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernel_trace.h"
+#include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/chip/chip.h"
 
 /// The waveform of an axis as the kernel put it out, held against what the driver chip needs.
@@ -36,6 +37,10 @@ struct WiredAxis {
   /// time and less than that of real time, and two writes are more than 1 us apart.
   std::int64_t one_write_ns = 600;
 };
+
+/// The wiring that an axis is configured with.
+/// @throw Error where the trace doesn't know a line's chip: its pins must be named label:offset.
+WiredAxis wiredAxis(const axis::AxisConfig& config, const KernelTrace& trace);
 
 enum class Rule {
   kStepHigh,
