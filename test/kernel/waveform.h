@@ -34,8 +34,9 @@ struct WiredAxis {
   std::int64_t shortest_interval_ns = 0;
   /// Changes of STEP and DIR whose stamps are this close were made by one write: the kernel stamps
   /// the lines of a write one after the other. On the test kernel a line takes 256 ns of virtual
-  /// time and less than that of real time, and two writes are more than 1 us apart.
-  std::int64_t one_write_ns = 600;
+  /// time, or mostly less of real time, and two writes are further apart than this. 0: only those
+  /// with one stamp.
+  std::int64_t one_write_ns = 1'000;
 };
 
 /// The wiring that an axis is configured with.

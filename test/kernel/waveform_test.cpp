@@ -49,7 +49,8 @@ class Hand {
   std::string text_;
 };
 
-/// A DRV8825: 1.9 us high and low, DIR 650 ns before and after, 650 ns from ENABLE.
+/// A DRV8825: 1.9 us high and low, DIR 650 ns before and after, 650 ns from ENABLE;
+/// 600 ns from one write to the next.
 WiredAxis wired() {
   WiredAxis axis;
   axis.driver = chip::Model::kDrv8825;
@@ -57,6 +58,7 @@ WiredAxis wired() {
   axis.step.line = kStep;
   axis.dir.line = kDir;
   axis.enable = WiredPin{kEnable, false};
+  axis.one_write_ns = 600;
   return axis;
 }
 
