@@ -62,6 +62,7 @@ class KernelBench {
   void awaitCount(const std::string& name, std::int64_t steps);
 
   void emergencyStop() { machine_->emergencyStop(); }
+  void recover() { machine_->recover(); }
   machine::EngineFigures figures() const { return machine_->figures(); }
 
   /// Shuts the machine down and releases its lines.
