@@ -84,6 +84,15 @@ void KernelBench::awaitCount(const std::string& name, std::int64_t steps) {
   }
 }
 
+bool KernelBench::awaitLevel(std::size_t chip, unsigned offset, bool level) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (chips_.at(chip).level(offset) != level) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
 KernelTrace KernelBench::finish(const std::string& name) {
   machine_.reset();
   return recording_.stop(name);

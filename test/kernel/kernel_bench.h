@@ -61,6 +61,9 @@ class KernelBench {
   /// Returns when the axis stands so many microsteps from 0, in either direction, or at rest.
   void awaitCount(const std::string& name, std::int64_t steps);
 
+  /// @return whether the line gets this level within ten seconds.
+  bool awaitLevel(std::size_t chip, unsigned offset, bool level);
+
   void emergencyStop() { machine_->emergencyStop(); }
   void recover() { machine_->recover(); }
   machine::EngineFigures figures() const { return machine_->figures(); }

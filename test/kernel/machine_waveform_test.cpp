@@ -335,6 +335,8 @@ TEST_F(Ending, ByAnEmergencyStopFinishesThePulse) {
     bench.emergencyStop();
     EXPECT_EQ(bench.axis("x").wait(x).end, MoveEnd::kEmergencyStop);
     EXPECT_EQ(bench.axis("y").wait(y).end, MoveEnd::kEmergencyStop);
+    EXPECT_TRUE(bench.awaitLevel(0, 0, true)) << "the pulse of x doesn't end";
+    EXPECT_TRUE(bench.awaitLevel(1, 0, false)) << "the pulse of y doesn't end";
     ends_x.push_back(bench.count("x"));
     ends_y.push_back(bench.count("y"));
     bench.recover();
