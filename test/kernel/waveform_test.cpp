@@ -92,6 +92,8 @@ TEST(Waveform, TakesRewrittenLevelsAndReadsForNoEdges) {
   const Waveform seen = Hand()
                             .request()
                             .at(9'000, kStep, false)
+                            .at(9'900, kDir, false)
+                            .at(9'900, kEnable, false)
                             .pulse(10'000, 12'000)
                             .at(12'100, kDir, false)
                             .at(12'200, kStep, true, "get")
