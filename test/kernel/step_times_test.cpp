@@ -89,7 +89,7 @@ double worstOf(const Waveform& seen, const Moves& moves, const Speed& speed) {
 }
 
 std::string missing() {
-  const std::string board = test::gpioSimBoard().missing();
+  std::string board = test::gpioSimBoard().missing();
   if (!board.empty()) return board;
   return timeTravels() ? "" : "runs in virtual time (run.sh --time-travel)";
 }
