@@ -165,7 +165,17 @@ TEST_F(LibgpiodOnGpioSim, SayHowToGetTheRightToAChip) {
       << text;
 }
 
+bool libraryHasBias() { return libgpiodVersion().rfind("1.4", 0) != 0; }
+
+TEST_F(LibgpiodOnGpioSim, RefuseABiasThatTheLibraryCannotSet) {
+  if (libraryHasBias()) GTEST_SKIP() << "libgpiod " << libgpiodVersion() << " can set it";
+  const std::string text = textOf({}, {{"header:1", Bias::kPullUp, false}});
+  EXPECT_NE(text.find("header:1"), std::string::npos) << text;
+  EXPECT_NE(text.find("can't set a bias"), std::string::npos) << text;
+}
+
 TEST_F(LibgpiodOnGpioSim, PullInputsAsTheBiasSays) {
+  if (!libraryHasBias()) GTEST_SKIP() << "libgpiod " << libgpiodVersion() << " can't set it";
   for (const bool edges : {false, true}) {
     const auto lines = makeLibgpiodBackend()->request({}, {{"header:1", Bias::kPullUp, edges},
                                                            {"header:2", Bias::kPullDown, edges},
