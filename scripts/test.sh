@@ -125,7 +125,7 @@ build_core_quietly() {
     cmake --build "$build/core" -j "$jobs"
 }
 test_core() {
-  ctest --test-dir "$build/core" -j "$jobs" --timeout 300 --no-tests=error --output-on-failure
+  (cd "$build/core" && ctest -j "$jobs" --timeout 300 --no-tests=error --output-on-failure)
 }
 
 test_kernel() {
@@ -186,7 +186,7 @@ build_node() {
     quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
 }
 test_node() {
-  ctest --test-dir "$build/catkin" --timeout 600 --no-tests=error --output-on-failure
+  (cd "$build/catkin" && ctest --timeout 600 --no-tests=error --output-on-failure)
 }
 
 # Nothing but the install space is on any path here.

@@ -1,6 +1,7 @@
 #include "node_config.h"
 
 #include "stepdriver_core/axis/config_reader.h"
+#include "stepdriver_core/gpio/libgpiod_lines.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -12,13 +13,16 @@ using axis::Range;
 constexpr Range kJointStateRates{1.0, 1000.0};
 constexpr double kLongestLatenessMs = 1000.0;
 
-void readGpio(ConfigReader gpio) {
+GpioBackend readGpio(ConfigReader gpio) {
   const std::string backend = gpio.oneOf("backend", {"simulated", "libgpiod"});
-  if (backend == "libgpiod") {
-    gpio.issue("backend",
-               "is \"libgpiod\", which is not built into this version; it must be simulated");
+  if (backend == "libgpiod" && gpio::libgpiodVersion().empty()) {
+    gpio.issue(
+        "backend",
+        "is \"libgpiod\", but stepdriver was built without it, so that it must be simulated; "
+        "install libgpiod-dev and build again for real lines");
   }
   gpio.rejectUnknown();
+  return backend == "libgpiod" ? GpioBackend::kLibgpiod : GpioBackend::kSimulated;
 }
 
 double readMaxLateness(ConfigReader realtime, double fallback) {
@@ -41,7 +45,7 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
                           std::vector<ConfigIssue>& issues) {
   NodeConfig config;
   ConfigReader reader(tree, name, issues);
-  readGpio(reader.map("gpio"));
+  config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
   config.max_lateness = readMaxLateness(reader.map("realtime"), config.max_lateness);
@@ -51,6 +55,12 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.axes = axis::readAxes(valueOf(tree, "axes"), reader.fullName("axes"), issues);
   const bool axes_are_right = issues.size() == issues_before;
   config.simulation = readSimulation(reader.map("simulation"), config.axes, axes_are_right);
+  if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {
+    issues.push_back({reader.fullName("simulation/trace"),
+                      "is \"" + config.simulation.trace +
+                          "\", but only the simulated rig has a trace, and gpio/backend is "
+                          "libgpiod; leave it out or empty"});
+  }
   reader.rejectUnknown();
   return config;
 }

@@ -10,8 +10,11 @@
 
 namespace stepdriver::ros_node {
 
+enum class GpioBackend { kSimulated, kLibgpiod };
+
 /// All parameters of the node.
 struct NodeConfig {
+  GpioBackend backend = GpioBackend::kSimulated;
   double joint_state_rate = 50.0;  ///< [Hz]
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
   SimulationConfig simulation;
@@ -21,10 +24,10 @@ struct NodeConfig {
 /// Reads the node's private parameters.
 ///
 /// @code{.yaml}
-/// gpio: {backend: simulated}     # simulated or libgpiod
+/// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
 /// realtime: {max_lateness_ms: 5.0}
-/// simulation: {...}              # see readSimulation()
+/// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode
 ///

@@ -13,8 +13,8 @@
 #include "bring_up.h"
 #include "call_queues.h"
 #include "end_requests.h"
+#include "hardware.h"
 #include "machine_services.h"
-#include "simulation.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
@@ -78,10 +78,10 @@ int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publ
 /// @return the exit code.
 int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_requests) {
   const NodeConfig config = readParameters(node, private_node);
-  const auto simulation = makeSimulation(config, private_node.getNamespace());
+  Hardware hardware(config, private_node.getNamespace());
   machine::MachineOptions options;
   options.max_lateness = config.max_lateness;
-  machine::Machine machine(config.axes, simulation->backend(), simulation->clock(), options);
+  machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   CallQueues queues(machine.axes().size());
   // Subscribers to latched topics are served by a queue too.
@@ -93,11 +93,12 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
   MachineServices machine_services(private_node, machine, queues);
-  machine_services.advertiseRig(*simulation);
+  if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   queues.start();
   publisher.start();
-  ROS_INFO("Ready: %zu %s on the simulated rig; pulse thread: %s", machine.axes().size(),
-           machine.axes().size() == 1 ? "axis" : "axes", machine.figures().realtime.c_str());
+  ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
+           machine.axes().size() == 1 ? "axis" : "axes", hardware.description().c_str(),
+           machine.figures().realtime.c_str());
 
   std::string who;
   while (who.empty()) who = end_requests.waitFor(kPoll);

@@ -69,10 +69,10 @@ const std::vector<BadBringUp> kBadBringUps = {
      setting("gpio/backend", "simulatd"),
      "gpio/backend",
      {"\"simulatd\"", "simulated", "libgpiod"}},
-    {"BackendThatIsNotBuilt",
+    {"TraceOfRealLines",
      setting("gpio/backend", "libgpiod"),
-     "gpio/backend",
-     {"not built into this version"}},
+     "simulation/trace",
+     {".vcd\"", "only the simulated rig"}},
     {"MissingDriver", erasing("axes/x/driver"), "axes/x/driver", {"missing", "a4988"}},
     {"UnknownDriver",
      setting("axes/x/driver", "a4989"),
@@ -180,6 +180,15 @@ TEST(BringUpWithManyMistakes, ListsThemAllAtOnce) {
     EXPECT_FALSE(lineWith(output, node.full(key)).empty()) << key << " isn't in\n" << output;
   }
   expectSays(output, "6 things are wrong");
+}
+
+TEST(BringUpOnGpioLines, OfWhichThereIsNoneEndsWithTheLineAndTheWayOut) {
+  NodeUnderTest node;
+  node.set("gpio/backend", "libgpiod");
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 2) << node.process().output();
+  expectSays(node.process().output(), "x_enable");
+  expectSays(node.process().output(), "gpiochip");
 }
 
 TEST(BringUpByHand, HelpExplainsAndUnknownArgumentsAreRefused) {
