@@ -1,40 +1,14 @@
 #include "stepdriver_core/pulse/pulse_driver.h"
 
 #include <pthread.h>
-#include <sched.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/pulse/realtime.h"
 
 namespace stepdriver::pulse {
-namespace {
-
-constexpr int kPriority = 50;
-
-int askForScheduler() {
-  // Half of the lateness of a wake-up is the default slack of 50 us.
-  prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
-  sched_param parameters{};
-  parameters.sched_priority = kPriority;
-  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
-}
-
-int lockMemory() {
-  // Under a limit a locked process fails at its next allocation, wherever that is.
-  rlimit limit{};
-  if (getrlimit(RLIMIT_MEMLOCK, &limit) != 0) return errno;
-  if (limit.rlim_cur != RLIM_INFINITY) return EPERM;
-  return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
-}
-
-}  // namespace
 
 PulseDriver::PulseDriver(PulseEngine& engine, Clock& clock, bool threaded)
     : engine_(engine), clock_(clock) {
@@ -59,7 +33,7 @@ void PulseDriver::post(const Command& command) {
 
 void PulseDriver::run() {
   pthread_setname_np(pthread_self(), "pulse");
-  if (clock_.realtime()) scheduler_error_ = askForScheduler();
+  if (clock_.realtime()) scheduler_error_ = requestScheduling();
   while (!stopping_) clock_.waitUntil(engine_.serve());
 }
 
@@ -92,18 +66,6 @@ void PulseDriver::advance(Nanoseconds time) {
   }
 }
 
-std::string PulseDriver::realtime() const {
-  const int scheduler = scheduler_error_;
-  const int memory = lock_error_;
-  if (scheduler < 0) return "real-time rights are not needed: the clock is virtual";
-  std::string text = scheduler == 0
-                         ? "SCHED_FIFO " + std::to_string(kPriority)
-                         : "SCHED_FIFO refused (" + std::string(std::strerror(scheduler)) +
-                               "): `@realtime - rtprio 98` in /etc/security/limits.d "
-                               "allows it to the group realtime";
-  text += memory == 0 ? "; memory locked"
-                      : "; memory not locked: `@realtime - memlock unlimited` there allows it";
-  return text;
-}
+std::string PulseDriver::realtime() const { return describe({scheduler_error_, lock_error_}); }
 
 }  // namespace stepdriver::pulse
