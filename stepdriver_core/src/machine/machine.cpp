@@ -8,10 +8,11 @@
 #include <thread>
 #include <utility>
 
-#include "stepdriver_core/axis/axis_lines.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/capability.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
+#include "wiring.h"
 
 namespace stepdriver::machine {
 namespace {
@@ -26,24 +27,26 @@ class Machine::Impl {
  public:
   Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options) {
-    std::vector<gpio::OutputRequest> outputs;
-    std::vector<gpio::InputRequest> inputs;
-    std::vector<axis::AxisLines> axis_lines;
-    std::vector<pulse::ChannelConfig> channels;
-    for (const axis::AxisConfig& config : configs) {
-      axis_lines.push_back(axis::requestLines(config, outputs, inputs));
-      channels.push_back(axis::channelConfig(config, axis_lines.back()));
+    const Wiring wiring(configs);
+    lines_ = backend.request(wiring.outputs, wiring.inputs);
+    if (options.realtime != RealtimePolicy::kUnmeasured && clock.realtime()) {
+      const Capability capability = measure(*lines_, clock, wiring);
+      warnings_ = shortfalls(stepRates(configs, capability));
+      if (options.realtime == RealtimePolicy::kEnforce) {
+        const std::string refusal = enforcementRefusal(capability.wake_ups.rights, warnings_);
+        if (!refusal.empty()) throw Error(refusal);
+      }
     }
-    lines_ = backend.request(outputs, inputs);
-    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, channels,
+    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness));
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
-      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i), axis_lines[i],
-                                                   *lines_, *driver_));
+      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),
+                                                   wiring.axis_lines[i], *lines_, *driver_));
     }
     for (const auto& axis : axes_) axis->bringUp();
-    if (options.threaded && !inputs.empty()) watcher_ = std::thread([this] { watchInputs(); });
+    if (options.threaded && !wiring.inputs.empty())
+      watcher_ = std::thread([this] { watchInputs(); });
   }
 
   ~Impl() {
@@ -98,6 +101,7 @@ class Machine::Impl {
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<pulse::PulseDriver> driver_;
   std::vector<std::unique_ptr<axis::Axis>> axes_;
+  std::vector<std::string> warnings_;
   std::atomic<bool> shut_{false};
   std::atomic<bool> watching_ended_{false};
   std::thread watcher_;
@@ -148,6 +152,8 @@ EngineFigures Machine::figures() const {
   figures.realtime = impl_->driver_->realtime();
   return figures;
 }
+
+const std::vector<std::string>& Machine::warnings() const { return impl_->warnings_; }
 
 void Machine::advance(double seconds) { impl_->driver_->advance(nanoseconds(seconds)); }
 

@@ -12,12 +12,22 @@
 
 namespace stepdriver::machine {
 
+/// What becomes of a top speed that the machine can't hold.
+enum class RealtimePolicy {
+  kUnmeasured,  ///< nothing is measured
+  kWarn,        ///< it is one of Machine::warnings()
+  kEnforce,     ///< there is no machine then, nor without SCHED_FIFO
+};
+
 struct MachineOptions {
   /// Serve the pulses in a thread of the machine's own. Without, waiting calls serve them, and
   /// advance() does: for tests on a virtual clock.
   bool threaded = true;
   /// A pulse that comes later than this at a speed that the motor can't restart from is a fault.
   double max_lateness = 0.005;  ///< [s]
+  /// Measure before the pulses are served, which takes about 0.4 s; on a clock with realtime()
+  /// only.
+  RealtimePolicy realtime = RealtimePolicy::kUnmeasured;
 };
 
 /// What the pulse engine has done since the start.
@@ -37,6 +47,7 @@ class Machine {
   ///
   /// @param backend, clock outlive the machine.
   /// @throw GpioError where a line can't be had; then none is held.
+  /// @throw Error where RealtimePolicy::kEnforce refuses; then all are safe and released.
   Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 
@@ -68,6 +79,10 @@ class Machine {
   void shutdown();
 
   EngineFigures figures() const;
+
+  /// What was measured at the start (see MachineOptions::realtime) and isn't enough, a sentence
+  /// each; empty: nothing.
+  const std::vector<std::string>& warnings() const;
 
   /// Serves the pulses for a time of the clock. Only where the machine has no thread.
   void advance(double seconds);
