@@ -25,18 +25,32 @@ GpioBackend readGpio(ConfigReader gpio) {
   return backend == "libgpiod" ? GpioBackend::kLibgpiod : GpioBackend::kSimulated;
 }
 
-double readMaxLateness(ConfigReader realtime, double fallback) {
-  const double milliseconds =
-      realtime.number("max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, fallback * 1e3);
-  realtime.rejectUnknown();
-  return milliseconds * 1e-3;
-}
-
 const ConfigValue& valueOf(const ConfigValue& tree, const std::string& key) {
   static const ConfigValue nothing;
   const auto* map = tree.as<ConfigValue::Map>();
   const auto found = map != nullptr ? map->find(key) : ConfigValue::Map::const_iterator{};
   return map != nullptr && found != map->end() ? found->second : nothing;
+}
+
+/// The policy by itself, or a map that may have it.
+void readRealtime(ConfigReader& reader, const ConfigValue& value, NodeConfig& config) {
+  const std::vector<std::string> policies{"warn", "enforce"};
+  std::string policy = policies.front();
+  if (value.as<std::string>() != nullptr) {
+    policy = reader.oneOf("realtime", policies);
+  } else if (!value.isNothing() && value.as<ConfigValue::Map>() == nullptr) {
+    reader.allow("realtime");
+    reader.issue("realtime", "is " + value.shown() + ", but must be warn, enforce or a map");
+  } else {
+    ConfigReader map = reader.map("realtime");
+    policy = map.oneOf("policy", policies, policy);
+    config.max_lateness = map.number("max_lateness_ms", Range{0.0, kLongestLatenessMs, true},
+                                     config.max_lateness * 1e3) *
+                          1e-3;
+    map.rejectUnknown();
+  }
+  config.realtime =
+      policy == "enforce" ? machine::RealtimePolicy::kEnforce : machine::RealtimePolicy::kWarn;
 }
 
 }  // namespace
@@ -48,7 +62,7 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
-  config.max_lateness = readMaxLateness(reader.map("realtime"), config.max_lateness);
+  readRealtime(reader, valueOf(tree, "realtime"), config);
 
   const std::size_t issues_before = issues.size();
   reader.allow("axes");

@@ -7,6 +7,7 @@
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/config_value.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 
@@ -17,6 +18,7 @@ struct NodeConfig {
   GpioBackend backend = GpioBackend::kSimulated;
   double joint_state_rate = 50.0;  ///< [Hz]
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
+  machine::RealtimePolicy realtime = machine::RealtimePolicy::kWarn;
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
 };
@@ -26,7 +28,9 @@ struct NodeConfig {
 /// @code{.yaml}
 /// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
-/// realtime: {max_lateness_ms: 5.0}
+/// realtime: warn                 # or enforce: what becomes of a top speed that is measured to be
+///                                # beyond this machine. Or a map:
+/// realtime: {policy: warn, max_lateness_ms: 5.0}
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode

@@ -17,6 +17,7 @@
 #include "machine_services.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/capability.h"
 #include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
@@ -44,7 +45,8 @@ Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases t
   topics      joint_states  ~endstops  ~axis_states
   parameters  ~axes  ~gpio  ~joint_state_rate  ~realtime  ~simulation  robot_description
 
-Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written.
+Exit codes: 0 ended as asked, 1 wrong configuration, or one that asks for more than this machine
+holds (realtime: enforce), 2 a GPIO line can't be had or written.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -81,7 +83,10 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   Hardware hardware(config, private_node.getNamespace());
   machine::MachineOptions options;
   options.max_lateness = config.max_lateness;
+  options.realtime = config.realtime;
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
+  for (const std::string& warning : machine.warnings()) ROS_WARN("%s", warning.c_str());
+  if (!machine.warnings().empty()) ROS_WARN("%s", machine::remedyForRates().c_str());
 
   CallQueues queues(machine.axes().size());
   // Subscribers to latched topics are served by a queue too.
