@@ -30,12 +30,14 @@ struct Times {
   Nanoseconds write = 0;
   Nanoseconds read = 0;
   Nanoseconds guard = 0;
+  Nanoseconds slept_p50 = 0;
 };
 
 Capability capabilityOf(const Times& times, std::size_t axes = 1) {
   Capability capability;
   capability.wake_ups.spun.p99 = times.spun;
   capability.wake_ups.slept.p99 = times.slept;
+  capability.wake_ups.slept.p50 = times.slept_p50;
   capability.wake_ups.guard = times.guard;
   pulse::CallCost cost;
   cost.write.p99 = times.write;
@@ -81,7 +83,16 @@ TEST(StepRates, AreLimitedByWhatMayBeSpun) {
   EXPECT_DOUBLE_EQ(rate.held, 1e9 / (60'000.0 / 0.8)) << "the guard, and the high time of 1 us";
   EXPECT_EQ(rate.limit, machine::RateLimit::kSpinning);
   EXPECT_EQ(rate.reason,
-            "the pulse thread spins for 59.0 us before an edge, and may for 80 % of the time only");
+            "before an edge the pulse thread spins for 59.0 us, which it may for 80 % of the time, "
+            "and without spinning wake-ups are later");
+}
+
+TEST(StepRates, CountThatALateSleepIsSpunForShorter) {
+  Times times{1000, 1'000'000, 1000, 0, 59'000};
+  times.slept_p50 = 8'000;
+  EXPECT_DOUBLE_EQ(rateOf(times).held, 1e9 / (52'000.0 / 0.8));
+  times.slept_p50 = 40'000;
+  EXPECT_DOUBLE_EQ(rateOf(times).held, 1e9 / 62'000.0) << "no room for a sleep: it only spins";
 }
 
 TEST(StepRates, GoOnWithoutSpinningWhereSleepingIsPunctualEnough) {
@@ -102,8 +113,10 @@ TEST(StepRates, LeaveRoomForTheOtherAxes) {
   EXPECT_DOUBLE_EQ(rates[1].asked, 2000.0);
   const auto spinning =
       machine::stepRates(axes, capabilityOf({1000, 1'000'000, 1000, 0, 59'000}, 3));
-  EXPECT_DOUBLE_EQ(spinning[0].held, (0.8 - 60e-6 * 5000.0) / 60e-6);
-  EXPECT_NE(spinning[0].reason.find("the other axes take 30 %"), std::string::npos);
+  const double others = (1.0 - 60e-6 * 2000.0) * (1.0 - 60e-6 * 3000.0);
+  EXPECT_DOUBLE_EQ(spinning[0].held, (1.0 - 0.2 / others) / 60e-6);
+  EXPECT_NE(spinning[0].reason.find("the other axes take 28 %"), std::string::npos)
+      << spinning[0].reason;
 }
 
 TEST(StepRates, AreNeverBelowWhatSleepingAloneHolds) {

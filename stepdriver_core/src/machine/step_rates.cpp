@@ -12,30 +12,47 @@ constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 /// What a step of an axis takes of the pulse thread's time, in nanoseconds.
 struct Load {
-  double rise;    // the calls for the rising edge: the read of an endstop and a write
-  double calls;   // those for both edges
-  double chip;    // high and low time
-  double spun;    // spinning before both edges
-  double per_ns;  // steps at top speed
+  double rise;      // the calls for the rising edge: the read of an endstop and a write
+  double calls;     // those for both edges
+  double chip;      // high and low time
+  double spinning;  // spinning before both edges, where nothing shortens it
+  double alone;     // the shortest interval that doesn't spin too much, with no other axis moving
+  double interval;  // of the steps at top speed
 };
 
-Load loadOf(const axis::AxisConfig& axis, const pulse::CallCost& cost, pulse::Nanoseconds guard) {
+Load loadOf(const axis::AxisConfig& axis, const pulse::CallCost& cost,
+            const pulse::WakeUps& wake_ups) {
   const auto write = static_cast<double>(cost.write.p99);
   const auto read = static_cast<double>(cost.read.p99);
+  const auto high = static_cast<double>(axis.timing.step_high_ns);
+  const auto guard = static_cast<double>(wake_ups.guard);
   Load load{};
   load.rise = read + write;
   load.calls = read + 2.0 * write;
-  load.chip = static_cast<double>(axis.timing.step_high_ns + axis.timing.step_low_ns);
-  load.spun = static_cast<double>(guard + std::min(guard, axis.timing.step_high_ns));
-  load.per_ns = axis.max_speed * axis.steps_per_unit * 1e-9;
+  load.chip = high + static_cast<double>(axis.timing.step_low_ns);
+  load.spinning = guard + std::min(guard, high);
+  // A sleep ends late, and shortens the spinning; but there must be room for one.
+  const double after_sleep =
+      load.spinning - std::min(guard, static_cast<double>(wake_ups.slept.p50));
+  if (guard > 0.0) {
+    load.alone =
+        std::max(guard + high + load.calls, after_sleep / pulse::SteadyClock::kMostSpinning);
+  }
+  load.interval = 1e9 / (axis.max_speed * axis.steps_per_unit);
   return load;
 }
 
-/// What the other axes take meanwhile.
+/// What the other axes take meanwhile, at their top speeds.
 struct Others {
   double rise = 0.0;
   double calls = 0.0;
-  double spinning = 0.0;  // share of the time
+  double not_spinning = 1.0;  // share of the time
+
+  void add(const Load& load) {
+    rise += load.rise;
+    calls += load.calls;
+    not_spinning *= 1.0 - std::min(1.0, load.spinning / load.interval);
+  }
 };
 
 /// The shortest interval that holds, and why none shorter does.
@@ -45,21 +62,30 @@ struct Interval {
   double lateness;
 };
 
-/// @param spinning the interval that spinning alone allows.
-Interval shortest(const Load& load, const Others& others, double lateness, double spinning) {
-  const double late = (lateness + load.rise + others.rise) / (1.0 - pulse::PulseEngine::kClosest);
+/// The shortest interval of an axis beside others with which the thread spins for no longer than it
+/// may: the edges of the axes come at random to each other.
+double shortestSpinning(const Load& load, const Others& others) {
+  if (others.not_spinning == 1.0) return load.alone;
+  const double room = 1.0 - (1.0 - pulse::SteadyClock::kMostSpinning) / others.not_spinning;
+  return room > 0.0 ? std::max(load.alone, load.spinning / room) : kEndless;
+}
+
+/// @param spinning the shortest interval as far as spinning goes.
+Interval shortest(const Load& load, const Others& others, pulse::Nanoseconds late,
+                  double spinning) {
+  const auto lateness = static_cast<double>(late);
+  const double absorbed = 1.0 - pulse::PulseEngine::kClosest;
   const double pulse = 2.0 * lateness + load.calls + load.chip + others.calls;
-  Interval interval{late, RateLimit::kLateness, lateness};
+  Interval interval{(lateness + load.rise + others.rise) / absorbed, RateLimit::kLateness,
+                    lateness};
   if (pulse > interval.ns) interval = {pulse, RateLimit::kPulse, lateness};
   if (spinning > interval.ns) interval = {spinning, RateLimit::kSpinning, lateness};
   return interval;
 }
 
 Interval shortest(const Load& load, const Others& others, const pulse::WakeUps& wake_ups) {
-  const double room = pulse::SteadyClock::kMostSpinning - others.spinning;
-  const Interval spun = shortest(load, others, static_cast<double>(wake_ups.spun.p99),
-                                 room > 0.0 ? load.spun / room : kEndless);
-  const Interval slept = shortest(load, others, static_cast<double>(wake_ups.slept.p99), 0.0);
+  const Interval spun = shortest(load, others, wake_ups.spun.p99, shortestSpinning(load, others));
+  const Interval slept = shortest(load, others, wake_ups.slept.p99, 0.0);
   return slept.ns < spun.ns ? slept : spun;
 }
 
@@ -87,13 +113,13 @@ std::string reasonOf(const Interval& interval, const Load& load, const Others& o
     case RateLimit::kSpinning:
       break;
   }
-  std::string text = "the pulse thread spins for " + inMicroseconds(static_cast<double>(guard)) +
-                     " before an edge, and may for " +
-                     percentText(pulse::SteadyClock::kMostSpinning) + " of the time only";
-  if (others.spinning > 0.0) {
-    text += ", of which the other axes take " + percentText(others.spinning);
+  std::string text = "before an edge the pulse thread spins for " +
+                     inMicroseconds(static_cast<double>(guard)) + ", which it may for " +
+                     percentText(pulse::SteadyClock::kMostSpinning) + " of the time";
+  if (others.not_spinning < 1.0) {
+    text += "; the other axes take " + percentText(1.0 - others.not_spinning);
   }
-  return text;
+  return text + ", and without spinning wake-ups are later";
 }
 
 std::string rateText(double rate) {
@@ -109,21 +135,18 @@ std::vector<StepRate> stepRates(const std::vector<axis::AxisConfig>& axes,
   const pulse::WakeUps& wake_ups = capability.wake_ups;
   std::vector<Load> loads;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    loads.push_back(loadOf(axes[i], capability.calls.at(i), wake_ups.guard));
+    loads.push_back(loadOf(axes[i], capability.calls.at(i), wake_ups));
   }
   std::vector<StepRate> rates;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     Others others;
     for (std::size_t k = 0; k < loads.size(); ++k) {
-      if (k == i) continue;
-      others.rise += loads[k].rise;
-      others.calls += loads[k].calls;
-      others.spinning += loads[k].spun * loads[k].per_ns;
+      if (k != i) others.add(loads[k]);
     }
     const Interval interval = shortest(loads[i], others, wake_ups);
     StepRate rate;
     rate.axis = axes[i].name;
-    rate.asked = loads[i].per_ns * 1e9;
+    rate.asked = 1e9 / loads[i].interval;
     rate.alone = 1e9 / shortest(loads[i], Others{}, wake_ups).ns;
     rate.held = 1e9 / interval.ns;
     rate.limit = interval.limit;

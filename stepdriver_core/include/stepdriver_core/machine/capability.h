@@ -47,8 +47,13 @@ struct StepRate {
 ///                                                   much, after the planned time, may the write of
 ///                                                   a pulse end (PulseEngine::kClosest)
 ///   T >= 2 l + r + 2 w + h + d + sum(r_o + 2 w_o)   the pulse, both of its waits late
-///   sum over all axes (g + min(g, h)) / T <= 0.8    the pulse thread spins for the clock's guard g
-///                                                   before an edge (SteadyClock::kMostSpinning)
+///   T >= g + h + r + 2 w, T >= (g + min(g, h) - s) / 0.8
+///                                                   the pulse thread spins for the clock's guard g
+///                                                   before an edge, less what a sleep is late by
+///                                                   (s, its median), and may for so much of the
+///                                                   time (SteadyClock::kMostSpinning)
+///   1 - product over all axes (1 - (g + min(g, h)) / T) <= 0.8
+///                                                   the same for several axes
 ///
 /// or where the first two hold with the lateness of waits without spinning. Steps of several axes
 /// that fall due at once are written in one call for each chip; that is counted as one for each
