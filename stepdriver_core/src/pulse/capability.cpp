@@ -40,7 +40,7 @@ CallCosts callCosts(gpio::Lines& lines, Clock& clock, const ChannelConfig& chann
   const gpio::LineWrite at_rest{channel.step.line, !channel.step.active};
   costs.write = costOf(clock, error, [&] { return lines.write(&at_rest, 1); });
   const auto& endstop = channel.endstop_max ? channel.endstop_max : channel.endstop_min;
-  if (endstop) {
+  if (endstop && error == 0) {
     costs.read = costOf(clock, error, [&] { return std::max(0, -lines.read(endstop->line)); });
   }
   return costs;
