@@ -25,11 +25,14 @@ GpioBackend readGpio(ConfigReader gpio) {
   return backend == "libgpiod" ? GpioBackend::kLibgpiod : GpioBackend::kSimulated;
 }
 
-double readMaxLateness(ConfigReader realtime, double fallback) {
-  const double milliseconds =
-      realtime.number("max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, fallback * 1e3);
+const std::vector<std::string> kPolicies = {"warn", "enforce"};
+
+void readRealtime(ConfigReader realtime, NodeConfig& config) {
+  config.enforce_realtime = realtime.oneOf("policy", kPolicies, "warn") == "enforce";
+  const double milliseconds = realtime.number(
+      "max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, config.max_lateness * 1e3);
+  config.max_lateness = milliseconds * 1e-3;
   realtime.rejectUnknown();
-  return milliseconds * 1e-3;
 }
 
 const ConfigValue& valueOf(const ConfigValue& tree, const std::string& key) {
@@ -48,7 +51,11 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
-  config.max_lateness = readMaxLateness(reader.map("realtime"), config.max_lateness);
+  if (valueOf(tree, "realtime").as<std::string>() != nullptr) {
+    config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
+  } else {
+    readRealtime(reader.map("realtime"), config);
+  }
 
   const std::size_t issues_before = issues.size();
   reader.allow("axes");

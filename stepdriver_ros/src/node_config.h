@@ -17,6 +17,7 @@ struct NodeConfig {
   GpioBackend backend = GpioBackend::kSimulated;
   double joint_state_rate = 50.0;  ///< [Hz]
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
+  bool enforce_realtime = false;   ///< don't start where the machine is too slow for its axes
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
 };
@@ -26,7 +27,10 @@ struct NodeConfig {
 /// @code{.yaml}
 /// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
-/// realtime: {max_lateness_ms: 5.0}
+/// realtime:                      # or `enforce` or `warn` alone
+///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
+///                                # not start
+///   max_lateness_ms: 5.0
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode
