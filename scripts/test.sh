@@ -15,7 +15,7 @@ Installs what is missing, builds, and runs the parts that are named; all of them
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
-          read by sigrok-cli
+          read by sigrok-cli; with --kernel also the whole node on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -49,14 +49,15 @@ conclude() {
   summary+=$(printf '%-12s %-8s %s' "$1" "$2" "$3")$'\n'
 }
 
-# stage NAME FUNCTION [NEEDED]: runs a function; not where the stage that it needs has failed.
+# stage NAME FUNCTION [NEEDED...]: runs a function; not where a stage that it needs didn't pass.
 stage() {
-  local name=$1 function=$2 needed=${3:-} start=$SECONDS
-  if [[ -n $needed && ${outcome[$needed]:-} != passed ]]; then
+  local name=$1 function=$2 needed start=$SECONDS
+  for needed in "${@:3}"; do
+    [[ ${outcome[$needed]:-} != passed ]] || continue
     skipped=$((skipped + 1))
     conclude "$name" skipped "needs $needed"
     return
-  fi
+  done
   say "" "==== $name"
   run "$function"
   if ((run_status == 0)); then
@@ -189,6 +190,17 @@ test_node() {
   (cd "$build/catkin" && ctest --timeout 600 --no-tests=error --output-on-failure)
 }
 
+# The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and
+# nodes of the tests' own on chips of their own. The kernel's trace of it all stays with the logs.
+test_node_in_kernel() {
+  local offset header=''
+  for offset in {2..27}; do header+=",$offset=GPIO$offset"; done
+  use_ros "$build/catkin/devel"
+  STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 \
+    --chip "header:pinctrl-bcm2711:58:${header#,}" --trace "$build/log/kernel-node.trace" -- \
+    rostest "$src/test/node/hardware/hardware.test"
+}
+
 # Nothing but the install space is on any path here.
 check_install() {
   local share=$build/install/share/stepdriver launch_file
@@ -240,6 +252,7 @@ if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
 fi
 if wants ros; then
   stage node-tests test_node node-build
+  ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   stage install check_install node-build
   stage trace check_trace install
 fi
