@@ -3,8 +3,10 @@
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Endstops.h>
+#include <stepdriver/Microstep.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/SetPosition.h>
 
 #include <array>
 #include <cerrno>
@@ -51,10 +53,10 @@ class LaunchedNode : public NeedsGpioSim {
 
   unsigned number(unsigned offset) const { return numberOf(header, offset); }
 
-  static std_srvs::SetBool::Response enable(bool on) {
+  static std_srvs::SetBool::Response set(const std::string& service, bool on) {
     std_srvs::SetBool::Request request;
     request.data = on;
-    return callWhenThere<std_srvs::SetBool>(kNode + "/x/enable", request);
+    return callWhenThere<std_srvs::SetBool>(kNode + "/" + service, request);
   }
 
   static std_srvs::Trigger::Response trigger(const std::string& service) {
@@ -104,7 +106,7 @@ TEST_F(LaunchedNode, HoldsTheMotorOffUntilEnable) {
   EXPECT_TRUE(timesSet(trace, number(kEnable), false).empty()) << "it was on for a moment";
   EXPECT_TRUE(timesSet(trace, number(kStep), true).empty());
 
-  EXPECT_TRUE(enable(true).success);
+  EXPECT_TRUE(set("x/enable", true).success);
   EXPECT_FALSE(header.level(kEnable));
 }
 
@@ -122,6 +124,41 @@ TEST_F(LaunchedNode, MovesByAsManyPulsesAsItSays) {
   expectPulses(0.006);
   EXPECT_TRUE(states.waitForLatest(
       [](const AxisStates& s) { return std::abs(s.position.at(0) - 0.006) < 1e-9; }));
+}
+
+TEST_F(LaunchedNode, SetsThePinsOfTheChipAsItsServicesSay) {
+  const auto expectMode = [this](int microsteps, std::array<bool, 3> code) {
+    Microstep::Request request;
+    request.microsteps = microsteps;
+    const auto answer = callWhenThere<Microstep>(kNode + "/x/microstep", request);
+    EXPECT_TRUE(answer.success) << answer.message;
+    for (const std::size_t i : {0U, 1U, 2U}) {
+      EXPECT_EQ(header.level(kMode[i]), code[i]) << "MS" << i + 1 << " at " << microsteps;
+    }
+  };
+  expectMode(8, {true, true, false});
+  expectMode(16, {true, true, true});
+
+  EXPECT_TRUE(set("x/sleep", true).success);
+  EXPECT_FALSE(header.level(kSleep));
+  EXPECT_TRUE(set("x/sleep", false).success);
+  EXPECT_TRUE(header.level(kSleep));
+
+  const auto resets = [this] {
+    return LineRecord::sinceBoot().times(number(kReset), false).size();
+  };
+  const std::size_t before = resets();
+  EXPECT_TRUE(trigger("x/reset").success);
+  EXPECT_TRUE(header.level(kReset));
+  EXPECT_EQ(resets(), before + 1);
+
+  EXPECT_TRUE(
+      states.waitForLatest([](const AxisStates& s) { return s.position_valid.at(0) == 0; }));
+  SetPosition::Request here;
+  here.position = 0.006;
+  EXPECT_TRUE(callWhenThere<SetPosition>(kNode + "/x/set_position", here).success);
+  EXPECT_TRUE(
+      states.waitForLatest([](const AxisStates& s) { return s.position_valid.at(0) != 0; }));
 }
 
 TEST_F(LaunchedNode, SendsNoStepAfterItReadAnEndstopThatIsPressedInMidMove) {

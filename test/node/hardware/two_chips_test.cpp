@@ -93,9 +93,10 @@ class TwoChips : public NeedsGpioSim {
 TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
   node->start();
   const Recorder<AxisStates> states(node->full("axis_states"));
+  auto x = moving("x", 1.0);
+  awaitMotion(states, kX);
   auto y = moving("y", 0.019);
   auto z = moving("z", -0.01);
-  auto x = moving("x", 1.0);
   EXPECT_TRUE(y.get().success);
   EXPECT_TRUE(z.get().success);
   const auto code = end();
