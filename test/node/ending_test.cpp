@@ -111,6 +111,18 @@ TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
   EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
 }
 
+TEST(EndingUnderNohup, TakesNoNoticeOfAClosedTerminal) {
+  NodeUnderTest node;
+  const auto before = std::signal(SIGHUP, SIG_IGN);  // a process inherits that
+  node.start();
+  std::signal(SIGHUP, before);
+  end(node, "SIGHUP");
+  EXPECT_TRUE(node.moveTo(0.001, true).success);
+  end(node, "SIGTERM");
+  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+  expectSays(node.process().output(), "Ending on SIGTERM");
+}
+
 TEST(EndingEnabled, LeavesTheMotorOnWhereConfiguredSo) {
   NodeUnderTest node;
   node.set("axes/x/disable_on_shutdown", false);
