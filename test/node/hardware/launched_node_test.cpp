@@ -127,7 +127,7 @@ TEST_F(LaunchedNode, MovesByAsManyPulsesAsItSays) {
 }
 
 TEST_F(LaunchedNode, SetsThePinsOfTheChipAsItsServicesSay) {
-  const auto expectMode = [this](int microsteps, std::array<bool, 3> code) {
+  const auto expect_mode = [this](int microsteps, std::array<bool, 3> code) {
     Microstep::Request request;
     request.microsteps = microsteps;
     const auto answer = callWhenThere<Microstep>(kNode + "/x/microstep", request);
@@ -136,8 +136,8 @@ TEST_F(LaunchedNode, SetsThePinsOfTheChipAsItsServicesSay) {
       EXPECT_EQ(header.level(kMode[i]), code[i]) << "MS" << i + 1 << " at " << microsteps;
     }
   };
-  expectMode(8, {true, true, false});
-  expectMode(16, {true, true, true});
+  expect_mode(8, {true, true, false});
+  expect_mode(16, {true, true, true});
 
   EXPECT_TRUE(set("x/sleep", true).success);
   EXPECT_FALSE(header.level(kSleep));
