@@ -191,14 +191,18 @@ test_node() {
 }
 
 # The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and
-# nodes of the tests' own on chips of their own. The kernel's trace of it all stays with the logs.
+# nodes of the tests' own on chips of their own. The kernel's trace of it all stays with the logs; what
+# the launched node did in it is held against its chip. It goes at 1600 steps/s at most, and a late
+# step takes up to a quarter of the interval after it.
 test_node_in_kernel() {
-  local offset header=''
-  for offset in {2..27}; do header+=",$offset=GPIO$offset"; done
+  local offset lines='' trace=$build/log/kernel-node.trace header=pinctrl-bcm2711
+  for offset in {2..27}; do lines+=",$offset=GPIO$offset"; done
   use_ros "$build/catkin/devel"
   STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 \
-    --chip "header:pinctrl-bcm2711:58:${header#,}" --trace "$build/log/kernel-node.trace" -- \
+    --chip "header:$header:58:${lines#,}" --trace "$trace" -- \
     rostest "$src/test/node/hardware/hardware.test"
+  "$build/core/test/kernel/check_waveform" "$trace" --axis x --driver a4988 --step "$header:17" \
+    --dir "$header:27" --enable "$header:22" --shortest-interval $((1000000000 * 3 / 4 / 1600))
 }
 
 # Nothing but the install space is on any path here.
