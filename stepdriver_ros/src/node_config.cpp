@@ -25,32 +25,21 @@ GpioBackend readGpio(ConfigReader gpio) {
   return backend == "libgpiod" ? GpioBackend::kLibgpiod : GpioBackend::kSimulated;
 }
 
+const std::vector<std::string> kPolicies = {"warn", "enforce"};
+
+void readRealtime(ConfigReader realtime, NodeConfig& config) {
+  config.enforce_realtime = realtime.oneOf("policy", kPolicies, "warn") == "enforce";
+  const double milliseconds = realtime.number(
+      "max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, config.max_lateness * 1e3);
+  config.max_lateness = milliseconds * 1e-3;
+  realtime.rejectUnknown();
+}
+
 const ConfigValue& valueOf(const ConfigValue& tree, const std::string& key) {
   static const ConfigValue nothing;
   const auto* map = tree.as<ConfigValue::Map>();
   const auto found = map != nullptr ? map->find(key) : ConfigValue::Map::const_iterator{};
   return map != nullptr && found != map->end() ? found->second : nothing;
-}
-
-/// The policy by itself, or a map that may have it.
-void readRealtime(ConfigReader& reader, const ConfigValue& value, NodeConfig& config) {
-  const std::vector<std::string> policies{"warn", "enforce"};
-  std::string policy = policies.front();
-  if (value.as<std::string>() != nullptr) {
-    policy = reader.oneOf("realtime", policies);
-  } else if (!value.isNothing() && value.as<ConfigValue::Map>() == nullptr) {
-    reader.allow("realtime");
-    reader.issue("realtime", "is " + value.shown() + ", but must be warn, enforce or a map");
-  } else {
-    ConfigReader map = reader.map("realtime");
-    policy = map.oneOf("policy", policies, policy);
-    config.max_lateness = map.number("max_lateness_ms", Range{0.0, kLongestLatenessMs, true},
-                                     config.max_lateness * 1e3) *
-                          1e-3;
-    map.rejectUnknown();
-  }
-  config.realtime =
-      policy == "enforce" ? machine::RealtimePolicy::kEnforce : machine::RealtimePolicy::kWarn;
 }
 
 }  // namespace
@@ -62,7 +51,11 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
-  readRealtime(reader, valueOf(tree, "realtime"), config);
+  if (valueOf(tree, "realtime").as<std::string>() != nullptr) {
+    config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
+  } else {
+    readRealtime(reader.map("realtime"), config);
+  }
 
   const std::size_t issues_before = issues.size();
   reader.allow("axes");

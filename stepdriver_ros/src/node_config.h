@@ -7,7 +7,6 @@
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/config_value.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 
@@ -18,7 +17,7 @@ struct NodeConfig {
   GpioBackend backend = GpioBackend::kSimulated;
   double joint_state_rate = 50.0;  ///< [Hz]
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
-  machine::RealtimePolicy realtime = machine::RealtimePolicy::kWarn;
+  bool enforce_realtime = false;   ///< don't start where the machine is too slow for its axes
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
 };
@@ -28,9 +27,10 @@ struct NodeConfig {
 /// @code{.yaml}
 /// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
-/// realtime: warn                 # or enforce: what becomes of a top speed that is measured to be
-///                                # beyond this machine. Or a map:
-/// realtime: {policy: warn, max_lateness_ms: 5.0}
+/// realtime:                      # or `enforce` or `warn` alone
+///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
+///                                # not start
+///   max_lateness_ms: 5.0
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode

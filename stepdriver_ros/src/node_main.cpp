@@ -17,8 +17,8 @@
 #include "machine_services.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/capability.h"
 #include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -26,6 +26,7 @@ namespace {
 constexpr int kExitOk = 0;
 constexpr int kExitConfig = 1;
 constexpr int kExitGpio = 2;
+constexpr int kExitTooSlow = 3;
 constexpr int kExitUsage = 64;
 
 constexpr std::chrono::milliseconds kMasterPoll{200};
@@ -36,7 +37,8 @@ constexpr std::chrono::milliseconds kLastAnswers{500};
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 
 Drives the axes of the parameter ~axes by services, and publishes where they are.
-Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases the lines.
+Ends on SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill`: decelerates, disables and releases the
+lines.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
@@ -45,8 +47,8 @@ Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases t
   topics      joint_states  ~endstops  ~axis_states
   parameters  ~axes  ~gpio  ~joint_state_rate  ~realtime  ~simulation  robot_description
 
-Exit codes: 0 ended as asked, 1 wrong configuration, or one that asks for more than this machine
-holds (realtime: enforce), 2 a GPIO line can't be had or written.
+Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
+3 the machine is too slow for its axes and ~realtime is enforce.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -75,6 +77,14 @@ int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publ
   return exit_code;
 }
 
+void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
+                    const pulse::Capability& capability) {
+  if (!capability.rights.granted()) ROS_WARN("Pulse thread: %s", capability.rights.text().c_str());
+  for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
+    ROS_WARN("%s. stepdriver_check says more", complaint.c_str());
+  }
+}
+
 /// The node's life, once there is a master.
 ///
 /// @return the exit code.
@@ -83,10 +93,11 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   Hardware hardware(config, private_node.getNamespace());
   machine::MachineOptions options;
   options.max_lateness = config.max_lateness;
-  options.realtime = config.realtime;
+  options.measure = true;
+  options.enforce = config.enforce_realtime;
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
-  for (const std::string& warning : machine.warnings()) ROS_WARN("%s", warning.c_str());
-  if (!machine.warnings().empty()) ROS_WARN("%s", machine::remedyForRates().c_str());
+
+  if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
   CallQueues queues(machine.axes().size());
   // Subscribers to latched topics are served by a queue too.
@@ -130,6 +141,9 @@ int runOrExplain(EndRequests& end_requests) {
   } catch (const GpioError& error) {
     ROS_FATAL("Not started: %s", error.what());
     return kExitGpio;
+  } catch (const Refused& error) {
+    ROS_FATAL("Not started: %s", error.what());
+    return kExitTooSlow;
   } catch (const std::exception& error) {
     ROS_FATAL("Not started: %s", error.what());
     return kExitConfig;

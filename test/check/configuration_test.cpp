@@ -96,14 +96,13 @@ TEST_F(Configuration, HasTheRealtimePolicyByItselfOrInAMap) {
   const auto policy = [&](const std::string& realtime) {
     return readConfiguration(file(kAxis + realtime), BackendChoice::kAsInTheFile);
   };
-  using machine::RealtimePolicy;
-  EXPECT_EQ(policy("").realtime, RealtimePolicy::kWarn);
-  EXPECT_EQ(policy("realtime: warn\n").realtime, RealtimePolicy::kWarn);
-  EXPECT_EQ(policy("realtime: enforce\n").realtime, RealtimePolicy::kEnforce);
+  EXPECT_FALSE(policy("").enforce_realtime);
+  EXPECT_FALSE(policy("realtime: warn\n").enforce_realtime);
+  EXPECT_TRUE(policy("realtime: enforce\n").enforce_realtime);
   const auto map = policy("realtime: {policy: enforce, max_lateness_ms: 2}\n");
-  EXPECT_EQ(map.realtime, RealtimePolicy::kEnforce);
+  EXPECT_TRUE(map.enforce_realtime);
   EXPECT_DOUBLE_EQ(map.max_lateness, 0.002);
-  EXPECT_EQ(policy("realtime: {max_lateness_ms: 2}\n").realtime, RealtimePolicy::kWarn);
+  EXPECT_FALSE(policy("realtime: {max_lateness_ms: 2}\n").enforce_realtime);
 }
 
 }  // namespace

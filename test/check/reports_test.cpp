@@ -145,25 +145,28 @@ TEST(SystemFacts, AreThereOnAnyMachine) {
 }
 
 TEST(RatesText, TellsAskedAndHeldRatesAndTheReason) {
-  machine::StepRate slow{"x", 8000.0, 20'000.9, 10'000.0, machine::RateLimit::kPulse, "because"};
-  machine::StepRate fast{"y", 1e6, 20'000.0, 10'000.0, machine::RateLimit::kPulse, "so"};
-  EXPECT_EQ(ratesText({slow, fast}),
+  machine::StepRates rates;
+  rates.axes.push_back({"x", 8000.0, 20'000.9, 10'000.0, "because"});
+  rates.axes.push_back({"y", 1e6, 20'000.0, 10'000.0, "so"});
+  EXPECT_EQ(ratesText(rates),
             "  axis  asks for  held alone  held with all  [steps/s]\n"
             "  x     8000      20000       10000          ok\n"
             "  y     1000000   20000       10000          TOO FAST\n"
             "  What limits the rate with all axes moving:\n"
             "  x: because\n"
             "  y: so\n");
+  EXPECT_EQ(tooFast(rates), "y");
 }
 
 TEST(MeasurementsText, IsInMicrosecondsAndDoesWithoutCalls) {
-  machine::Capability capability;
-  capability.wake_ups.spun = {250, 1500, 2000, 3000, 4000};
+  pulse::Capability capability;
+  capability.lateness = {1500, 2000, 3000, 4000, 300};
   axis::AxisConfig x;
   x.name = "x";
-  EXPECT_TRUE(has(measurementsText({x}, capability), "with spinning  1.50  2.00  3.00  4.00"));
+  EXPECT_TRUE(
+      has(measurementsText({x}, capability), "with spinning  1.50    2.00  3.00  4.00  300"));
   EXPECT_FALSE(has(measurementsText({x}, capability), "x/step"));
-  capability.calls.push_back({{200, 1000, 1100, 1200, 1300}, {}, 0});
+  capability.channels.push_back({{1000, 1100, 1200, 1300, 200}, {}});
   EXPECT_TRUE(has(measurementsText({x}, capability), "write of x/step"));
   EXPECT_FALSE(has(measurementsText({x}, capability), "endstop"));
 }

@@ -1,4 +1,4 @@
-#include "stepdriver_core/machine/capability.h"
+#include "stepdriver_core/pulse/capability.h"
 
 #include <gtest/gtest.h>
 
@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/step_rates.h"
 #include "support/bench.h"
 #include "support/fake_hardware.h"
 
 namespace stepdriver {
 namespace {
 
-using machine::Capability;
+using pulse::Capability;
 using pulse::Nanoseconds;
 using pulse::Spread;
 using test::LateClock;
@@ -25,17 +26,16 @@ auto rising(Nanoseconds step) {
   return [step, next = Nanoseconds{0}]() mutable { return next += step; };
 }
 
-TEST(Spread, TakesPercentilesFromTheTimesThemselves) {
-  std::vector<Nanoseconds> times;
-  for (Nanoseconds i = 200; i > 0; --i) times.push_back(10 * i);
-  const Spread spread = pulse::spreadOf(times);
-  EXPECT_EQ(spread.count, 200U);
-  EXPECT_EQ(spread.p50, 1000);
-  EXPECT_EQ(spread.p90, 1800);
-  EXPECT_EQ(spread.p99, 1980);
-  EXPECT_EQ(spread.max, 2000);
-  EXPECT_EQ(pulse::spreadOf({7}).p99, 7);
-  EXPECT_EQ(pulse::spreadOf({}).count, 0U);
+TEST(Spread, IsThatOfTheSamples) {
+  std::vector<Nanoseconds> samples;
+  for (Nanoseconds i = 100; i >= 0; --i) samples.push_back(i);
+  const Spread spread = pulse::spreadOf(samples);
+  EXPECT_EQ(spread.median, 50);
+  EXPECT_EQ(spread.p90, 90);
+  EXPECT_EQ(spread.p99, 99);
+  EXPECT_EQ(spread.max, 100);
+  EXPECT_EQ(spread.count, 101U);
+  EXPECT_EQ(pulse::spreadOf({7}).median, 7);
 }
 
 TEST(Capability, TellsTheLatenessOfBothKindsOfWait) {
@@ -43,16 +43,17 @@ TEST(Capability, TellsTheLatenessOfBothKindsOfWait) {
   clock.spun = rising(10);
   clock.slept = rising(1000);
   clock.spin_guard = 60'000;
-  const pulse::WakeUps wake_ups = pulse::measureWakeUps(clock);
-  EXPECT_EQ(wake_ups.spun.count, 250U);
-  EXPECT_EQ(wake_ups.spun.p50, 1250);
-  EXPECT_EQ(wake_ups.spun.p90, 2250);
-  EXPECT_EQ(wake_ups.spun.p99, 2480);
-  EXPECT_EQ(wake_ups.spun.max, 2500);
-  EXPECT_EQ(wake_ups.slept.count, 150U);
-  EXPECT_EQ(wake_ups.slept.p99, 149'000);
-  EXPECT_EQ(wake_ups.guard, 60'000);
-  EXPECT_GE(wake_ups.rights.scheduler, 0) << "it asks as the pulse thread does";
+  const Capability capability = pulse::measureWakeUps(clock);
+  EXPECT_EQ(capability.lateness.count, 300U);
+  EXPECT_EQ(capability.lateness.median, 1510);
+  EXPECT_EQ(capability.lateness.p90, 2700);
+  EXPECT_EQ(capability.lateness.p99, 2970);
+  EXPECT_EQ(capability.lateness.max, 3000);
+  EXPECT_EQ(capability.sleep_lateness.count, 100U);
+  EXPECT_EQ(capability.sleep_lateness.p99, 99'000);
+  EXPECT_EQ(capability.guard, 60'000);
+  EXPECT_GE(capability.rights.scheduler_error, 0) << "it asks as the pulse thread does";
+  EXPECT_TRUE(capability.channels.empty());
 }
 
 TEST(Capability, IsMeasuredInBoundedTimeOnAMachineThatStalls) {
@@ -60,9 +61,9 @@ TEST(Capability, IsMeasuredInBoundedTimeOnAMachineThatStalls) {
   clock.spun = [] { return 300'000'000; };
   clock.slept = clock.spun;
   const Nanoseconds begin = clock.now();
-  const pulse::WakeUps wake_ups = pulse::measureWakeUps(clock);
-  EXPECT_EQ(wake_ups.spun.count, 4U);
-  EXPECT_EQ(wake_ups.spun.p50, 300'000'000);
+  const Capability capability = pulse::measureWakeUps(clock);
+  EXPECT_EQ(capability.lateness.count, 4U);
+  EXPECT_EQ(capability.lateness.median, 300'000'000);
   EXPECT_LT(clock.now() - begin, 3'000'000'000);
 }
 
@@ -75,13 +76,13 @@ TEST(Capability, TellsWhatTheCallsOfEachAxisCost) {
   plain.endstop_min.reset();
   plain.endstop_max.reset();
   const Capability capability = machine::measure({linearAxis("x"), plain}, backend, clock);
-  ASSERT_EQ(capability.calls.size(), 2U);
-  EXPECT_EQ(capability.calls[0].write.count, 200U);
-  EXPECT_EQ(capability.calls[0].write.p50, 1010) << "the first of 201 isn't counted";
-  EXPECT_EQ(capability.calls[0].write.p99, 1990);
-  EXPECT_EQ(capability.calls[0].read.p99, 5000) << "the slower endstop counts";
-  EXPECT_EQ(capability.calls[1].write.p50, 3020);
-  EXPECT_EQ(capability.calls[1].read.count, 0U);
+  ASSERT_EQ(capability.channels.size(), 2U);
+  EXPECT_EQ(capability.channels[0].write.count, 200U);
+  EXPECT_EQ(capability.channels[0].write.median, 1020) << "the first of 201 isn't counted";
+  EXPECT_EQ(capability.channels[0].write.p99, 1990);
+  EXPECT_EQ(capability.channels[0].read.p99, 5000) << "the slower endstop counts";
+  EXPECT_EQ(capability.channels[1].write.median, 3030);
+  EXPECT_EQ(capability.channels[1].read.count, 0U);
 }
 
 TEST(Capability, IsMeasuredWithoutAnEdge) {
@@ -100,18 +101,29 @@ TEST(Capability, IsMeasuredWithoutAnEdge) {
   }
 }
 
-TEST(Capability, NamesTheLineThatFailsWhileItIsMeasured) {
+TEST(Capability, OfAChipThatTakesItsTimeIsFromFewerCalls) {
   LateClock clock;
   SlowBackend backend(clock);
-  backend.error = EIO;
-  try {
-    machine::measure({linearAxis("x")}, backend, clock);
-    FAIL();
-  } catch (const GpioError& error) {
-    EXPECT_NE(std::string(error.what()).find("x.step"), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("EIO"), std::string::npos) << error.what();
+  backend.write_cost = [] { return 1'000'000; };
+  const Capability capability = machine::measure({linearAxis("x")}, backend, clock);
+  EXPECT_EQ(capability.channels[0].write.count, 20U);
+}
+
+TEST(Capability, NamesTheLineThatFailsWhileItIsMeasured) {
+  for (const bool writing : {true, false}) {
+    LateClock clock;
+    SlowBackend backend(clock);
+    (writing ? backend.write_error : backend.read_error) = EIO;
+    try {
+      machine::measure({linearAxis("x")}, backend, clock);
+      FAIL();
+    } catch (const GpioError& error) {
+      EXPECT_EQ(error.what(), std::string("Line ") + (writing ? "x.step" : "x.min") +
+                                  " failed while the cost of its calls was measured: EIO, "
+                                  "input/output error.");
+    }
+    EXPECT_FALSE(backend.held);
   }
-  EXPECT_FALSE(backend.held);
 }
 
 }  // namespace

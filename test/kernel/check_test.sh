@@ -148,7 +148,7 @@ says_which_axis_asks_for_too_much() {
   configuration 12500.0
   checks 3
   says '^  x +1000000 .* TOO FAST$'
-  says '^NOT GOOD: .*by x\.'
+  says '^NOT GOOD: .*top speed of x\.'
   no_edge_at_all
 }
 

@@ -5,11 +5,12 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <thread>
 #include <utility>
 
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/capability.h"
+#include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "wiring.h"
@@ -29,13 +30,10 @@ class Machine::Impl {
        const MachineOptions& options) {
     const Wiring wiring(configs);
     lines_ = backend.request(wiring.outputs, wiring.inputs);
-    if (options.realtime != RealtimePolicy::kUnmeasured && clock.realtime()) {
-      const Capability capability = measure(*lines_, clock, wiring);
-      warnings_ = shortfalls(stepRates(configs, capability));
-      if (options.realtime == RealtimePolicy::kEnforce) {
-        const std::string refusal = enforcementRefusal(capability.wake_ups.rights, warnings_);
-        if (!refusal.empty()) throw Error(refusal);
-      }
+    if (options.measure && clock.realtime()) {
+      capability_ = pulse::measureCapability(*lines_, clock, wiring.channels);
+      const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
+      if (!why.empty()) throw Refused(why);
     }
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness));
@@ -70,7 +68,7 @@ class Machine::Impl {
     std::array<gpio::EdgeEvent, 16> events{};
     while (!watching_ended_) {
       const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
-      // Where waiting fails, a chip was unplugged, say, reading will fail too, and say so.
+      // Where waiting fails, reading will fail too, and say so.
       if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
       engine_->inputsChanged();
     }
@@ -98,10 +96,10 @@ class Machine::Impl {
 
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
+  std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<pulse::PulseDriver> driver_;
   std::vector<std::unique_ptr<axis::Axis>> axes_;
-  std::vector<std::string> warnings_;
   std::atomic<bool> shut_{false};
   std::atomic<bool> watching_ended_{false};
   std::thread watcher_;
@@ -123,6 +121,8 @@ axis::Axis& Machine::axis(const std::string& name) const {
   }
   throw Refused("there is no axis " + name + "; there are " + names);
 }
+
+const std::optional<pulse::Capability>& Machine::capability() const { return impl_->capability_; }
 
 void Machine::stop() {
   impl_->forAll([](axis::Axis& axis) { axis.stop(); });
@@ -149,11 +149,9 @@ EngineFigures Machine::figures() const {
   figures.slips = state.slips;
   figures.slipped = static_cast<double>(state.slipped) * 1e-9;
   figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
-  figures.realtime = impl_->driver_->realtime();
+  figures.realtime = impl_->driver_->rights().text();
   return figures;
 }
-
-const std::vector<std::string>& Machine::warnings() const { return impl_->warnings_; }
 
 void Machine::advance(double seconds) { impl_->driver_->advance(nanoseconds(seconds)); }
 

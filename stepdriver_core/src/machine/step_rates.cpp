@@ -1,12 +1,17 @@
+#include "stepdriver_core/machine/step_rates.h"
+
 #include <algorithm>
 #include <cstdio>
 #include <limits>
 
-#include "stepdriver_core/machine/capability.h"
+#include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::machine {
 namespace {
+
+/// What limits the step rate of an axis.
+enum class RateLimit { kLateness, kPulse, kSpinning };
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
@@ -20,12 +25,12 @@ struct Load {
   double interval;  // of the steps at top speed
 };
 
-Load loadOf(const axis::AxisConfig& axis, const pulse::CallCost& cost,
-            const pulse::WakeUps& wake_ups) {
+Load loadOf(const axis::AxisConfig& axis, const pulse::CallCosts& cost,
+            const pulse::Capability& capability) {
   const auto write = static_cast<double>(cost.write.p99);
   const auto read = static_cast<double>(cost.read.p99);
   const auto high = static_cast<double>(axis.timing.step_high_ns);
-  const auto guard = static_cast<double>(wake_ups.guard);
+  const auto guard = static_cast<double>(capability.guard);
   Load load{};
   load.rise = read + write;
   load.calls = read + 2.0 * write;
@@ -33,7 +38,7 @@ Load loadOf(const axis::AxisConfig& axis, const pulse::CallCost& cost,
   load.spinning = guard + std::min(guard, high);
   // A sleep ends late, and shortens the spinning; but there must be room for one.
   const double after_sleep =
-      load.spinning - std::min(guard, static_cast<double>(wake_ups.slept.p50));
+      load.spinning - std::min(guard, static_cast<double>(capability.sleep_lateness.median));
   if (guard > 0.0) {
     load.alone =
         std::max(guard + high + load.calls, after_sleep / pulse::SteadyClock::kMostSpinning);
@@ -83,9 +88,10 @@ Interval shortest(const Load& load, const Others& others, pulse::Nanoseconds lat
   return interval;
 }
 
-Interval shortest(const Load& load, const Others& others, const pulse::WakeUps& wake_ups) {
-  const Interval spun = shortest(load, others, wake_ups.spun.p99, shortestSpinning(load, others));
-  const Interval slept = shortest(load, others, wake_ups.slept.p99, 0.0);
+Interval shortest(const Load& load, const Others& others, const pulse::Capability& capability) {
+  const Interval spun =
+      shortest(load, others, capability.lateness.p99, shortestSpinning(load, others));
+  const Interval slept = shortest(load, others, capability.sleep_lateness.p99, 0.0);
   return slept.ns < spun.ns ? slept : spun;
 }
 
@@ -124,64 +130,62 @@ std::string reasonOf(const Interval& interval, const Load& load, const Others& o
 
 std::string rateText(double rate) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.0f", rate);
+  std::snprintf(text, sizeof text, "%.0f steps/s", rate);
   return text;
 }
 
 }  // namespace
 
-std::vector<StepRate> stepRates(const std::vector<axis::AxisConfig>& axes,
-                                const Capability& capability) {
-  const pulse::WakeUps& wake_ups = capability.wake_ups;
+std::string StepRate::text() const {
+  std::string text =
+      axis + ": asks for " + rateText(asked) + ", and this machine holds " + rateText(held);
+  if (alone > held) text += " while all axes move, " + rateText(alone) + " with this one alone";
+  return text + ": " + limited;
+}
+
+bool StepRates::holds() const {
+  return std::all_of(axes.begin(), axes.end(), [](const StepRate& rate) { return rate.holds(); });
+}
+
+std::vector<std::string> StepRates::complaints() const {
+  std::vector<std::string> complaints;
+  for (const StepRate& rate : axes) {
+    if (!rate.holds()) complaints.push_back(rate.text());
+  }
+  return complaints;
+}
+
+StepRates stepRates(const std::vector<axis::AxisConfig>& axes,
+                    const pulse::Capability& capability) {
   std::vector<Load> loads;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    loads.push_back(loadOf(axes[i], capability.calls.at(i), wake_ups));
+    loads.push_back(loadOf(axes[i], capability.channels.at(i), capability));
   }
-  std::vector<StepRate> rates;
+  StepRates rates;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     Others others;
     for (std::size_t k = 0; k < loads.size(); ++k) {
       if (k != i) others.add(loads[k]);
     }
-    const Interval interval = shortest(loads[i], others, wake_ups);
-    StepRate rate;
-    rate.axis = axes[i].name;
-    rate.asked = 1e9 / loads[i].interval;
-    rate.alone = 1e9 / shortest(loads[i], Others{}, wake_ups).ns;
-    rate.held = 1e9 / interval.ns;
-    rate.limit = interval.limit;
-    rate.reason = reasonOf(interval, loads[i], others, wake_ups.guard);
-    rates.push_back(rate);
+    const Interval interval = shortest(loads[i], others, capability);
+    rates.axes.push_back({axes[i].name, 1e9 / loads[i].interval,
+                          1e9 / shortest(loads[i], Others{}, capability).ns, 1e9 / interval.ns,
+                          reasonOf(interval, loads[i], others, capability.guard)});
   }
   return rates;
 }
 
-std::vector<std::string> shortfalls(const std::vector<StepRate>& rates) {
-  std::vector<std::string> texts;
-  for (const StepRate& rate : rates) {
-    if (rate.enough()) continue;
-    std::string text = "axis " + rate.axis + " asks for " + rateText(rate.asked) +
-                       " steps/s at its top speed, and this machine holds " + rateText(rate.held);
-    if (rates.size() > 1) {
-      text += " while all axes move (" + rateText(rate.alone) + " alone)";
-    }
-    texts.push_back(text + ": " + rate.reason);
+std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
+                             const pulse::Capability& capability) {
+  std::string why;
+  if (!capability.rights.granted()) why = capability.rights.text();
+  for (const std::string& complaint : stepRates(axes, capability).complaints()) {
+    why += (why.empty() ? "" : "; ") + complaint;
   }
-  return texts;
-}
-
-std::string enforcementRefusal(const pulse::RealtimeRights& rights,
-                               const std::vector<std::string>& shortfalls) {
-  std::string reasons = rights.scheduler == 0 ? "" : "\n" + describe(rights);
-  for (const std::string& shortfall : shortfalls) reasons += "\n" + shortfall;
-  if (reasons.empty()) return "";
-  return "realtime is enforced, and this machine isn't up to it:" + reasons + "\n" +
-         remedyForRates() + ". With realtime: warn the axes start all the same";
-}
-
-std::string remedyForRates() {
-  return "Lower the top speed or the microsteps, allow real-time rights, run a PREEMPT_RT kernel, "
-         "or take the load off this machine; stepdriver_check measures again";
+  if (why.empty()) return "";
+  return "this machine can't do what is asked of it in real time: " + why +
+         ". Lower the top speed or the microsteps, allow real-time rights, run a PREEMPT_RT "
+         "kernel, or take load off this machine";
 }
 
 }  // namespace stepdriver::machine

@@ -1,7 +1,6 @@
 #include "wiring.h"
 
-#include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
+#include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::machine {
 
@@ -12,26 +11,11 @@ Wiring::Wiring(const std::vector<axis::AxisConfig>& axes) {
   }
 }
 
-Capability measure(gpio::Lines& lines, pulse::Clock& clock, const Wiring& wiring) {
-  Capability capability;
-  capability.calls = pulse::measureCalls(lines, clock, wiring.channels);
-  for (std::size_t i = 0; i < capability.calls.size(); ++i) {
-    const int error = capability.calls[i].error;
-    if (error == 0) continue;
-    const auto step = static_cast<std::size_t>(wiring.axis_lines[i].step);
-    throw GpioError("Line " + wiring.outputs[step].line +
-                    " or an endstop of the same axis failed while its calls were measured: " +
-                    gpio::errorText(error) + ".");
-  }
-  capability.wake_ups = pulse::measureWakeUps(clock);
-  return capability;
-}
-
-Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
-                   pulse::Clock& clock) {
+pulse::Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
+                          pulse::Clock& clock) {
   const Wiring wiring(axes);
   const auto lines = backend.request(wiring.outputs, wiring.inputs);
-  return measure(*lines, clock, wiring);
+  return pulse::measureCapability(*lines, clock, wiring.channels);
 }
 
 }  // namespace stepdriver::machine

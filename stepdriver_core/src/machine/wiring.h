@@ -1,13 +1,10 @@
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "stepdriver_core/axis/axis_lines.h"
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/machine/capability.h"
-#include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::machine {
@@ -21,10 +18,5 @@ struct Wiring {
   std::vector<axis::AxisLines> axis_lines;     // by axis
   std::vector<pulse::ChannelConfig> channels;  // by axis
 };
-
-/// Measures on lines that are held and that nothing was written to yet.
-///
-/// @throw GpioError where a call fails.
-Capability measure(gpio::Lines& lines, pulse::Clock& clock, const Wiring& wiring);
 
 }  // namespace stepdriver::machine

@@ -1,129 +1,128 @@
 #include "stepdriver_core/pulse/capability.h"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <functional>
+#include <string>
 #include <thread>
 #include <utility>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::pulse {
 namespace {
 
-// Deadlines as far apart as the steps of a slow motion: a processor that slept for as long needs
-// its time to wake.
-constexpr Nanoseconds kPeriod = 1'000'000;
-constexpr std::size_t kSpunWaits = 250;
-constexpr std::size_t kSleptWaits = 150;
-// On a machine that stalls there are fewer of them.
+constexpr Nanoseconds kBetweenWakeUps = 1'000'000;
 constexpr Nanoseconds kLongestWaits = 1'000'000'000;
-
-constexpr std::size_t kCalls = 200;
 // A chip behind I2C takes its time.
 constexpr Nanoseconds kLongestCalls = 20'000'000;
 
-/// Does it in a thread like the pulse thread. @return what that thread was granted.
-RealtimeRights asPulseThread(const std::function<void()>& action) {
-  RealtimeRights rights;
-  rights.memory = lockMemory();
-  std::thread thread([&] {
-    pthread_setname_np(pthread_self(), "measure");
-    rights.scheduler = requestScheduling();
-    action();
-  });
-  thread.join();
-  return rights;
-}
-
-/// @param take one sample; false: it failed, and none follows.
-std::vector<Nanoseconds> sample(Clock& clock, std::size_t count, Nanoseconds longest,
-                                const std::function<bool(Nanoseconds&)>& take) {
-  std::vector<Nanoseconds> times;
-  times.reserve(count);
+/// Takes samples, for no longer than that, but one.
+template <typename Sample>
+Spread spreadOfMany(Clock& clock, int count, Nanoseconds longest, const Sample& sample) {
+  std::vector<Nanoseconds> samples;
+  samples.reserve(static_cast<std::size_t>(count));
   const Nanoseconds end = clock.now() + longest;
-  while (times.size() < count && (times.empty() || clock.now() < end)) {
-    Nanoseconds time = 0;
-    if (!take(time)) break;
-    times.push_back(time);
+  do {
+    samples.push_back(sample());
+  } while (samples.size() < static_cast<std::size_t>(count) && clock.now() < end);
+  return spreadOf(std::move(samples));
+}
+
+using Wait = void (Clock::*)(Nanoseconds);
+
+Spread latenessOf(Clock& clock, Wait wait, int count) {
+  return spreadOfMany(clock, count, kLongestWaits, [&] {
+    const Nanoseconds due = clock.now() + kBetweenWakeUps;
+    while (clock.now() < due) (clock.*wait)(due);
+    return clock.now() - due;
+  });
+}
+
+/// The calls of one channel after the other, up to one that fails.
+class CallMeter {
+ public:
+  CallMeter(gpio::Lines& lines, Clock& clock) : lines_(lines), clock_(clock) {}
+
+  CallCosts measure(const ChannelConfig& channel) {
+    CallCosts costs;
+    const gpio::LineWrite at_rest{channel.step.line, !channel.step.active};
+    costs.write =
+        costOf(lines_.outputName(channel.step.line), [&] { return lines_.write(&at_rest, 1); });
+    for (const auto& endstop : {channel.endstop_min, channel.endstop_max}) {
+      if (!endstop) continue;
+      const Spread read = costOf(lines_.inputName(endstop->line),
+                                 [&] { return std::max(0, -lines_.read(endstop->line)); });
+      if (read.p99 >= costs.read.p99) costs.read = read;
+    }
+    return costs;
   }
-  return times;
-}
 
-/// The first call is thrown away: it brings the code into the cache.
-Spread costOf(Clock& clock, const std::function<int()>& call, int& error) {
-  const auto take = [&](Nanoseconds& time) {
-    const Nanoseconds begin = clock.now();
-    const int result = call();
-    time = clock.now() - begin;
-    if (result != 0) error = result;
-    return result == 0;
-  };
-  Nanoseconds first = 0;
-  if (!take(first)) return {};
-  return spreadOf(sample(clock, kCalls, kLongestCalls, take));
-}
+  /// The call that failed, in words; empty: none.
+  const std::string& failure() const { return failure_; }
 
-CallCost costOf(gpio::Lines& lines, Clock& clock, const ChannelConfig& channel) {
-  CallCost cost;
-  const gpio::LineWrite at_rest{channel.step.line, !channel.step.active};
-  cost.write = costOf(
-      clock, [&] { return lines.write(&at_rest, 1); }, cost.error);
-  for (const auto& endstop : {channel.endstop_min, channel.endstop_max}) {
-    if (!endstop || cost.error != 0) continue;
-    const auto read = [&] {
-      const int level = lines.read(endstop->line);
-      return level < 0 ? -level : 0;
+ private:
+  template <typename Call>
+  Spread costOf(const std::string& line, const Call& call) {
+    const auto timed = [&] {
+      const Nanoseconds begin = clock_.now();
+      const int error = failure_.empty() ? call() : 0;
+      if (error != 0) {
+        failure_ = "Line " + line +
+                   " failed while the cost of its calls was measured: " + gpio::errorText(error) +
+                   ".";
+      }
+      return clock_.now() - begin;
     };
-    const Spread spread = costOf(clock, read, cost.error);
-    if (spread.p99 >= cost.read.p99) cost.read = spread;
+    timed();  // brings the code into the caches
+    return spreadOfMany(clock_, kMeasuredCalls, kLongestCalls, timed);
   }
-  return cost;
+
+  gpio::Lines& lines_;
+  Clock& clock_;
+  std::string failure_;
+};
+
+/// @param measure_calls false: one failed, and nothing else is measured.
+Capability asPulseThread(Clock& clock, const std::function<bool(Capability&)>& measure_calls) {
+  Capability capability;
+  capability.rights.memory_error = lockMemory();
+  capability.guard = clock.guard();
+  std::thread([&] {
+    capability.rights.scheduler_error = askForScheduler();
+    if (!measure_calls(capability)) return;
+    capability.lateness = latenessOf(clock, &Clock::waitUntil, kMeasuredWakeUps);
+    capability.sleep_lateness = latenessOf(clock, &Clock::sleepUntil, kMeasuredSleeps);
+  }).join();
+  return capability;
 }
 
 }  // namespace
 
-Spread spreadOf(std::vector<Nanoseconds> times) {
-  Spread spread;
-  if (times.empty()) return spread;
-  std::sort(times.begin(), times.end());
-  const auto percentile = [&](std::size_t percent) {
-    return times[(times.size() * percent + 99) / 100 - 1];
+Spread spreadOf(std::vector<Nanoseconds> samples) {
+  std::sort(samples.begin(), samples.end());
+  const auto at = [&samples](double part) {
+    const auto last = static_cast<double>(samples.size() - 1);
+    return samples[static_cast<std::size_t>(part * last + 0.5)];
   };
-  spread.count = times.size();
-  spread.p50 = percentile(50);
-  spread.p90 = percentile(90);
-  spread.p99 = percentile(99);
-  spread.max = times.back();
-  return spread;
+  return {at(0.5), at(0.9), at(0.99), samples.back(), samples.size()};
 }
 
-WakeUps measureWakeUps(Clock& clock) {
-  WakeUps wake_ups;
-  wake_ups.guard = clock.guard();
-  using Wait = void (Clock::*)(Nanoseconds);
-  const auto latenessOf = [&clock](Wait wait, std::size_t count) {
-    return spreadOf(sample(clock, count, kLongestWaits, [&](Nanoseconds& late) {
-      const Nanoseconds deadline = clock.now() + kPeriod;
-      while (clock.now() < deadline) (clock.*wait)(deadline);
-      late = clock.now() - deadline;
-      return true;
-    }));
-  };
-  wake_ups.rights = asPulseThread([&] {
-    wake_ups.spun = latenessOf(&Clock::waitUntil, kSpunWaits);
-    wake_ups.slept = latenessOf(&Clock::sleepUntil, kSleptWaits);
+Capability measureCapability(gpio::Lines& lines, Clock& clock,
+                             const std::vector<ChannelConfig>& channels) {
+  CallMeter meter(lines, clock);
+  Capability capability = asPulseThread(clock, [&](Capability& measured) {
+    for (const ChannelConfig& channel : channels) {
+      measured.channels.push_back(meter.measure(channel));
+    }
+    return meter.failure().empty();
   });
-  return wake_ups;
+  if (!meter.failure().empty()) throw GpioError(meter.failure());
+  return capability;
 }
 
-std::vector<CallCost> measureCalls(gpio::Lines& lines, Clock& clock,
-                                   const std::vector<ChannelConfig>& channels) {
-  std::vector<CallCost> costs;
-  costs.reserve(channels.size());
-  asPulseThread([&] {
-    for (const ChannelConfig& channel : channels) costs.push_back(costOf(lines, clock, channel));
-  });
-  return costs;
+Capability measureWakeUps(Clock& clock) {
+  return asPulseThread(clock, [](Capability& /*measured*/) { return true; });
 }
 
 }  // namespace stepdriver::pulse

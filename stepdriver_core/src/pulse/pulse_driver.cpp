@@ -6,10 +6,8 @@
 #include <chrono>
 
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/pulse/realtime.h"
 
 namespace stepdriver::pulse {
-
 PulseDriver::PulseDriver(PulseEngine& engine, Clock& clock, bool threaded)
     : engine_(engine), clock_(clock) {
   if (!threaded) return;
@@ -33,7 +31,7 @@ void PulseDriver::post(const Command& command) {
 
 void PulseDriver::run() {
   pthread_setname_np(pthread_self(), "pulse");
-  if (clock_.realtime()) scheduler_error_ = requestScheduling();
+  if (clock_.realtime()) scheduler_error_ = askForScheduler();
   while (!stopping_) clock_.waitUntil(engine_.serve());
 }
 
@@ -66,6 +64,6 @@ void PulseDriver::advance(Nanoseconds time) {
   }
 }
 
-std::string PulseDriver::realtime() const { return describe({scheduler_error_, lock_error_}); }
+RealtimeRights PulseDriver::rights() const { return {scheduler_error_.load(), lock_error_.load()}; }
 
 }  // namespace stepdriver::pulse

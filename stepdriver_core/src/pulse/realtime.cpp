@@ -11,7 +11,7 @@
 
 namespace stepdriver::pulse {
 
-int requestScheduling() {
+int askForScheduler() {
   // Half of the lateness of a wake-up is the default slack of 50 us.
   prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
   sched_param parameters{};
@@ -26,14 +26,14 @@ int lockMemory() {
   return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
 }
 
-std::string describe(const RealtimeRights& rights) {
-  if (rights.scheduler < 0) return "real-time rights are not needed: the clock is virtual";
-  std::string text = rights.scheduler == 0
+std::string RealtimeRights::text() const {
+  if (scheduler_error < 0) return "real-time rights are not needed: the clock is virtual";
+  std::string text = scheduler_error == 0
                          ? "SCHED_FIFO " + std::to_string(kRealtimePriority)
-                         : "SCHED_FIFO refused (" + std::string(std::strerror(rights.scheduler)) +
+                         : "SCHED_FIFO refused (" + std::string(std::strerror(scheduler_error)) +
                                "): `@realtime - rtprio 98` in /etc/security/limits.d "
                                "allows it to the group realtime";
-  text += rights.memory == 0
+  text += memory_error == 0
               ? "; memory locked"
               : "; memory not locked: `@realtime - memlock unlimited` there allows it";
   return text;

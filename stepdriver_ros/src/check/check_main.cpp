@@ -14,7 +14,8 @@
 #include "rates_report.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
-#include "stepdriver_core/machine/capability.h"
+#include "stepdriver_core/machine/step_rates.h"
+#include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "system_report.h"
 
@@ -53,7 +54,7 @@ class Check {
     const SystemFacts facts = systemFacts();
     section("Permissions", permissionsText(facts));
     measure();
-    section("Real time", limitsText(facts, capability_.wake_ups.rights));
+    section("Real time", limitsText(facts, capability_.rights));
     section("Measured here and now", measurementsText(config_.axes, capability_));
     reportRates();
     if (options_.move) move();
@@ -98,26 +99,20 @@ class Check {
         note(kExitLines, error.what());
       }
     }
-    capability_.wake_ups = pulse::measureWakeUps(clock_);
+    capability_ = pulse::measureWakeUps(clock_);
   }
 
   void reportRates() {
-    if (capability_.calls.empty()) return;
-    const auto rates = machine::stepRates(config_.axes, capability_);
-    section("Step rates: about one step in a hundred, or less, comes late enough to be seen",
-            ratesText(rates));
-    const auto shortfalls = machine::shortfalls(rates);
-    std::string too_fast;
-    for (const machine::StepRate& rate : rates) {
-      if (!rate.enough()) too_fast += (too_fast.empty() ? "" : ", ") + rate.axis;
-    }
-    if (!too_fast.empty()) {
-      note(kExitRates, "more steps/s than this machine holds are asked for by " + too_fast + ". " +
-                           machine::remedyForRates() + ".");
-    } else if (config_.realtime == machine::RealtimePolicy::kEnforce) {
-      const std::string refusal =
-          machine::enforcementRefusal(capability_.wake_ups.rights, shortfalls);
-      if (!refusal.empty()) note(kExitRates, "the node won't start: " + refusal + ".");
+    if (capability_.channels.empty()) return;
+    const machine::StepRates rates = machine::stepRates(config_.axes, capability_);
+    section("Step rates, with about one step in a hundred late, or fewer", ratesText(rates));
+    if (!rates.holds()) {
+      note(kExitRates, "this machine doesn't hold the top speed of " + tooFast(rates) +
+                           ". Lower it or the microsteps, allow real-time rights, run a "
+                           "PREEMPT_RT kernel, or take load off this machine.");
+    } else if (config_.enforce_realtime) {
+      const std::string why = machine::whyNotInRealtime(config_.axes, capability_);
+      if (!why.empty()) note(kExitRates, "the node won't start (realtime: enforce): " + why + ".");
     }
   }
 
@@ -147,7 +142,7 @@ class Check {
   const ros_node::NodeConfig config_;
   const bool real_;
   pulse::SteadyClock clock_;
-  machine::Capability capability_;
+  pulse::Capability capability_;
   int exit_code_ = kExitGood;
   std::string verdict_ = "every line can be had, and every axis's top speed can be held.";
 };

@@ -13,11 +13,17 @@ namespace {
 constexpr std::chrono::milliseconds kPoll{50};
 constexpr std::int64_t kSecond = 1'000'000'000;
 
+bool isIgnored(int signal) {
+  struct sigaction action {};
+  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
 sigset_t interrupts() {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT}) sigaddset(&signals, signal);
+  // Under nohup a terminal that closes changes nothing.
+  if (!isIgnored(SIGHUP)) sigaddset(&signals, SIGHUP);
   return signals;
 }
 

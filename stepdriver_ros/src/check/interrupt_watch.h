@@ -7,10 +7,11 @@
 
 namespace stepdriver::check {
 
-/// Waits in a thread for SIGINT and SIGTERM, for as long as it lives.
+/// Waits in a thread for what asks a program to end, for as long as it lives: SIGINT, SIGTERM,
+/// SIGQUIT, and SIGHUP where that isn't ignored.
 class InterruptWatch {
  public:
-  /// Blocks both signals in this thread and in those that it starts from now on.
+  /// Blocks these signals in this thread and in those that it starts from now on.
   static void block();
 
   /// @return whether one of them comes in this time; they are blocked.

@@ -52,7 +52,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   const machine::EngineFigures after = machine.figures();
   say("  " + config.name + ": " + std::to_string(after.pulses - before.pulses) + " pulses, " +
       std::to_string(after.slips - before.slips) + " slips, worst lateness " +
-      numberText(after.worst_lateness * 1e6) + " us so far; " +
+      numberText(after.worst_lateness * 1e6) + " us; " +
       (off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
   if (config.pins.enable.wired()) axis.enable(false);
   return reached && off == 0.0;

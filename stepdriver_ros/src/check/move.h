@@ -26,8 +26,8 @@ double startFor(const axis::AxisConfig& axis, double stroke);
 /// Drives axes forth and back at their top speeds; each is disabled again when it is done.
 ///
 /// @param say is told each line of text as it comes.
-/// @return whether each is back where it was. An interrupt (SIGINT or SIGTERM, which must be
-///   blocked in this thread) decelerates, disables, and makes it false.
+/// @return whether each is back where it was. An interrupt (see InterruptWatch, whose signals
+///   are blocked in this thread) decelerates, disables, and makes it false.
 /// @throw GpioError where a line can't be had.
 bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clock& clock,
                       const std::function<void(const std::string&)>& say);

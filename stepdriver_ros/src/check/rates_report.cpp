@@ -16,7 +16,7 @@ std::string inMicroseconds(pulse::Nanoseconds time) {
 
 std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spread) {
   return {what,
-          inMicroseconds(spread.p50),
+          inMicroseconds(spread.median),
           inMicroseconds(spread.p90),
           inMicroseconds(spread.p99),
           inMicroseconds(spread.max),
@@ -29,28 +29,36 @@ std::string rateText(double rate) { return numberText(std::floor(rate)); }
 }  // namespace
 
 std::string measurementsText(const std::vector<axis::AxisConfig>& axes,
-                             const machine::Capability& capability) {
-  std::vector<std::vector<std::string>> rows = {{"[us]", "p50", "p90", "p99", "max", "samples"}};
-  for (std::size_t i = 0; i < capability.calls.size(); ++i) {
-    rows.push_back(rowOf("write of " + axes[i].name + "/step", capability.calls[i].write));
-    const pulse::Spread& read = capability.calls[i].read;
+                             const pulse::Capability& capability) {
+  std::vector<std::vector<std::string>> rows = {{"[us]", "median", "p90", "p99", "max", "samples"}};
+  for (std::size_t i = 0; i < capability.channels.size(); ++i) {
+    rows.push_back(rowOf("write of " + axes[i].name + "/step", capability.channels[i].write));
+    const pulse::Spread& read = capability.channels[i].read;
     if (read.count > 0) rows.push_back(rowOf("read of an endstop of " + axes[i].name, read));
   }
-  rows.push_back(rowOf("wake-up late by, with spinning", capability.wake_ups.spun));
-  rows.push_back(rowOf("wake-up late by, without", capability.wake_ups.slept));
+  rows.push_back(rowOf("wake-up late by, with spinning", capability.lateness));
+  rows.push_back(rowOf("wake-up late by, without", capability.sleep_lateness));
   return table(rows);
 }
 
-std::string ratesText(const std::vector<machine::StepRate>& rates) {
+std::string ratesText(const machine::StepRates& rates) {
   std::vector<std::vector<std::string>> rows = {
       {"axis", "asks for", "held alone", "held with all", "[steps/s]"}};
   std::string reasons;
-  for (const machine::StepRate& rate : rates) {
+  for (const machine::StepRate& rate : rates.axes) {
     rows.push_back({rate.axis, numberText(rate.asked), rateText(rate.alone), rateText(rate.held),
-                    rate.enough() ? "ok" : "TOO FAST"});
-    reasons += "  " + rate.axis + ": " + rate.reason + "\n";
+                    rate.holds() ? "ok" : "TOO FAST"});
+    reasons += "  " + rate.axis + ": " + rate.limited + "\n";
   }
   return table(rows) + "  What limits the rate with all axes moving:\n" + reasons;
+}
+
+std::string tooFast(const machine::StepRates& rates) {
+  std::string names;
+  for (const machine::StepRate& rate : rates.axes) {
+    if (!rate.holds()) names += (names.empty() ? "" : ", ") + rate.axis;
+  }
+  return names;
 }
 
 }  // namespace stepdriver::check

@@ -21,6 +21,10 @@ std::string modeText(unsigned mode) {
   return text;
 }
 
+bool isNumber(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
+
 std::string orUnknown(const std::string& text) { return text.empty() ? "unknown" : text; }
 
 /// As the kernel has it: microseconds of each period, or -1 for all of it.
@@ -52,9 +56,9 @@ std::string permissionsText(const SystemFacts& facts) {
 
 std::string limitsText(const SystemFacts& facts, const pulse::RealtimeRights& rights) {
   return table(
-      {{"rights", describe(rights)},
+      {{"rights", rights.text()},
        {"RLIMIT_RTPRIO", orUnknown(facts.rtprio)},
-       {"RLIMIT_MEMLOCK", orUnknown(facts.memlock)},
+       {"RLIMIT_MEMLOCK", orUnknown(facts.memlock) + (isNumber(facts.memlock) ? " bytes" : "")},
        {"throttle", throttleText(facts)},
        {"kernel", facts.kernel},
        {"PREEMPT_RT", facts.preempt_rt ? "yes" : "no"},

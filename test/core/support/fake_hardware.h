@@ -1,10 +1,10 @@
 #pragma once
 
-#include <cerrno>
 #include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stepdriver_core/gpio/lines.h"
@@ -53,7 +53,8 @@ class SlowBackend : public gpio::Backend {
   std::function<pulse::Nanoseconds(const std::string& line)> read_cost = [](const auto&) {
     return 0;
   };
-  int error = 0;  ///< errno of every call
+  int write_error = 0;  ///< errno of every write
+  int read_error = 0;
 
   struct Write {
     std::string line;
@@ -86,14 +87,20 @@ class SlowBackend::Held : public gpio::Lines {
           {outputs_[output].line, writes[i].level, levels_[output] != writes[i].level});
       levels_[output] = writes[i].level;
     }
-    return backend_.error;
+    return backend_.write_error;
   }
   int read(int input) noexcept override {
     backend_.clock_.pass(backend_.read_cost(inputs_[static_cast<std::size_t>(input)].line));
-    return backend_.error == 0 ? 1 : -backend_.error;
+    return backend_.read_error == 0 ? 1 : -backend_.read_error;
   }
   int waitForEdges(std::int64_t, gpio::EdgeEvent*, std::size_t) noexcept override { return 0; }
   void interrupt() noexcept override {}
+  const std::string& outputName(int output) const override {
+    return outputs_[static_cast<std::size_t>(output)].line;
+  }
+  const std::string& inputName(int input) const override {
+    return inputs_[static_cast<std::size_t>(input)].line;
+  }
 
  private:
   SlowBackend& backend_;

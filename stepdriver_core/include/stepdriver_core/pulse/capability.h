@@ -8,47 +8,51 @@
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "stepdriver_core/pulse/realtime.h"
 
-/// What a machine and its wiring are capable of, measured as the pulse thread would find it: in a
-/// thread of the same scheduling, with the same waits and the same calls. Nothing moves: an output
-/// is only ever written the level that it has.
-///
-/// The calls take a bounded time, about 0.4 s for the wake-ups and up to 20 ms for each line, and
-/// mean something on a clock with realtime() only.
 namespace stepdriver::pulse {
 
-/// How measured times are spread. A percentile is one of the times: the smallest that so many of
-/// all don't exceed.
+/// How measured times are spread: half of them are at most the median, and so on.
 struct Spread {
-  std::size_t count = 0;
-  Nanoseconds p50 = 0;
+  Nanoseconds median = 0;
   Nanoseconds p90 = 0;
   Nanoseconds p99 = 0;
   Nanoseconds max = 0;
+  std::size_t count = 0;  ///< of the samples
 };
 
-/// @return all zero where there are no times.
-Spread spreadOf(std::vector<Nanoseconds> times);
+/// @param samples not empty.
+Spread spreadOf(std::vector<Nanoseconds> samples);
 
-/// How late the pulse thread wakes.
-struct WakeUps {
-  Spread spun;            ///< lateness of a wait that ends with spinning
-  Spread slept;           ///< lateness of one that may not spin (see Clock::sleepUntil())
+/// What the calls of one channel cost.
+struct CallCosts {
+  Spread write;  ///< of its STEP line
+  Spread read;   ///< of the slower of its endstops; all 0 where it has none
+};
+
+/// What a machine and its lines can do, as measured there and then.
+struct Capability {
+  Spread lateness;        ///< of wake-ups, as the pulse thread waits
+  Spread sleep_lateness;  ///< of those of waits that may not spin (see Clock::sleepUntil())
   Nanoseconds guard = 0;  ///< Clock::guard()
+  std::vector<CallCosts> channels;
   RealtimeRights rights;
 };
 
-WakeUps measureWakeUps(Clock& clock);
+constexpr int kMeasuredWakeUps = 300;  // a millisecond each
+constexpr int kMeasuredSleeps = 100;   // a millisecond each
+constexpr int kMeasuredCalls = 200;    // of each line; fewer where they take more than 20 ms
 
-/// What the calls of one channel cost.
-struct CallCost {
-  Spread write;   ///< of its STEP line
-  Spread read;    ///< of the slower one of its endstops; none where count is 0
-  int error = 0;  ///< errno of a call that failed; 0: none did
-};
+/// Measures in a thread with the rights of the pulse thread; takes about 0.4 s of the clock, on a
+/// machine that stalls up to 2 s, and what the calls cost. Nothing moves: STEP lines are written
+/// the level that they have, and no other line is.
+///
+/// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
+///   inactive level.
+/// @param clock not waited on by anyone else meanwhile.
+/// @throw GpioError where a line can't be written or read.
+Capability measureCapability(gpio::Lines& lines, Clock& clock,
+                             const std::vector<ChannelConfig>& channels);
 
-/// @param lines as requested, before anything was written.
-/// @return the costs by channel.
-std::vector<CallCost> measureCalls(gpio::Lines& lines, Clock& clock,
-                                   const std::vector<ChannelConfig>& channels);
+/// The same without lines: of a machine alone. There are no channels in it.
+Capability measureWakeUps(Clock& clock);
 
 }  // namespace stepdriver::pulse

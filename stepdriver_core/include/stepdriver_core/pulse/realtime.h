@@ -4,27 +4,26 @@
 
 namespace stepdriver::pulse {
 
-constexpr int kRealtimePriority = 50;
-
-/// What the kernel said when a thread that must not be late asked for its rights. Each is an errno;
-/// 0: granted, -1: not asked for.
+/// What the kernel gave a process and a thread that asked for real-time rights.
 struct RealtimeRights {
-  int scheduler = -1;
-  int memory = -1;
+  int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not asked for
+  int memory_error = -1;     ///< of the request to lock the memory
+
+  bool granted() const { return scheduler_error == 0 && memory_error == 0; }
+
+  /// In a sentence, with the remedy where something was refused.
+  std::string text() const;
 };
 
-/// Asks for SCHED_FIFO 50 for the calling thread, and for sleeps as short as they are asked for.
-///
-/// @return 0 or an errno.
-int requestScheduling();
+/// The priority that askForScheduler() asks for.
+constexpr int kRealtimePriority = 50;
 
-/// Locks the memory of the process where RLIMIT_MEMLOCK is unlimited: under a limit a locked
-/// process fails at its next allocation, wherever that is.
-///
-/// @return 0 or an errno.
+/// Asks for SCHED_FIFO, and for timers without slack, for the calling thread.
+/// @return 0, or the errno of the refusal.
+int askForScheduler();
+
+/// Locks the memory of the process, where its limit is none: under a limit a locked process fails
+/// at its next allocation, wherever that is. @return 0, or the errno of the refusal.
 int lockMemory();
-
-/// In a sentence, with the way to get what was refused.
-std::string describe(const RealtimeRights& rights);
 
 }  // namespace stepdriver::pulse
