@@ -9,28 +9,6 @@ namespace {
 // From this time on a double's 53 bits leave more than 1/32 ns of doubt.
 constexpr double kFarNs = 281474976710656.0;  // 2^48, 78 hours
 
-// The first time after `after` and clearly before the end of the piece at which the velocity
-// changes its sign; the end where there is none. A turning point this close to an end moves
-// nothing.
-double firstTurn(const Piece& piece, double after) {
-  const double end = piece.duration.value();
-  const double margin = 1e-9 * end;
-  double first = end;
-  const auto consider = [&](double root) {
-    if (root > after + margin && root < end - margin) first = std::min(first, root);
-  };
-  if (piece.j == 0.0) {
-    if (piece.a != 0.0) consider(-piece.v0 / piece.a);
-    return first;
-  }
-  const double discriminant = piece.a * piece.a - 2.0 * piece.j * piece.v0;
-  if (discriminant <= 0.0) return first;  // never, or a touch without a change of sign
-  const double q = -(piece.a + std::copysign(std::sqrt(discriminant), piece.a));
-  consider(q / piece.j);
-  if (q != 0.0) consider(2.0 * piece.v0 / q);
-  return first;
-}
-
 }  // namespace
 
 StepFinder::StepFinder(const Profile& profile, std::int64_t count)
@@ -67,7 +45,7 @@ bool StepFinder::enterNext() {
   if (profile_ == nullptr || piece_ >= profile_->pieces().size()) return false;
   const Piece& piece = profile_->pieces()[piece_];
   const double end = piece.duration.value();
-  const double turn = firstTurn(piece, done_);
+  const double turn = piece.firstTurn(done_);
   const DoubleDouble begin = done_;
   const DoubleDouble stretch_end = turn < end ? DoubleDouble(turn) : piece.duration;
   enter(piece, begin, stretch_end, profile_->pieceStart(piece_));
@@ -101,7 +79,7 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   const double v_end = direction * piece.velocityAt(end).value();
   const bool backwards = v_end < v_begin;
   const DoubleDouble anchor = backwards ? end : begin;
-  const double acceleration = piece.a + piece.j * anchor.value();
+  const double acceleration = piece.accelerationAt(anchor).value();
 
   stretch_.direction = direction;
   stretch_.time_sign = backwards ? -1.0 : 1.0;
