@@ -10,6 +10,7 @@ using axis::ConfigValue;
 using axis::Range;
 
 constexpr Range kJointStateRates{1.0, 1000.0};
+constexpr Range kJogTimeouts{0.02, 60.0};
 constexpr double kLongestLatenessMs = 1000.0;
 
 void readGpio(ConfigReader gpio) {
@@ -44,6 +45,7 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
+  config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
   config.max_lateness = readMaxLateness(reader.map("realtime"), config.max_lateness);
 
   const std::size_t issues_before = issues.size();

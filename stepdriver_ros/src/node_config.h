@@ -13,6 +13,7 @@ namespace stepdriver::ros_node {
 /// All parameters of the node.
 struct NodeConfig {
   double joint_state_rate = 50.0;  ///< [Hz]
+  double jog_timeout = 0.5;        ///< [s] without a jog message; then the axis comes to rest
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
@@ -23,6 +24,7 @@ struct NodeConfig {
 /// @code{.yaml}
 /// gpio: {backend: simulated}     # simulated or libgpiod
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
+/// jog_timeout: 0.5               # [s] from 0.02 to 60
 /// realtime: {max_lateness_ms: 5.0}
 /// simulation: {...}              # see readSimulation()
 /// axes: {...}                    # see axis::readAxes()

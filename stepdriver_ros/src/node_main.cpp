@@ -13,6 +13,7 @@
 #include "bring_up.h"
 #include "call_queues.h"
 #include "end_requests.h"
+#include "jog_subscriber.h"
 #include "machine_services.h"
 #include "simulation.h"
 #include "state_publisher.h"
@@ -39,10 +40,11 @@ Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases t
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
-              ~stop  ~emergency_stop  ~recover
+              ~stop  ~emergency_stop  ~recover  ~speed_override
               ~rig/report (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states
-  parameters  ~axes  ~gpio  ~joint_state_rate  ~realtime  ~simulation  robot_description
+  topics      joint_states  ~endstops  ~axis_states  ~jog (subscribed)
+  parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~simulation
+              robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written.
 Start it with: roslaunch stepdriver axis.launch
@@ -94,6 +96,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   }
   MachineServices machine_services(private_node, machine, queues);
   machine_services.advertiseRig(*simulation);
+  const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   queues.start();
   publisher.start();
   ROS_INFO("Ready: %zu %s on the simulated rig; pulse thread: %s", machine.axes().size(),
