@@ -12,8 +12,8 @@ Installs what is missing, builds, and runs the parts that are named; all of them
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS
-  --kernel  the GPIO backends on a kernel of their own with simulated GPIO chips (test/kernel), with
-          each libgpiod that this Debian has; takes --core in
+  --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
+          (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
           read by sigrok-cli
 
@@ -125,7 +125,7 @@ build_core_quietly() {
     cmake --build "$build/core" -j "$jobs"
 }
 test_core() {
-  ctest --test-dir "$build/core" -j "$jobs" --timeout 300 --no-tests=error --output-on-failure
+  (cd "$build/core" && ctest -j "$jobs" --timeout 300 --no-tests=error --output-on-failure)
 }
 
 test_kernel() {
@@ -136,12 +136,31 @@ test_kernel() {
   ((status == 0)) || die "$reason"
   bash "$src/test/kernel/rig_test.sh" "$build/core/test/kernel/trace_to_vcd"
   test_lines_in_kernel "$build/core"
+  test_waveform_in_kernel "$build/core"
 }
 test_lines_in_kernel() {
   local test
   for test in lines_conformance_test libgpiod_lines_test; do
     STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 -- "$1/test/core/$test"
   done
+}
+
+# Whole machines there, held against what the kernel's own trace says of their pulses.
+test_waveform_in_kernel() {
+  local tests=$1/test/kernel traces=$1/traces run
+  rm -rf "$traces"
+  in_kernel -- "$tests/write_cost"
+  in_kernel --timeout 300 -- "$tests/machine_waveform_test"
+  for run in 1 2; do
+    mkdir -p "$traces/$run"
+    STEPDRIVER_TRACES=$traces/$run in_kernel --timeout 300 --time-travel -- "$tests/step_times_test"
+  done
+  diff -r "$traces/1" "$traces/2" >/dev/null || die "two runs in virtual time differ: see $traces"
+  say "Both runs have the same trace, to the nanosecond."
+}
+in_kernel() {
+  STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" "$@" | tee "$build/log/in-kernel.log"
+  ! grep -qF '[  SKIPPED ]' "$build/log/in-kernel.log" || die "what must run there was skipped"
 }
 
 # The same with libgpiod 2 where the system's is 1.
@@ -153,11 +172,13 @@ test_kernel_gpiod2() {
   [[ -n $unpacked ]] || skip "this Debian's own libgpiod is 2"
   quietly gpiod2-build build_gpiod2 "$unpacked"
   test_lines_in_kernel "$build/gpiod2"
+  test_waveform_in_kernel "$build/gpiod2"
 }
 build_gpiod2() {
   cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DSTEPDRIVER_GPIOD=2 \
     -DSTEPDRIVER_GPIOD_ROOT="$1" &&
-    cmake --build "$build/gpiod2" -j "$jobs" --target lines_conformance_test libgpiod_lines_test
+    cmake --build "$build/gpiod2" -j "$jobs" --target lines_conformance_test libgpiod_lines_test \
+      machine_waveform_test step_times_test write_cost
 }
 
 build_node() {
@@ -165,7 +186,7 @@ build_node() {
     quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
 }
 test_node() {
-  ctest --test-dir "$build/catkin" --timeout 600 --no-tests=error --output-on-failure
+  (cd "$build/catkin" && ctest --timeout 600 --no-tests=error --output-on-failure)
 }
 
 # Nothing but the install space is on any path here.

@@ -6,11 +6,13 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test_in_root.sh bookworm|trixie [--keep]
+usage: scripts/test_in_root.sh bookworm|trixie|focal [--keep]
 
-Makes a clean root of that Debian with debootstrap (minbase, nothing else), copies the checkout
-into a folder of it whose path has a space, and runs scripts/demo.sh and scripts/test.sh there as
-root, without a terminal. Prints both exit codes, and is 0 where both are 0. Needs root.
+Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
+copies the checkout into a folder of it whose path has a space, and runs scripts/demo.sh and
+scripts/test.sh there as root, without a terminal; on Ubuntu without the parts that need Debian's
+kernel source and clang: --core and --ros. Prints both exit codes, and is 0 where both are 0. Needs
+root.
 
 The base root is kept in ~/.cache/stepdriver/roots (STEPDRIVER_ROOTS names another folder) for
 the next time; the copy that is worked in is removed at the end.
@@ -22,7 +24,7 @@ END
 suite='' keep=
 for argument; do
   case $argument in
-    bookworm | trixie) suite=$argument ;;
+    bookworm | trixie | focal) suite=$argument ;;
     --keep) keep=1 ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
@@ -52,15 +54,24 @@ roots=${STEPDRIVER_ROOTS:-${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/stepdriver/ro
 mkdir -p "$roots"
 roots=$(cd "$roots" && pwd -P)
 base=$roots/$suite
-mirror=$(mirror_of Debian http://deb.debian.org/debian)
-security=$(mirror_of Debian-Security http://deb.debian.org/debian-security)
+parts=()
+if [[ $suite == focal ]]; then
+  components=main,universe
+  mirror=$(mirror_of Ubuntu http://archive.ubuntu.com/ubuntu)
+  security_suite="$mirror $suite-security"
+  parts=(--core --ros)
+else
+  components=main
+  mirror=$(mirror_of Debian http://deb.debian.org/debian)
+  security_suite="$(mirror_of Debian-Security http://deb.debian.org/debian-security) $suite-security"
+fi
 
 if [[ ! -d $base ]]; then
   say "Making $base from $mirror"
   rm -rf "$base.new"
   include=()
   [[ $mirror != https* ]] || include=(--include=ca-certificates)
-  run debootstrap --variant=minbase "${include[@]}" "$suite" "$base.new" "$mirror" >"$base.log" 2>&1
+  run debootstrap --variant=minbase --components="$components" "${include[@]}" "$suite" "$base.new" "$mirror" >"$base.log" 2>&1
   ((run_status == 0)) || die "debootstrap failed; its output: $base.log"
   mv "$base.new" "$base"
 fi
@@ -82,9 +93,9 @@ cp -L /etc/resolv.conf "$work/etc/resolv.conf"
 printf '127.0.0.1 localhost\n' >"$work/etc/hosts"
 apt_transport >"$work/etc/apt/apt.conf.d/90host"
 cat >"$work/etc/apt/sources.list" <<END
-deb $mirror $suite main
-deb $mirror $suite-updates main
-deb $security $suite-security main
+deb $mirror $suite ${components/,/ }
+deb $mirror $suite-updates ${components/,/ }
+deb $security_suite ${components/,/ }
 END
 
 checkout="/home/new user/step driver"
@@ -121,10 +132,11 @@ in_root() {
 
 exit_codes=''
 worst=0
-for command in demo.sh test.sh; do
+for command in demo.sh "test.sh ${parts[*]}"; do
   say "" "######## $suite: scripts/$command"
   start=$SECONDS
-  run in_root bash "$checkout/scripts/$command"
+  # shellcheck disable=SC2086
+  run in_root bash "$checkout/scripts/"$command
   exit_codes+=" $command exit code $run_status after $((SECONDS - start)) s;"
   ((run_status == 0)) || worst=1
 done

@@ -49,7 +49,7 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
   // What depends on the axes can only be judged where they are right.
   if (!issues.empty()) throw ConfigError(issues);
   const auto sources = applyDescriptionParameter(node, config.axes, issues);
-  if (issues.empty()) {
+  if (issues.empty() && config.backend == GpioBackend::kSimulated) {
     checkSimulation(config.axes, config.simulation, name + "/simulation", issues);
   }
   if (!issues.empty()) throw ConfigError(issues);
@@ -57,15 +57,6 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
     ROS_INFO("%s", limitsText(config.axes[i], sources[i]).c_str());
   }
   return config;
-}
-
-std::unique_ptr<Simulation> makeSimulation(const NodeConfig& config, const std::string& node_name) {
-  try {
-    return std::make_unique<Simulation>(config.axes, config.simulation);
-  } catch (const Error& error) {
-    throw ConfigError(
-        {{node_name + "/simulation/trace", std::string("is wrong: ") + error.what()}});
-  }
 }
 
 }  // namespace stepdriver::ros_node

@@ -1,6 +1,7 @@
 #include "node_config.h"
 
 #include "stepdriver_core/axis/config_reader.h"
+#include "stepdriver_core/gpio/libgpiod_lines.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -13,20 +14,26 @@ constexpr Range kJointStateRates{1.0, 1000.0};
 constexpr Range kJogTimeouts{0.02, 60.0};
 constexpr double kLongestLatenessMs = 1000.0;
 
-void readGpio(ConfigReader gpio) {
+GpioBackend readGpio(ConfigReader gpio) {
   const std::string backend = gpio.oneOf("backend", {"simulated", "libgpiod"});
-  if (backend == "libgpiod") {
-    gpio.issue("backend",
-               "is \"libgpiod\", which is not built into this version; it must be simulated");
+  if (backend == "libgpiod" && gpio::libgpiodVersion().empty()) {
+    gpio.issue(
+        "backend",
+        "is \"libgpiod\", but stepdriver was built without it, so that it must be simulated; "
+        "install libgpiod-dev and build again for real lines");
   }
   gpio.rejectUnknown();
+  return backend == "libgpiod" ? GpioBackend::kLibgpiod : GpioBackend::kSimulated;
 }
 
-double readMaxLateness(ConfigReader realtime, double fallback) {
-  const double milliseconds =
-      realtime.number("max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, fallback * 1e3);
+const std::vector<std::string> kPolicies = {"warn", "enforce"};
+
+void readRealtime(ConfigReader realtime, NodeConfig& config) {
+  config.enforce_realtime = realtime.oneOf("policy", kPolicies, "warn") == "enforce";
+  const double milliseconds = realtime.number(
+      "max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, config.max_lateness * 1e3);
+  config.max_lateness = milliseconds * 1e-3;
   realtime.rejectUnknown();
-  return milliseconds * 1e-3;
 }
 
 const ConfigValue& valueOf(const ConfigValue& tree, const std::string& key) {
@@ -42,17 +49,31 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
                           std::vector<ConfigIssue>& issues) {
   NodeConfig config;
   ConfigReader reader(tree, name, issues);
-  readGpio(reader.map("gpio"));
+  config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
+<<<<<<< HEAD
   config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
   config.max_lateness = readMaxLateness(reader.map("realtime"), config.max_lateness);
+=======
+  if (valueOf(tree, "realtime").as<std::string>() != nullptr) {
+    config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
+  } else {
+    readRealtime(reader.map("realtime"), config);
+  }
+>>>>>>> main
 
   const std::size_t issues_before = issues.size();
   reader.allow("axes");
   config.axes = axis::readAxes(valueOf(tree, "axes"), reader.fullName("axes"), issues);
   const bool axes_are_right = issues.size() == issues_before;
   config.simulation = readSimulation(reader.map("simulation"), config.axes, axes_are_right);
+  if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {
+    issues.push_back({reader.fullName("simulation/trace"),
+                      "is \"" + config.simulation.trace +
+                          "\", but only the simulated rig has a trace, and gpio/backend is "
+                          "libgpiod; leave it out or empty"});
+  }
   reader.rejectUnknown();
   return config;
 }

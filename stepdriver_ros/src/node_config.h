@@ -10,11 +10,15 @@
 
 namespace stepdriver::ros_node {
 
+enum class GpioBackend { kSimulated, kLibgpiod };
+
 /// All parameters of the node.
 struct NodeConfig {
+  GpioBackend backend = GpioBackend::kSimulated;
   double joint_state_rate = 50.0;  ///< [Hz]
   double jog_timeout = 0.5;        ///< [s] without a jog message; then the axis comes to rest
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
+  bool enforce_realtime = false;   ///< don't start where the machine is too slow for its axes
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
 };
@@ -22,11 +26,19 @@ struct NodeConfig {
 /// Reads the node's private parameters.
 ///
 /// @code{.yaml}
-/// gpio: {backend: simulated}     # simulated or libgpiod
+/// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
+<<<<<<< HEAD
 /// jog_timeout: 0.5               # [s] from 0.02 to 60
 /// realtime: {max_lateness_ms: 5.0}
 /// simulation: {...}              # see readSimulation()
+=======
+/// realtime:                      # or `enforce` or `warn` alone
+///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
+///                                # not start
+///   max_lateness_ms: 5.0
+/// simulation: {...}              # see readSimulation(); only a simulated node heeds it
+>>>>>>> main
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode
 ///

@@ -13,12 +13,16 @@
 #include "bring_up.h"
 #include "call_queues.h"
 #include "end_requests.h"
+<<<<<<< HEAD
 #include "jog_subscriber.h"
+=======
+#include "hardware.h"
+>>>>>>> main
 #include "machine_services.h"
-#include "simulation.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -26,6 +30,7 @@ namespace {
 constexpr int kExitOk = 0;
 constexpr int kExitConfig = 1;
 constexpr int kExitGpio = 2;
+constexpr int kExitTooSlow = 3;
 constexpr int kExitUsage = 64;
 
 constexpr std::chrono::milliseconds kMasterPoll{200};
@@ -46,7 +51,8 @@ Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases t
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~simulation
               robot_description
 
-Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written.
+Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
+3 the machine is too slow for its axes and ~realtime is enforce.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -75,15 +81,27 @@ int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publ
   return exit_code;
 }
 
+void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
+                    const pulse::Capability& capability) {
+  if (!capability.rights.granted()) ROS_WARN("Pulse thread: %s", capability.rights.text().c_str());
+  for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
+    ROS_WARN("%s. stepdriver_check says more", complaint.c_str());
+  }
+}
+
 /// The node's life, once there is a master.
 ///
 /// @return the exit code.
 int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_requests) {
   const NodeConfig config = readParameters(node, private_node);
-  const auto simulation = makeSimulation(config, private_node.getNamespace());
+  Hardware hardware(config, private_node.getNamespace());
   machine::MachineOptions options;
   options.max_lateness = config.max_lateness;
-  machine::Machine machine(config.axes, simulation->backend(), simulation->clock(), options);
+  options.measure = true;
+  options.enforce = config.enforce_realtime;
+  machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
+
+  if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
   CallQueues queues(machine.axes().size());
   // Subscribers to latched topics are served by a queue too.
@@ -95,12 +113,17 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
   MachineServices machine_services(private_node, machine, queues);
+<<<<<<< HEAD
   machine_services.advertiseRig(*simulation);
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
+=======
+  if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
+>>>>>>> main
   queues.start();
   publisher.start();
-  ROS_INFO("Ready: %zu %s on the simulated rig; pulse thread: %s", machine.axes().size(),
-           machine.axes().size() == 1 ? "axis" : "axes", machine.figures().realtime.c_str());
+  ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
+           machine.axes().size() == 1 ? "axis" : "axes", hardware.description().c_str(),
+           machine.figures().realtime.c_str());
 
   std::string who;
   while (who.empty()) who = end_requests.waitFor(kPoll);
@@ -127,6 +150,9 @@ int runOrExplain(EndRequests& end_requests) {
   } catch (const GpioError& error) {
     ROS_FATAL("Not started: %s", error.what());
     return kExitGpio;
+  } catch (const Refused& error) {
+    ROS_FATAL("Not started: %s", error.what());
+    return kExitTooSlow;
   } catch (const std::exception& error) {
     ROS_FATAL("Not started: %s", error.what());
     return kExitConfig;

@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -59,12 +60,12 @@ class OtherProgram {
  public:
   OtherProgram(const std::string& chip, unsigned offset, const std::string& consumer) {
     const int file = open(("/dev/" + chip).c_str(), O_RDWR | O_CLOEXEC);
-    gpio_v2_line_request request{};
-    request.offsets[0] = offset;
-    request.num_lines = 1;
-    request.config.flags = GPIO_V2_LINE_FLAG_INPUT;
-    std::snprintf(request.consumer, sizeof request.consumer, "%s", consumer.c_str());
-    const int result = ioctl(file, GPIO_V2_GET_LINE_IOCTL, &request);
+    gpiohandle_request request{};
+    request.lineoffsets[0] = offset;
+    request.lines = 1;
+    request.flags = GPIOHANDLE_REQUEST_INPUT;
+    std::snprintf(request.consumer_label, sizeof request.consumer_label, "%s", consumer.c_str());
+    const int result = ioctl(file, GPIO_GET_LINEHANDLE_IOCTL, &request);
     close(file);
     if (result < 0) throw std::runtime_error("the line can't be held");
     line_ = request.fd;
@@ -164,7 +165,17 @@ TEST_F(LibgpiodOnGpioSim, SayHowToGetTheRightToAChip) {
       << text;
 }
 
+bool libraryHasBias() { return libgpiodVersion().rfind("1.4", 0) != 0; }
+
+TEST_F(LibgpiodOnGpioSim, RefuseABiasThatTheLibraryCannotSet) {
+  if (libraryHasBias()) GTEST_SKIP() << "libgpiod " << libgpiodVersion() << " can set it";
+  const std::string text = textOf({}, {{"header:1", Bias::kPullUp, false}});
+  EXPECT_NE(text.find("header:1"), std::string::npos) << text;
+  EXPECT_NE(text.find("can't set a bias"), std::string::npos) << text;
+}
+
 TEST_F(LibgpiodOnGpioSim, PullInputsAsTheBiasSays) {
+  if (!libraryHasBias()) GTEST_SKIP() << "libgpiod " << libgpiodVersion() << " can't set it";
   for (const bool edges : {false, true}) {
     const auto lines = makeLibgpiodBackend()->request({}, {{"header:1", Bias::kPullUp, edges},
                                                            {"header:2", Bias::kPullDown, edges},

@@ -69,10 +69,10 @@ const std::vector<BadBringUp> kBadBringUps = {
      setting("gpio/backend", "simulatd"),
      "gpio/backend",
      {"\"simulatd\"", "simulated", "libgpiod"}},
-    {"BackendThatIsNotBuilt",
+    {"TraceOfRealLines",
      setting("gpio/backend", "libgpiod"),
-     "gpio/backend",
-     {"not built into this version"}},
+     "simulation/trace",
+     {".vcd\"", "only the simulated rig"}},
     {"MissingDriver", erasing("axes/x/driver"), "axes/x/driver", {"missing", "a4988"}},
     {"UnknownDriver",
      setting("axes/x/driver", "a4989"),
@@ -122,6 +122,12 @@ const std::vector<BadBringUp> kBadBringUps = {
      setting("realtime/max_lateness_ms", 0.0),
      "realtime/max_lateness_ms",
      {"above 0"}},
+    {"UnknownRealtimePolicy",
+     setting("realtime/policy", "enforced"),
+     "realtime/policy",
+     {"\"enforced\"", "did you mean enforce"}},
+    {"UnknownRealtimeWord", setting("realtime", "enforec"), "realtime", {"\"enforec\"", "warn"}},
+    {"RealtimeThatIsNoWord", setting("realtime", 5.0), "realtime", {"5", "map"}},
     {"NegativeSimulationSpeed", setting("simulation/speed", -1), "simulation/speed", {"-1"}},
     {"SimulatedAxisThatIsNone",
      setting("simulation/axes/xx/bounces", 1),
@@ -180,6 +186,15 @@ TEST(BringUpWithManyMistakes, ListsThemAllAtOnce) {
     EXPECT_FALSE(lineWith(output, node.full(key)).empty()) << key << " isn't in\n" << output;
   }
   expectSays(output, "6 things are wrong");
+}
+
+TEST(BringUpOnGpioLines, OfWhichThereIsNoneEndsWithTheLineAndTheWayOut) {
+  NodeUnderTest node;
+  node.set("gpio/backend", "libgpiod");
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 2) << node.process().output();
+  expectSays(node.process().output(), "x_enable");
+  expectSays(node.process().output(), "gpiochip");
 }
 
 TEST(BringUpByHand, HelpExplainsAndUnknownArgumentsAreRefused) {

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <thread>
 #include <utility>
 
 #include "stepdriver_core/axis/axis_lines.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 
@@ -22,6 +24,16 @@ constexpr double kLeastOverride = 0.01;
 constexpr double kMostOverride = 2.0;
 
 pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+
+void refuseTooSlow(const std::vector<axis::AxisConfig>& configs,
+                   const pulse::Capability& capability) {
+  std::string why;
+  if (!capability.rights.granted()) why = capability.rights.text();
+  for (const std::string& complaint : stepRates(configs, capability).complaints()) {
+    why += (why.empty() ? "" : "; ") + complaint;
+  }
+  if (!why.empty()) throw Refused("this machine can't do what is asked of it in real time: " + why);
+}
 
 }  // namespace
 
@@ -38,6 +50,10 @@ class Machine::Impl {
       channels.push_back(axis::channelConfig(config, axis_lines.back()));
     }
     lines_ = backend.request(outputs, inputs);
+    if (options.measure && clock.realtime()) {
+      capability_ = pulse::measureCapability(*lines_, clock, channels);
+      if (options.enforce) refuseTooSlow(configs, *capability_);
+    }
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, channels,
                                                    nanoseconds(options.max_lateness));
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
@@ -98,6 +114,7 @@ class Machine::Impl {
 
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
+  std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<pulse::PulseDriver> driver_;
   std::vector<std::unique_ptr<axis::Axis>> axes_;
@@ -122,6 +139,8 @@ axis::Axis& Machine::axis(const std::string& name) const {
   }
   throw Refused("there is no axis " + name + "; there are " + names);
 }
+
+const std::optional<pulse::Capability>& Machine::capability() const { return impl_->capability_; }
 
 void Machine::stop() {
   impl_->forAll([](axis::Axis& axis) { axis.stop(); });
@@ -158,7 +177,7 @@ EngineFigures Machine::figures() const {
   figures.slips = state.slips;
   figures.slipped = static_cast<double>(state.slipped) * 1e-9;
   figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
-  figures.realtime = impl_->driver_->realtime();
+  figures.realtime = impl_->driver_->rights().text();
   return figures;
 }
 

@@ -1,41 +1,13 @@
 #include "stepdriver_core/pulse/pulse_driver.h"
 
 #include <pthread.h>
-#include <sched.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::pulse {
-namespace {
-
-constexpr int kPriority = 50;
-
-int askForScheduler() {
-  // Half of the lateness of a wake-up is the default slack of 50 us.
-  prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
-  sched_param parameters{};
-  parameters.sched_priority = kPriority;
-  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
-}
-
-int lockMemory() {
-  // Under a limit a locked process fails at its next allocation, wherever that is.
-  rlimit limit{};
-  if (getrlimit(RLIMIT_MEMLOCK, &limit) != 0) return errno;
-  if (limit.rlim_cur != RLIM_INFINITY) return EPERM;
-  return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
-}
-
-}  // namespace
-
 PulseDriver::PulseDriver(PulseEngine& engine, Clock& clock, bool threaded)
     : engine_(engine), clock_(clock) {
   if (!threaded) return;
@@ -92,18 +64,6 @@ void PulseDriver::advance(Nanoseconds time) {
   }
 }
 
-std::string PulseDriver::realtime() const {
-  const int scheduler = scheduler_error_;
-  const int memory = lock_error_;
-  if (scheduler < 0) return "real-time rights are not needed: the clock is virtual";
-  std::string text = scheduler == 0
-                         ? "SCHED_FIFO " + std::to_string(kPriority)
-                         : "SCHED_FIFO refused (" + std::string(std::strerror(scheduler)) +
-                               "): `@realtime - rtprio 98` in /etc/security/limits.d "
-                               "allows it to the group realtime";
-  text += memory == 0 ? "; memory locked"
-                      : "; memory not locked: `@realtime - memlock unlimited` there allows it";
-  return text;
-}
+RealtimeRights PulseDriver::rights() const { return {scheduler_error_.load(), lock_error_.load()}; }
 
 }  // namespace stepdriver::pulse

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::machine {
@@ -18,6 +20,10 @@ struct MachineOptions {
   bool threaded = true;
   /// A pulse that comes later than this at a speed that the motor can't restart from is a fault.
   double max_lateness = 0.005;  ///< [s]
+  /// On a clock that is real, measure what the machine and its lines can do, before anything else.
+  bool measure = false;
+  /// And where that is less than the axes ask for, or real-time rights are refused, don't start.
+  bool enforce = false;
 };
 
 /// What the pulse engine has done since the start.
@@ -37,6 +43,7 @@ class Machine {
   ///
   /// @param backend, clock outlive the machine.
   /// @throw GpioError where a line can't be had; then none is held.
+  /// @throw Refused with MachineOptions::enforce, naming what can't be done; no line is held then.
   Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 
@@ -74,6 +81,9 @@ class Machine {
   void shutdown();
 
   EngineFigures figures() const;
+
+  /// As measured at the start; none where that wasn't asked for, or the clock is virtual.
+  const std::optional<pulse::Capability>& capability() const;
 
   /// Serves the pulses for a time of the clock. Only where the machine has no thread.
   void advance(double seconds);

@@ -3,18 +3,18 @@
 #include <atomic>
 #include <functional>
 #include <mutex>
-#include <string>
 #include <thread>
 
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
+#include "stepdriver_core/pulse/realtime.h"
 
 namespace stepdriver::pulse {
 
 /// Keeps an engine served: in a thread of its own, or, on a virtual clock, by whoever waits.
 ///
 /// The thread asks for SCHED_FIFO 50 and locked memory where the clock says that being late
-/// matters; where that is refused it goes on without, and realtime() says so.
+/// matters; where that is refused it goes on without, and rights() says so.
 class PulseDriver {
  public:
   /// @param engine, clock outlive the driver.
@@ -46,8 +46,8 @@ class PulseDriver {
   /// Clock time less all slips: the time that profiles are planned in.
   Nanoseconds motionNow() const { return clock_.now() - engine_.state().slipped; }
 
-  /// How the thread runs, in a sentence.
-  std::string realtime() const;
+  /// What the thread asked for and was given.
+  RealtimeRights rights() const;
 
  private:
   void run();

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <vector>
+
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+#include "stepdriver_core/pulse/realtime.h"
+
+namespace stepdriver::pulse {
+
+/// How measured times are spread: half of them are at most the median, and so on.
+struct Spread {
+  Nanoseconds median = 0;
+  Nanoseconds p90 = 0;
+  Nanoseconds p99 = 0;
+  Nanoseconds max = 0;
+};
+
+/// @param samples not empty.
+Spread spreadOf(std::vector<Nanoseconds> samples);
+
+/// What the calls of one channel cost.
+struct CallCosts {
+  Spread write;  ///< of its STEP line
+  Spread read;   ///< of an endstop; all 0 where it has none
+};
+
+/// What a machine and its lines can do, as measured there and then.
+struct Capability {
+  Spread lateness;  ///< of wake-ups, as the pulse thread waits
+  std::vector<CallCosts> channels;
+  RealtimeRights rights;
+};
+
+constexpr int kMeasuredWakeUps = 300;  // a millisecond each
+constexpr int kMeasuredCalls = 50;     // of each line
+
+/// Measures in a thread with the rights of the pulse thread; takes about 0.3 s of the clock and
+/// what the calls cost. Nothing moves: STEP lines are written the level that they have, and no
+/// other line is.
+///
+/// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
+///   inactive level.
+/// @param clock not waited on by anyone else meanwhile.
+/// @throw GpioError where a line can't be written or read.
+Capability measureCapability(gpio::Lines& lines, Clock& clock,
+                             const std::vector<ChannelConfig>& channels);
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+namespace stepdriver::pulse {
+
+/// What the kernel gave a process and a thread that asked for real-time rights.
+struct RealtimeRights {
+  int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not asked for
+  int memory_error = -1;     ///< of the request to lock the memory
+
+  bool granted() const { return scheduler_error == 0 && memory_error == 0; }
+
+  /// In a sentence, with the remedy where something was refused.
+  std::string text() const;
+};
+
+/// The priority that askForScheduler() asks for.
+constexpr int kRealtimePriority = 50;
+
+/// Asks for SCHED_FIFO, and for timers without slack, for the calling thread.
+/// @return 0, or the errno of the refusal.
+int askForScheduler();
+
+/// Locks the memory of the process, where its limit is none: under a limit a locked process fails
+/// at its next allocation, wherever that is. @return 0, or the errno of the refusal.
+int lockMemory();
+
+}  // namespace stepdriver::pulse

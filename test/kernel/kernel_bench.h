@@ -1,0 +1,90 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "kernel_trace.h"
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/motion/step_finder.h"
+#include "stepdriver_core/motion/trapezoid.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "support/gpio_sim.h"
+#include "waveform.h"
+
+/// What tests of whole machines on the test kernel share.
+namespace stepdriver::kernel {
+
+/// Whether this kernel's time is virtual: `run.sh --time-travel`.
+bool timeTravels();
+
+/// Records the kernel's gpio tracepoints from its making on; there can be one at a time.
+class Recording {
+ public:
+  Recording();
+
+  /// Ends it. Where the environment names a folder in STEPDRIVER_TRACES, it is kept there.
+  /// @param name of its file there.
+  KernelTrace stop(const std::string& name);
+};
+
+/// Where an axis is: lines as label:offset, whose level the wiring may invert.
+struct Place {
+  axis::Pin step, dir, enable;
+};
+
+/// A linear axis of 80 microsteps/mm with 2000 microsteps/s and 10,000 microsteps/s^2, enabled on
+/// start, and without switches.
+axis::AxisConfig axisAt(const std::string& name, chip::Model model, const Place& place);
+
+/// A machine with a thread for its pulses, on the lines of two chips of the kernel's gpio-sim,
+/// board-0 and board-1. A pulse that is late, on a machine that stalls, is never a fault.
+class KernelBench {
+ public:
+  /// @param guard of the clock (pulse::SteadyClock).
+  explicit KernelBench(const std::vector<axis::AxisConfig>& axes,
+                       pulse::Nanoseconds guard = 60'000);
+
+  axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
+  test::GpioSimChip& chip(std::size_t index) { return chips_.at(index); }
+
+  /// Where the axis says that it stands [microsteps].
+  std::int64_t count(const std::string& name);
+
+  /// Starts a move by a number of microsteps.
+  axis::Move start(const std::string& name, std::int64_t steps);
+
+  /// Returns when the axis stands so many microsteps from 0, in either direction, or at rest.
+  void awaitCount(const std::string& name, std::int64_t steps);
+
+  /// @return whether the line gets this level within ten seconds.
+  bool awaitLevel(std::size_t chip, unsigned offset, bool level);
+
+  void emergencyStop() { machine_->emergencyStop(); }
+  void recover() { machine_->recover(); }
+  machine::EngineFigures figures() const { return machine_->figures(); }
+
+  /// Shuts the machine down and releases its lines.
+  /// @return what the kernel did to them since they were requested.
+  KernelTrace finish(const std::string& name);
+
+ private:
+  std::array<test::GpioSimChip, 2> chips_{{{"bench0", "board-0", 8}, {"bench1", "board-1", 8}}};
+  pulse::SteadyClock clock_;
+  std::unique_ptr<gpio::Backend> backend_;
+  Recording recording_;
+  std::unique_ptr<machine::Machine> machine_;
+};
+
+/// What axisAt() is planned with, in microsteps.
+motion::TrapezoidLimits limitsOf(const axis::AxisConfig& config);
+
+/// The steps of a move, in nanoseconds after its start.
+std::vector<motion::Step> plannedSteps(std::int64_t from, std::int64_t to,
+                                       const motion::TrapezoidLimits& limits);
+
+}  // namespace stepdriver::kernel

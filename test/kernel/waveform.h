@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kernel_trace.h"
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/chip/chip.h"
+
+/// The waveform of an axis as the kernel put it out, held against what the driver chip needs.
+///
+/// The chip needs its times from the end of one write to the beginning of the next. The kernel
+/// stamps a write within it, so what lies between two stamps is never shorter than what was kept:
+/// limits are held to the nanosecond.
+namespace stepdriver::kernel {
+
+struct WiredPin {
+  unsigned line = 0;      ///< as KernelTrace::line() has it
+  bool inverted = false;  ///< the wiring inverts the level on its way to the chip
+};
+
+/// An axis as it is wired, and what it must keep.
+struct WiredAxis {
+  chip::Model driver = chip::Model::kA4988;
+  chip::Timing timing{};
+  WiredPin step;
+  WiredPin dir;
+  std::optional<WiredPin> enable;  ///< none: not wired, the motor is always energized
+  /// Shortest time from one active STEP edge to the next, as it was planned; 0: any.
+  std::int64_t shortest_interval_ns = 0;
+  /// Changes of STEP and DIR whose stamps are this close were made by one write: the kernel stamps
+  /// the lines of a write one after the other. On the test kernel a line takes 256 ns of virtual
+  /// time, or mostly less of real time, and two writes are further apart than this. 0: only those
+  /// with one stamp.
+  std::int64_t one_write_ns = 1'000;
+};
+
+/// The wiring that an axis is configured with.
+/// @throw Error where the trace doesn't know a line's chip: its pins must be named label:offset.
+WiredAxis wiredAxis(const axis::AxisConfig& config, const KernelTrace& trace);
+
+enum class Rule {
+  kStepHigh,
+  kStepLow,
+  kDirSetup,
+  kDirHold,
+  kOneWrite,    ///< STEP and DIR don't change in one write: its lines may change in any order
+  kEnabled,     ///< no step without ENABLE, or before ENABLE is driven at all
+  kEnableTime,  ///< from ENABLE to the first step
+  kInterval,
+  kRest,  ///< STEP is inactive when it is requested, and at the end
+};
+
+/// In words, as in reports: `STEP high time`.
+const char* nameOf(Rule rule);
+
+struct Violation {
+  Rule rule;
+  std::int64_t time_ns;  ///< of the edge that broke it
+  std::int64_t seen_ns;
+  std::int64_t least_ns;  ///< what would have been right; 0 where the rule has no time
+};
+
+/// An active STEP edge.
+struct Pulse {
+  std::int64_t time_ns;
+  bool forward;
+};
+
+/// The shortest times that occurred; none where there weren't two such edges.
+struct ShortestTimes {
+  std::optional<std::int64_t> high;
+  std::optional<std::int64_t> low;
+  std::optional<std::int64_t> interval;
+  std::optional<std::int64_t> dir_setup;  ///< from the last change of DIR, or its request
+  std::optional<std::int64_t> dir_hold;
+};
+
+/// What the kernel did to the lines of an axis.
+struct Waveform {
+  std::vector<Pulse> pulses;
+  std::size_t edges = 0;  ///< changes of STEP, DIR and ENABLE
+  ShortestTimes shortest;
+  std::vector<Violation> violations;  ///< in the order of time
+
+  std::int64_t forward() const;
+  std::int64_t backward() const;
+  /// The sum of the pulses, where the axis stands if it began at 0.
+  std::int64_t position() const { return forward() - backward(); }
+  std::map<Rule, std::size_t> violationsByRule() const;
+};
+
+/// @throw Error where one of the lines has no event: it is a wrong number, or nothing drove it.
+Waveform waveformOf(const KernelTrace& trace, const WiredAxis& axis);
+
+/// The figures of a waveform in a few lines, each indented, and each rule that was broken with the
+/// first place where it was.
+std::string reportOf(const Waveform& waveform);
+
+}  // namespace stepdriver::kernel
