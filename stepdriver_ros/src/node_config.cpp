@@ -52,16 +52,12 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
-<<<<<<< HEAD
   config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
-  config.max_lateness = readMaxLateness(reader.map("realtime"), config.max_lateness);
-=======
   if (valueOf(tree, "realtime").as<std::string>() != nullptr) {
     config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
   } else {
     readRealtime(reader.map("realtime"), config);
   }
->>>>>>> main
 
   const std::size_t issues_before = issues.size();
   reader.allow("axes");

@@ -28,17 +28,12 @@ struct NodeConfig {
 /// @code{.yaml}
 /// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
-<<<<<<< HEAD
 /// jog_timeout: 0.5               # [s] from 0.02 to 60
-/// realtime: {max_lateness_ms: 5.0}
-/// simulation: {...}              # see readSimulation()
-=======
 /// realtime:                      # or `enforce` or `warn` alone
 ///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
 ///                                # not start
 ///   max_lateness_ms: 5.0
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
->>>>>>> main
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode
 ///

@@ -13,11 +13,8 @@
 #include "bring_up.h"
 #include "call_queues.h"
 #include "end_requests.h"
-<<<<<<< HEAD
-#include "jog_subscriber.h"
-=======
 #include "hardware.h"
->>>>>>> main
+#include "jog_subscriber.h"
 #include "machine_services.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
@@ -113,12 +110,8 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
   MachineServices machine_services(private_node, machine, queues);
-<<<<<<< HEAD
-  machine_services.advertiseRig(*simulation);
-  const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
-=======
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
->>>>>>> main
+  const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   queues.start();
   publisher.start();
   ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
