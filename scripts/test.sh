@@ -15,7 +15,7 @@ Installs what is missing, builds, and runs the parts that are named; all of them
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
-          read by sigrok-cli
+          read by sigrok-cli; with --kernel also the whole node on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -49,14 +49,15 @@ conclude() {
   summary+=$(printf '%-12s %-8s %s' "$1" "$2" "$3")$'\n'
 }
 
-# stage NAME FUNCTION [NEEDED]: runs a function; not where the stage that it needs has failed.
+# stage NAME FUNCTION [NEEDED...]: runs a function; not where a stage that it needs didn't pass.
 stage() {
-  local name=$1 function=$2 needed=${3:-} start=$SECONDS
-  if [[ -n $needed && ${outcome[$needed]:-} != passed ]]; then
+  local name=$1 function=$2 needed start=$SECONDS
+  for needed in "${@:3}"; do
+    [[ ${outcome[$needed]:-} != passed ]] || continue
     skipped=$((skipped + 1))
     conclude "$name" skipped "needs $needed"
     return
-  fi
+  done
   say "" "==== $name"
   run "$function"
   if ((run_status == 0)); then
@@ -189,6 +190,21 @@ test_node() {
   (cd "$build/catkin" && ctest --timeout 600 --no-tests=error --output-on-failure)
 }
 
+# The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and
+# nodes of the tests' own on chips of their own. The kernel's trace of it all stays with the logs; what
+# the launched node did in it is held against its chip. It goes at 1600 steps/s at most, and a late
+# step takes up to a quarter of the interval after it.
+test_node_in_kernel() {
+  local offset lines='' trace=$build/log/kernel-node.trace header=pinctrl-bcm2711
+  for offset in {2..27}; do lines+=",$offset=GPIO$offset"; done
+  use_ros "$build/catkin/devel"
+  STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 \
+    --chip "header:$header:58:${lines#,}" --trace "$trace" -- \
+    rostest "$src/test/node/hardware/hardware.test"
+  "$build/core/test/kernel/check_waveform" "$trace" --axis x --driver a4988 --step "$header:17" \
+    --dir "$header:27" --enable "$header:22" --shortest-interval $((1000000000 * 3 / 4 / 1600))
+}
+
 # Nothing but the install space is on any path here.
 check_install() {
   local share=$build/install/share/stepdriver launch_file
@@ -240,6 +256,7 @@ if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
 fi
 if wants ros; then
   stage node-tests test_node node-build
+  ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   stage install check_install node-build
   stage trace check_trace install
 fi

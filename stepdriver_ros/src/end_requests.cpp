@@ -5,7 +5,7 @@
 #include <ros/xmlrpc_manager.h>
 
 #include <algorithm>
-#include <csignal>
+#include <array>
 #include <ctime>
 
 namespace stepdriver::ros_node {
@@ -14,19 +14,28 @@ namespace {
 // How long a shutdown call, which ends no wait, goes unnoticed at most.
 constexpr std::chrono::milliseconds kPoll{20};
 
-sigset_t endSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  return signals;
+struct EndSignal {
+  int number;
+  const char* name;
+};
+
+constexpr std::array<EndSignal, 4> kEndSignals{
+    {{SIGINT, "SIGINT"}, {SIGTERM, "SIGTERM"}, {SIGQUIT, "SIGQUIT"}, {SIGHUP, "SIGHUP"}}};
+
+bool isIgnored(int signal) {
+  struct sigaction action {};
+  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
 }
 
 }  // namespace
 
 EndRequests::EndRequests() {
-  const sigset_t signals = endSignals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  sigemptyset(&signals_);
+  for (const EndSignal& signal : kEndSignals) {
+    if (signal.number == SIGHUP && isIgnored(SIGHUP)) continue;
+    sigaddset(&signals_, signal.number);
+  }
+  pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
 }
 
 void EndRequests::takeOverShutdownCall() {
@@ -42,15 +51,15 @@ void EndRequests::takeOverShutdownCall() {
 
 std::string EndRequests::waitFor(std::chrono::milliseconds time) {
   const auto deadline = std::chrono::steady_clock::now() + time;
-  const sigset_t signals = endSignals();
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::nanoseconds>(
         deadline - std::chrono::steady_clock::now());
     const auto nap = std::clamp<std::chrono::nanoseconds>(left, std::chrono::nanoseconds(0), kPoll);
     const timespec timeout{0, static_cast<long>(nap.count())};
-    const int signal = sigtimedwait(&signals, nullptr, &timeout);
-    if (signal == SIGINT) return "SIGINT";
-    if (signal == SIGTERM) return "SIGTERM";
+    const int number = sigtimedwait(&signals_, nullptr, &timeout);
+    for (const EndSignal& signal : kEndSignals) {
+      if (signal.number == number) return signal.name;
+    }
     if (shutdown_called_ || ros::isShuttingDown()) return "a shutdown call (rosnode kill)";
     if (left.count() <= 0) return {};
   }

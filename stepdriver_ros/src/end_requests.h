@@ -2,16 +2,18 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <string>
 
 namespace stepdriver::ros_node {
 
-/// What asks the node to end: SIGINT, SIGTERM, and the shutdown call of `rosnode kill` and of the
+/// What asks the node to end: SIGINT, SIGTERM, SIGQUIT, SIGHUP, as of a terminal that is closed,
+/// where nobody has it ignored (nohup), and the shutdown call of `rosnode kill` and of the
 /// master. One object, made first thing in main(), that outlives ros::shutdown(); waitFor() is
 /// called by main's thread.
 class EndRequests {
  public:
-  /// Blocks both signals in this thread and in all that it starts from now on.
+  /// Blocks the signals in this thread and in all that it starts from now on.
   EndRequests();
   EndRequests(const EndRequests&) = delete;
   EndRequests& operator=(const EndRequests&) = delete;
@@ -26,6 +28,7 @@ class EndRequests {
   std::string waitFor(std::chrono::milliseconds time);
 
  private:
+  sigset_t signals_{};
   std::atomic<bool> shutdown_called_{false};
 };
 

@@ -38,7 +38,8 @@ constexpr std::chrono::milliseconds kLastAnswers{500};
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 
 Drives the axes of the parameter ~axes by services, and publishes where they are.
-Ends on SIGINT, SIGTERM and `rosnode kill`: decelerates, disables and releases the lines.
+Ends on SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill`: decelerates, disables and releases the
+lines.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop

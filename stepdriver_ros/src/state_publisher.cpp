@@ -67,6 +67,9 @@ StatePublisher::StatePublisher(ros::NodeHandle node, ros::NodeHandle private_nod
   const std::size_t axes = machine.axes().size();
   joint_states_.position.resize(axes);
   joint_states_.velocity.resize(axes);
+  endstops_.min.resize(axes);
+  endstops_.max.resize(axes);
+  endstops_unreadable_.resize(axes);
 }
 
 StatePublisher::~StatePublisher() { stop(); }
@@ -125,19 +128,18 @@ void StatePublisher::publishJointStates() {
 }
 
 void StatePublisher::publishEndstopsOnChange() {
-  Endstops read;
-  read.name = endstops_.name;
-  try {
-    for (const auto& axis : machine_.axes()) {
-      const axis::EndstopState state = axis->endstops();
-      read.min.push_back(state.min.value_or(false));
-      read.max.push_back(state.max.value_or(false));
+  Endstops read = endstops_;
+  for (std::size_t i = 0; i < machine_.axes().size(); ++i) {
+    try {
+      const axis::EndstopState state = machine_.axes()[i]->endstops();
+      read.min[i] = state.min.value_or(false);
+      read.max[i] = state.max.value_or(false);
+      endstops_unreadable_[i] = false;
+    } catch (const GpioError& error) {
+      // What was read last stands; the other axes' switches are read all the same.
+      if (!endstops_unreadable_[i]) ROS_ERROR("%s", error.what());
+      endstops_unreadable_[i] = true;
     }
-    endstops_unreadable_ = false;
-  } catch (const GpioError& error) {
-    if (!endstops_unreadable_) ROS_ERROR("%s", error.what());
-    endstops_unreadable_ = true;
-    return;
   }
   if (endstops_published_ && read.min == endstops_.min && read.max == endstops_.max) return;
   read.header.stamp = ros::Time::now();

@@ -10,6 +10,7 @@
 #include <condition_variable>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include "stepdriver_core/machine/machine.h"
 
@@ -53,7 +54,7 @@ class StatePublisher {
   Endstops endstops_;
   AxisStates axis_states_;
   bool endstops_published_ = false;
-  bool endstops_unreadable_ = false;
+  std::vector<bool> endstops_unreadable_;  // of each axis
 
   std::mutex mutex_;
   std::condition_variable stop_asked_;

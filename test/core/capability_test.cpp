@@ -58,6 +58,8 @@ class SlowLines : public gpio::Lines {
     return 0;
   }
   void interrupt() noexcept override {}
+  const std::string& outputName(int /*output*/) const override { return name_; }
+  const std::string& inputName(int /*input*/) const override { return name_; }
 
   std::vector<gpio::LineWrite> written;
   std::vector<int> read_inputs;
@@ -66,6 +68,7 @@ class SlowLines : public gpio::Lines {
 
  private:
   FakeClock& clock_;
+  const std::string name_ = "a line";
 };
 
 std::vector<pulse::ChannelConfig> channels() {

@@ -1,23 +1,19 @@
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <linux/gpio.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/error.h"
 #include "support/gpio_sim.h"
+#include "support/other_program.h"
 
 // What is libgpiod's alone; lines_conformance_test.cpp has what all backends share.
 
@@ -25,6 +21,7 @@ namespace stepdriver::gpio {
 namespace {
 
 using test::GpioSimChip;
+using test::OtherProgram;
 
 std::string textOf(const std::vector<OutputRequest>& outputs,
                    const std::vector<InputRequest>& inputs) {
@@ -54,29 +51,6 @@ TEST(LibgpiodLines, SayThatThereIsNoSuchChipOnAnyMachine) {
             0U)
       << text;
 }
-
-/// A line that another program holds, as far as the kernel can tell.
-class OtherProgram {
- public:
-  OtherProgram(const std::string& chip, unsigned offset, const std::string& consumer) {
-    const int file = open(("/dev/" + chip).c_str(), O_RDWR | O_CLOEXEC);
-    gpiohandle_request request{};
-    request.lineoffsets[0] = offset;
-    request.lines = 1;
-    request.flags = GPIOHANDLE_REQUEST_INPUT;
-    std::snprintf(request.consumer_label, sizeof request.consumer_label, "%s", consumer.c_str());
-    const int result = ioctl(file, GPIO_GET_LINEHANDLE_IOCTL, &request);
-    close(file);
-    if (result < 0) throw std::runtime_error("the line can't be held");
-    line_ = request.fd;
-  }
-  OtherProgram(const OtherProgram&) = delete;
-  OtherProgram& operator=(const OtherProgram&) = delete;
-  ~OtherProgram() { close(line_); }
-
- private:
-  int line_;
-};
 
 class LibgpiodOnGpioSim : public testing::Test {
  protected:

@@ -4,68 +4,20 @@
 
 #include <cerrno>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "stepdriver_core/motion/trapezoid.h"
+#include "support/recording_lines.h"
 
 namespace stepdriver::pulse {
 namespace {
 
 constexpr int kLinesPerChannel = 2;  // STEP and DIR
 
-struct Edge {
-  int line;
-  bool level;
-  Nanoseconds time;
-  std::size_t write;  // number of the call that made it
-};
-
-// Lines that remember; a write can take time or fail.
-class RecordingLines : public gpio::Lines {
- public:
-  explicit RecordingLines(VirtualClock& clock) : clock_(clock) {}
-
-  int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
-    ++calls;
-    if (fail_after-- == 0) return EIO;
-    for (std::size_t i = 0; i < count; ++i) {
-      bool& level = levels[writes[i].output];
-      if (level != writes[i].level) {
-        edges.push_back({writes[i].output, writes[i].level, clock_.now(), calls});
-      }
-      level = writes[i].level;
-    }
-    return 0;
-  }
-
-  int read(int input) noexcept override { return inputs[input]; }
-
-  int waitForEdges(std::int64_t /*timeout_ns*/, gpio::EdgeEvent* /*events*/,
-                   std::size_t /*capacity*/) noexcept override {
-    return -ENOTSUP;
-  }
-  void interrupt() noexcept override {}
-
-  std::vector<Nanoseconds> rises(int line) const {
-    std::vector<Nanoseconds> times;
-    for (const Edge& edge : edges) {
-      if (edge.line == line && edge.level) times.push_back(edge.time);
-    }
-    return times;
-  }
-
-  std::vector<Edge> edges;
-  std::map<int, bool> levels;
-  std::map<int, int> inputs;
-  std::size_t calls = 0;
-  int fail_after = -1;
-
- private:
-  VirtualClock& clock_;
-};
+using test::Edge;
+using test::RecordingLines;
 
 class PulseEngineTest : public testing::Test {
  protected:
@@ -403,9 +355,33 @@ TEST_F(PulseEngineTest, StopsAtALineThatFailsAndDoesNotCountItsEdge) {
   const ChannelState state = engine->channel(0);
   EXPECT_EQ(state.end, EndReason::kLineError);
   EXPECT_EQ(state.ended, failing);
-  EXPECT_EQ(state.error, EIO);
+  EXPECT_EQ(state.failure.error, EIO);
+  EXPECT_EQ(state.failure.line, 0);
+  EXPECT_FALSE(state.failure.input);
   EXPECT_EQ(state.line_errors, 1U);
   EXPECT_EQ(state.count, static_cast<std::int64_t>(lines.rises(0).size()));
+}
+
+TEST_F(PulseEngineTest, GoesOnWithTheOthersWhereOneLineOfAWriteFails) {
+  make({config(0), config(1), config(2)});
+  for (const int channel : {0, 1, 2}) follow(cruise(1'000'000, 0, 100, 1000.0), channel);
+  runUntil(50'300'000);
+  const std::int64_t before = engine->channel(1).count;
+  lines.broken = 2;
+  runOut();
+  for (const int channel : {0, 2}) {
+    const ChannelState state = engine->channel(channel);
+    EXPECT_EQ(state.end, EndReason::kDone) << channel;
+    EXPECT_EQ(state.count, 100) << channel;
+    EXPECT_EQ(lines.rises(channel * kLinesPerChannel).size(), 100U) << channel;
+    EXPECT_EQ(state.line_errors, 0U) << channel;
+  }
+  const ChannelState failed = engine->channel(1);
+  EXPECT_EQ(failed.end, EndReason::kLineError);
+  EXPECT_EQ(failed.failure.error, ENODEV);
+  EXPECT_EQ(failed.failure.line, 2);
+  EXPECT_EQ(failed.count, before);
+  EXPECT_EQ(failed.line_errors, 1U);
 }
 
 }  // namespace

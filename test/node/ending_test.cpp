@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
-#include <ros/master.h>
-#include <ros/network.h>
-#include <ros/this_node.h>
 #include <stepdriver/AxisStates.h>
-#include <xmlrpcpp/XmlRpcClient.h>
 
 #include <chrono>
 #include <cmath>
@@ -13,6 +9,7 @@
 #include <future>
 #include <string>
 
+#include "support/ask_node.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
@@ -22,26 +19,12 @@
 namespace stepdriver::node_test {
 namespace {
 
-/// What `rosnode kill` does.
-void rosnodeKill(const std::string& node) {
-  XmlRpc::XmlRpcValue request;
-  request[0] = ros::this_node::getName();
-  request[1] = node;
-  XmlRpc::XmlRpcValue response;
-  XmlRpc::XmlRpcValue uri;
-  ASSERT_TRUE(ros::master::execute("lookupNode", request, response, uri, false));
-  std::string host;
-  std::uint32_t port = 0;
-  ASSERT_TRUE(ros::network::splitURI(static_cast<std::string&>(uri), host, port));
-  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
-  request[1] = "asked by a test";
-  ASSERT_TRUE(client.execute("shutdown", request, response));
-}
-
 void end(NodeUnderTest& node, const std::string& how) {
   if (how == "SIGINT") node.process().signal(SIGINT);
   if (how == "SIGTERM") node.process().signal(SIGTERM);
-  if (how == "kill") rosnodeKill(node.name());
+  if (how == "SIGHUP") node.process().signal(SIGHUP);
+  if (how == "SIGQUIT") node.process().signal(SIGQUIT);
+  if (how == "kill") askNode(node.name(), "shutdown", "asked by a test");  // as rosnode kill does
 }
 
 class Ending : public testing::TestWithParam<std::string> {};
@@ -97,7 +80,8 @@ TEST_P(Ending, AtRestIsQuickAndDisables) {
   EXPECT_EQ(pins["x/step"].changesTo(true), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(How, Ending, testing::Values("SIGINT", "SIGTERM", "kill"),
+INSTANTIATE_TEST_SUITE_P(How, Ending,
+                         testing::Values("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "kill"),
                          [](const auto& value) { return value.param; });
 
 TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
@@ -125,6 +109,18 @@ TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
   EXPECT_FALSE(answer.success);
   expectSays(answer.message, "shut down");
   EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+}
+
+TEST(EndingUnderNohup, TakesNoNoticeOfAClosedTerminal) {
+  NodeUnderTest node;
+  const auto before = std::signal(SIGHUP, SIG_IGN);  // a process inherits that
+  node.start();
+  std::signal(SIGHUP, before);
+  end(node, "SIGHUP");
+  EXPECT_TRUE(node.moveTo(0.001, true).success);
+  end(node, "SIGTERM");
+  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+  expectSays(node.process().output(), "Ending on SIGTERM");
 }
 
 TEST(EndingEnabled, LeavesTheMotorOnWhereConfiguredSo) {

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 #include <ros/master.h>
-#include <ros/service.h>
 #include <sensor_msgs/JointState.h>
 #include <std_srvs/SetBool.h>
 #include <stepdriver/MoveTo.h>
@@ -19,29 +18,19 @@ namespace {
 
 using sensor_msgs::JointState;
 
-template <typename Service>
-typename Service::Response call(const std::string& name,
-                                const typename Service::Request& request = {}) {
-  EXPECT_TRUE(ros::service::waitForService(name, ros::Duration(kBound.count())));
-  Service call;
-  call.request = request;
-  EXPECT_TRUE(callService(name, call)) << name << " doesn't answer";
-  return call.response;
-}
-
 /// Enables an axis, moves it, and looks whether its pins agree.
 void expectMoves(const std::string& node, const std::string& axis, double position,
                  std::int64_t pulses, std::size_t index = 0) {
   std_srvs::SetBool::Request on;
   on.data = true;
-  const auto enabled = call<std_srvs::SetBool>(node + "/" + axis + "/enable", on);
+  const auto enabled = callWhenThere<std_srvs::SetBool>(node + "/" + axis + "/enable", on);
   EXPECT_TRUE(enabled.success) << enabled.message;
   MoveTo::Request request;
   request.position = position;
   request.wait = true;
-  const auto answer = call<MoveTo>(node + "/" + axis + "/move_to", request);
+  const auto answer = callWhenThere<MoveTo>(node + "/" + axis + "/move_to", request);
   EXPECT_TRUE(answer.success) << answer.message;
-  const auto report = call<RigReport>(node + "/rig/report");
+  const auto report = callWhenThere<RigReport>(node + "/rig/report");
   EXPECT_EQ(report.name.at(index), axis);
   EXPECT_EQ(report.pulses_forward.at(index), pulses);
   EXPECT_NEAR(report.carriage.at(index), position, 1e-4);
@@ -62,16 +51,16 @@ TEST(Launch, KeepsNodesInNamespacesApart) {
   EXPECT_EQ(left.messages().back().name, std::vector<std::string>{"x_joint"});
   EXPECT_EQ(both.messages().back().name, (std::vector<std::string>{"r_joint", "x_joint"}));
 
-  const auto before = call<RigReport>("/both/stepdriver/rig/report");
+  const auto before = callWhenThere<RigReport>("/both/stepdriver/rig/report");
   MoveTo::Request request;
   request.position = 0.005;
   request.relative = true;
   request.wait = true;
   std_srvs::SetBool::Request on;
   on.data = true;
-  EXPECT_TRUE(call<std_srvs::SetBool>("/left/stepdriver/x/enable", on).success);
-  EXPECT_TRUE(call<MoveTo>("/left/stepdriver/x/move_to", request).success);
-  const auto after = call<RigReport>("/both/stepdriver/rig/report");
+  EXPECT_TRUE(callWhenThere<std_srvs::SetBool>("/left/stepdriver/x/enable", on).success);
+  EXPECT_TRUE(callWhenThere<MoveTo>("/left/stepdriver/x/move_to", request).success);
+  const auto after = callWhenThere<RigReport>("/both/stepdriver/rig/report");
   EXPECT_EQ(after.pulses_forward, before.pulses_forward);
 }
 
@@ -80,13 +69,13 @@ TEST(Launch, BringsUpTwoAxesThatMoveAtTheSameTime) {
   std_srvs::SetBool::Request on;
   on.data = true;
   for (const char* axis : {"x", "r"}) {
-    EXPECT_TRUE(call<std_srvs::SetBool>(node + "/" + axis + "/enable", on).success);
+    EXPECT_TRUE(callWhenThere<std_srvs::SetBool>(node + "/" + axis + "/enable", on).success);
   }
   MoveTo::Request request;
   request.position = 0.05;
-  EXPECT_TRUE(call<MoveTo>(node + "/x/move_to", request).success);
+  EXPECT_TRUE(callWhenThere<MoveTo>(node + "/x/move_to", request).success);
   request.position = 1.0;
-  EXPECT_TRUE(call<MoveTo>(node + "/r/move_to", request).success);
+  EXPECT_TRUE(callWhenThere<MoveTo>(node + "/r/move_to", request).success);
   const Recorder<JointState> states(std::string("/both/joint_states"));
   EXPECT_TRUE(states.waitForLatest([](const JointState& s) {
     return std::abs(s.position.at(0) - 1.0) < 1e-3 && std::abs(s.position.at(1) - 0.05) < 1e-4;

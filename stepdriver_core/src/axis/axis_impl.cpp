@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <utility>
 
 namespace stepdriver::axis {
@@ -31,7 +30,7 @@ pulse::ChannelState Axis::Impl::harvest() {
   const pulse::ChannelState state = driver.engine().channel(channel);
   if (state.line_errors != line_errors_seen_) {
     line_errors_seen_ = state.line_errors;
-    fault = "a GPIO line failed: " + std::string(std::strerror(state.error));
+    fault = failureText(state.failure);
     position_valid = false;
     pins_doubtful_ = true;
   }

@@ -52,6 +52,10 @@ class Axis::Impl {
   std::int64_t nearestCommon(int wanted);
   void changeMicrosteps(int wanted);
 
+  // A line that failed, in words.
+  std::string failureText(const pulse::LineFailure& failure) const;
+  int readInput(int line) const;
+
   // Refusals.
   [[noreturn]] void refuse(const std::string& why) const {
     throw Refused(config.name + ": " + why);

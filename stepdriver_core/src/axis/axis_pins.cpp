@@ -1,5 +1,3 @@
-#include <cstring>
-
 #include "axis_impl.h"
 
 namespace stepdriver::axis {
@@ -20,8 +18,7 @@ void Axis::Impl::writePins(const pulse::PinSequence& sequence, std::optional<std
   });
   harvest();
   if (state.pins_failed == command.serial) {
-    throw GpioError(config.name +
-                    ": a line could not be written: " + std::string(std::strerror(state.error)));
+    throw GpioError(config.name + ": " + failureText(state.failure));
   }
   if (state.refused == command.serial) refuse("it moves");
 }
@@ -37,14 +34,7 @@ void Axis::Impl::restorePins() {
 
 void Axis::Impl::resetFaultyChip() {
   if (!config.fault || asleep) return;
-  const auto faulty = [this] {
-    const int level = lines.read(axis_lines.fault);
-    if (level < 0) {
-      throw GpioError(config.name + ": the fault line " + config.fault->line +
-                      " can't be read: " + std::strerror(-level));
-    }
-    return level == 0;
-  };
+  const auto faulty = [this] { return readInput(axis_lines.fault) == 0; };
   if (!faulty()) return;
   if (pins.hasReset()) {
     writePins(pins.reset());

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <cstring>
 
 #include "axis_impl.h"
 
@@ -61,12 +60,7 @@ void Axis::Impl::refuseIntoEndstop(std::int64_t steps) const {
 std::optional<bool> Axis::Impl::endstopActive(int line,
                                               const std::optional<Endstop>& endstop) const {
   if (!endstop) return std::nullopt;
-  const int level = lines.read(line);
-  if (level < 0) {
-    throw GpioError(config.name + ": the endstop line " + endstop->line +
-                    " can't be read: " + std::strerror(-level));
-  }
-  return (level != 0) == endstop->active_level;
+  return (readInput(line) != 0) == endstop->active_level;
 }
 
 }  // namespace stepdriver::axis

@@ -81,6 +81,13 @@ class SimulatedBackend::HeldLines : public Lines {
 
   void interrupt() noexcept override { edges_.interrupt(); }
 
+  const std::string& outputName(int output) const override {
+    return outputs_.at(static_cast<std::size_t>(output)).request.line;
+  }
+  const std::string& inputName(int input) const override {
+    return inputs_.at(static_cast<std::size_t>(input)).line;
+  }
+
  private:
   struct Output {
     OutputRequest request;

@@ -86,7 +86,7 @@ class Machine::Impl {
     std::array<gpio::EdgeEvent, 16> events{};
     while (!watching_ended_) {
       const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
-      // Where waiting fails, a chip was unplugged, say, reading will fail too, and say so.
+      // Where waiting fails, reading will fail too, and say so.
       if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
       engine_->inputsChanged();
     }

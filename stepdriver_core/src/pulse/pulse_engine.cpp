@@ -162,9 +162,12 @@ void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
   const int level = lines_.read(channel.config.fault->line);
   const bool faulty = level < 0 || (level != 0) == channel.config.fault->active;
   if (faulty && !channel.faulty) {
-    if (level >= 0) ++channel.state.chip_faults;
-    end(channel, level < 0 ? EndReason::kLineError : EndReason::kChipFault, now,
-        level < 0 ? -level : 0);
+    if (level < 0) {
+      fail(channel, {-level, channel.config.fault->line, true}, now);
+    } else {
+      ++channel.state.chip_faults;
+      end(channel, EndReason::kChipFault, now);
+    }
   }
   channel.faulty = faulty;
 }
@@ -195,7 +198,7 @@ bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
   if (!endstop) return true;
   const int level = lines_.read(endstop->line);
   if (level < 0) {
-    end(channel, EndReason::kLineError, now, -level);
+    fail(channel, {-level, endstop->line, true}, now);
     return false;
   }
   if ((level != 0) != endstop->active) return true;
@@ -228,13 +231,15 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     if (kept == 0) return;
   }
   const int error = lines_.write(writes_.data(), writes_.size());
-  const Nanoseconds written = clock_.now();
-  for (Channel* channel : writers_) {
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    Channel* const channel = writers_[i];
+    // One by one it shows whose line it is. What the write has set already keeps its level.
+    const int own_error = error != 0 && writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
     const bool fall = channel->high;
-    channel->high = !fall && error == 0;
-    (fall ? channel->fell : channel->rose) = written;
-    if (error != 0) {
-      end(*channel, EndReason::kLineError, now, error);
+    channel->high = !fall && own_error == 0;
+    (fall ? channel->fell : channel->rose) = clock_.now();
+    if (own_error != 0) {
+      fail(*channel, {own_error, writes_[i].output}, now);
     } else if (!fall) {
       channel->state.count += channel->direction;
       ++channel->state.pulses;
@@ -272,7 +277,7 @@ void PulseEngine::turn(Channel& channel, Nanoseconds now) {
   const Signal& dir = channel.config.dir;
   const gpio::LineWrite write{dir.line, forward ? dir.active : !dir.active};
   if (const int error = lines_.write(&write, 1)) {
-    end(channel, EndReason::kLineError, now, error);
+    fail(channel, {error, write.output}, now);
     return;
   }
   channel.turned = clock_.now();
@@ -288,10 +293,8 @@ void PulseEngine::writePin(Channel& channel, Nanoseconds now) {
   const gpio::LineWrite write{pin.line, pin.level};
   if (const int error = lines_.write(&write, 1)) {
     channel.state.pins_failed = channel.pins_serial;
-    channel.state.error = error;
-    ++channel.state.line_errors;
     channel.pins_serial = 0;
-    channel.published.store(channel.state);
+    fail(channel, {error, write.output}, now);
     return;
   }
   const Nanoseconds written = clock_.now();
@@ -307,9 +310,13 @@ void PulseEngine::pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds 
   channel.published.store(channel.state);
 }
 
-void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now, int error) {
-  if (error != 0) ++channel.state.line_errors;
-  channel.state.error = error;
+void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds now) {
+  channel.state.failure = failure;
+  ++channel.state.line_errors;
+  end(channel, EndReason::kLineError, now);
+}
+
+void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
   // What fails after the motion was over leaves that motion's end as it was.
   if (channel.profile != nullptr) {
     channel.state.end = reason;

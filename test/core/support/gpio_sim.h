@@ -28,29 +28,61 @@ inline void writeText(const std::string& path, const std::string& text) {
   }
 }
 
+/// The lines of a chip of the kernel's gpio-sim, as what is wired to them sees them.
+class GpioSimLines {
+ public:
+  static constexpr const char* kFolder = "/sys/kernel/config/gpio-sim";
+
+  GpioSimLines() = default;
+
+  /// @param device of a chip that is there: its name in configfs.
+  explicit GpioSimLines(const std::string& device) {
+    const std::string folder = std::string(kFolder) + "/" + device;
+    name_ = readText(folder + "/bank0/chip_name");
+    label_ = readText(folder + "/bank0/label");
+    lines_ = "/sys/devices/platform/" + readText(folder + "/dev_name") + "/" + name_ + "/sim_gpio";
+  }
+
+  const std::string& name() const { return name_; }
+  const std::string& label() const { return label_; }
+
+  /// The level of a line, whoever drives it.
+  bool level(unsigned offset) const {
+    return readText(lines_ + std::to_string(offset) + "/value") == "1";
+  }
+
+  /// Drives an input from outside.
+  void drive(unsigned offset, bool level) const {
+    writeText(lines_ + std::to_string(offset) + "/pull", level ? "pull-up" : "pull-down");
+  }
+
+ private:
+  std::string name_;
+  std::string label_;
+  std::string lines_;
+};
+
 /// A chip of the kernel's gpio-sim, there for as long as this object. Needs root and configfs.
 class GpioSimChip {
  public:
   using Names = std::vector<std::pair<unsigned, std::string>>;
 
-  static constexpr const char* kFolder = "/sys/kernel/config/gpio-sim";
-
   /// @param device its name in configfs.
   /// @param names of lines, by offset.
-  GpioSimChip(const std::string& device, std::string label, unsigned lines, const Names& names = {})
-      : folder_(std::string(kFolder) + "/" + device), label_(std::move(label)) {
+  GpioSimChip(const std::string& device, const std::string& label, unsigned lines,
+              const Names& names = {})
+      : folder_(std::string(GpioSimLines::kFolder) + "/" + device) {
     const std::string bank = folder_ + "/bank0";
     make(folder_);
     make(bank);
-    writeText(bank + "/label", label_);
+    writeText(bank + "/label", label);
     writeText(bank + "/num_lines", std::to_string(lines));
     for (const auto& [offset, name] : names) {
       make(bank + "/line" + std::to_string(offset));
       writeText(bank + "/line" + std::to_string(offset) + "/name", name);
     }
     writeText(folder_ + "/live", "1");
-    name_ = readText(bank + "/chip_name");
-    lines_ = "/sys/devices/platform/" + readText(folder_ + "/dev_name") + "/" + name_ + "/sim_gpio";
+    lines_ = GpioSimLines(device);
   }
   GpioSimChip(const GpioSimChip&) = delete;
   GpioSimChip& operator=(const GpioSimChip&) = delete;
@@ -60,23 +92,16 @@ class GpioSimChip {
     for (; !made_.empty(); made_.pop_back()) std::filesystem::remove(made_.back(), ignored);
   }
 
-  const std::string& name() const { return name_; }
-  const std::string& label() const { return label_; }
+  const GpioSimLines& lines() const { return lines_; }
+  const std::string& name() const { return lines_.name(); }
+  const std::string& label() const { return lines_.label(); }
+  bool level(unsigned offset) const { return lines_.level(offset); }
+  void drive(unsigned offset, bool level) const { lines_.drive(offset, level); }
 
   /// As a cable that is pulled out; the chip doesn't come back.
   void unplug() {
     writeText(folder_ + "/live", "0");
     there_ = false;
-  }
-
-  /// The level of a line, whoever drives it.
-  bool level(unsigned offset) const {
-    return readText(lines_ + std::to_string(offset) + "/value") == "1";
-  }
-
-  /// Drives an input from outside.
-  void drive(unsigned offset, bool level) {
-    writeText(lines_ + std::to_string(offset) + "/pull", level ? "pull-up" : "pull-down");
   }
 
  private:
@@ -86,9 +111,7 @@ class GpioSimChip {
   }
 
   std::string folder_;
-  std::string label_;
-  std::string name_;
-  std::string lines_;
+  GpioSimLines lines_;
   std::vector<std::string> made_;
   bool there_ = true;
 };

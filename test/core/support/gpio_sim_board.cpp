@@ -137,8 +137,8 @@ std::string missing() {
     return "runs in the test kernel (test/kernel/run.sh with STEPDRIVER_GPIO_SIM=1)";
   }
   if (gpio::libgpiodVersion().empty()) return "stepdriver was built without libgpiod";
-  if (!std::filesystem::is_directory(GpioSimChip::kFolder)) {
-    return std::string("STEPDRIVER_GPIO_SIM is 1, but there is no ") + GpioSimChip::kFolder;
+  if (!std::filesystem::is_directory(GpioSimLines::kFolder)) {
+    return std::string("STEPDRIVER_GPIO_SIM is 1, but there is no ") + GpioSimLines::kFolder;
   }
   return "";
 }

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <gtest/gtest.h>
 #include <ros/node_handle.h>
+#include <ros/service.h>
 
 #include <string>
+
+#include "support/wait.h"
 
 namespace stepdriver::node_test {
 
@@ -14,6 +18,17 @@ namespace stepdriver::node_test {
 template <typename Service>
 bool callService(const std::string& name, Service& call) {
   return ros::NodeHandle().serviceClient<Service>(name, true).call(call);
+}
+
+/// Calls a service of a node that may still be starting; the test fails where no answer comes.
+template <typename Service>
+typename Service::Response callWhenThere(const std::string& name,
+                                         const typename Service::Request& request = {}) {
+  EXPECT_TRUE(ros::service::waitForService(name, ros::Duration(kBound.count())));
+  Service call;
+  call.request = request;
+  EXPECT_TRUE(callService(name, call)) << name << " doesn't answer";
+  return call.response;
 }
 
 }  // namespace stepdriver::node_test

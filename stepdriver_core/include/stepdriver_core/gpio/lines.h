@@ -70,12 +70,17 @@ class Lines {
   ///
   /// @param timeout_ns on CLOCK_MONOTONIC, on simulated lines too; negative: no time-out.
   /// @param capacity of `events`, above 0. Edges that don't fit are told by the next call.
-  /// @return the number of events; 0 after the time-out, an interrupt() or a signal; or -errno.
+  /// @return the number of events; 0 after the time-out, an interrupt() or a signal; or -errno,
+  ///   which is told once where a chip has gone.
   [[nodiscard]] virtual int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
                                          std::size_t capacity) noexcept = 0;
 
   /// Ends the waitForEdges() under way in another thread, or else the next one.
   virtual void interrupt() noexcept = 0;
+
+  /// A line as messages name it, with the chip that it is on, by its index in the request.
+  virtual const std::string& outputName(int output) const = 0;
+  virtual const std::string& inputName(int input) const = 0;
 };
 
 /// Where lines come from.

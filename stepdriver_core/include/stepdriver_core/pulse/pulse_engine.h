@@ -85,6 +85,13 @@ enum class EndReason {
   kLineError,  ///< a line could not be written or read
 };
 
+/// A write or a read that failed.
+struct LineFailure {
+  int error = 0;       ///< errno; 0: none did
+  int line = -1;       ///< by its index in the gpio::Lines
+  bool input = false;  ///< it was read; else it was written
+};
+
 /// What a channel does and has done.
 struct ChannelState {
   std::int64_t count = 0;       ///< microsteps: active STEP edges forward less those backward
@@ -94,14 +101,14 @@ struct ChannelState {
   std::uint64_t following = 0;  ///< serial of the profile under way; 0: at rest
   std::uint64_t ended = 0;      ///< serial of the last profile that ended
   EndReason end = EndReason::kDone;
-  int error = 0;                  ///< errno of a kLineError
+  LineFailure failure;            ///< the last one
   Nanoseconds end_time = 0;       ///< motion time at which it ended
   bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
   Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
   std::uint64_t pins_done = 0;    ///< serial of the last kPins that was carried out
-  std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `error`
+  std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `failure`
   std::uint64_t chip_faults = 0;  ///< times that the fault line became active
-  std::uint64_t line_errors = 0;  ///< failed writes and reads, the last with `error`
+  std::uint64_t line_errors = 0;  ///< failed writes and reads
   Nanoseconds ready = 0;          ///< clock time before which no step goes out
 };
 
@@ -123,6 +130,7 @@ struct EngineState {
 ///   (the edge is not later than that) to the beginning of the write that makes the next.
 /// - A step that comes late doesn't bring the next one closer than kClosest of their planned
 ///   interval; what is more than that slides the timeline of all channels (a slip).
+/// - Where a write for several channels fails, those whose own lines can be written go on.
 /// - Before a step towards an endstop the switch is read; none goes out while it reads active.
 class PulseEngine {
  public:
@@ -206,7 +214,8 @@ class PulseEngine {
   void turn(Channel& channel, Nanoseconds now);
   void writePin(Channel& channel, Nanoseconds now);
   void pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now);
-  void end(Channel& channel, EndReason reason, Nanoseconds now, int error = 0);
+  void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
+  void end(Channel& channel, EndReason reason, Nanoseconds now);
 
   void scheduleAll();
   bool schedule(Channel& channel);

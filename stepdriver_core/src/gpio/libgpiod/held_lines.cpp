@@ -121,9 +121,10 @@ int HeldLines::waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
   for (std::size_t i = 0; i < sources_.size() && count < capacity; ++i) {
     const short seen = polled_[i + 1].revents;
     if (seen == 0) continue;
-    // Without POLLIN it is the chip that has gone, and this would come again at once.
-    const int taken =
-        (seen & POLLIN) != 0 ? takeEdges(sources_[i], events + count, capacity - count) : -ENODEV;
+    // Without POLLIN it is the chip that has gone.
+    const bool gone = (seen & POLLIN) == 0;
+    if (gone && count == 0) polled_[i + 1].fd = -1;  // told once: it would come again for ever
+    const int taken = gone ? -ENODEV : takeEdges(sources_[i], events + count, capacity - count);
     if (taken < 0) return count > 0 ? static_cast<int>(count) : taken;
     count += static_cast<std::size_t>(taken);
   }
@@ -146,5 +147,13 @@ int HeldLines::takeEdges(const EdgeSource& source, EdgeEvent* events,
 }
 
 void HeldLines::interrupt() noexcept { eventfd_write(interrupt_fd_, 1); }
+
+const std::string& HeldLines::outputName(int output) const {
+  return parts_.output_names.at(static_cast<std::size_t>(output));
+}
+
+const std::string& HeldLines::inputName(int input) const {
+  return parts_.input_names.at(static_cast<std::size_t>(input));
+}
 
 }  // namespace stepdriver::gpio::gpiod

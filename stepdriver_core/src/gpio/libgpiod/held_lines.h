@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "gpiod_calls.h"
@@ -49,6 +50,8 @@ class HeldLines : public Lines {
     std::vector<std::unique_ptr<OutputGroup>> output_groups;
     std::vector<OutputSeat> outputs;
     std::vector<Seat> inputs;
+    std::vector<std::string> output_names;
+    std::vector<std::string> input_names;
   };
 
   /// @throw std::system_error where the kernel has no eventfd left.
@@ -60,6 +63,8 @@ class HeldLines : public Lines {
   int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
                    std::size_t capacity) noexcept override;
   void interrupt() noexcept override;
+  const std::string& outputName(int output) const override;
+  const std::string& inputName(int input) const override;
 
  private:
   struct EdgeSource {

@@ -26,6 +26,7 @@ class Requester {
     addresses_ = findLines(open_.table, outputs_, inputs_);
     takeInputs();
     takeOutputs();
+    keepNames();
     parts_.chips = std::move(open_.chips);
     return std::make_unique<HeldLines>(std::move(parts_));
   }
@@ -96,6 +97,15 @@ class Requester {
           [&](const auto& some) { group->request = from.requestOutputs(some); },
           [&](std::size_t k, int error) { return outputRefusal(members[k], error); });
       parts_.output_groups.push_back(std::move(group));
+    }
+  }
+
+  void keepNames() {
+    for (std::size_t i = 0; i < outputs_.size(); ++i) {
+      parts_.output_names.push_back(describe(open_.table, outputs_[i].line, addresses_[i]));
+    }
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      parts_.input_names.push_back(describe(open_.table, inputs_[i].line, addressOfInput(i)));
     }
   }
 

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <stepdriver/AxisStates.h>
+
+#include <string>
+
+#include "support/node_under_test.h"
+
+namespace stepdriver::node_test {
+
+/// A NodeUnderTest on GPIO lines. Its axes x and y, A4988s, are on the chip "board", z, a DRV8825
+/// with its fault line, on the chip "expander", and so is the switch of y: 80 steps/mm, at most 20
+/// mm/s (y 19) and 500 mm/s^2, enabled on start.
+class HardwareNode : public NodeUnderTest {
+ public:
+  HardwareNode();
+
+  /// Offsets on their chip.
+  struct Axis {
+    unsigned step, dir, enable, sleep, reset, max;
+  };
+  static constexpr Axis kX{0, 1, 2, 3, 4, 5};
+  static constexpr Axis kY{8, 9, 10, 11, 12, 13};
+  static constexpr Axis kZ{0, 1, 2, 3, 4, 5};
+  static constexpr unsigned kZFault = 6;
+  static constexpr unsigned kLinesOfChip = 16;
+
+  MoveTo::Response move(const std::string& axis, double position, bool wait);
+
+ private:
+  void setAxis(const std::string& axis, const std::string& driver, const std::string& chip,
+               const Axis& lines);
+};
+
+}  // namespace stepdriver::node_test

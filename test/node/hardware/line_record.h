@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/support/gpio_sim.h"
+#include "kernel/kernel_trace.h"
+
+namespace stepdriver::node_test {
+
+/// What the kernel does to its GPIO lines from its making on, in a buffer of its own.
+class LineRecord {
+ public:
+  /// @throw std::runtime_error where the kernel has no gpio tracepoints.
+  LineRecord();
+  ~LineRecord();
+  LineRecord(const LineRecord&) = delete;
+  LineRecord& operator=(const LineRecord&) = delete;
+
+  kernel::KernelTrace read() const;
+
+  /// Since the machine was booted, as `run.sh --trace` has it recorded.
+  static kernel::KernelTrace sinceBoot();
+
+ private:
+  std::string folder_;
+};
+
+/// The number that the kernel's trace has for a line.
+unsigned numberOf(const test::GpioSimLines& chip, unsigned offset);
+
+/// Lines of an axis by the kernel's numbers; STEP is active high, DIR high is forward.
+struct StepAndDir {
+  unsigned step;
+  unsigned dir;
+};
+
+/// STEP pulses forward less those backward, both lines low at first.
+std::int64_t pulsesIn(const kernel::KernelTrace& trace, const StepAndDir& lines);
+
+/// Times at which the line was set to this level, whatever it had before.
+std::vector<std::int64_t> timesSet(const kernel::KernelTrace& trace, unsigned line, bool level);
+
+/// The level that the line was set to last. @throw std::runtime_error where it never was.
+bool lastSet(const kernel::KernelTrace& trace, unsigned line);
+
+/// How often both lines changed in one write. Only where each write names all lines of its chip, as
+/// those of libgpiod 1 do, can it be told where a write ends.
+int changesTogether(const kernel::KernelTrace& trace, unsigned one, unsigned other);
+
+}  // namespace stepdriver::node_test

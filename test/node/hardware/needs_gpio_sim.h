@@ -1,0 +1,20 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+namespace stepdriver::node_test {
+
+/// Skipped where there is no gpio-sim.
+class NeedsGpioSim : public testing::Test {
+ protected:
+  void SetUp() override {
+    const char* const wanted = std::getenv("STEPDRIVER_GPIO_SIM");
+    if (wanted != nullptr && std::string(wanted) == "1") return;
+    GTEST_SKIP() << "runs in the test kernel (scripts/test.sh --kernel --ros)";
+  }
+};
+
+}  // namespace stepdriver::node_test
