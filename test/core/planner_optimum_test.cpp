@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stepdriver_core/motion/planner.h"
+#include "support/random_motion.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -124,9 +125,9 @@ class Lattice {
   std::vector<std::int16_t> seconds_;
 };
 
-class PlannerOptimum : public testing::TestWithParam<std::array<int, 3>> {};
+class PlannerLattice : public testing::TestWithParam<std::array<int, 3>> {};
 
-TEST_P(PlannerOptimum, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
+TEST_P(PlannerLattice, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
   const auto [acceleration, deceleration, speed] = GetParam();
   const Lattice below(acceleration, deceleration, speed, true);
   const Lattice free(acceleration, deceleration, speed, false);
@@ -154,9 +155,41 @@ TEST_P(PlannerOptimum, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
   EXPECT_LT(faster / (direct + overshoots), 1.1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Limits, PlannerOptimum,
+INSTANTIATE_TEST_SUITE_P(Limits, PlannerLattice,
                          testing::Values(std::array{3, 3, 24}, std::array{2, 4, 30},
                                          std::array{4, 2, 24}, std::array{5, 5, 20}));
+
+// Without a jerk limit: brake where the way is too short or leads away, then a trapezoid from the
+// speed that is left.
+long double trapezoidTime(long double way, long double v, const MotionLimits& limits) {
+  const long double a = limits.acceleration;
+  const long double d = limits.deceleration;
+  const long double stop = v * std::abs(v) / (2.0L * d);
+  if (way < stop) return trapezoidTime(-way, -v, limits);
+  if (v < 0.0L) return -v / d + trapezoidTime(way - stop, 0.0L, limits);
+  const long double highest = std::sqrt((2.0L * way + v * v / a) / (1.0L / a + 1.0L / d));
+  const long double peak = std::min<long double>(limits.max_speed, highest);
+  const long double change = peak > v ? a : -d;
+  const long double ramps = (peak * peak - v * v) / (2.0L * change) + peak * peak / (2.0L * d);
+  return (peak - v) / change + (way - ramps) / peak + peak / d;
+}
+
+TEST(PlannerOptimum, WithoutAJerkLimitIsTheClosedForm) {
+  Random random(1);
+  for (int i = 0; i < 20000; ++i) {
+    MotionLimits limits = anyLimits(random);
+    limits.jerk = 0.0;
+    limits.start_speed = 0.0;
+    const MotionState from = anyState(random, limits);
+    const std::int64_t target = anyTarget(random, from, limits);
+    SCOPED_TRACE(testing::Message() << from << " to " << target << ", " << limits);
+    const long double way = target - static_cast<long double>(from.position.hi) - from.position.lo;
+    const auto time = static_cast<double>(trapezoidTime(way, from.velocity, limits));
+    const double planned = planMove(0, from, target, limits).profile.duration().value();
+    EXPECT_NEAR(planned, time, 1e-9 + 1e-12 * time);
+    if (HasFailure()) return;
+  }
+}
 
 }  // namespace
 }  // namespace stepdriver::motion

@@ -45,8 +45,7 @@ bool Course::turnAt(std::int64_t target, double sign, const MotionLimits& limits
     return DoubleDouble(-sign) * (position_ + turned(a_end).length() - end);
   };
   const TurnRange range = turnRange(Path(v_, a_), sign, limits);
-  const double doubt = stoppingDoubt(turned(range.hardest).length());
-  if (!(beyond(range.hardest).hi <= doubt)) return false;
+  if (!(beyond(range.hardest).hi <= stopFrom(v_, a_, limits).doubt)) return false;
   DoubleDouble a_end = range.hardest;
   if (beyond(range.hardest).hi < 0.0 && beyond(range.softest).hi > 0.0) {
     const auto from_softest = [&](DoubleDouble more) { return beyond(range.softest + more); };
@@ -71,10 +70,10 @@ double Course::heading(const MotionLimits& limits) const {
 }
 
 std::int64_t Course::nextRest(const MotionLimits& limits) const {
-  const DoubleDouble stopping = stoppingLength(v_, a_, limits);
+  const Stop stop = stopFrom(v_, a_, limits);
   const double sign = heading(limits);
-  const Split rest = split(position_ + stopping);
-  const bool short_of_it = sign * rest.rest > stoppingDoubt(stopping);
+  const Split rest = split(position_ + stop.length);
+  const bool short_of_it = sign * rest.rest > stop.doubt;
   return rest.whole + (short_of_it ? static_cast<std::int64_t>(sign) : 0);
 }
 

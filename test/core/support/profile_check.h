@@ -47,7 +47,8 @@ class ProfileCheck {
   /// After expectWithinLimits().
   void expectRestOn(std::int64_t target) const {
     const double off = (profile_.endPosition() - fromInteger(target)).hi;
-    EXPECT_LE(std::abs(off), 1e-12 + 1e-28 * way_) << "ends beside the target";
+    // 1e-15 s is the shortest piece that there is.
+    EXPECT_LE(std::abs(off), 1e-12 + 1e-28 * way_ + 2e-15 * fastest_) << "ends beside the target";
     EXPECT_LE(std::abs(end_.velocity), start_ + speedDoubt());
     if (limits_.jerk > 0.0) {
       EXPECT_LE(std::abs(end_.acceleration), accelerationDoubt());
@@ -74,6 +75,14 @@ class ProfileCheck {
 
   /// All ways there and back [microsteps], after expectWithinLimits().
   double way() const { return way_; }
+
+  /// A stop is never faster than it was, or than what the axis reaches within a microstep.
+  double fastestStop() const {
+    const double a = limits_.acceleration;
+    const double d = limits_.deceleration;
+    return std::max(
+        {std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)), start_});
+  }
 
   double positionDoubt() const { return 1e-9 + 1e-14 * (way_ + stopping()); }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -20,8 +21,10 @@ struct Step {
 /// nanosecond they are rounded to.
 ///
 /// Between two turning points the curve is followed from its slow end, where all terms of the
-/// equation have one sign: 2 x / (v + sqrt(v^2 + 2 a x)) then cancels nothing. With a jerk,
-/// Newton's method from the last step's time, kept inside a bracket.
+/// equation have one sign: 2 x / (v + sqrt(v^2 + 2 a x)) then cancels nothing. With a jerk it is
+/// Newton's method, kept inside a bracket, from where the cubic through the last four steps' times
+/// expects the next one: that is mostly so near that one of its steps is enough, which the second
+/// term of its error, a dt^2/(2 v), tells without another evaluation.
 ///
 /// Doesn't allocate or throw. Not for use from two threads at once.
 class StepFinder {
@@ -42,24 +45,34 @@ class StepFinder {
   // A part of a piece without a turning point, as seen from its slow end ("anchor"): the way from
   // there is v t + a t^2/2 + j t^3/6 with t away from the anchor.
   struct Stretch {
-    double direction = 0.0;  // of the motion
+    enum class Curve { kLine, kParabola, kCubic };
+    Curve curve = Curve::kLine;
+    int direction = 0;       // of the motion
+    double half = 0.0;       // of a step in that direction
     double time_sign = 1.0;  // +1: the anchor is the beginning, -1: it is the end
-    Split anchor_ns;         // after the profile's start
+    double way_sign = 1.0;   // of the count away from the anchor
+    Split anchor_ns;         // motion time
     Split anchor_position;   // microsteps
     double v = 0.0;
     double a = 0.0;
     double j = 0.0;
+    double v_squared = 0.0;
     double duration = 0.0;  // s
-    double last = 0.0;      // s from the anchor: the time of the step before
+    std::array<double, 4> last =
+        {};         // s from the anchor: the times of the last steps, latest first
+    int known = 0;  // of these
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
     std::int64_t steps_left = 0;
+    double v_rest = 0.0;  // what the doubles leave of the exact v and a
+    double a_rest = 0.0;
   };
 
   bool enterNext();
   void enter(const Piece& piece, DoubleDouble begin, DoubleDouble end, DoubleDouble piece_start);
   double timeFromAnchor(double way);
-  double solveCubic(double way) const;
+  double cubicTime(double way);
+  double bracketedTime(double way) const;
   std::int64_t refined(double t, double line) const;
 
   const Profile* profile_ = nullptr;
