@@ -31,13 +31,12 @@ Approach finish(Path path, const MotionLimits& limits) {
 }  // namespace
 
 Stop stopFrom(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
-  constexpr double kRounding = 1.0 + 1e-15;
+  const DoubleDouble rounded(1.0 + 1e-15);
   const DoubleDouble length = stoppingLength(v, a, limits);
   const auto change = [&](DoubleDouble other_v, DoubleDouble other_a) {
     return std::abs((stoppingLength(other_v, other_a, limits) - length).hi);
   };
-  return {length,
-          1e-9 + change(v * DoubleDouble(kRounding), a) + change(v, a * DoubleDouble(kRounding))};
+  return {length, std::min(1e-9 + change(v * rounded, a) + change(v, a * rounded), 1e-3)};
 }
 
 Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const MotionLimits& limits) {

@@ -9,7 +9,7 @@ namespace stepdriver::motion {
 struct Stop {
   DoubleDouble length;
   /// What the rounding of the velocity and the acceleration to doubles makes of the length. A
-  /// target is met where it is no farther off.
+  /// target is met where it is no farther off. At most a thousandth of a microstep.
   double doubt = 0.0;
 };
 Stop stopFrom(DoubleDouble v, DoubleDouble a, const MotionLimits& limits);

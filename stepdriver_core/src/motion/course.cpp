@@ -12,6 +12,8 @@ namespace {
 constexpr double kForever = 3.0e9;        // s, 95 years
 constexpr double kFarthest = 1.15292e18;  // microsteps, 2^60: fits into a Split, with room
 
+constexpr double kRounding = 1e-15;  // relative, of a state's doubles
+
 // Less than a millionth of a nanosecond is nothing but rounding.
 constexpr double kNoTime = 1e-15;  // s
 
@@ -26,14 +28,32 @@ Course::Course(const MotionState& from, const MotionLimits& limits)
   const double start = startSpeed(limits);
   const bool may_rest = start > 0.0 && std::abs(from.velocity) <= start;
   if (limits.jerk == 0.0 || may_rest) a_ = 0.0;
+  unround(limits);
+}
+
+void Course::unround(const MotionLimits& limits) {
+  if (limits.jerk == 0.0) return;
+  for (const double limit : {limits.acceleration, limits.deceleration}) {
+    if (std::abs(std::abs(a_.hi) - limit) <= kRounding * limit) a_ = std::copysign(limit, a_.hi);
+  }
+  const DoubleDouble level = levelVelocity({v_, a_}, limits);
+  const double scale = std::max(std::abs(v_.hi), std::abs(level.hi));
+  for (const double speed : {0.0, startSpeed(limits), limits.max_speed}) {
+    const DoubleDouble off = DoubleDouble(std::copysign(speed, level.hi)) - level;
+    if (std::abs(off.hi) > kRounding * scale) continue;
+    v_ = v_ + off;
+    return;
+  }
 }
 
 void Course::moveTo(std::int64_t target, const MotionLimits& limits) {
+  unround(limits);
   const DoubleDouble end = fromInteger(target);
   add(approach(v_, a_, end - position_, limits), end);
 }
 
 bool Course::turnAt(std::int64_t target, double sign, const MotionLimits& limits) {
+  unround(limits);
   const DoubleDouble end = fromInteger(target);
   const auto turned = [&](DoubleDouble a_end) {
     Path path(v_, a_);
@@ -57,6 +77,7 @@ bool Course::turnAt(std::int64_t target, double sign, const MotionLimits& limits
 }
 
 void Course::moveOn(double sign, const MotionLimits& limits) {
+  unround(limits);
   Path path(v_, a_);
   changeToMaximum(path, sign, limits);
   path.run(0.0, std::min(kForever, kFarthest / limits.max_speed));

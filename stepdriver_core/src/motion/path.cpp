@@ -5,9 +5,8 @@
 namespace stepdriver::motion {
 namespace {
 
-// To the last few bits of a double, which are what a state of doubles can say.
 bool same(DoubleDouble a, DoubleDouble b, DoubleDouble scale) {
-  return std::abs((a - b).hi) <= 1e-15 * (std::abs(scale.hi) + std::abs(b.hi));
+  return std::abs((a - b).hi) <= kExact * (std::abs(scale.hi) + std::abs(b.hi));
 }
 
 }  // namespace

@@ -49,6 +49,9 @@ class Path {
   DoubleDouble length_;
 };
 
+/// What double-double arithmetic leaves of a difference that is none, relative to the operands.
+constexpr double kExact = 1e-30;
+
 /// The way of a phase in the time `t` from its beginning.
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t);
 

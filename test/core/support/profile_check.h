@@ -55,6 +55,23 @@ class ProfileCheck {
     }
   }
 
+  /// It goes beyond the target as far as it says; after expectWithinLimits().
+  void expectOvershoot(std::int64_t target, double overshoot) const {
+    const double way = (fromInteger(target) - from_.position).hi;
+    double farthest = 0.0;
+    for (const Piece& piece : profile_.pieces()) {
+      const double turn = piece.firstTurn(0.0);
+      for (int i = 0; i <= 20; ++i) {
+        for (const double t : {turn * i / 20.0, turn + (piece.duration.hi - turn) * i / 20.0}) {
+          const double beyond = (piece.positionAt(t) - fromInteger(target)).hi;
+          farthest =
+              std::max(farthest, way == 0.0 ? std::abs(beyond) : (way > 0.0 ? beyond : -beyond));
+        }
+      }
+    }
+    EXPECT_NEAR(farthest, overshoot, 2.0 * positionDoubt());
+  }
+
   /// The steps lead from the one count to the other, none closer than the peak speed allows.
   void expectSteps(std::int64_t target) const {
     const std::int64_t begin = split(from_.position).whole;
@@ -84,7 +101,13 @@ class ProfileCheck {
         {std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)), start_});
   }
 
-  double positionDoubt() const { return 1e-9 + 1e-14 * (way_ + stopping()); }
+  /// What the rounding of a state to doubles makes of the position. Just above the start speed it
+  /// makes the most of it: a speed of dv more takes the time sqrt(dv/j).
+  double positionDoubt() const {
+    const double way = 1e-9 + 1e-14 * (way_ + stopping());
+    if (start_ == 0.0 || limits_.jerk == 0.0) return way;
+    return way + std::min(1e-3, start_ * std::sqrt(1e-14 * start_ / limits_.jerk));
+  }
 
  private:
   double stopping() const {
