@@ -114,6 +114,20 @@ TEST(PlanMove, RefusesWhatTakesCenturies) {
   EXPECT_THROW(planMove(0, at(0), std::int64_t{1} << 40, limits), std::range_error);
 }
 
+TEST(PlanMove, GoesOnFromTheStateItWasPlannedFrom) {
+  const MotionLimits limits{0, 1000, 2000, 2000, 20000};
+  const MotionState state = planMove(5, at(1, 300, 700), 4000, limits).profile.stateAt(5);
+  EXPECT_EQ(state.position.value(), 1.0);
+  EXPECT_EQ(state.velocity, 300.0);
+  EXPECT_EQ(state.acceleration, 700.0);
+}
+
+TEST(PlanMove, HasItsPeakSpeedInsideAPieceWhereItNeverCruises) {
+  const Profile profile = planMove(0, at(0), 10, {0, 1000, 2000, 2000, 20000}).profile;
+  EXPECT_EQ(profile.pieces().size(), 3U);
+  EXPECT_DOUBLE_EQ(profile.peakSpeed(), 2.0 * 10.0 / seconds(profile));
+}
+
 // ---- the start speed ----
 
 TEST(StartSpeed, IsTakenAtOnceAndTheRampsBeginThere) {

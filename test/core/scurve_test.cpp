@@ -231,5 +231,32 @@ TEST(SCurve, IsExactInPhasesOfWeeks) {
   }
 }
 
+TEST(SCurve, IsExactAtBothEndsOfALongSwing) {
+  // From one turning point to the other under one jerk: each end is the other's mirror image.
+  const double a = 2000.0;
+  const double j = 0.125;
+  const std::int64_t length = 341'333'333'333;  // 2 a^3/(3 j^2) less a third
+  const DoubleDouble duration(2.0 * a / j);
+  const Profile profile(0, {Piece{duration, fromInteger(length), 0.0, -a, j}});
+  for (std::int64_t steps = 0; steps < 100'000'000'000; steps = steps * 3 + 1) {
+    SCOPED_TRACE(steps);
+    Step first;
+    ASSERT_TRUE(StepFinder(profile, length - steps).next(first));
+    const long double after = first.time_ns * 1e-9L;
+    const long double way = after * after * (a / 2.0L - after * j / 6.0L);
+    const long double speed = after * (a - after * j / 2.0L);
+    EXPECT_LE(std::abs((way - (steps + 0.5L)) / speed), 1e-9L);
+    // The turning point is a third of a microstep below 0.
+    Step last;
+    ASSERT_TRUE(StepFinder(profile, steps + 1).next(last));
+    const long double before = duration.hi - last.time_ns * 1e-9L;
+    const long double way_left = before * before * (a / 2.0L - before * j / 6.0L);
+    const long double speed_left = before * (a - before * j / 2.0L);
+    const long double end =
+        static_cast<long double>(profile.endPosition().hi) + profile.endPosition().lo;
+    EXPECT_LE(std::abs((way_left - (steps + 0.5L - end)) / speed_left), 1e-9L);
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::motion

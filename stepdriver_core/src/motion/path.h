@@ -50,7 +50,7 @@ class Path {
 };
 
 /// What double-double arithmetic leaves of a difference that is none, relative to the operands.
-constexpr double kExact = 1e-30;
+constexpr double kExact = 1e-29;
 
 /// The way of a phase in the time `t` from its beginning.
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t);

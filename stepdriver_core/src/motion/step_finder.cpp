@@ -16,6 +16,15 @@ std::int64_t nearest(double number) {
   return static_cast<std::int64_t>((number + kShift) - kShift);
 }
 
+// The first turning point or highest speed after the time `after`; the end where there is none.
+double firstCut(const Piece& piece, double after) {
+  const double turn = piece.firstTurn(after);
+  if (piece.j == 0.0) return turn;
+  const double level = -piece.a / piece.j;
+  const double margin = 1e-9 * piece.duration.value();
+  return level > after + margin && level < turn - margin ? level : turn;
+}
+
 }  // namespace
 
 StepFinder::StepFinder(const Profile& profile, std::int64_t count)
@@ -80,17 +89,11 @@ bool StepFinder::next(Step& step) {
 bool StepFinder::enterNext() {
   if (profile_ == nullptr || piece_ >= profile_->pieces().size()) return false;
   const Piece& piece = profile_->pieces()[piece_];
-  const double end = piece.duration.value();
-  const double turn = piece.firstTurn(done_);
-  const DoubleDouble begin = done_;
-  const DoubleDouble stretch_end = turn < end ? DoubleDouble(turn) : piece.duration;
-  enter(piece, begin, stretch_end, profile_->pieceStart(piece_));
-  if (turn < end) {
-    done_ = turn;
-  } else {
-    ++piece_;
-    done_ = 0.0;
-  }
+  const double cut = firstCut(piece, done_);
+  const bool last = !(cut < piece.duration.value());
+  enter(piece, done_, last ? piece.duration : DoubleDouble(cut), profile_->pieceStart(piece_));
+  done_ = last ? 0.0 : cut;
+  if (last) ++piece_;
   return true;
 }
 
@@ -126,13 +129,9 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   };
   stretch_.anchor_ns = motion_time(anchor);
   stretch_.anchor_position = backwards ? goal : split(from);
-  const DoubleDouble v = DoubleDouble(direction) * piece.velocityAt(anchor);
-  const DoubleDouble a = DoubleDouble(stretch_.way_sign) * piece.accelerationAt(anchor);
-  stretch_.v = std::max(0.0, v.hi);
-  stretch_.v_rest = v.hi > 0.0 ? v.lo : 0.0;
+  stretch_.v = std::max(0.0, backwards ? v_end : v_begin);
   stretch_.v_squared = stretch_.v * stretch_.v;
-  stretch_.a = a.hi;
-  stretch_.a_rest = a.lo;
+  stretch_.a = stretch_.way_sign * piece.accelerationAt(anchor).value();
   stretch_.j = direction * piece.j;
   stretch_.curve = piece.j != 0.0   ? Stretch::Curve::kCubic
                    : piece.a != 0.0 ? Stretch::Curve::kParabola
@@ -170,7 +169,7 @@ double StepFinder::bracketedTime(double way) const {
 
 std::int64_t StepFinder::refined(double t, double line) const {
   const Stretch& s = stretch_;
-  const Piece seen{s.duration, 0.0, s.v, s.a, s.j, s.v_rest, s.a_rest};
+  const Piece seen{s.duration, 0.0, s.v, s.a, s.j};
   const DoubleDouble way =
       DoubleDouble(s.way_sign) * (DoubleDouble(line) - DoubleDouble(s.anchor_position.rest));
   const double correction =

@@ -20,11 +20,12 @@ struct Step {
 /// curve itself, never from the step before: errors do not add up. Times are right to the
 /// nanosecond they are rounded to.
 ///
-/// Between two turning points the curve is followed from its slow end, where all terms of the
-/// equation have one sign: 2 x / (v + sqrt(v^2 + 2 a x)) then cancels nothing. With a jerk it is
-/// Newton's method, kept inside a bracket, from where the cubic through the last four steps' times
-/// expects the next one: that is mostly so near that one of its steps is enough, which the second
-/// term of its error, a dt^2/(2 v), tells without another evaluation.
+/// The curve is followed in stretches in which the speed only rises or only falls, each from its
+/// slow end. Without a jerk all terms of the equation have one sign there, and the root in the form
+/// 2 x / (v + sqrt(v^2 + 2 a x)) cancels nothing. With one it is Newton's method, from where the
+/// cubic through the last four steps' times expects the next step: that is mostly so near that one
+/// iteration is enough, which the second term of its error, a dt^2/(2 v), tells without another
+/// evaluation. Else more of them follow, from the last step's time, kept inside a bracket.
 ///
 /// Doesn't allocate or throw. Not for use from two threads at once.
 class StepFinder {
@@ -42,8 +43,8 @@ class StepFinder {
   std::int64_t count() const { return count_; }
 
  private:
-  // A part of a piece without a turning point, as seen from its slow end ("anchor"): the way from
-  // there is v t + a t^2/2 + j t^3/6 with t away from the anchor.
+  // A part of a piece in which the speed only rises or only falls, as seen from its slow end
+  // ("anchor"): the way from there is v t + a t^2/2 + j t^3/6 with t away from the anchor.
   struct Stretch {
     enum class Curve { kLine, kParabola, kCubic };
     Curve curve = Curve::kLine;
@@ -58,14 +59,12 @@ class StepFinder {
     double j = 0.0;
     double v_squared = 0.0;
     double duration = 0.0;  // s
-    std::array<double, 4> last =
-        {};         // s from the anchor: the times of the last steps, latest first
+    // s from the anchor: the times of the last steps, the latest first.
+    std::array<double, 4> last = {};
     int known = 0;  // of these
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
     std::int64_t steps_left = 0;
-    double v_rest = 0.0;  // what the doubles leave of the exact v and a
-    double a_rest = 0.0;
   };
 
   bool enterNext();
