@@ -60,7 +60,7 @@ inline double StepFinder::timeFromAnchor(double way) {
     case Stretch::Curve::kLine:
       return way / s.v;
     case Stretch::Curve::kParabola:
-      return 2.0 * way / (s.v + std::sqrt(s.v_squared + 2.0 * s.a * way));
+      return 2.0 * way / (s.v + std::sqrt(s.v_squared + s.twice_a * way));
     default:
       return cubicTime(way);
   }
@@ -73,9 +73,8 @@ bool StepFinder::next(Step& step) {
   Stretch& s = stretch_;
   const double line = static_cast<double>(count_ - s.anchor_position.whole) + s.half;
   const double t = timeFromAnchor(s.way_sign * (line - s.anchor_position.rest));
-  std::int64_t time = t < kFar
-                          ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + s.time_sign * (t * 1e9))
-                          : refined(t, line);
+  std::int64_t time =
+      t < kFar ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + t * s.ns_per_s) : refined(t, line);
   time = std::min(std::max(time, s.begin_ns), s.end_ns);
   s.begin_ns = time;
   --s.steps_left;
@@ -122,6 +121,7 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   stretch_.direction = direction > 0.0 ? 1 : -1;
   stretch_.half = direction * 0.5;
   stretch_.time_sign = backwards ? -1.0 : 1.0;
+  stretch_.ns_per_s = 1e9 * stretch_.time_sign;
   stretch_.way_sign = direction * stretch_.time_sign;
   const auto motion_time = [&](DoubleDouble after) {
     const Split ns = splitNanoseconds(piece_start + after);
@@ -132,6 +132,7 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   stretch_.v = std::max(0.0, backwards ? v_end : v_begin);
   stretch_.v_squared = stretch_.v * stretch_.v;
   stretch_.a = stretch_.way_sign * piece.accelerationAt(anchor).value();
+  stretch_.twice_a = 2.0 * stretch_.a;
   stretch_.j = direction * piece.j;
   stretch_.curve = piece.j != 0.0   ? Stretch::Curve::kCubic
                    : piece.a != 0.0 ? Stretch::Curve::kParabola

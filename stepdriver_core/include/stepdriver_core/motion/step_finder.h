@@ -58,6 +58,8 @@ class StepFinder {
     double a = 0.0;
     double j = 0.0;
     double v_squared = 0.0;
+    double twice_a = 0.0;
+    double ns_per_s = 1e9;  // with time_sign
     double duration = 0.0;  // s
     // s from the anchor: the times of the last steps, the latest first.
     std::array<double, 4> last = {};
