@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "stepdriver_core/motion/planner.h"
@@ -125,6 +127,45 @@ class Lattice {
   std::vector<std::int16_t> seconds_;
 };
 
+// The same for changes of velocity to `goal`, wherever they lead.
+class VelocityLattice {
+ public:
+  VelocityLattice(int acceleration, int deceleration, int goal)
+      : acceleration_(acceleration), deceleration_(deceleration) {
+    std::vector<std::pair<int, int>> now{{0, goal}};
+    for (int second = 0; !now.empty(); ++second) {
+      std::vector<std::pair<int, int>> before;
+      for (const auto& [a, v] : now) {
+        if (!allowed(a, v) || !seconds_.emplace(std::pair{a, v}, second).second) continue;
+        for (int j = -1; j <= 1; ++j) {
+          const int from = v - 2 * (a - j) - j;
+          const int widest = std::max(std::abs(a), std::abs(a - j));
+          if (from * v < 0 && widest > std::min(acceleration, deceleration)) continue;
+          before.emplace_back(a - j, from);
+        }
+      }
+      now = std::move(before);
+    }
+  }
+
+  template <typename Visitor>
+  void forEach(const Visitor& visit) const {
+    for (const auto& [state, seconds] : seconds_) visit(state.first, state.second, seconds);
+  }
+
+ private:
+  bool allowed(int a, int v) const {
+    const int up = v < 0 ? deceleration_ : acceleration_;
+    const int down = v > 0 ? deceleration_ : acceleration_;
+    if (v == 0) return std::abs(a) <= std::min(acceleration_, deceleration_);
+    return std::abs(v) <= 80 && a <= up && a >= -down;
+  }
+
+  int acceleration_;
+  int deceleration_;
+  std::map<std::pair<int, int>, int> seconds_;
+};
+
 class PlannerLattice : public testing::TestWithParam<std::array<int, 3>> {};
 
 TEST_P(PlannerLattice, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
@@ -158,6 +199,26 @@ TEST_P(PlannerLattice, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
 INSTANTIATE_TEST_SUITE_P(Limits, PlannerLattice,
                          testing::Values(std::array{3, 3, 24}, std::array{2, 4, 30},
                                          std::array{4, 2, 24}, std::array{5, 5, 20}));
+
+TEST_P(PlannerLattice, NoChangeOfVelocityOnALatticeIsFaster) {
+  const auto [acceleration, deceleration, speed] = GetParam();
+  for (const int goal : {1, 4, speed / 2, speed}) {
+    const VelocityLattice lattice(acceleration, deceleration, goal);
+    const MotionLimits limits{0.0, 3.0 * speed, 6.0 * acceleration, 6.0 * deceleration, 6.0};
+    double faster = 0.0;
+    int changes = 0;
+    lattice.forEach([&](int a, int v, int seconds) {
+      const Profile change =
+          planVelocity(0, {DoubleDouble(0.0), 3.0 * v, 6.0 * a}, 3.0 * goal, limits).profile;
+      const double time = change.pieceStart(change.pieces().size() - 1).value();
+      EXPECT_LE(time, seconds + 1e-9) << "a " << a << ", v " << v << " to " << goal;
+      faster += seconds - time;
+      ++changes;
+    });
+    EXPECT_GT(changes, 100);
+    EXPECT_LT(faster / changes, 1.0);
+  }
+}
 
 // Without a jerk limit: brake where the way is too short or leads away, then a trapezoid from the
 // speed that is left.

@@ -90,6 +90,27 @@ TEST(PlannerProperties, HoldForLimitsThatHaveNothingToDoWithEachOther) {
   }
 }
 
+// Any command: a new target, another speed, a stop.
+Profile anyCommand(Random& random, std::int64_t now, const MotionState& state,
+                   const MotionLimits& limits) {
+  const double which = random.within(0.0, 1.0);
+  MotionLimits in_force = limits;
+  Profile profile(now, state.position);
+  if (which < 0.6) {
+    profile = planMove(now, state, anyTarget(random, state, limits), limits).profile;
+  } else if (which < 0.8) {
+    const double velocity = limits.max_speed * random.within(-1.0, 1.0);
+    profile = planVelocity(now, state, velocity, limits).profile;
+    in_force.max_speed = std::abs(velocity);
+  } else {
+    profile = planStop(now, state, limits);
+  }
+  ProfileCheck check(profile, state, in_force);
+  check.expectWithinLimits();
+  if (profile.duration().hi < 1e9) check.expectRestOn(split(profile.endPosition()).whole);
+  return profile;
+}
+
 TEST(PlannerProperties, APlanMayBeReplacedAtAnyMoment) {
   Random random(3);
   for (int i = 0; i < 400; ++i) {
@@ -98,15 +119,12 @@ TEST(PlannerProperties, APlanMayBeReplacedAtAnyMoment) {
     std::int64_t now = 0;
     for (int link = 0; link < 50; ++link) {
       SCOPED_TRACE(testing::Message() << i << ", " << link << ": " << state << ", " << limits);
-      const std::int64_t target = anyTarget(random, state, limits);
-      const Plan plan = planMove(now, state, target, limits);
-      ProfileCheck check(plan.profile, state, limits);
-      check.expectWithinLimits();
-      check.expectRestOn(target);
+      const Profile profile = anyCommand(random, now, state, limits);
       if (HasFailure()) return;
-      const std::int64_t duration = plan.profile.endNs() - now;
-      now += std::llround(static_cast<double>(duration) * random.within(0.0, 1.0));
-      state = plan.profile.stateAt(now);
+      const double ramps = 3.0 * limits.max_speed / limits.deceleration;
+      const double seconds = std::min(profile.duration().value(), ramps) * random.within(0.0, 1.0);
+      now += std::llround(seconds * 1e9);
+      state = profile.stateAt(now);
       if (!random.chance(0.3)) continue;
       // Some other limits, of the same order of magnitude: an override, another acceleration.
       limits.max_speed *= random.within(0.5, 2.0);

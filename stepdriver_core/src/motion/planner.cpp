@@ -84,10 +84,7 @@ Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t targe
 
 Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocity,
                   const MotionLimits& limits, std::optional<std::int64_t> stand_at) {
-  if (velocity == 0.0) {
-    return {stand_at ? planStop(start_ns, from, limits, *stand_at)
-                     : planStop(start_ns, from, limits)};
-  }
+  if (velocity == 0.0) return {planStop(start_ns, from, limits, stand_at)};
   MotionLimits bounded = limits;
   bounded.max_speed = std::min(limits.max_speed, std::abs(velocity));
   if (stand_at) return planMove(start_ns, from, *stand_at, bounded);
@@ -98,18 +95,16 @@ Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocit
   return {course.profile(start_ns)};
 }
 
-Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits) {
-  const Course course(state, limits);
-  const std::int64_t rest = course.nextRest(limits);
-  return fastestMove(at_ns, state, rest, stopping(course, limits)).profile;
-}
-
 Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
-                 std::int64_t not_beyond) {
+                 std::optional<std::int64_t> not_beyond) {
   const Course course(state, limits);
-  std::int64_t rest = course.nextRest(limits);
-  rest = course.heading(limits) > 0.0 ? std::min(rest, not_beyond) : std::max(rest, not_beyond);
-  return planMove(at_ns, state, rest, stopping(course, limits)).profile;
+  const MotionLimits slower = stopping(course, limits);
+  const std::int64_t rest = course.nextRest(limits);
+  const bool forwards = course.heading(limits) > 0.0;
+  if (not_beyond && (forwards ? *not_beyond < rest : *not_beyond > rest)) {
+    return planMove(at_ns, state, *not_beyond, slower).profile;
+  }
+  return fastestMove(at_ns, state, rest, slower).profile;
 }
 
 }  // namespace stepdriver::motion

@@ -61,8 +61,8 @@ class ProfileCheck {
     double farthest = 0.0;
     for (const Piece& piece : profile_.pieces()) {
       const double turn = piece.firstTurn(0.0);
-      for (int i = 0; i <= 20; ++i) {
-        for (const double t : {turn * i / 20.0, turn + (piece.duration.hi - turn) * i / 20.0}) {
+      for (int i = 0; i <= 8; ++i) {
+        for (const double t : {turn * i / 8.0, turn + (piece.duration.hi - turn) * i / 8.0}) {
           const double beyond = (piece.positionAt(t) - fromInteger(target)).hi;
           farthest =
               std::max(farthest, way == 0.0 ? std::abs(beyond) : (way > 0.0 ? beyond : -beyond));
