@@ -156,6 +156,9 @@ TEST(PlannerProperties, ReplanningForTheSameTargetChangesNothing) {
     if (limits.start_speed > 0.0 && turns) continue;
     const double doubt = limits.start_speed > 0.0 ? 1e3 : 2.0 + 1e-9 * end;
     EXPECT_NEAR(static_cast<double>(second.profile.endNs()), end, doubt);
+    for (const Piece& piece : second.profile.pieces()) {
+      EXPECT_GT(piece.duration.hi, 1e-12 * first.profile.duration().hi) << "a sliver";
+    }
     if (HasFailure()) return;
   }
 }

@@ -193,6 +193,17 @@ TEST(PlanStop, DoesNotPassWhereTheMotionWouldHaveEnded) {
   }
 }
 
+TEST(PlanStop, ComesBackToWhatALowerDecelerationMakesItPass) {
+  for (const double jerk : {0.0, 20000.0}) {
+    const MotionLimits limits{0, 1000, 2000, 1000, jerk};
+    for (const double sign : {1.0, -1.0}) {
+      const MotionState from = at(0.0, sign * 1000.0);
+      const std::int64_t target = sign > 0.0 ? 400 : -400;
+      expectSound(planStop(0, from, limits, target), from, limits, target);
+    }
+  }
+}
+
 TEST(PlanStop, EndsACrawlSoon) {
   const MotionLimits limits{0, 1000, 2000, 2000, 20000};
   EXPECT_LT(seconds(planStop(0, at(0.1, 0.01), limits)), 0.15);

@@ -14,9 +14,6 @@ constexpr double kFarthest = 1.15292e18;  // microsteps, 2^60: fits into a Split
 
 constexpr double kRounding = 1e-15;  // relative, of a state's doubles
 
-// Less than a millionth of a nanosecond is nothing but rounding.
-constexpr double kNoTime = 1e-15;  // s
-
 Piece pieceOf(const Phase& phase, DoubleDouble position) {
   return {phase.duration, position, phase.v.hi, phase.a.hi, phase.j, phase.v.lo, phase.a.lo};
 }
@@ -33,9 +30,6 @@ Course::Course(const MotionState& from, const MotionLimits& limits)
 
 void Course::unround(const MotionLimits& limits) {
   if (limits.jerk == 0.0) return;
-  for (const double limit : {limits.acceleration, limits.deceleration}) {
-    if (std::abs(std::abs(a_.hi) - limit) <= kRounding * limit) a_ = std::copysign(limit, a_.hi);
-  }
   const DoubleDouble level = levelVelocity({v_, a_}, limits);
   const double scale = std::max(std::abs(v_.hi), std::abs(level.hi));
   for (const double speed : {0.0, startSpeed(limits), limits.max_speed}) {
@@ -101,7 +95,7 @@ std::int64_t Course::nextRest(const MotionLimits& limits) const {
 void Course::add(const Approach& part, DoubleDouble end) {
   const Path& path = part.path;
   const auto take = [this](const Phase& phase, DoubleDouble position) {
-    if (phase.duration.hi > kNoTime) pieces_.push_back(pieceOf(phase, position));
+    pieces_.push_back(pieceOf(phase, position));
   };
   for (std::size_t i = 0; i < part.first_part; ++i) {
     take(path[i], position_);

@@ -22,7 +22,8 @@ class Path {
   Path(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
 
   /// A phase of jerk `j` from where the path has come to. It joins the phase before it where the
-  /// two are one motion; one of no duration is none.
+  /// two are one motion; one of no duration is none: less than a millionth of a nanosecond is only
+  /// rounding.
   void run(double j, DoubleDouble duration);
   /// Goes on from another velocity and acceleration: a jump, or the exact value for a rounded one.
   void settle(DoubleDouble v, DoubleDouble a);
