@@ -4,9 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "stepdriver_core/motion/planner.h"
+#include "support/random_motion.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -124,9 +127,48 @@ class Lattice {
   std::vector<std::int16_t> seconds_;
 };
 
-class PlannerOptimum : public testing::TestWithParam<std::array<int, 3>> {};
+// The same for changes of velocity to `goal`, wherever they lead.
+class VelocityLattice {
+ public:
+  VelocityLattice(int acceleration, int deceleration, int goal)
+      : acceleration_(acceleration), deceleration_(deceleration) {
+    std::vector<std::pair<int, int>> now{{0, goal}};
+    for (int second = 0; !now.empty(); ++second) {
+      std::vector<std::pair<int, int>> before;
+      for (const auto& [a, v] : now) {
+        if (!allowed(a, v) || !seconds_.emplace(std::pair{a, v}, second).second) continue;
+        for (int j = -1; j <= 1; ++j) {
+          const int from = v - 2 * (a - j) - j;
+          const int widest = std::max(std::abs(a), std::abs(a - j));
+          if (from * v < 0 && widest > std::min(acceleration, deceleration)) continue;
+          before.emplace_back(a - j, from);
+        }
+      }
+      now = std::move(before);
+    }
+  }
 
-TEST_P(PlannerOptimum, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
+  template <typename Visitor>
+  void forEach(const Visitor& visit) const {
+    for (const auto& [state, seconds] : seconds_) visit(state.first, state.second, seconds);
+  }
+
+ private:
+  bool allowed(int a, int v) const {
+    const int up = v < 0 ? deceleration_ : acceleration_;
+    const int down = v > 0 ? deceleration_ : acceleration_;
+    if (v == 0) return std::abs(a) <= std::min(acceleration_, deceleration_);
+    return std::abs(v) <= 80 && a <= up && a >= -down;
+  }
+
+  int acceleration_;
+  int deceleration_;
+  std::map<std::pair<int, int>, int> seconds_;
+};
+
+class PlannerLattice : public testing::TestWithParam<std::array<int, 3>> {};
+
+TEST_P(PlannerLattice, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
   const auto [acceleration, deceleration, speed] = GetParam();
   const Lattice below(acceleration, deceleration, speed, true);
   const Lattice free(acceleration, deceleration, speed, false);
@@ -154,9 +196,61 @@ TEST_P(PlannerOptimum, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
   EXPECT_LT(faster / (direct + overshoots), 1.1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Limits, PlannerOptimum,
+INSTANTIATE_TEST_SUITE_P(Limits, PlannerLattice,
                          testing::Values(std::array{3, 3, 24}, std::array{2, 4, 30},
                                          std::array{4, 2, 24}, std::array{5, 5, 20}));
+
+TEST_P(PlannerLattice, NoChangeOfVelocityOnALatticeIsFaster) {
+  const auto [acceleration, deceleration, speed] = GetParam();
+  for (const int goal : {1, 4, speed / 2, speed}) {
+    const VelocityLattice lattice(acceleration, deceleration, goal);
+    const MotionLimits limits{0.0, 3.0 * speed, 6.0 * acceleration, 6.0 * deceleration, 6.0};
+    double faster = 0.0;
+    int changes = 0;
+    lattice.forEach([&](int a, int v, int seconds) {
+      const Profile change =
+          planVelocity(0, {DoubleDouble(0.0), 3.0 * v, 6.0 * a}, 3.0 * goal, limits).profile;
+      const double time = change.pieceStart(change.pieces().size() - 1).value();
+      EXPECT_LE(time, seconds + 1e-9) << "a " << a << ", v " << v << " to " << goal;
+      faster += seconds - time;
+      ++changes;
+    });
+    EXPECT_GT(changes, 100);
+    EXPECT_LT(faster / changes, 1.0);
+  }
+}
+
+// Without a jerk limit: brake where the way is too short or leads away, then a trapezoid from the
+// speed that is left.
+long double trapezoidTime(long double way, long double v, const MotionLimits& limits) {
+  const long double a = limits.acceleration;
+  const long double d = limits.deceleration;
+  const long double stop = v * std::abs(v) / (2.0L * d);
+  if (way < stop) return trapezoidTime(-way, -v, limits);
+  if (v < 0.0L) return -v / d + trapezoidTime(way - stop, 0.0L, limits);
+  const long double highest = std::sqrt((2.0L * way + v * v / a) / (1.0L / a + 1.0L / d));
+  const long double peak = std::min<long double>(limits.max_speed, highest);
+  const long double change = peak > v ? a : -d;
+  const long double ramps = (peak * peak - v * v) / (2.0L * change) + peak * peak / (2.0L * d);
+  return (peak - v) / change + (way - ramps) / peak + peak / d;
+}
+
+TEST(PlannerOptimum, WithoutAJerkLimitIsTheClosedForm) {
+  Random random(1);
+  for (int i = 0; i < 20000; ++i) {
+    MotionLimits limits = anyLimits(random);
+    limits.jerk = 0.0;
+    limits.start_speed = 0.0;
+    const MotionState from = anyState(random, limits);
+    const std::int64_t target = anyTarget(random, from, limits);
+    SCOPED_TRACE(testing::Message() << from << " to " << target << ", " << limits);
+    const long double way = target - static_cast<long double>(from.position.hi) - from.position.lo;
+    const auto time = static_cast<double>(trapezoidTime(way, from.velocity, limits));
+    const double planned = planMove(0, from, target, limits).profile.duration().value();
+    EXPECT_NEAR(planned, time, 1e-9 + 1e-12 * time);
+    if (HasFailure()) return;
+  }
+}
 
 }  // namespace
 }  // namespace stepdriver::motion

@@ -9,6 +9,12 @@
 namespace stepdriver::motion {
 namespace {
 
+DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
+  Path path(v, a);
+  comeToRest(path, limits);
+  return path.length();
+}
+
 // How far a motion comes that leaves a phase at the time t for the fastest way to rest.
 DoubleDouble endAfter(const Phase& phase, DoubleDouble t, const MotionLimits& limits) {
   const DoubleDouble v = phase.v + t * (phase.a + t * DoubleDouble(phase.j * 0.5));
@@ -24,20 +30,19 @@ Approach finish(Path path, const MotionLimits& limits) {
 
 }  // namespace
 
-DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
-  Path path(v, a);
-  comeToRest(path, limits);
-  return path.length();
-}
-
-double stoppingDoubt(DoubleDouble stopping_length) {
-  return 1e-9 + 2e-15 * std::abs(stopping_length.hi);
+Stop stopFrom(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
+  const DoubleDouble rounded(1.0 + 1e-15);
+  const DoubleDouble length = stoppingLength(v, a, limits);
+  const auto change = [&](DoubleDouble other_v, DoubleDouble other_a) {
+    return std::abs((stoppingLength(other_v, other_a, limits) - length).hi);
+  };
+  return {length, std::min(1e-9 + change(v * rounded, a) + change(v, a * rounded), 1e-3)};
 }
 
 Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const MotionLimits& limits) {
-  const DoubleDouble stopping = stoppingLength(v, a, limits);
-  const DoubleDouble beyond = length - stopping;
-  if (std::abs(beyond.hi) <= stoppingDoubt(stopping)) return finish(Path(v, a), limits);
+  const Stop stop = stopFrom(v, a, limits);
+  const DoubleDouble beyond = length - stop.length;
+  if (std::abs(beyond.hi) <= stop.doubt) return finish(Path(v, a), limits);
 
   const double sign = beyond.hi > 0.0 ? 1.0 : -1.0;
   Path fastest(v, a);

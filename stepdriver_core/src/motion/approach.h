@@ -5,12 +5,14 @@
 
 namespace stepdriver::motion {
 
-/// The way to rest from a velocity and an acceleration.
-DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits);
-
-/// How far off a target may be that counts as met: what the rounding of a state's velocity and
-/// acceleration to doubles makes of the way to rest [microsteps].
-double stoppingDoubt(DoubleDouble stopping_length);
+/// The fastest way to rest from a velocity and an acceleration [microsteps].
+struct Stop {
+  DoubleDouble length;
+  /// What the rounding of the velocity and the acceleration to doubles makes of the length. A
+  /// target is met where it is no farther off. At most a thousandth of a microstep.
+  double doubt = 0.0;
+};
+Stop stopFrom(DoubleDouble v, DoubleDouble a, const MotionLimits& limits);
 
 /// A motion to rest, in two parts: the first lies where the motion begins, the second where it
 /// ends.

@@ -34,6 +34,9 @@ class Course {
   Profile profile(std::int64_t start_ns) const;
 
  private:
+  // Takes the velocity that a change to one of the limits, or to rest, has at its acceleration for
+  // the one that the rounding to doubles has left beside it: there would be slivers else.
+  void unround(const MotionLimits& limits);
   void add(const Approach& part, DoubleDouble end);
 
   DoubleDouble position_;

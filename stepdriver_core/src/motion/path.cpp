@@ -5,9 +5,10 @@
 namespace stepdriver::motion {
 namespace {
 
-// To the last few bits of a double, which are what a state of doubles can say.
+constexpr double kNoTime = 1e-15;  // s
+
 bool same(DoubleDouble a, DoubleDouble b, DoubleDouble scale) {
-  return std::abs((a - b).hi) <= 1e-15 * (std::abs(scale.hi) + std::abs(b.hi));
+  return std::abs((a - b).hi) <= kExact * (std::abs(scale.hi) + std::abs(b.hi));
 }
 
 }  // namespace
@@ -19,7 +20,7 @@ DoubleDouble wayOf(const Phase& phase, DoubleDouble t) {
 }
 
 void Path::run(double j, DoubleDouble duration) {
-  if (!(duration.hi > 0.0)) return;
+  if (!(duration.hi > kNoTime)) return;
   const Phase phase{duration, v_, a_, j};
   Phase* last = size_ > 0 ? &phases_[size_ - 1] : nullptr;
   if (last != nullptr && last->j == j && same(end_v_, v_, last->v) && same(end_a_, a_, last->a)) {

@@ -22,7 +22,8 @@ class Path {
   Path(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
 
   /// A phase of jerk `j` from where the path has come to. It joins the phase before it where the
-  /// two are one motion; one of no duration is none.
+  /// two are one motion; one of no duration is none: less than a millionth of a nanosecond is only
+  /// rounding.
   void run(double j, DoubleDouble duration);
   /// Goes on from another velocity and acceleration: a jump, or the exact value for a rounded one.
   void settle(DoubleDouble v, DoubleDouble a);
@@ -48,6 +49,9 @@ class Path {
   DoubleDouble end_a_;
   DoubleDouble length_;
 };
+
+/// What double-double arithmetic leaves of a difference that is none, relative to the operands.
+constexpr double kExact = 1e-29;
 
 /// The way of a phase in the time `t` from its beginning.
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t);

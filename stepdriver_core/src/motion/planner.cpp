@@ -10,7 +10,7 @@ namespace stepdriver::motion {
 namespace {
 
 // How far a profile goes beyond its target, seen from where it begins.
-double overshootOf(const Profile& profile, const MotionState& from, DoubleDouble target) {
+double farthestBeyond(const Profile& profile, const MotionState& from, DoubleDouble target) {
   const double way = (target - from.position).hi;
   double farthest = 0.0;
   const auto consider = [&](DoubleDouble position) {
@@ -24,8 +24,7 @@ double overshootOf(const Profile& profile, const MotionState& from, DoubleDouble
       consider(piece.positionAt(t));
     }
   }
-  const double doubt = stoppingDoubt(way);
-  return farthest > 2.0 * doubt ? farthest : 0.0;
+  return farthest;
 }
 
 // The speed of a move of one microstep without a jerk limit, up from 0 and down again:
@@ -51,42 +50,41 @@ void restBeforeTurn(Course& course, double sign, const MotionLimits& limits) {
   course.moveTo(course.nextRest(limits), stopping(course, limits));
 }
 
-Profile directMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
-                   const MotionLimits& limits) {
+// The fastest motion to rest on the target, which it may pass.
+Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
+                 const MotionLimits& limits) {
+  const DoubleDouble end = fromInteger(target);
   Course course(from, limits);
-  const DoubleDouble stopping_length = stoppingLength(course.v(), course.a(), limits);
-  const double beyond = (fromInteger(target) - course.position() - stopping_length).hi;
-  if (std::abs(beyond) > stoppingDoubt(stopping_length)) {
+  const Stop stop = stopFrom(course.v(), course.a(), limits);
+  const double beyond = (end - course.position() - stop.length).hi;
+  if (std::abs(beyond) > stop.doubt) {
     restBeforeTurn(course, std::copysign(1.0, beyond), limits);
   }
   course.moveTo(target, limits);
-  return course.profile(start_ns);
+  Plan plan{course.profile(start_ns)};
+  const double farthest = farthestBeyond(plan.profile, from, end);
+  if (farthest > 2.0 * stop.doubt) plan.overshoot = farthest;
+  return plan;
 }
 
 }  // namespace
 
 Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
               const MotionLimits& limits) {
-  const DoubleDouble end = fromInteger(target);
-  Plan plan{directMove(start_ns, from, target, limits)};
-  plan.overshoot = overshootOf(plan.profile, from, end);
-  const double way = (end - from.position).hi;
-  if (!plan.overshoots() || limits.jerk == 0.0 || startSpeed(limits) > 0.0 || way == 0.0) {
-    return plan;
-  }
+  Plan fastest = fastestMove(start_ns, from, target, limits);
+  const double way = (fromInteger(target) - from.position).hi;
+  const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && way != 0.0;
+  if (!fastest.overshoots() || !may_turn) return fastest;
   // The fastest motion eases its deceleration before it turns. Without that it may turn in time.
   Course course(from, limits);
-  if (!course.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return plan;
+  if (!course.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return fastest;
   course.moveTo(target, limits);
-  return {course.profile(start_ns), 0.0};
+  return {course.profile(start_ns)};
 }
 
 Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocity,
                   const MotionLimits& limits, std::optional<std::int64_t> stand_at) {
-  if (velocity == 0.0) {
-    return {stand_at ? planStop(start_ns, from, limits, *stand_at)
-                     : planStop(start_ns, from, limits)};
-  }
+  if (velocity == 0.0) return {planStop(start_ns, from, limits, stand_at)};
   MotionLimits bounded = limits;
   bounded.max_speed = std::min(limits.max_speed, std::abs(velocity));
   if (stand_at) return planMove(start_ns, from, *stand_at, bounded);
@@ -97,18 +95,16 @@ Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocit
   return {course.profile(start_ns)};
 }
 
-Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits) {
-  const Course course(state, limits);
-  const std::int64_t rest = course.nextRest(limits);
-  return directMove(at_ns, state, rest, stopping(course, limits));
-}
-
 Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
-                 std::int64_t not_beyond) {
+                 std::optional<std::int64_t> not_beyond) {
   const Course course(state, limits);
-  std::int64_t rest = course.nextRest(limits);
-  rest = course.heading(limits) > 0.0 ? std::min(rest, not_beyond) : std::max(rest, not_beyond);
-  return planMove(at_ns, state, rest, stopping(course, limits)).profile;
+  const MotionLimits slower = stopping(course, limits);
+  const std::int64_t rest = course.nextRest(limits);
+  const bool forwards = course.heading(limits) > 0.0;
+  if (not_beyond && (forwards ? *not_beyond < rest : *not_beyond > rest)) {
+    return planMove(at_ns, state, *not_beyond, slower).profile;
+  }
+  return fastestMove(at_ns, state, rest, slower).profile;
 }
 
 }  // namespace stepdriver::motion

@@ -33,15 +33,18 @@ Bracket bracketOf(const Function& f, double high) {
 }
 
 double ridders(const Function& f, Bracket bracket) {
-  while (bracket.f_high != 0.0 && bracket.high - bracket.low > 4e-16 * bracket.high) {
+  constexpr double kNear = 1e-13;  // secants do the rest
+  while (bracket.high - bracket.low > 4e-16 * bracket.high) {
     const double half = (bracket.high - bracket.low) / 2.0;
     const double middle = bracket.low + half;
     if (!(middle > bracket.low && middle < bracket.high)) break;
     const double f_middle = f(middle).hi;
     const double root = std::sqrt(f_middle * f_middle - bracket.f_low * bracket.f_high);
     const double t = root > 0.0 ? middle + half * (f_middle / root) : middle;
+    const double f_t = f(t).hi;
+    if (std::abs(f_t) < kNear) return t;
     bracket.narrow(middle, f_middle);
-    bracket.narrow(t, f(t).hi);
+    bracket.narrow(t, f_t);
   }
   return bracket.high;
 }
@@ -53,7 +56,7 @@ DoubleDouble rootOf(const Function& f, double high) {
   DoubleDouble f_t = f(t);
   const double aside = 1e-7 * t.hi;
   const DoubleDouble slope = (f_t - f(t - DoubleDouble(aside))) / DoubleDouble(aside);
-  for (int i = 0; i < 4 && slope.hi < 0.0 && f_t.hi != 0.0; ++i) {
+  for (int i = 0; i < 6 && slope.hi < 0.0 && f_t.hi != 0.0; ++i) {
     const DoubleDouble better = t - f_t / slope;
     const DoubleDouble f_better = f(better);
     if (!(abs(f_better) < abs(f_t))) break;

@@ -10,10 +10,6 @@ const DoubleDouble kHalf(0.5);
 
 DoubleDouble square(DoubleDouble x) { return x * x; }
 
-bool same(DoubleDouble a, DoubleDouble b) {
-  return std::abs((a - b).hi) <= 1e-15 * std::max(std::abs(a.hi), std::abs(b.hi));
-}
-
 // The state seen in the direction of the change, so that the velocity always rises.
 struct Mirrored {
   Path& path;
@@ -40,20 +36,20 @@ void rise(Mirrored m, DoubleDouble v_end, DoubleDouble a_end, double limit, doub
   }
   const DoubleDouble j(jerk);
   const DoubleDouble a = m.a();
-  const DoubleDouble level = std::max(DoubleDouble(limit), a_end);
+  const DoubleDouble top = std::max(DoubleDouble(limit), a_end);
   // Where the line that rises from (v, a^2/2) meets the one that falls to (v_end, a_end^2/2).
   const DoubleDouble corner = (square(a) + square(a_end)) * kHalf + j * change;
-  if (!(square(level) < corner)) {
+  if (!(square(top) < corner)) {
     const DoubleDouble peak = sqrt(corner);
     m.run(jerk, (peak - a) / j);
     m.run(-jerk, (peak - a_end) / j);
   } else {
-    const DoubleDouble up = abs(square(level) - square(a));
-    const DoubleDouble down = square(level) - square(a_end);
-    if (!same(a, level)) m.run(a < level ? jerk : -jerk, abs(level - a) / j);
-    m.settle(m.v(), level);
-    m.run(0.0, (change - (up + down) * kHalf / j) / level);
-    m.run(-jerk, (level - a_end) / j);
+    const DoubleDouble up = abs(square(top) - square(a));
+    const DoubleDouble down = square(top) - square(a_end);
+    m.run(a < top ? jerk : -jerk, abs(top - a) / j);
+    m.settle(m.v(), top);
+    m.run(0.0, (change - (up + down) * kHalf / j) / top);
+    m.run(-jerk, (top - a_end) / j);
   }
   m.settle(v_end, a_end);
 }
@@ -82,7 +78,7 @@ bool dropToStartSpeed(Mirrored m, double start, const MotionLimits& limits) {
   const DoubleDouble above = m.v() - DoubleDouble(start);
   if (limits.jerk == 0.0 || !(m.a() < 0.0)) return false;
   const DoubleDouble root = square(m.a()) - DoubleDouble(2.0 * limits.jerk) * above;
-  if (!(DoubleDouble(0.0) < root)) return false;
+  if (!(root.hi > kExact * limits.jerk * m.v().hi)) return false;
   m.run(limits.jerk, DoubleDouble(2.0) * above / (sqrt(root) - m.a()));
   m.settle(start, 0.0);
   return true;
@@ -98,7 +94,7 @@ DoubleDouble levelVelocity(const Path& path, const MotionLimits& limits) {
 void changeVelocity(Path& path, DoubleDouble velocity, const MotionLimits& limits) {
   const DoubleDouble at_level = levelVelocity(path, limits);
   const DoubleDouble scale = std::max(abs(path.v()), abs(at_level));
-  if (std::abs((velocity - at_level).hi) <= 1e-15 * scale.hi) {
+  if (std::abs((velocity - at_level).hi) <= kExact * scale.hi) {
     // As good as there, once the acceleration is gone.
     if (path.a().hi != 0.0) level({path, path.a().hi > 0.0 ? -1.0 : 1.0}, limits.jerk);
     path.settle(velocity, 0.0);

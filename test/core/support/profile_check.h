@@ -47,11 +47,29 @@ class ProfileCheck {
   /// After expectWithinLimits().
   void expectRestOn(std::int64_t target) const {
     const double off = (profile_.endPosition() - fromInteger(target)).hi;
-    EXPECT_LE(std::abs(off), 1e-12 + 1e-28 * way_) << "ends beside the target";
+    // 1e-15 s is the shortest piece that there is.
+    EXPECT_LE(std::abs(off), 1e-12 + 1e-28 * way_ + 2e-15 * fastest_) << "ends beside the target";
     EXPECT_LE(std::abs(end_.velocity), start_ + speedDoubt());
     if (limits_.jerk > 0.0) {
       EXPECT_LE(std::abs(end_.acceleration), accelerationDoubt());
     }
+  }
+
+  /// It goes beyond the target as far as it says; after expectWithinLimits().
+  void expectOvershoot(std::int64_t target, double overshoot) const {
+    const double way = (fromInteger(target) - from_.position).hi;
+    double farthest = 0.0;
+    for (const Piece& piece : profile_.pieces()) {
+      const double turn = piece.firstTurn(0.0);
+      for (int i = 0; i <= 8; ++i) {
+        for (const double t : {turn * i / 8.0, turn + (piece.duration.hi - turn) * i / 8.0}) {
+          const double beyond = (piece.positionAt(t) - fromInteger(target)).hi;
+          farthest =
+              std::max(farthest, way == 0.0 ? std::abs(beyond) : (way > 0.0 ? beyond : -beyond));
+        }
+      }
+    }
+    EXPECT_NEAR(farthest, overshoot, 2.0 * positionDoubt());
   }
 
   /// The steps lead from the one count to the other, none closer than the peak speed allows.
@@ -75,7 +93,21 @@ class ProfileCheck {
   /// All ways there and back [microsteps], after expectWithinLimits().
   double way() const { return way_; }
 
-  double positionDoubt() const { return 1e-9 + 1e-14 * (way_ + stopping()); }
+  /// A stop is never faster than it was, or than what the axis reaches within a microstep.
+  double fastestStop() const {
+    const double a = limits_.acceleration;
+    const double d = limits_.deceleration;
+    return std::max(
+        {std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)), start_});
+  }
+
+  /// What the rounding of a state to doubles makes of the position. Just above the start speed it
+  /// makes the most of it: a speed of dv more takes the time sqrt(dv/j).
+  double positionDoubt() const {
+    const double way = 1e-9 + 1e-14 * (way_ + stopping());
+    if (start_ == 0.0 || limits_.jerk == 0.0) return way;
+    return way + std::min(1e-3, start_ * std::sqrt(1e-14 * start_ / limits_.jerk));
+  }
 
  private:
   double stopping() const {

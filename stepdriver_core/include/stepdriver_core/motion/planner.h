@@ -11,16 +11,20 @@ namespace stepdriver::motion {
 /// The planners take over from whatever state an axis is in: at rest, moving either way, speeding
 /// up or slowing down, faster than the limits or with more acceleration than they allow. The speed
 /// never jumps, but by the start speed; the acceleration jumps where there is no jerk limit. A
-/// speed above the maximum falls to it at the deceleration, an acceleration beyond its limit comes
-/// back at the jerk. Each returned profile goes on exactly from the state that it was planned from,
-/// but for the rounding of that state's velocity and acceleration to doubles: its effect on the way
-/// to rest is at most a billionth of a microstep, or 2e-15 of the way.
+/// speed above the maximum falls to it at the deceleration; an acceleration beyond its limit comes
+/// back at the jerk, and so does one that would take the speed beyond its limit or past standstill.
+///
+/// A profile ends on its target exactly and goes on from the state that it was planned from, but
+/// for the rounding of that state's velocity and acceleration to doubles. That is far below a
+/// billionth of a microstep; just above a start speed, or over a ramp of millions of microsteps, it
+/// may be more: at most a thousandth.
 ///
 /// A speed up to the start speed is one to rest from and to start with, either way, whatever the
-/// acceleration. With a start speed a motion turns round on a whole microstep only, at rest: so the
-/// steps there and back are as far apart as at the start speed.
+/// acceleration. With a start speed a motion turns round on a whole microstep only, at rest: so its
+/// steps there and back are about as far apart as at the start speed.
 ///
-/// All throw std::range_error where the motion takes longer than Profile::kLongest.
+/// All throw std::range_error where the motion takes longer than Profile::kLongest. A plan takes
+/// some 20 us, and at most some 200 us, of a processor of 3 GHz.
 /// @pre finite states; positions and targets of less than 2^53 microsteps.
 
 struct Plan {
@@ -46,12 +50,12 @@ Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t targe
 Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocity,
                   const MotionLimits& limits, std::optional<std::int64_t> stand_at = std::nullopt);
 
-/// Slows down to rest on the first whole microstep that the deceleration and the jerk allow. It
-/// does not speed up for it, but from a crawl slower than what the axis reaches within a microstep.
+/// Slows down to rest on the first whole microstep that the deceleration and the jerk allow: it
+/// goes on as fast as it is for less than a microstep, and decelerates at the limit. It does not
+/// speed up for it, but from a crawl slower than what the axis reaches within a microstep.
 ///
 /// @param not_beyond a position ahead by which the motion would have come to rest anyway.
 Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
-                 std::int64_t not_beyond);
-Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits);
+                 std::optional<std::int64_t> not_beyond = std::nullopt);
 
 }  // namespace stepdriver::motion
