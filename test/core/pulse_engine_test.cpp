@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "stepdriver_core/motion/trapezoid.h"
+#include "support/plan_from_rest.h"
 #include "support/recording_lines.h"
 
 namespace stepdriver::pulse {
@@ -93,7 +93,7 @@ class PulseEngineTest : public testing::Test {
 
   static motion::Profile cruise(Nanoseconds start, std::int64_t from, std::int64_t to,
                                 double speed) {
-    return motion::planTrapezoid(start, from, to, {speed, speed, 1.0, 1.0});
+    return motion::planFromRest(start, from, to, {speed, speed, 1.0, 1.0});
   }
 
   VirtualClock clock;
@@ -106,7 +106,7 @@ class PulseEngineTest : public testing::Test {
 
 TEST_F(PulseEngineTest, PutsEachStepOutAtItsNanosecond) {
   make({config(0)});
-  const auto profile = motion::planTrapezoid(1'000'000, 0, 500, {0, 5000, 20000, 30000});
+  const auto profile = motion::planFromRest(1'000'000, 0, 500, {0, 5000, 20000, 30000});
   motion::StepFinder finder(profile, 0);
   follow(profile);
   runOut();

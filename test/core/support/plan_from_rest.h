@@ -6,11 +6,9 @@
 
 namespace stepdriver::motion {
 
-using TrapezoidLimits = MotionLimits;
-
 /// The fastest motion from rest to rest.
-inline Profile planTrapezoid(std::int64_t start_ns, std::int64_t from, std::int64_t to,
-                             const MotionLimits& limits) {
+inline Profile planFromRest(std::int64_t start_ns, std::int64_t from, std::int64_t to,
+                            const MotionLimits& limits) {
   return planMove(start_ns, {fromInteger(from), 0.0, 0.0}, to, limits).profile;
 }
 
