@@ -28,7 +28,6 @@ axis::AxisConfig config() {
   config.max_speed = 1.0;
   config.acceleration = 2.0;
   config.deceleration = 2.0;
-  config.stop_deceleration = 2.0;
   return config;
 }
 

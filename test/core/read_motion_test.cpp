@@ -29,12 +29,10 @@ TEST(ReadMotion, ChecksEachNumberOfTheMotion) {
        {"max_position_mm", "far", "is \"far\" (a string), but must be a number"}});
 }
 
-TEST(ReadMotion, TakesNoJerkLimitAndTheDecelerationOfAMotionForAStop) {
+TEST(ReadMotion, TakesNoJerkLimitAndNoDecelerationOfAStopWhereNoneIsGiven) {
   ConfigValue axis = linearAxis();
   EXPECT_EQ(readX(axis).jerk, 0.0);
-  EXPECT_EQ(readX(axis).stop_deceleration, 0.5);
-  put(axis, "deceleration_mm_s2", 250.0);
-  EXPECT_EQ(readX(axis).stop_deceleration, 0.25);
+  EXPECT_FALSE(readX(axis).stop_deceleration);
   put(axis, "stop_deceleration_mm_s2", 2000);
   put(axis, "jerk_mm_s3", 5000.0);
   EXPECT_EQ(readX(axis).stop_deceleration, 2.0);
@@ -43,7 +41,7 @@ TEST(ReadMotion, TakesNoJerkLimitAndTheDecelerationOfAMotionForAStop) {
   put(rotary, "jerk_deg_s3", 180.0);
   put(rotary, "stop_deceleration_deg_s2", 720.0);
   EXPECT_DOUBLE_EQ(readX(rotary).jerk, kPi);
-  EXPECT_DOUBLE_EQ(readX(rotary).stop_deceleration, 4.0 * kPi);
+  EXPECT_DOUBLE_EQ(readX(rotary).stop_deceleration.value_or(0.0), 4.0 * kPi);
 }
 
 TEST(ReadMotion, ChecksTheJerkAndTheDecelerationOfAStop) {

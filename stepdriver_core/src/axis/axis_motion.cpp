@@ -169,7 +169,7 @@ motion::Plan Axis::Impl::plan(const Goal& goal, std::int64_t at, const Motion* b
 motion::Profile Axis::Impl::planStopOf(const Motion& before, std::int64_t at,
                                        const motion::MotionState& from) const {
   motion::MotionLimits stopping = limits(maxSpeed());
-  stopping.deceleration = config.stop_deceleration * stepsPerUnit();
+  stopping.deceleration = config.stop_deceleration.value_or(config.deceleration) * stepsPerUnit();
   const motion::DoubleDouble end = before.profile->endPosition();
   const bool ends_ahead = (end - from.position).value() * from.velocity >= 0.0;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);

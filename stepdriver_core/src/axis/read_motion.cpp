@@ -196,7 +196,7 @@ class MotionReader {
     }
     config.acceleration = si(up.value_or(0.0));
     config.deceleration = down ? si(*down) : config.acceleration;
-    config.stop_deceleration = stop ? si(*stop) : config.deceleration;
+    if (stop) config.stop_deceleration = si(*stop);
   }
 
   void readJerk(AxisConfig& config) {

@@ -37,7 +37,6 @@ inline axis::AxisConfig linearAxis(const std::string& name,
   config.max_speed = 0.1;
   config.acceleration = 1.0;
   config.deceleration = 1.0;
-  config.stop_deceleration = 1.0;
   config.endstop_min = axis::Endstop{name + ".min", false};
   config.endstop_max = axis::Endstop{name + ".max", false};
   config.enable_on_start = true;
