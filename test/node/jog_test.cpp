@@ -118,22 +118,22 @@ TEST_F(JogTest, SpeedOverrideHoldsForTheMotionUnderWay) {
   node.set("simulation/speed", 1.0);
   start();
   const Recorder<AxisStates> states(node.full("axis_states"));
-  const auto setOverride = [this](double factor) {
+  const auto set_override = [this](double factor) {
     SpeedOverride::Request request;
     request.factor = factor;
     return node.call<SpeedOverride>("speed_override", request);
   };
   for (const double factor : {0.0, 0.009, 2.01, -1.0, std::nan("")}) {
-    const auto answer = setOverride(factor);
+    const auto answer = set_override(factor);
     EXPECT_FALSE(answer.success);
     expectSays(answer.message, "must be from 0.01 to 2");
   }
   EXPECT_TRUE(node.moveTo(0.2, false).success);
   ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.velocity.at(0) > 0.09; }));
-  EXPECT_TRUE(setOverride(0.25).success);
+  EXPECT_TRUE(set_override(0.25).success);
   EXPECT_TRUE(states.waitForLatest(
       [](const AxisStates& s) { return std::abs(s.velocity.at(0) - 0.025) < 1e-9; }));
-  EXPECT_TRUE(setOverride(2.0).success);
+  EXPECT_TRUE(set_override(2.0).success);
   EXPECT_TRUE(states.waitForLatest(
       [](const AxisStates& s) { return std::abs(s.velocity.at(0) - 0.1) < 1e-9; }));
   EXPECT_TRUE(waitUntil([&] { return node.pulses() == 16000; }));
