@@ -100,7 +100,7 @@ check_tidy() {
   quietly tidy-configure configure_tidy
   own_files '*.cpp' | grep -E '^(stepdriver_core|test/core|test/kernel)/' | compiled_by "$build/core" |
     tidy "$build/core" || status=1
-  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node)/' | tidy "$build/catkin" || status=1
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check)/' | tidy "$build/catkin" || status=1
   return "$status"
 }
 compiled_by() {
@@ -205,6 +205,12 @@ test_node_in_kernel() {
     --dir "$header:27" --enable "$header:22" --shortest-interval $((1000000000 * 3 / 4 / 1600))
 }
 
+# stepdriver_check there, with and without lines that it can have.
+test_check_in_kernel() {
+  bash "$src/test/kernel/check_test.sh" "$build/catkin/devel/lib/stepdriver/stepdriver_check" \
+    "$build/core/test/kernel/check_waveform"
+}
+
 # Nothing but the install space is on any path here.
 check_install() {
   local share=$build/install/share/stepdriver launch_file
@@ -218,6 +224,8 @@ check_install() {
   done
   "$build/install/lib/stepdriver/stepdriver_node" --help >"$build/log/node-help.log" ||
     die "stepdriver_node --help doesn't work"
+  rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
+    >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then
     die "these installed files refer to the build folder"
   fi
@@ -257,6 +265,7 @@ fi
 if wants ros; then
   stage node-tests test_node node-build
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
+  ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
   stage install check_install node-build
   stage trace check_trace install
 fi

@@ -10,11 +10,11 @@
 #include <thread>
 #include <utility>
 
-#include "stepdriver_core/axis/axis_lines.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
+#include "wiring.h"
 
 namespace stepdriver::machine {
 namespace {
@@ -25,44 +25,29 @@ constexpr double kMostOverride = 2.0;
 
 pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 
-void refuseTooSlow(const std::vector<axis::AxisConfig>& configs,
-                   const pulse::Capability& capability) {
-  std::string why;
-  if (!capability.rights.granted()) why = capability.rights.text();
-  for (const std::string& complaint : stepRates(configs, capability).complaints()) {
-    why += (why.empty() ? "" : "; ") + complaint;
-  }
-  if (!why.empty()) throw Refused("this machine can't do what is asked of it in real time: " + why);
-}
-
 }  // namespace
 
 class Machine::Impl {
  public:
   Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options) {
-    std::vector<gpio::OutputRequest> outputs;
-    std::vector<gpio::InputRequest> inputs;
-    std::vector<axis::AxisLines> axis_lines;
-    std::vector<pulse::ChannelConfig> channels;
-    for (const axis::AxisConfig& config : configs) {
-      axis_lines.push_back(axis::requestLines(config, outputs, inputs));
-      channels.push_back(axis::channelConfig(config, axis_lines.back()));
-    }
-    lines_ = backend.request(outputs, inputs);
+    const Wiring wiring(configs);
+    lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
-      capability_ = pulse::measureCapability(*lines_, clock, channels);
-      if (options.enforce) refuseTooSlow(configs, *capability_);
+      capability_ = pulse::measureCapability(*lines_, clock, wiring.channels);
+      const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
+      if (!why.empty()) throw Refused(why);
     }
-    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, channels,
+    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness));
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
-      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i), axis_lines[i],
-                                                   *lines_, *driver_));
+      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),
+                                                   wiring.axis_lines[i], *lines_, *driver_));
     }
     for (const auto& axis : axes_) axis->bringUp();
-    if (options.threaded && !inputs.empty()) watcher_ = std::thread([this] { watchInputs(); });
+    if (options.threaded && !wiring.inputs.empty())
+      watcher_ = std::thread([this] { watchInputs(); });
   }
 
   ~Impl() {

@@ -2,55 +2,149 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
+
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::machine {
 namespace {
 
-template <typename... Values>
-std::string format(const char* form, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, form, values...);
+/// What limits the step rate of an axis.
+enum class RateLimit { kLateness, kPulse, kSpinning };
+
+constexpr double kEndless = std::numeric_limits<double>::infinity();
+
+/// What a step of an axis takes of the pulse thread's time, in nanoseconds.
+struct Load {
+  double rise;      // the calls for the rising edge: the read of an endstop and a write
+  double calls;     // those for both edges
+  double chip;      // high and low time
+  double spinning;  // spinning before both edges, where nothing shortens it
+  double alone;     // the shortest interval that doesn't spin too much, with no other axis moving
+  double interval;  // of the steps at top speed
+};
+
+Load loadOf(const axis::AxisConfig& axis, const pulse::CallCosts& cost,
+            const pulse::Capability& capability) {
+  const auto write = static_cast<double>(cost.write.p99);
+  const auto read = static_cast<double>(cost.read.p99);
+  const auto high = static_cast<double>(axis.timing.step_high_ns);
+  const auto guard = static_cast<double>(capability.guard);
+  Load load{};
+  load.rise = read + write;
+  load.calls = read + 2.0 * write;
+  load.chip = high + static_cast<double>(axis.timing.step_low_ns);
+  load.spinning = guard + std::min(guard, high);
+  // A sleep ends late, and shortens the spinning; but there must be room for one.
+  const double after_sleep =
+      load.spinning - std::min(guard, static_cast<double>(capability.sleep_lateness.median));
+  if (guard > 0.0) {
+    load.alone =
+        std::max(guard + high + load.calls, after_sleep / pulse::SteadyClock::kMostSpinning);
+  }
+  load.interval = 1e9 / (axis.max_speed * axis.steps_per_unit);
+  return load;
+}
+
+/// What the other axes take meanwhile, at their top speeds.
+struct Others {
+  double rise = 0.0;
+  double calls = 0.0;
+  double not_spinning = 1.0;  // share of the time
+
+  void add(const Load& load) {
+    rise += load.rise;
+    calls += load.calls;
+    not_spinning *= 1.0 - std::min(1.0, load.spinning / load.interval);
+  }
+};
+
+/// The shortest interval that holds, and why none shorter does.
+struct Interval {
+  double ns;
+  RateLimit limit;
+  double lateness;
+};
+
+/// The shortest interval of an axis beside others with which the thread spins for no longer than it
+/// may: the edges of the axes come at random to each other.
+double shortestSpinning(const Load& load, const Others& others) {
+  if (others.not_spinning == 1.0) return load.alone;
+  const double room = 1.0 - (1.0 - pulse::SteadyClock::kMostSpinning) / others.not_spinning;
+  return room > 0.0 ? std::max(load.alone, load.spinning / room) : kEndless;
+}
+
+/// @param spinning the shortest interval as far as spinning goes.
+Interval shortest(const Load& load, const Others& others, pulse::Nanoseconds late,
+                  double spinning) {
+  const auto lateness = static_cast<double>(late);
+  const double absorbed = 1.0 - pulse::PulseEngine::kClosest;
+  const double pulse = 2.0 * lateness + load.calls + load.chip + others.calls;
+  Interval interval{(lateness + load.rise + others.rise) / absorbed, RateLimit::kLateness,
+                    lateness};
+  if (pulse > interval.ns) interval = {pulse, RateLimit::kPulse, lateness};
+  if (spinning > interval.ns) interval = {spinning, RateLimit::kSpinning, lateness};
+  return interval;
+}
+
+Interval shortest(const Load& load, const Others& others, const pulse::Capability& capability) {
+  const Interval spun =
+      shortest(load, others, capability.lateness.p99, shortestSpinning(load, others));
+  const Interval slept = shortest(load, others, capability.sleep_lateness.p99, 0.0);
+  return slept.ns < spun.ns ? slept : spun;
+}
+
+std::string inMicroseconds(double ns) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f us", ns * 1e-3);
   return text;
 }
 
-double microseconds(pulse::Nanoseconds time) { return static_cast<double>(time) * 1e-3; }
+std::string percentText(double share) {
+  return std::to_string(static_cast<int>(share * 100.0 + 0.5)) + " %";
+}
 
-StepRate rateOf(const axis::AxisConfig& axis, const pulse::CallCosts& costs,
-                pulse::Nanoseconds late) {
-  const pulse::Nanoseconds high = axis.timing.step_high_ns;
-  const pulse::Nanoseconds low = axis.timing.step_low_ns;
-  const pulse::Nanoseconds busy = costs.read.median + 2 * costs.write.median + high + low + late;
-  const auto absorbed = static_cast<pulse::Nanoseconds>(static_cast<double>(late) /
-                                                        (1.0 - pulse::PulseEngine::kClosest));
-  StepRate rate;
-  rate.axis = axis.name;
-  rate.asked = axis.max_speed * axis.steps_per_unit;
-  rate.held = 1e9 / static_cast<double>(std::max(busy, absorbed));
-  if (absorbed > busy) {
-    rate.limited = format(
-        "wake-ups are up to %.1f us late (p99), and a quarter of an interval can "
-        "be made good",
-        microseconds(late));
-  } else {
-    rate.limited = format(
-        "a step takes two writes of %.1f us, %.1f us for the endstop, %.1f us "
-        "high and %.1f us low, and %.1f us for late wake-ups (p99)",
-        microseconds(costs.write.median), microseconds(costs.read.median), microseconds(high),
-        microseconds(low), microseconds(late));
+std::string reasonOf(const Interval& interval, const Load& load, const Others& others,
+                     pulse::Nanoseconds guard) {
+  switch (interval.limit) {
+    case RateLimit::kLateness:
+      return "wake-ups late by " + inMicroseconds(interval.lateness) + " and calls of " +
+             inMicroseconds(load.rise + others.rise) +
+             " before the pulse is out must fit in a quarter of a step's interval";
+    case RateLimit::kPulse:
+      return "the chip's high and low time of " + inMicroseconds(load.chip) + ", calls of " +
+             inMicroseconds(load.calls + others.calls) + " and two wake-ups late by " +
+             inMicroseconds(interval.lateness) + " must fit in a step's interval";
+    case RateLimit::kSpinning:
+      break;
   }
-  return rate;
+  std::string text = "before an edge the pulse thread spins for " +
+                     inMicroseconds(static_cast<double>(guard)) + ", which it may for " +
+                     percentText(pulse::SteadyClock::kMostSpinning) + " of the time";
+  if (others.not_spinning < 1.0) {
+    text += "; the other axes take " + percentText(1.0 - others.not_spinning);
+  }
+  return text + ", and without spinning wake-ups are later";
+}
+
+std::string rateText(double rate) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f steps/s", rate);
+  return text;
 }
 
 }  // namespace
 
 std::string StepRate::text() const {
-  return axis + ": asks for " +
-         format("%.0f steps/s, and this machine holds %.0f steps/s: ", asked, held) + limited;
+  std::string text =
+      axis + ": asks for " + rateText(asked) + ", and this machine holds " + rateText(held);
+  if (alone > held) text += " while all axes move, " + rateText(alone) + " with this one alone";
+  return text + ": " + limited;
 }
 
 bool StepRates::holds() const {
-  return load <= kHighestLoad &&
-         std::all_of(axes.begin(), axes.end(), [](const StepRate& rate) { return rate.holds(); });
+  return std::all_of(axes.begin(), axes.end(), [](const StepRate& rate) { return rate.holds(); });
 }
 
 std::vector<std::string> StepRates::complaints() const {
@@ -58,25 +152,40 @@ std::vector<std::string> StepRates::complaints() const {
   for (const StepRate& rate : axes) {
     if (!rate.holds()) complaints.push_back(rate.text());
   }
-  if (load > kHighestLoad) {
-    complaints.push_back(
-        format("with all axes at their top speeds the calls to their lines take "
-               "%.0f %% of the time, and more than %.0f %% can't be had",
-               load * 100.0, kHighestLoad * 100.0));
-  }
   return complaints;
 }
 
 StepRates stepRates(const std::vector<axis::AxisConfig>& axes,
                     const pulse::Capability& capability) {
+  std::vector<Load> loads;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    loads.push_back(loadOf(axes[i], capability.channels.at(i), capability));
+  }
   StepRates rates;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    const pulse::CallCosts& costs = capability.channels.at(i);
-    rates.axes.push_back(rateOf(axes[i], costs, capability.lateness.p99));
-    const auto calls = static_cast<double>(costs.read.median + 2 * costs.write.median);
-    rates.load += rates.axes.back().asked * calls * 1e-9;
+    Others others;
+    for (std::size_t k = 0; k < loads.size(); ++k) {
+      if (k != i) others.add(loads[k]);
+    }
+    const Interval interval = shortest(loads[i], others, capability);
+    rates.axes.push_back({axes[i].name, 1e9 / loads[i].interval,
+                          1e9 / shortest(loads[i], Others{}, capability).ns, 1e9 / interval.ns,
+                          reasonOf(interval, loads[i], others, capability.guard)});
   }
   return rates;
+}
+
+std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
+                             const pulse::Capability& capability) {
+  std::string why;
+  if (!capability.rights.granted()) why = capability.rights.text();
+  for (const std::string& complaint : stepRates(axes, capability).complaints()) {
+    why += (why.empty() ? "" : "; ") + complaint;
+  }
+  if (why.empty()) return "";
+  return "this machine can't do what is asked of it in real time: " + why +
+         ". Lower the top speed or the microsteps, allow real-time rights, run a PREEMPT_RT "
+         "kernel, or take load off this machine";
 }
 
 }  // namespace stepdriver::machine

@@ -1,49 +1,100 @@
 #include "stepdriver_core/pulse/capability.h"
 
 #include <algorithm>
-#include <cstring>
+#include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::pulse {
 namespace {
 
 constexpr Nanoseconds kBetweenWakeUps = 1'000'000;
+constexpr Nanoseconds kLongestWaits = 1'000'000'000;
+// A chip behind I2C takes its time.
+constexpr Nanoseconds kLongestCalls = 20'000'000;
 
-template <typename Call>
-Spread costOf(Clock& clock, int& error, const Call& call) {
+/// Takes samples, for no longer than that, but one.
+template <typename Sample>
+Spread spreadOfMany(Clock& clock, int count, Nanoseconds longest, const Sample& sample) {
   std::vector<Nanoseconds> samples;
-  samples.reserve(kMeasuredCalls);
-  while (samples.size() < kMeasuredCalls && error == 0) {
-    const Nanoseconds begin = clock.now();
-    error = call();
-    samples.push_back(clock.now() - begin);
-  }
+  samples.reserve(static_cast<std::size_t>(count));
+  const Nanoseconds end = clock.now() + longest;
+  do {
+    samples.push_back(sample());
+  } while (samples.size() < static_cast<std::size_t>(count) && clock.now() < end);
   return spreadOf(std::move(samples));
 }
 
-Spread latenessOf(Clock& clock) {
-  std::vector<Nanoseconds> samples;
-  samples.reserve(kMeasuredWakeUps);
-  while (samples.size() < kMeasuredWakeUps) {
+using Wait = void (Clock::*)(Nanoseconds);
+
+Spread latenessOf(Clock& clock, Wait wait, int count) {
+  return spreadOfMany(clock, count, kLongestWaits, [&] {
     const Nanoseconds due = clock.now() + kBetweenWakeUps;
-    while (clock.now() < due) clock.waitUntil(due);
-    samples.push_back(clock.now() - due);
-  }
-  return spreadOf(std::move(samples));
+    while (clock.now() < due) (clock.*wait)(due);
+    return clock.now() - due;
+  });
 }
 
-CallCosts callCosts(gpio::Lines& lines, Clock& clock, const ChannelConfig& channel, int& error) {
-  CallCosts costs;
-  const gpio::LineWrite at_rest{channel.step.line, !channel.step.active};
-  costs.write = costOf(clock, error, [&] { return lines.write(&at_rest, 1); });
-  const auto& endstop = channel.endstop_max ? channel.endstop_max : channel.endstop_min;
-  if (endstop && error == 0) {
-    costs.read = costOf(clock, error, [&] { return std::max(0, -lines.read(endstop->line)); });
+/// The calls of one channel after the other, up to one that fails.
+class CallMeter {
+ public:
+  CallMeter(gpio::Lines& lines, Clock& clock) : lines_(lines), clock_(clock) {}
+
+  CallCosts measure(const ChannelConfig& channel) {
+    CallCosts costs;
+    const gpio::LineWrite at_rest{channel.step.line, !channel.step.active};
+    costs.write =
+        costOf(lines_.outputName(channel.step.line), [&] { return lines_.write(&at_rest, 1); });
+    for (const auto& endstop : {channel.endstop_min, channel.endstop_max}) {
+      if (!endstop) continue;
+      const Spread read = costOf(lines_.inputName(endstop->line),
+                                 [&] { return std::max(0, -lines_.read(endstop->line)); });
+      if (read.p99 >= costs.read.p99) costs.read = read;
+    }
+    return costs;
   }
-  return costs;
+
+  /// The call that failed, in words; empty: none.
+  const std::string& failure() const { return failure_; }
+
+ private:
+  template <typename Call>
+  Spread costOf(const std::string& line, const Call& call) {
+    const auto timed = [&] {
+      const Nanoseconds begin = clock_.now();
+      const int error = failure_.empty() ? call() : 0;
+      if (error != 0) {
+        failure_ = "Line " + line +
+                   " failed while the cost of its calls was measured: " + gpio::errorText(error) +
+                   ".";
+      }
+      return clock_.now() - begin;
+    };
+    timed();  // brings the code into the caches
+    return spreadOfMany(clock_, kMeasuredCalls, kLongestCalls, timed);
+  }
+
+  gpio::Lines& lines_;
+  Clock& clock_;
+  std::string failure_;
+};
+
+/// @param measure_calls false: one failed, and nothing else is measured.
+Capability asPulseThread(Clock& clock, const std::function<bool(Capability&)>& measure_calls) {
+  Capability capability;
+  capability.rights.memory_error = lockMemory();
+  capability.guard = clock.guard();
+  std::thread([&] {
+    capability.rights.scheduler_error = askForScheduler();
+    if (!measure_calls(capability)) return;
+    capability.lateness = latenessOf(clock, &Clock::waitUntil, kMeasuredWakeUps);
+    capability.sleep_lateness = latenessOf(clock, &Clock::sleepUntil, kMeasuredSleeps);
+  }).join();
+  return capability;
 }
 
 }  // namespace
@@ -54,26 +105,24 @@ Spread spreadOf(std::vector<Nanoseconds> samples) {
     const auto last = static_cast<double>(samples.size() - 1);
     return samples[static_cast<std::size_t>(part * last + 0.5)];
   };
-  return {at(0.5), at(0.9), at(0.99), samples.back()};
+  return {at(0.5), at(0.9), at(0.99), samples.back(), samples.size()};
 }
 
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
                              const std::vector<ChannelConfig>& channels) {
-  Capability capability;
-  capability.rights.memory_error = lockMemory();
-  int error = 0;
-  std::thread([&] {
-    capability.rights.scheduler_error = askForScheduler();
+  CallMeter meter(lines, clock);
+  Capability capability = asPulseThread(clock, [&](Capability& measured) {
     for (const ChannelConfig& channel : channels) {
-      if (error == 0) capability.channels.push_back(callCosts(lines, clock, channel, error));
+      measured.channels.push_back(meter.measure(channel));
     }
-    if (error == 0) capability.lateness = latenessOf(clock);
-  }).join();
-  if (error != 0) {
-    throw GpioError("a line failed while its cost was measured: " +
-                    std::string(std::strerror(error)));
-  }
+    return meter.failure().empty();
+  });
+  if (!meter.failure().empty()) throw GpioError(meter.failure());
   return capability;
+}
+
+Capability measureWakeUps(Clock& clock) {
+  return asPulseThread(clock, [](Capability& /*measured*/) { return true; });
 }
 
 }  // namespace stepdriver::pulse

@@ -14,11 +14,8 @@ namespace {
 
 constexpr Nanoseconds kLongestGuard = 200'000;
 
-// Of each window at most this much is spun: a real-time thread that spins on is stopped for the
-// rest of the second by the kernel (sched_rt_runtime_us), which costs far more than one late
-// wake-up.
 constexpr Nanoseconds kSpinWindow = 100'000'000;
-constexpr Nanoseconds kSpinBudget = 80'000'000;
+constexpr auto kSpinBudget = static_cast<Nanoseconds>(SteadyClock::kMostSpinning * kSpinWindow);
 
 Nanoseconds steadyNow() {
   timespec time{};
@@ -27,7 +24,7 @@ Nanoseconds steadyNow() {
 }
 
 // Sleeps until the time of CLOCK_MONOTONIC, or while the word has this value, or less.
-void sleepUntil(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32_t value) {
+void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32_t value) {
   timespec deadline{};
   deadline.tv_sec = static_cast<time_t>(time / 1'000'000'000);
   deadline.tv_nsec = static_cast<decltype(deadline.tv_nsec)>(time % 1'000'000'000);
@@ -43,14 +40,20 @@ SteadyClock::SteadyClock(Nanoseconds guard)
 Nanoseconds SteadyClock::now() { return steadyNow(); }
 
 void SteadyClock::waitUntil(Nanoseconds time) {
-  Nanoseconds now = steadyNow();
+  const Nanoseconds now = steadyNow();
   if (now - window_ > kSpinWindow) {
     window_ = now;
     spun_ = 0;
   }
-  const Nanoseconds guard = spun_ < kSpinBudget ? guard_ : 0;
+  wait(time, spun_ < kSpinBudget ? guard_ : 0);
+}
+
+void SteadyClock::sleepUntil(Nanoseconds time) { wait(time, 0); }
+
+void SteadyClock::wait(Nanoseconds time, Nanoseconds guard) {
+  Nanoseconds now = steadyNow();
   while (wakes_.load(std::memory_order_acquire) == seen_ && now < time - guard) {
-    sleepUntil(time == kNever ? kNever : time - guard, wakes_, seen_);
+    sleepOnWord(time == kNever ? kNever : time - guard, wakes_, seen_);
     now = steadyNow();
   }
   const Nanoseconds spin_begin = now;

@@ -4,46 +4,65 @@
 #include <vector>
 
 #include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/capability.h"
 
 namespace stepdriver::machine {
 
-/// The highest step rate of one axis, on a machine and lines as they were measured.
+/// The highest step rate of one axis, on a machine and lines as they were measured; at the
+/// configured microsteps.
 struct StepRate {
   std::string axis;
   double asked = 0.0;   ///< [steps/s] at the axis's top speed
-  double held = 0.0;    ///< [steps/s] that can be held with this axis alone
-  std::string limited;  ///< by what, in words
+  double alone = 0.0;   ///< [steps/s] that can be held with this axis alone
+  double held = 0.0;    ///< [steps/s] that can be held while all others move at their top speeds
+  std::string limited;  ///< `held` is, by what, in words
 
   bool holds() const { return asked <= held; }
-  /// "x: asks for 8000 steps/s; this machine holds 12500 steps/s: ..."
+  /// "x: asks for 8000 steps/s, and this machine holds 12500 steps/s: ..."
   std::string text() const;
 };
 
 /// What a machine can do of what its axes ask for.
 struct StepRates {
   std::vector<StepRate> axes;
-  double load = 0.0;  ///< part of the pulse thread's time that calls take with all at top speed
-
-  /// The kernel stops a real-time thread that takes more than this (sched_rt_runtime_us).
-  static constexpr double kHighestLoad = 0.95;
 
   bool holds() const;
   /// What doesn't hold, a sentence each; empty: all does.
   std::vector<std::string> complaints() const;
 };
 
-/// The highest step rates.
+/// The highest step rates, from the lateness l of wake-ups and the costs w of a write and r of an
+/// endstop's read, each at its 99th percentile. With the chip's high and low times h and d, and the
+/// sums over all other axes, an interval T can be held where
 ///
-/// A step needs its two writes, the read of the endstop ahead where there is one, and the chip's
-/// high and low times: with costs as their medians these are the shortest interval of a thread that
-/// is never late. Of a wake-up's lateness L (its p99) the engine makes good a quarter of an
-/// interval at most (see PulseEngine::kClosest), and the pulse's falling edge may be late too; so
+///   T >= 4 (l + r + w + sum(r + w))           a pulse must be out within a quarter of an interval
+///                                             after its planned time: that is what the engine
+///                                             absorbs (PulseEngine::kClosest)
+///   T >= 2 l + r + 2 w + h + d + sum(r + 2 w)  the pulse itself, both of its wake-ups late
+///   T >= g + h + r + 2 w                      where the clock spins for a guard g before an edge,
+///   T >= (g + min(g, h) - s) / 0.8            less what a sleep is late by (s, a median): it may
+///                                             for so much of the time (SteadyClock::kMostSpinning)
+///   1 - product(1 - (g + min(g, h)) / T) <= 0.8, over all axes: the same for several
 ///
-///   interval >= max(read + 2 write + high + low + L, 4 L).
+/// or where the first two hold with the lateness of waits that don't spin. Faster, more than about
+/// one step in a hundred slides the timeline: nothing is lost and no pulse is too short, but the
+/// motion takes longer than planned.
 ///
-/// Faster, more than about one step in a hundred slides the timeline: nothing is lost and no pulse
-/// is too short, but the motion takes longer than planned.
+/// Steps of several axes that fall due at once are one call for each chip; that counts as one for
+/// each axis here. Changes of DIR, and what the engine calculates, about a microsecond a step, are
+/// left out.
 StepRates stepRates(const std::vector<axis::AxisConfig>& axes, const pulse::Capability& capability);
+
+/// Why a machine under MachineOptions::enforce doesn't start; empty: it does.
+std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
+                             const pulse::Capability& capability);
+
+/// Takes the lines of the axes as a Machine does, measures, and releases them. Nothing moves, and
+/// ENABLE isn't asserted.
+///
+/// @throw GpioError where a line can't be had, written or read; none is held then.
+pulse::Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
+                          pulse::Clock& clock);
 
 }  // namespace stepdriver::machine

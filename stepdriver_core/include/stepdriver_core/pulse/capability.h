@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "stepdriver_core/gpio/lines.h"
@@ -15,6 +16,7 @@ struct Spread {
   Nanoseconds p90 = 0;
   Nanoseconds p99 = 0;
   Nanoseconds max = 0;
+  std::size_t count = 0;  ///< of the samples
 };
 
 /// @param samples not empty.
@@ -23,22 +25,25 @@ Spread spreadOf(std::vector<Nanoseconds> samples);
 /// What the calls of one channel cost.
 struct CallCosts {
   Spread write;  ///< of its STEP line
-  Spread read;   ///< of an endstop; all 0 where it has none
+  Spread read;   ///< of the slower of its endstops; all 0 where it has none
 };
 
 /// What a machine and its lines can do, as measured there and then.
 struct Capability {
-  Spread lateness;  ///< of wake-ups, as the pulse thread waits
+  Spread lateness;        ///< of wake-ups, as the pulse thread waits
+  Spread sleep_lateness;  ///< of those of waits that may not spin (see Clock::sleepUntil())
+  Nanoseconds guard = 0;  ///< Clock::guard()
   std::vector<CallCosts> channels;
   RealtimeRights rights;
 };
 
 constexpr int kMeasuredWakeUps = 300;  // a millisecond each
-constexpr int kMeasuredCalls = 50;     // of each line
+constexpr int kMeasuredSleeps = 100;   // a millisecond each
+constexpr int kMeasuredCalls = 200;    // of each line; fewer where they take more than 20 ms
 
-/// Measures in a thread with the rights of the pulse thread; takes about 0.3 s of the clock and
-/// what the calls cost. Nothing moves: STEP lines are written the level that they have, and no
-/// other line is.
+/// Measures in a thread with the rights of the pulse thread; takes about 0.4 s of the clock, on a
+/// machine that stalls up to 2 s, and what the calls cost. Nothing moves: STEP lines are written
+/// the level that they have, and no other line is.
 ///
 /// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
 ///   inactive level.
@@ -46,5 +51,8 @@ constexpr int kMeasuredCalls = 50;     // of each line
 /// @throw GpioError where a line can't be written or read.
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
                              const std::vector<ChannelConfig>& channels);
+
+/// The same without lines: of a machine alone. There are no channels in it.
+Capability measureWakeUps(Clock& clock);
 
 }  // namespace stepdriver::pulse

@@ -24,6 +24,13 @@ class Clock {
   /// Returns when the time has come, or earlier after a wake(). kNever waits for a wake() alone.
   virtual void waitUntil(Nanoseconds time) = 0;
 
+  /// The same as a wait is where the clock has spun for as long as it may: it returns when the
+  /// system lets it. For whoever measures.
+  virtual void sleepUntil(Nanoseconds time) { waitUntil(time); }
+
+  /// How long before the time waitUntil() begins to spin; 0: it doesn't.
+  virtual Nanoseconds guard() const { return 0; }
+
   /// Ends the wait under way, or else the next one.
   virtual void wake() = 0;
 
@@ -50,16 +57,25 @@ class ClockHold {
 /// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins.
 class SteadyClock : public Clock {
  public:
+  /// Of the time it spins for no longer than this share, and only sleeps from then on: a real-time
+  /// thread that spins on is stopped for the rest of the second by the kernel
+  /// (sched_rt_runtime_us), which costs far more than one late wake-up.
+  static constexpr double kMostSpinning = 0.8;
+
   /// @param guard how long before the time the sleep ends; at most 200 us, so that the spinning
   ///   stays far below what the kernel's real-time throttle allows.
   explicit SteadyClock(Nanoseconds guard = 60'000);
 
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
+  void sleepUntil(Nanoseconds time) override;
+  Nanoseconds guard() const override { return guard_; }
   void wake() override;
   bool realtime() const override { return true; }
 
  private:
+  void wait(Nanoseconds time, Nanoseconds guard);
+
   Nanoseconds guard_;
   std::atomic<std::uint32_t> wakes_{0};
   std::uint32_t seen_ = 0;

@@ -1,0 +1,192 @@
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "configuration.h"
+#include "interrupt_watch.h"
+#include "lines_report.h"
+#include "move.h"
+#include "options.h"
+#include "rates_report.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/libgpiod_lines.h"
+#include "stepdriver_core/machine/step_rates.h"
+#include "stepdriver_core/pulse/capability.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "system_report.h"
+
+namespace stepdriver::check {
+namespace {
+
+constexpr int kExitGood = 0;
+constexpr int kExitConfig = 1;
+constexpr int kExitLines = 2;
+constexpr int kExitRates = 3;
+constexpr int kExitMove = 4;
+constexpr int kExitUsage = 64;
+
+constexpr std::chrono::seconds kWarning{2};
+
+void print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+void section(const std::string& title, const std::string& text) {
+  print(title + "\n" + text + "\n");
+}
+
+/// The program, section by section. It remembers the worst that it found.
+class Check {
+ public:
+  Check(Options options, ros_node::NodeConfig config)
+      : options_(std::move(options)),
+        config_(std::move(config)),
+        real_(config_.backend == ros_node::GpioBackend::kLibgpiod) {}
+
+  int run() {
+    section("Configuration: " + options_.config, configurationText(config_));
+    reportLines();
+    const SystemFacts facts = systemFacts();
+    section("Permissions", permissionsText(facts));
+    measure();
+    section("Real time", limitsText(facts, capability_.rights));
+    section("Measured here and now", measurementsText(config_.axes, capability_));
+    reportRates();
+    if (options_.move) move();
+    print((exit_code_ == kExitGood ? "Good: " : "NOT GOOD: ") + verdict_ + "\n");
+    return exit_code_;
+  }
+
+ private:
+  void note(int exit_code, const std::string& verdict) {
+    if (exit_code_ != kExitGood) return;
+    exit_code_ = exit_code;
+    verdict_ = verdict;
+  }
+
+  void reportLines() {
+    const std::string version = gpio::libgpiodVersion();
+    const std::string title =
+        "GPIO: " + (version.empty() ? "built without libgpiod" : "libgpiod " + version);
+    if (!real_) {
+      section(
+          title,
+          "  The configuration asks for the simulated rig (gpio/backend: simulated), so that no\n"
+          "  line is looked at; --backend libgpiod looks at them.\n");
+      verdict_ = "the configuration is right; on the simulated rig every step rate can be held.";
+      return;
+    }
+    const std::vector<gpio::ChipInfo> chips = gpio::gpioChips();
+    const LinesReport report = linesReport(chips, linesOf(config_.axes));
+    section(title, chipsText(chips) + "\n" + report.text);
+    if (report.missing == 0) return;
+    note(kExitLines, std::to_string(report.missing) + (report.missing == 1 ? " line" : " lines") +
+                         " can't be had, see above; the calls and step rates weren't measured.");
+  }
+
+  void measure() {
+    if (real_ && exit_code_ == kExitGood) {
+      try {
+        const auto backend = gpio::makeLibgpiodBackend();
+        capability_ = machine::measure(config_.axes, *backend, clock_);
+        return;
+      } catch (const GpioError& error) {
+        note(kExitLines, error.what());
+      }
+    }
+    capability_ = pulse::measureWakeUps(clock_);
+  }
+
+  void reportRates() {
+    if (capability_.channels.empty()) return;
+    const machine::StepRates rates = machine::stepRates(config_.axes, capability_);
+    section("Step rates, with about one step in a hundred late, or fewer", ratesText(rates));
+    if (!rates.holds()) {
+      note(kExitRates, "this machine doesn't hold the top speed of " + tooFast(rates) +
+                           ". Lower it or the microsteps, allow real-time rights, run a "
+                           "PREEMPT_RT kernel, or take load off this machine.");
+    } else if (config_.enforce_realtime) {
+      const std::string why = machine::whyNotInRealtime(config_.axes, capability_);
+      if (!why.empty()) note(kExitRates, "the node won't start (realtime: enforce): " + why + ".");
+    }
+  }
+
+  void move() {
+    if (!real_ || exit_code_ == kExitLines) {
+      note(kExitMove, "nothing was moved: there are no lines to move it by.");
+      return;
+    }
+    print("Moving, in " + std::to_string(kWarning.count()) +
+          " s: keep clear. Nothing here knows where the axes stand. Ctrl-C stops them.\n");
+    InterruptWatch::block();
+    bool back = false;
+    try {
+      if (InterruptWatch::comesWithin(kWarning)) throw Error("interrupted");
+      const MoveOrder order{config_.axes, options_.axis, options_.distance, config_.max_lateness};
+      const auto backend = gpio::makeLibgpiodBackend();
+      back = moveForthAndBack(order, *backend, clock_,
+                              [](const std::string& line) { print(line + "\n"); });
+    } catch (const Error& error) {
+      print(std::string("  ") + error.what() + "\n");
+    }
+    print("\n");
+    if (!back) note(kExitMove, "not every axis went forth and back, see above.");
+  }
+
+  const Options options_;
+  const ros_node::NodeConfig config_;
+  const bool real_;
+  pulse::SteadyClock clock_;
+  pulse::Capability capability_;
+  int exit_code_ = kExitGood;
+  std::string verdict_ = "every line can be had, and every axis's top speed can be held.";
+};
+
+bool hasAxis(const std::vector<axis::AxisConfig>& axes, const std::string& name) {
+  return std::any_of(axes.begin(), axes.end(),
+                     [&](const axis::AxisConfig& axis) { return axis.name == name; });
+}
+
+int run(const std::vector<std::string>& arguments) {
+  Options options;
+  try {
+    options = parseOptions(arguments);
+  } catch (const Error& error) {
+    std::fprintf(stderr, "stepdriver_check: %s\n%s", error.what(), kUsage);
+    return kExitUsage;
+  }
+  if (options.help) {
+    print(kUsage);
+    return kExitGood;
+  }
+  try {
+    ros_node::NodeConfig config = readConfiguration(options.config, options.backend);
+    if (!options.axis.empty() && !hasAxis(config.axes, options.axis)) {
+      std::fprintf(stderr, "stepdriver_check: --axis %s: %s has no such axis\n",
+                   options.axis.c_str(), options.config.c_str());
+      return kExitUsage;
+    }
+    return Check(std::move(options), std::move(config)).run();
+  } catch (const ConfigError& error) {
+    std::fprintf(stderr, "stepdriver_check: %s: %zu %s wrong\n", options.config.c_str(),
+                 error.issues().size(), error.issues().size() == 1 ? "thing is" : "things are");
+    for (const ConfigIssue& issue : error.issues()) {
+      std::fprintf(stderr, "  %s %s\n", issue.key.c_str(), issue.message.c_str());
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "stepdriver_check: %s\n", error.what());
+  }
+  return kExitConfig;
+}
+
+}  // namespace
+}  // namespace stepdriver::check
+
+int main(int argc, char** argv) {
+  return stepdriver::check::run(std::vector<std::string>(argv + 1, argv + argc));
+}

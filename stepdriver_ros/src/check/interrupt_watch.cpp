@@ -1,0 +1,60 @@
+#include "interrupt_watch.h"
+
+#include <pthread.h>
+
+#include <csignal>
+#include <cstdint>
+#include <ctime>
+#include <utility>
+
+namespace stepdriver::check {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll{50};
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+bool isIgnored(int signal) {
+  struct sigaction action {};
+  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
+sigset_t interrupts() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT}) sigaddset(&signals, signal);
+  // Under nohup a terminal that closes changes nothing.
+  if (!isIgnored(SIGHUP)) sigaddset(&signals, SIGHUP);
+  return signals;
+}
+
+}  // namespace
+
+void InterruptWatch::block() {
+  const sigset_t signals = interrupts();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+bool InterruptWatch::comesWithin(std::chrono::nanoseconds time) {
+  const sigset_t signals = interrupts();
+  const timespec wait{static_cast<std::time_t>(time.count() / kSecond),
+                      static_cast<long>(time.count() % kSecond)};
+  return sigtimedwait(&signals, nullptr, &wait) > 0;
+}
+
+InterruptWatch::InterruptWatch(std::function<void()> act)
+    : act_(std::move(act)), thread_([this] { watch(); }) {}
+
+InterruptWatch::~InterruptWatch() {
+  ended_ = true;
+  thread_.join();
+}
+
+void InterruptWatch::watch() {
+  while (!ended_ && !interrupted_) {
+    if (!comesWithin(kPoll)) continue;
+    interrupted_ = true;
+    act_();
+  }
+}
+
+}  // namespace stepdriver::check

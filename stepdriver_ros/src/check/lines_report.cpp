@@ -1,0 +1,120 @@
+#include "lines_report.h"
+
+#include <map>
+#include <utility>
+
+#include "stepdriver_core/error.h"
+#include "table.h"
+
+namespace stepdriver::check {
+namespace {
+
+/// Reasons, and the lines that share them, in the order of the first.
+class Reasons {
+ public:
+  /// @param message as findLine() throws it: with the line's name first.
+  void add(const std::string& line, const std::string& message) {
+    const std::string prefix = "Line " + line + ": ";
+    const bool named = message.rfind(prefix, 0) == 0;
+    addReason(named ? line : "", named ? message.substr(prefix.size()) : message);
+  }
+
+  std::string text() const {
+    std::string all;
+    for (const auto& [reason, lines] : reasons_) {
+      all += "  " + (lines.empty() ? reason : lines + ": " + reason) + "\n";
+    }
+    return all;
+  }
+
+ private:
+  void addReason(const std::string& line, const std::string& reason) {
+    for (auto& [known, lines] : reasons_) {
+      if (known != reason || line.empty()) continue;
+      lines += ", " + line;
+      return;
+    }
+    reasons_.emplace_back(reason, line);
+  }
+
+  std::vector<std::pair<std::string, std::string>> reasons_;  // reason -> lines
+};
+
+std::string placeOf(const std::vector<gpio::ChipInfo>& chips, gpio::LineAddress address) {
+  return chips[address.chip].name + ":" + std::to_string(address.offset);
+}
+
+std::string holderOf(const gpio::LineInfo& info) {
+  if (!info.used) return "free";
+  return info.consumer.empty() ? "held by the kernel" : "held by \"" + info.consumer + '"';
+}
+
+}  // namespace
+
+std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes) {
+  std::vector<NamedLine> lines;
+  for (const axis::AxisConfig& axis : axes) {
+    const auto add = [&](const char* pin, const std::string& line) {
+      if (!line.empty()) lines.push_back({axis.name + "/" + pin, line});
+    };
+    const axis::Pins& pins = axis.pins;
+    add("step", pins.step.line);
+    add("dir", pins.dir.line);
+    add("enable", pins.enable.line);
+    const bool numbered_from_0 = axis.driver == chip::Model::kDrv8825;
+    add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
+    add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
+    add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);
+    add("sleep", pins.sleep.line);
+    add("reset", pins.reset.line);
+    if (axis.endstop_min) add("endstops/min", axis.endstop_min->line);
+    if (axis.endstop_max) add("endstops/max", axis.endstop_max->line);
+    if (axis.fault) add("fault", axis.fault->line);
+  }
+  return lines;
+}
+
+std::string chipsText(const std::vector<gpio::ChipInfo>& chips) {
+  if (chips.empty()) return "  This machine has no GPIO chip (no /dev/gpiochip*).\n";
+  std::vector<std::vector<std::string>> rows = {{"chip", "label", "lines"}};
+  std::string remedy;
+  for (const gpio::ChipInfo& chip : chips) {
+    if (chip.error == 0) {
+      rows.push_back({chip.name, chip.label, std::to_string(chip.lines.size())});
+    } else {
+      rows.push_back({chip.name, "can't be opened: " + gpio::errorText(chip.error)});
+      remedy = gpio::remedyFor(chip.error);
+    }
+  }
+  return table(rows) + (remedy.empty() ? "" : " " + remedy + "\n");
+}
+
+LinesReport linesReport(const std::vector<gpio::ChipInfo>& chips,
+                        const std::vector<NamedLine>& lines) {
+  LinesReport report;
+  Reasons reasons;
+  std::map<std::string, std::string> users;  // place -> pin
+  std::vector<std::vector<std::string>> rows = {{"pin", "line", "found at", "state"}};
+  for (const auto& [pin, line] : lines) {
+    try {
+      const gpio::LineAddress address = gpio::findLine(chips, line);
+      const gpio::LineInfo& info = chips[address.chip].lines[address.offset];
+      const std::string place = placeOf(chips, address);
+      const auto [user, is_new] = users.emplace(place, pin);
+      rows.push_back(
+          {pin, line, place, is_new ? holderOf(info) : "the same line as " + user->second});
+      if (is_new && !info.used) continue;
+      reasons.add(line, "Line " + gpio::describe(chips, line, address) +
+                            (is_new ? gpio::busyText(info)
+                                    : " is named twice. Each pin needs a line of its own."));
+    } catch (const GpioError& error) {
+      rows.push_back({pin, line, "not found"});
+      reasons.add(line, error.what());
+    }
+    ++report.missing;
+  }
+  report.text = table(rows) + reasons.text();
+  return report;
+}
+
+}  // namespace stepdriver::check

@@ -1,0 +1,102 @@
+#include "move.h"
+
+#include <algorithm>
+
+#include "interrupt_watch.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+#include "table.h"
+
+namespace stepdriver::check {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kShortStroke = 1.0;  // [mm]
+constexpr double kShortTurn = 10.0;   // [deg]
+
+using Say = std::function<void(const std::string&)>;
+
+/// Millimetres or degrees in a unit of the axis.
+double perUnit(const axis::AxisConfig& axis) {
+  return axis.kind == axis::Kind::kLinear ? 1e3 : 180.0 / kPi;
+}
+
+std::string lengthText(const axis::AxisConfig& axis, double length) {
+  return numberText(length * perUnit(axis)) +
+         (axis.kind == axis::Kind::kLinear ? " mm" : " degrees");
+}
+
+double strokeOf(const axis::AxisConfig& axis, const std::optional<double>& distance) {
+  const double usual = axis.kind == axis::Kind::kLinear ? kShortStroke : kShortTurn;
+  return distance.value_or(usual) / perUnit(axis);
+}
+
+/// Moves one axis. @return whether it is back where it was.
+bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const Say& say) {
+  const axis::AxisConfig& config = axis.config();
+  const machine::EngineFigures before = machine.figures();
+  axis.setPosition(startFor(config, stroke));
+  if (config.pins.enable.wired()) axis.enable(true);
+  const double start = axis.state().position;
+  const axis::MoveResult forth = axis.wait(axis.moveTo(stroke, true));
+  say("  " + config.name + ": forth: " + forth.message);
+  bool reached = forth.end == axis::MoveEnd::kReached;
+  // Away from an endstop that it met is where it came from; anything else isn't to be trusted.
+  if (reached || forth.end == axis::MoveEnd::kEndstopMin ||
+      forth.end == axis::MoveEnd::kEndstopMax) {
+    const axis::MoveResult back = axis.wait(axis.moveTo(start));
+    say("  " + config.name + ": back: " + back.message);
+    reached = reached && back.end == axis::MoveEnd::kReached;
+  }
+  const double off = axis.state().position - start;
+  const machine::EngineFigures after = machine.figures();
+  say("  " + config.name + ": " + std::to_string(after.pulses - before.pulses) + " pulses, " +
+      std::to_string(after.slips - before.slips) + " slips, worst lateness " +
+      numberText(after.worst_lateness * 1e6) + " us; " +
+      (off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
+  if (config.pins.enable.wired()) axis.enable(false);
+  return reached && off == 0.0;
+}
+
+}  // namespace
+
+double startFor(const axis::AxisConfig& axis, double stroke) {
+  double start = 0.0;
+  if (axis.max_position) start = std::min(start, *axis.max_position - std::max(stroke, 0.0));
+  if (axis.min_position) start = std::max(start, *axis.min_position - std::min(stroke, 0.0));
+  return start;
+}
+
+bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clock& clock,
+                      const Say& say) {
+  std::vector<axis::AxisConfig> axes = order.axes;
+  for (axis::AxisConfig& axis : axes) {
+    axis.enable_on_start = false;
+    axis.disable_on_shutdown = true;
+  }
+  machine::MachineOptions options;
+  options.max_lateness = order.max_lateness;
+  machine::Machine machine(axes, backend, clock, options);
+  InterruptWatch watch([&] {
+    say("  interrupted: decelerating");
+    try {
+      machine.shutdown();
+    } catch (const Error& error) {
+      say(std::string("  ") + error.what());
+    }
+  });
+  bool all_back = true;
+  for (const auto& axis : machine.axes()) {
+    if (!order.only.empty() && order.only != axis->config().name) continue;
+    const double stroke = strokeOf(axis->config(), order.distance);
+    try {
+      all_back = moveAxis(machine, *axis, stroke, say) && all_back;
+    } catch (const Refused& refused) {
+      say(std::string("  ") + refused.what());
+      all_back = false;
+    }
+  }
+  return all_back && !watch.interrupted();
+}
+
+}  // namespace stepdriver::check

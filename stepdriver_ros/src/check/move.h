@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::check {
+
+/// What is to be moved.
+struct MoveOrder {
+  std::vector<axis::AxisConfig> axes;  ///< all of them: their lines are held
+  std::string only;                    ///< name of an axis; empty: all, one after the other
+  std::optional<double> distance;      ///< [mm|deg] 1 mm or 10 degrees by default
+  double max_lateness = 0.005;         ///< [s] see machine::MachineOptions
+};
+
+/// Where an axis is declared to stand before a stroke of this length, both in its unit, so that the
+/// stroke is within the soft limits; 0 where that is.
+double startFor(const axis::AxisConfig& axis, double stroke);
+
+/// Drives axes forth and back at their top speeds; each is disabled again when it is done.
+///
+/// @param say is told each line of text as it comes.
+/// @return whether each is back where it was. An interrupt (see InterruptWatch, whose signals
+///   are blocked in this thread) decelerates, disables, and makes it false.
+/// @throw GpioError where a line can't be had.
+bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clock& clock,
+                      const std::function<void(const std::string&)>& say);
+
+}  // namespace stepdriver::check

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "configuration.h"
+
+namespace stepdriver::check {
+
+struct Options {
+  bool help = false;
+  std::string config;
+  BackendChoice backend = BackendChoice::kAsInTheFile;
+  bool move = false;
+  std::string axis;                ///< the only one to move; empty: all, one after the other
+  std::optional<double> distance;  ///< [mm|deg]
+};
+
+/// How the program is used and how it ends.
+extern const char* const kUsage;
+
+/// @throw Error where they can't be understood.
+Options parseOptions(const std::vector<std::string>& arguments);
+
+}  // namespace stepdriver::check

@@ -1,0 +1,64 @@
+#include "rates_report.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "table.h"
+
+namespace stepdriver::check {
+namespace {
+
+std::string inMicroseconds(pulse::Nanoseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", static_cast<double>(time) * 1e-3);
+  return text;
+}
+
+std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spread) {
+  return {what,
+          inMicroseconds(spread.median),
+          inMicroseconds(spread.p90),
+          inMicroseconds(spread.p99),
+          inMicroseconds(spread.max),
+          std::to_string(spread.count)};
+}
+
+/// Downwards: whoever writes what is named here must not be told that it is too much.
+std::string rateText(double rate) { return numberText(std::floor(rate)); }
+
+}  // namespace
+
+std::string measurementsText(const std::vector<axis::AxisConfig>& axes,
+                             const pulse::Capability& capability) {
+  std::vector<std::vector<std::string>> rows = {{"[us]", "median", "p90", "p99", "max", "samples"}};
+  for (std::size_t i = 0; i < capability.channels.size(); ++i) {
+    rows.push_back(rowOf("write of " + axes[i].name + "/step", capability.channels[i].write));
+    const pulse::Spread& read = capability.channels[i].read;
+    if (read.count > 0) rows.push_back(rowOf("read of an endstop of " + axes[i].name, read));
+  }
+  rows.push_back(rowOf("wake-up late by, with spinning", capability.lateness));
+  rows.push_back(rowOf("wake-up late by, without", capability.sleep_lateness));
+  return table(rows);
+}
+
+std::string ratesText(const machine::StepRates& rates) {
+  std::vector<std::vector<std::string>> rows = {
+      {"axis", "asks for", "held alone", "held with all", "[steps/s]"}};
+  std::string reasons;
+  for (const machine::StepRate& rate : rates.axes) {
+    rows.push_back({rate.axis, numberText(rate.asked), rateText(rate.alone), rateText(rate.held),
+                    rate.holds() ? "ok" : "TOO FAST"});
+    reasons += "  " + rate.axis + ": " + rate.limited + "\n";
+  }
+  return table(rows) + "  What limits the rate with all axes moving:\n" + reasons;
+}
+
+std::string tooFast(const machine::StepRates& rates) {
+  std::string names;
+  for (const machine::StepRate& rate : rates.axes) {
+    if (!rate.holds()) names += (names.empty() ? "" : ", ") + rate.axis;
+  }
+  return names;
+}
+
+}  // namespace stepdriver::check

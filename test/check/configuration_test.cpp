@@ -1,0 +1,109 @@
+#include "configuration.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/libgpiod_lines.h"
+
+namespace stepdriver::check {
+namespace {
+
+using ros_node::GpioBackend;
+
+class Configuration : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (gpio::libgpiodVersion().empty()) GTEST_SKIP() << "stepdriver was built without libgpiod";
+  }
+  ~Configuration() override { std::remove(path_.c_str()); }
+
+  static constexpr const char* kAxis =
+      "axes: {x: {driver: a4988, pins: {step: S, dir: D}, microsteps: 16, steps_per_mm: 80.0,\n"
+      "  max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0}}\n";
+
+  std::string file(const std::string& text) {
+    std::ofstream(path_) << text;
+    return path_;
+  }
+
+  const std::string path_ =
+      testing::TempDir() + "stepdriver_check_" + std::to_string(getpid()) + ".yaml";
+};
+
+TEST_F(Configuration, ReadsEveryFileThatIsShipped) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(STEPDRIVER_CONFIGS)) {
+    if (entry.path().extension() != ".yaml") continue;
+    SCOPED_TRACE(entry.path());
+    const auto config = readConfiguration(entry.path().string(), BackendChoice::kAsInTheFile);
+    EXPECT_FALSE(config.axes.empty());
+    EXPECT_EQ(config.backend, GpioBackend::kLibgpiod) << "the file leaves it to the launch file";
+    ++files;
+  }
+  EXPECT_GE(files, 5);
+}
+
+TEST_F(Configuration, TakesTheBackendOfTheFileUnlessToldOtherwise) {
+  const std::string text =
+      std::string("gpio: {backend: simulated}\n") + kAxis + "simulation: {trace: /tmp/x.vcd}\n";
+  const auto read = [&](BackendChoice choice) { return readConfiguration(file(text), choice); };
+  EXPECT_EQ(read(BackendChoice::kAsInTheFile).backend, GpioBackend::kSimulated);
+  EXPECT_EQ(read(BackendChoice::kLibgpiod).backend, GpioBackend::kLibgpiod);
+  EXPECT_EQ(readConfiguration(file(kAxis), BackendChoice::kSimulated).backend,
+            GpioBackend::kSimulated);
+}
+
+TEST_F(Configuration, ListsEverythingThatIsWrongByItsFullName) {
+  const std::string text =
+      "gpio: {backend: gpio}\n"
+      "joint_state_rate: often\n"
+      "axes: {x: {driver: a4989}}\n";
+  try {
+    readConfiguration(file(text), BackendChoice::kAsInTheFile);
+    FAIL();
+  } catch (const ConfigError& error) {
+    std::vector<std::string> keys;
+    for (const ConfigIssue& issue : error.issues()) keys.push_back(issue.key);
+    for (const char* key : {"gpio/backend", "joint_state_rate", "axes/x/driver"}) {
+      EXPECT_NE(std::find(keys.begin(), keys.end(), key), keys.end()) << key << "\n"
+                                                                      << error.what();
+    }
+  }
+}
+
+TEST_F(Configuration, RefusesWhatIsNoMapAsTheNodeDoes) {
+  for (const char* text : {"just words\n", "[1, 2]\n", "gpio: 5\naxes: 7\n"}) {
+    EXPECT_THROW(readConfiguration(file(text), BackendChoice::kAsInTheFile), ConfigError) << text;
+  }
+}
+
+TEST_F(Configuration, IsShownWithTopSpeedsInStepsPerSecond) {
+  const auto config = readConfiguration(file(kAxis), BackendChoice::kAsInTheFile);
+  EXPECT_EQ(configurationText(config),
+            "  axis  driver  kind    microsteps  top speed  steps/s  endstops\n"
+            "  x     A4988   linear  16          100 mm/s   8000     none\n");
+}
+
+TEST_F(Configuration, HasTheRealtimePolicyByItselfOrInAMap) {
+  const auto policy = [&](const std::string& realtime) {
+    return readConfiguration(file(kAxis + realtime), BackendChoice::kAsInTheFile);
+  };
+  EXPECT_FALSE(policy("").enforce_realtime);
+  EXPECT_FALSE(policy("realtime: warn\n").enforce_realtime);
+  EXPECT_TRUE(policy("realtime: enforce\n").enforce_realtime);
+  const auto map = policy("realtime: {policy: enforce, max_lateness_ms: 2}\n");
+  EXPECT_TRUE(map.enforce_realtime);
+  EXPECT_DOUBLE_EQ(map.max_lateness, 0.002);
+  EXPECT_FALSE(policy("realtime: {max_lateness_ms: 2}\n").enforce_realtime);
+}
+
+}  // namespace
+}  // namespace stepdriver::check

@@ -1,0 +1,151 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "configuration.h"
+#include "stepdriver_core/error.h"
+#include "yaml_value.h"
+
+namespace stepdriver::check {
+namespace {
+
+using axis::ConfigValue;
+
+ConfigValue valueOf(const std::string& scalar) {
+  const ConfigValue tree = parseYaml("a: " + scalar + "\n", "text");
+  return tree.as<ConfigValue::Map>()->at("a");
+}
+
+std::string errorOf(const std::string& text) {
+  try {
+    parseYaml(text, "axis.yaml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Yaml, TellsIntsAsPyYamlDoes) {
+  for (const auto& [text, number] :
+       std::vector<std::pair<std::string, int>>{{"0", 0},
+                                                {"-7", -7},
+                                                {"+7", 7},
+                                                {"1_000", 1000},
+                                                {"0x1F", 31},
+                                                {"017", 15},
+                                                {"0b101", 5},
+                                                {"-0x10", -16},
+                                                {"1:30", 90},
+                                                {"-1:00", -60},
+                                                {"2147483647", 2147483647},
+                                                {"!!int 5", 5}}) {
+    const ConfigValue value = valueOf(text);
+    ASSERT_NE(value.as<int>(), nullptr) << text << " is " << value.shown();
+    EXPECT_EQ(*value.as<int>(), number) << text;
+  }
+}
+
+TEST(Yaml, TellsDoublesAsPyYamlDoes) {
+  for (const auto& [text, number] :
+       std::vector<std::pair<std::string, double>>{{"1.5", 1.5},
+                                                   {"1.", 1.0},
+                                                   {".5", 0.5},
+                                                   {"-1_0.25", -10.25},
+                                                   {"1.5e+3", 1500.0},
+                                                   {"1.0e-3", 0.001},
+                                                   {"1:30.5", 90.5},
+                                                   {"!!float 2", 2.0},
+                                                   {"deg(90)", 1.5707963267948966},
+                                                   {"deg(-45.0)", -0.7853981633974483},
+                                                   {"rad(1.5)", 1.5},
+                                                   {"rad(pi/2)", 1.5707963267948966},
+                                                   {"rad(2*pi)", 6.283185307179586}}) {
+    const ConfigValue value = valueOf(text);
+    ASSERT_NE(value.as<double>(), nullptr) << text << " is " << value.shown();
+    EXPECT_DOUBLE_EQ(*value.as<double>(), number) << text;
+  }
+  EXPECT_TRUE(std::isnan(*valueOf(".nan").as<double>()));
+  EXPECT_EQ(*valueOf("-.inf").as<double>(), -INFINITY);
+}
+
+TEST(Yaml, TellsBooleansAndNothing) {
+  for (const char* text : {"true", "True", "yes", "on", "ON", "!!bool yes"}) {
+    ASSERT_NE(valueOf(text).as<bool>(), nullptr) << text;
+    EXPECT_TRUE(*valueOf(text).as<bool>()) << text;
+  }
+  for (const char* text : {"false", "FALSE", "no", "off"}) {
+    ASSERT_NE(valueOf(text).as<bool>(), nullptr) << text;
+    EXPECT_FALSE(*valueOf(text).as<bool>()) << text;
+  }
+  for (const char* text : {"", "~", "null"}) EXPECT_TRUE(valueOf(text).isNothing()) << text;
+}
+
+TEST(Yaml, LeavesEverythingElseAString) {
+  for (const char* text :
+       {"x_joint", "GPIO17", "1e3", "1.5e3", "08", "0x", "tRue", "1.2.3", "y", "gpiochip0:17"}) {
+    const ConfigValue value = valueOf(text);
+    ASSERT_NE(value.as<std::string>(), nullptr) << text << " is " << value.shown();
+    EXPECT_EQ(*value.as<std::string>(), text);
+  }
+  for (const char* text : {"\"17\"", "'17'", "!!str 17"}) {
+    ASSERT_NE(valueOf(text).as<std::string>(), nullptr) << text;
+    EXPECT_EQ(*valueOf(text).as<std::string>(), "17");
+  }
+  EXPECT_EQ(*valueOf("'yes'").as<std::string>(), "yes");
+}
+
+TEST(Yaml, ResolvesAliasesAndMergeKeys) {
+  const ConfigValue tree = parseYaml(
+      "pins: &pins {step: A, dir: B}\n"
+      "x: {<<: *pins, dir: C}\n"
+      "y: *pins\n"
+      "z: {<<: [{dir: D}, *pins]}\n",
+      "text");
+  const auto& map = *tree.as<ConfigValue::Map>();
+  const auto pin = [&](const char* axis, const char* name) {
+    return *map.at(axis).as<ConfigValue::Map>()->at(name).as<std::string>();
+  };
+  EXPECT_EQ(pin("x", "step") + pin("x", "dir"), "AC");
+  EXPECT_EQ(pin("y", "step") + pin("y", "dir"), "AB");
+  EXPECT_EQ(pin("z", "step") + pin("z", "dir"), "AD");
+}
+
+TEST(Yaml, SaysWhereItIsWrong) {
+  EXPECT_EQ(errorOf("a: 1\nb: [1, 2\n").rfind("axis.yaml:3:1: ", 0), 0U) << errorOf("b: [1, 2\n");
+  EXPECT_EQ(errorOf("a: 1\na: 2\n"), "axis.yaml:2:1: the key a is there twice");
+  EXPECT_EQ(errorOf("a:\n  b: 4294967296\n"),
+            "axis.yaml:2:6: 4294967296 is beyond the integers of ROS parameters, -2147483648 to "
+            "2147483647");
+  EXPECT_EQ(errorOf("a: deg(x)\n"),
+            "axis.yaml:1:4: deg(x) isn't an angle: it must be as deg(90.0)");
+  EXPECT_EQ(errorOf("a: rad(1+1)\n").rfind("axis.yaml:1:4: rad(1+1) isn't an angle", 0), 0U);
+  EXPECT_EQ(errorOf("a: !!int x\n"), "axis.yaml:1:4: x isn't what its tag !!int says");
+  EXPECT_EQ(errorOf("a: !mine x\n"), "axis.yaml:1:4: the tag !mine can't be a ROS parameter");
+  EXPECT_EQ(errorOf("[1]: x\n"), "axis.yaml:1:1: a key must be a word");
+  EXPECT_EQ(errorOf("a: 1\n---\nb: 2\n").rfind("axis.yaml:3:1: a second document", 0), 0U);
+  EXPECT_NE(errorOf("a: &a [*a]\n").find("alias of what it is in"), std::string::npos);
+}
+
+TEST(Yaml, SaysWhichFileCannotBeRead) {
+  for (const std::string path : {"/nowhere/at/all.yaml", "/"}) {
+    try {
+      loadYaml(path);
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(std::string(error.what()).rfind(path + ": ", 0), 0U) << error.what();
+    }
+  }
+}
+
+TEST(Yaml, OfAnEmptyFileIsAnEmptyMap) {
+  for (const char* text : {"", "# nothing\n", "---\n"}) {
+    const ConfigValue tree = parseYaml(text, "text");
+    ASSERT_NE(tree.as<ConfigValue::Map>(), nullptr) << text;
+    EXPECT_TRUE(tree.as<ConfigValue::Map>()->empty());
+  }
+}
+
+}  // namespace
+}  // namespace stepdriver::check
