@@ -47,8 +47,13 @@ void AxisServices::answerMove(const axis::Move& move, bool wait, Response& respo
   if (!wait) {
     response.position = move.target;
     response.duration = move.duration;
-    response.message = axis_.config().name + ": moves to " + numberText(move.target) + " " +
-                       unitOf(axis_.config().kind) + " in " + numberText(move.duration) + " s";
+    const std::string unit = std::string(" ") + unitOf(axis_.config().kind);
+    response.message = axis_.config().name + ": moves to " + numberText(move.target) + unit +
+                       " in " + numberText(move.duration) + " s";
+    if (move.overshoot > 0.0) {
+      response.message += "; it can't stop before that, goes " + numberText(move.overshoot) + unit +
+                          " beyond, and comes back";
+    }
     return;
   }
   const axis::MoveResult result = axis_.wait(move);

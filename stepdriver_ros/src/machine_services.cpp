@@ -1,10 +1,12 @@
 #include "machine_services.h"
 
 #include <ros/console.h>
+#include <stepdriver/SpeedOverride.h>
 
 #include <exception>
 
 #include "answer.h"
+#include "text.h"
 
 namespace stepdriver::ros_node {
 
@@ -15,6 +17,20 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
   advertise("emergency_stop", queues.emergency(), "all axes are stopped; recover ends that",
             [&machine] { machine.emergencyStop(); });
   advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
+  advertiseSpeedOverride(machine);
+}
+
+void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
+  const boost::function<bool(SpeedOverride::Request&, SpeedOverride::Response&)> handler =
+      [&machine](SpeedOverride::Request& request, SpeedOverride::Response& response) {
+        return answer(response, [&] {
+          machine.setSpeedOverride(request.factor);
+          response.message = "all axes move at " + numberText(request.factor) +
+                             " times the velocity that is commanded, within their maximum";
+        });
+      };
+  node_.setCallbackQueue(&queues_.control());
+  servers_.push_back(node_.advertiseService("speed_override", handler));
 }
 
 void MachineServices::advertise(const std::string& name, ros::CallbackQueue& queue,

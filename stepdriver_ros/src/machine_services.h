@@ -31,6 +31,8 @@ class MachineServices {
 
   ros::NodeHandle node_;
   CallQueues& queues_;
+  void advertiseSpeedOverride(machine::Machine& machine);
+
   std::vector<ros::ServiceServer> servers_;
 };
 

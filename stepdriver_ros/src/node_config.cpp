@@ -11,6 +11,7 @@ using axis::ConfigValue;
 using axis::Range;
 
 constexpr Range kJointStateRates{1.0, 1000.0};
+constexpr Range kJogTimeouts{0.02, 60.0};
 constexpr double kLongestLatenessMs = 1000.0;
 
 GpioBackend readGpio(ConfigReader gpio) {
@@ -51,6 +52,7 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.backend = readGpio(reader.map("gpio"));
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
+  config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
   if (valueOf(tree, "realtime").as<std::string>() != nullptr) {
     config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
   } else {

@@ -16,6 +16,7 @@ enum class GpioBackend { kSimulated, kLibgpiod };
 struct NodeConfig {
   GpioBackend backend = GpioBackend::kSimulated;
   double joint_state_rate = 50.0;  ///< [Hz]
+  double jog_timeout = 0.5;        ///< [s] without a jog message; then the axis comes to rest
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
   bool enforce_realtime = false;   ///< don't start where the machine is too slow for its axes
   SimulationConfig simulation;
@@ -27,6 +28,7 @@ struct NodeConfig {
 /// @code{.yaml}
 /// gpio: {backend: simulated}     # simulated, or libgpiod: the machine's own lines
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
+/// jog_timeout: 0.5               # [s] from 0.02 to 60
 /// realtime:                      # or `enforce` or `warn` alone
 ///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
 ///                                # not start

@@ -14,6 +14,7 @@
 #include "call_queues.h"
 #include "end_requests.h"
 #include "hardware.h"
+#include "jog_subscriber.h"
 #include "machine_services.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
@@ -42,10 +43,11 @@ lines.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
-              ~stop  ~emergency_stop  ~recover
+              ~stop  ~emergency_stop  ~recover  ~speed_override
               ~rig/report (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states
-  parameters  ~axes  ~gpio  ~joint_state_rate  ~realtime  ~simulation  robot_description
+  topics      joint_states  ~endstops  ~axis_states  ~jog (subscribed)
+  parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~simulation
+              robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
 3 the machine is too slow for its axes and ~realtime is enforce.
@@ -110,6 +112,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   }
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
+  const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   queues.start();
   publisher.start();
   ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <random>
@@ -180,7 +181,7 @@ TEST(Machine, KeepsTheChipsTimesOnTheSteadyClockToo) {
 class RandomCommands {
  public:
   RandomCommands(std::uint64_t seed, chip::Model model)
-      : random_(seed), model_(model), bench_({configOf(model)}, {specOf(model)}) {}
+      : random_(seed), model_(model), bench_({configOf(model, seed)}, {specOf(model, seed)}) {}
 
   void run(int commands) {
     for (int i = 0; i < commands && !testing::Test::HasFatalFailure(); ++i) {
@@ -191,24 +192,27 @@ class RandomCommands {
     EXPECT_GT(moves_, commands / 4);
     EXPECT_GT(endstops_, 0);
     EXPECT_GT(stops_, 0);
+    EXPECT_GT(taken_over_, 0);
     checkSpeeds();
   }
 
  private:
-  static axis::AxisConfig configOf(chip::Model model) {
+  static axis::AxisConfig configOf(chip::Model model, std::uint64_t seed) {
     axis::AxisConfig config = linearAxis("x", model);
     config.max_speed = 0.2;
     config.acceleration = 5.0;
     config.deceleration = 3.0;
-    config.start_speed = 0.005;
+    config.stop_deceleration = 4.0;
+    config.start_speed = seed % 4 == 0 ? 0.0 : 0.005;
+    config.jerk = seed % 2 == 0 ? 0.0 : 100.0;
     config.align_on_microstep_change = true;
     config.min_position = -0.02;
     config.max_position = 0.02;
     return config;
   }
 
-  static sim::RigAxisSpec specOf(chip::Model model) {
-    sim::RigAxisSpec spec = test::rigAxis(configOf(model));
+  static sim::RigAxisSpec specOf(chip::Model model, std::uint64_t seed) {
+    sim::RigAxisSpec spec = test::rigAxis(configOf(model, seed));
     spec.min_switch->position = -12.0;
     spec.max_switch->position = 12.0;
     spec.max_switch->bounces = 2;
@@ -218,7 +222,7 @@ class RandomCommands {
 
   void command() {
     axis::Axis& x = bench_.axis();
-    const int kind = static_cast<int>(random_() % 20);
+    const int kind = static_cast<int>(random_() % 24);
     try {
       if (kind < 14) {
         const double target = uniform(-0.022, 0.022);
@@ -240,6 +244,8 @@ class RandomCommands {
       } else if (kind == 17) {
         x.enable(false);
         x.enable(true);
+      } else if (kind >= 20) {
+        wander();
       } else if (kind == 18) {
         x.sleep(true);
         x.sleep(false);
@@ -250,6 +256,32 @@ class RandomCommands {
     } catch (const Refused&) {
       ++refused_;
     }
+  }
+
+  // Commands that take over from one another in mid-motion.
+  void wander() {
+    axis::Axis& x = bench_.axis();
+    for (int i = 0; i < 5; ++i) {
+      switch (random_() % 4) {
+        case 0:
+          x.jog(uniform(-0.2, 0.2));
+          break;
+        case 1:
+          x.setSpeedOverride(uniform(0.05, 2.0));
+          break;
+        case 2:
+          x.stop();
+          break;
+        default:
+          x.moveTo(uniform(-0.02, 0.02), false, uniform(0.001, 0.2));
+      }
+      ++taken_over_;
+      bench_.machine->advance(uniform(0.0, 0.05));
+      check();
+    }
+    x.setSpeedOverride(1.0);
+    x.stop();
+    while (x.state().moving) bench_.machine->advance(0.01);
   }
 
   void check() {
@@ -266,12 +298,19 @@ class RandomCommands {
     ASSERT_LE(std::abs(state.position), 0.02 + 0.5 / 5000.0);
   }
 
-  // No two steps closer than the top speed has them.
+  // No two steps in one direction closer than the top speed has them. A step and the one back may
+  // be: the motion turns between them.
   void checkSpeeds() {
     const auto rises = bench_.trace->times("x", "step", true);
     ASSERT_GT(rises.size(), 1000U);
     const double steps_per_unit = 80'000.0 * (model_ == chip::Model::kDrv8825 ? 2.0 : 1.0);
+    std::vector<std::int64_t> turns = bench_.trace->times("x", "dir", true);
+    const auto back = bench_.trace->times("x", "dir", false);
+    turns.insert(turns.end(), back.begin(), back.end());
+    std::sort(turns.begin(), turns.end());
     for (std::size_t i = 1; i < rises.size(); ++i) {
+      const auto turn = std::lower_bound(turns.begin(), turns.end(), rises[i - 1]);
+      if (turn != turns.end() && *turn < rises[i]) continue;
       ASSERT_GE(static_cast<double>(rises[i] - rises[i - 1]), 1e9 / (0.2 * steps_per_unit) - 1.0)
           << "pulse " << i;
     }
@@ -290,6 +329,7 @@ class RandomCommands {
   int stops_ = 0;
   int endstops_ = 0;
   int refused_ = 0;
+  int taken_over_ = 0;
 };
 
 TEST(Machine, KeepsItsPromisesThroughTenThousandRandomCommands) {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "stepdriver_core/motion/trapezoid.h"
+#include "support/plan_from_rest.h"
 #include "support/recording_lines.h"
 
 namespace stepdriver::pulse {
@@ -37,11 +37,13 @@ class PulseEngineTest : public testing::Test {
     engine = std::make_unique<PulseEngine>(lines, clock, channels, max_lateness);
   }
 
-  std::uint64_t follow(motion::Profile profile, int channel = 0) {
+  /// @param continues serial of the profile that this one goes on from.
+  std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
     profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
     Command command;
     command.channel = channel;
     command.serial = ++serial;
+    command.continues = continues;
     command.profile = profiles.back().get();
     command.restart_interval = restart_interval;
     EXPECT_TRUE(engine->post(command));
@@ -91,7 +93,7 @@ class PulseEngineTest : public testing::Test {
 
   static motion::Profile cruise(Nanoseconds start, std::int64_t from, std::int64_t to,
                                 double speed) {
-    return motion::planTrapezoid(start, from, to, {speed, speed, 1.0, 1.0});
+    return motion::planFromRest(start, from, to, {speed, speed, 1.0, 1.0});
   }
 
   VirtualClock clock;
@@ -104,7 +106,7 @@ class PulseEngineTest : public testing::Test {
 
 TEST_F(PulseEngineTest, PutsEachStepOutAtItsNanosecond) {
   make({config(0)});
-  const auto profile = motion::planTrapezoid(1'000'000, 0, 500, {0, 5000, 20000, 30000});
+  const auto profile = motion::planFromRest(1'000'000, 0, 500, {0, 5000, 20000, 30000});
   motion::StepFinder finder(profile, 0);
   follow(profile);
   runOut();
@@ -138,7 +140,7 @@ TEST_F(PulseEngineTest, KeepsDirSetupAndHoldWhateverThePlanWants) {
     follow(cruise(start, 0, 3, speed));
     runUntil(start + 40'000);
     std::vector<motion::Piece> back{{0.0004, 3.0 - 0.4995, -speed, 0.0, 0.0}};
-    follow({start + 50'010, back});
+    follow({start + 50'010, back}, 0, serial);
     runOut();
     EXPECT_GT(engine->state().slips, 0U);
     expectTimes(channel);
@@ -293,7 +295,7 @@ TEST_F(PulseEngineTest, SwapsAPlanAtItsTimeAndLosesNoStep) {
   const Nanoseconds swap = 101'234'567;
   const motion::MotionState state = first.stateAt(swap);
   std::vector<motion::Piece> on{{0.05, state.position, 500.0, 0.0, 0.0}};
-  follow({swap, on});
+  follow({swap, on}, 0, serial);
   runOut();
   const auto rises = lines.rises(0);
   EXPECT_EQ(static_cast<double>(rises.size()), 125.0);  // 100.23 at 1000/s, then 25 at 500/s
@@ -310,6 +312,22 @@ TEST_F(PulseEngineTest, RefusesAPlanThatComesTooLate) {
   runOut();
   EXPECT_EQ(engine->channel(0).refused, late);
   EXPECT_TRUE(lines.edges.empty());
+}
+
+TEST_F(PulseEngineTest, RefusesAPlanThatGoesOnFromAMotionThatIsOver) {
+  make({config(0)});
+  const auto first = follow(cruise(clock.now(), 0, 10, 1000.0));
+  const auto from_rest = follow(cruise(clock.now() + 5'000'000, 5, 50, 1000.0));
+  runUntil(clock.now() + 4'000'000);
+  EXPECT_EQ(engine->channel(0).refused, from_rest) << "planned from rest, but it moves";
+  const std::size_t edges = lines.edges.size();
+  engine->emergencyStop();
+  runOut();
+  engine->clearEmergencyStop();
+  const auto on = follow(cruise(clock.now() + 1'000'000, 5, 50, 1000.0), 0, first);
+  runOut();
+  EXPECT_EQ(engine->channel(0).refused, on) << "planned from a speed that it no longer has";
+  EXPECT_LE(lines.edges.size(), edges + 1) << "only the pulse that was out ends";
 }
 
 TEST_F(PulseEngineTest, WaitsForThePinsBeforeTheFirstStep) {

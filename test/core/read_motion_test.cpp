@@ -11,8 +11,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(ReadMotion, ChecksEachNumberOfTheMotion) {
-  for (const std::string key :
-       {"steps_per_mm", "max_speed_mm_s", "acceleration_mm_s2", "deceleration_mm_s2"}) {
+  for (const std::string key : {"steps_per_mm", "max_speed_mm_s", "acceleration_mm_s2",
+                                "deceleration_mm_s2", "stop_deceleration_mm_s2"}) {
     expectIssues(linearAxis(),
                  {{key, 0, "is 0, but must be above 0"},
                   {key, -5, "is -5, but must be above 0"},
@@ -27,6 +27,41 @@ TEST(ReadMotion, ChecksEachNumberOfTheMotion) {
        {"min_speed_mm_s", 101, "is 101, but must be at most max_speed_mm_s, which is 100.0"},
        {"min_position_mm", kNan, "is nan, but must be a finite number"},
        {"max_position_mm", "far", "is \"far\" (a string), but must be a number"}});
+}
+
+TEST(ReadMotion, TakesNoJerkLimitAndNoDecelerationOfAStopWhereNoneIsGiven) {
+  ConfigValue axis = linearAxis();
+  EXPECT_EQ(readX(axis).jerk, 0.0);
+  EXPECT_FALSE(readX(axis).stop_deceleration);
+  put(axis, "stop_deceleration_mm_s2", 2000);
+  put(axis, "jerk_mm_s3", 5000.0);
+  EXPECT_EQ(readX(axis).stop_deceleration, 2.0);
+  EXPECT_EQ(readX(axis).jerk, 5.0);
+  ConfigValue rotary = rotaryAxis();
+  put(rotary, "jerk_deg_s3", 180.0);
+  put(rotary, "stop_deceleration_deg_s2", 720.0);
+  EXPECT_DOUBLE_EQ(readX(rotary).jerk, kPi);
+  EXPECT_DOUBLE_EQ(readX(rotary).stop_deceleration.value_or(0.0), 4.0 * kPi);
+}
+
+TEST(ReadMotion, ChecksTheJerkAndTheDecelerationOfAStop) {
+  expectIssues(
+      linearAxis(),
+      {{"jerk_mm_s3", 0, ""},
+       {"jerk_mm_s3", -1.0, "is -1.0, but must be 0 or more"},
+       {"jerk_mm_s3", kNan, "is nan, but must be a finite number of 0 or more"},
+       {"jerk_mm_s3", 1e-6,
+        "is 1e-06, but must be 0 for none, or from 1.25e-05 to 12500000000000, which is 0.001 to "
+        "1e+15 steps/s^3"},
+       {"stop_deceleration_mm_s2", 500.0, ""},
+       {"stop_deceleration_mm_s2", 499.0,
+        "is 499.0, but must be at least acceleration_mm_s2, which is 500.0: a stop must not "
+        "end beyond what it stops"}});
+  ConfigValue axis = linearAxis();
+  put(axis, "deceleration_mm_s2", 800.0);
+  expectIssues(axis, {{"stop_deceleration_mm_s2", 700.0,
+                       "is 700.0, but must be at least deceleration_mm_s2, which is 800.0: a stop "
+                       "must not end beyond what it stops"}});
 }
 
 TEST(ReadMotion, WantsTheLowerLimitBelowTheUpper) {

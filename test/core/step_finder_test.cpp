@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "stepdriver_core/motion/trapezoid.h"
+#include "support/plan_from_rest.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -109,7 +109,7 @@ TEST(StepFinder, FollowsRandomCubicsLikeBisectionDoes) {
 
 TEST(StepFinder, StaysExactOverYears) {
   // 0.001 steps/s for 2^20 steps: 33 years. The period is 1000 s to the last bit of 0.001.
-  const Profile profile = planTrapezoid(0, 0, 1 << 20, {0.001, 0.001, 1.0, 1.0});
+  const Profile profile = planFromRest(0, 0, 1 << 20, {0.001, 0.001, 1.0, 1.0});
   StepFinder finder(profile, 0);
   Step step;
   for (std::int64_t k = 0; k < (1 << 20); ++k) {
@@ -124,7 +124,7 @@ TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
   const std::int64_t steps = std::int64_t{1} << 40;
   const double speed = 19999.7;
   const double acceleration = 12345.6;
-  const Profile profile = planTrapezoid(0, 0, steps, {0.0, speed, acceleration, acceleration});
+  const Profile profile = planFromRest(0, 0, steps, {0.0, speed, acceleration, acceleration});
   const long double ramp = static_cast<long double>(speed) / acceleration;
   const long double way = static_cast<long double>(speed) * speed / (2.0L * acceleration);
   const long double total = 2.0L * ramp + (steps - 2.0L * way) / speed;
@@ -156,7 +156,7 @@ TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
 TEST(StepFinder, IsExactAtTheEndOfALongSlowdown) {
   // From 20,000 steps/s at 1 step/s^2: v^2 - 2 d s leaves nothing of a double there.
   const std::int64_t steps = 400'000'000;
-  const Profile profile = planTrapezoid(0, 0, steps, {0.0, 20000.0, 1e6, 1.0});
+  const Profile profile = planFromRest(0, 0, steps, {0.0, 20000.0, 1e6, 1.0});
   const long double ramps = 20000.0L / 1e6L + 20000.0L;
   const long double ways = 2e8L + 200.0L;
   const long double total = ramps + (steps - ways) / 20000.0L;

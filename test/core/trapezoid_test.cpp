@@ -1,5 +1,3 @@
-#include "stepdriver_core/motion/trapezoid.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "stepdriver_core/motion/step_finder.h"
+#include "support/plan_from_rest.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -16,7 +15,7 @@ namespace {
 struct Textbook {
   long double start, peak, up_time, cruise_time, down_time, up, cruise, length, a, d;
 
-  Textbook(std::int64_t steps, const TrapezoidLimits& limits) {
+  Textbook(std::int64_t steps, const MotionLimits& limits) {
     length = std::abs(static_cast<long double>(steps));
     a = limits.acceleration;
     d = limits.deceleration;
@@ -45,12 +44,12 @@ struct Textbook {
   }
 };
 
-void expectTextbook(std::int64_t from, std::int64_t to, const TrapezoidLimits& limits) {
+void expectTextbook(std::int64_t from, std::int64_t to, const MotionLimits& limits) {
   SCOPED_TRACE(testing::Message() << from << " to " << to << ", start " << limits.start_speed
                                   << ", max " << limits.max_speed << ", a " << limits.acceleration
                                   << ", d " << limits.deceleration);
   const std::int64_t start_ns = 123'456'789;
-  const Profile profile = planTrapezoid(start_ns, from, to, limits);
+  const Profile profile = planFromRest(start_ns, from, to, limits);
   const std::int64_t length = std::abs(to - from);
   const Textbook textbook(length, limits);
   StepFinder finder(profile, from);
@@ -79,20 +78,20 @@ void expectTextbook(std::int64_t from, std::int64_t to, const TrapezoidLimits& l
 }
 
 TEST(Trapezoid, NoWayTakesNoTimeAndNoStep) {
-  const Profile profile = planTrapezoid(7, 42, 42, {0, 100, 100, 100});
+  const Profile profile = planFromRest(7, 42, 42, {0, 100, 100, 100});
   EXPECT_EQ(profile.endNs(), 7);
   Step step;
   EXPECT_FALSE(StepFinder(profile, 42).next(step));
 }
 
 TEST(Trapezoid, FollowsTheTextbook) {
-  const std::vector<TrapezoidLimits> all = {
+  const std::vector<MotionLimits> all = {
       {0, 1000, 2000, 2000},    {0, 1000, 2000, 500},   {0, 1000, 500, 2000},
       {100, 1000, 2000, 2000},  {999.9, 1000, 2000, 1}, {1000, 1000, 2000, 2000},
       {5000, 1000, 2000, 2000}, {0, 1e5, 1e6, 3e5},     {0, 0.001, 0.001, 0.001},
       {0, 2.5e5, 1e9, 1e9},     {0.3, 7.7, 0.013, 17},  {1, 40000, 3, 1e7},
   };
-  for (const TrapezoidLimits& limits : all) {
+  for (const MotionLimits& limits : all) {
     for (const std::int64_t steps : {1, 2, 3, 4, 5, 7, 16, 99, 1000, 4001}) {
       expectTextbook(0, steps, limits);
       expectTextbook(steps / 2, steps / 2 - steps, limits);
@@ -101,7 +100,7 @@ TEST(Trapezoid, FollowsTheTextbook) {
 }
 
 TEST(Trapezoid, ThousandStepsAtThousandPerSecondTakeOneAndAHalf) {
-  const Profile profile = planTrapezoid(0, 0, 1000, {0, 1000, 2000, 2000});
+  const Profile profile = planFromRest(0, 0, 1000, {0, 1000, 2000, 2000});
   EXPECT_EQ(profile.endNs(), 1'500'000'000);
   EXPECT_DOUBLE_EQ(profile.peakSpeed(), 1000.0);
 }
@@ -112,7 +111,7 @@ TEST(Trapezoid, FollowsTheTextbookForRandomMoves) {
   std::uniform_int_distribution<std::int64_t> steps(-3000, 3000);
   for (int i = 0; i < 500; ++i) {
     const auto any = [&] { return std::pow(10.0, decade(random)); };
-    const TrapezoidLimits limits{i % 3 == 0 ? 0.0 : any(), any(), any(), any()};
+    const MotionLimits limits{i % 3 == 0 ? 0.0 : any(), any(), any(), any()};
     const std::int64_t from = steps(random);
     expectTextbook(from, from + steps(random), limits);
     if (testing::Test::HasFatalFailure()) return;
@@ -120,12 +119,12 @@ TEST(Trapezoid, FollowsTheTextbookForRandomMoves) {
 }
 
 TEST(Trapezoid, RefusesWhatTakesCenturies) {
-  EXPECT_THROW(planTrapezoid(0, 0, std::int64_t{1} << 40, {0.001, 0.001, 1, 1}), std::range_error);
+  EXPECT_THROW(planFromRest(0, 0, std::int64_t{1} << 40, {0.001, 0.001, 1, 1}), std::range_error);
 }
 
 TEST(Stop, RestsOnAWholeStepWithinTheDeceleration) {
-  const TrapezoidLimits limits{50, 1000, 2000, 1500};
-  const Profile move = planTrapezoid(0, 0, 4000, limits);
+  const MotionLimits limits{50, 1000, 2000, 1500};
+  const Profile move = planFromRest(0, 0, 4000, limits);
   for (std::int64_t at = 1'000'000; at < move.endNs(); at += 13'333'337) {
     const MotionState state = move.stateAt(at);
     const Profile stop = planStop(at, state, limits, 4000);
@@ -149,7 +148,7 @@ TEST(Stop, DoesNothingToAnAxisAtRest) {
 }
 
 TEST(Profile, HasThePositionAndSpeedOfTheTextbookInBetween) {
-  const Profile profile = planTrapezoid(1000, 100, 1100, {0, 1000, 2000, 1000});
+  const Profile profile = planFromRest(1000, 100, 1100, {0, 1000, 2000, 1000});
   EXPECT_DOUBLE_EQ(profile.stateAt(0).position.value(), 100.0);
   const MotionState quarter = profile.stateAt(1000 + 250'000'000);
   EXPECT_NEAR(quarter.position.value(), 100.0 + 62.5, 1e-9);

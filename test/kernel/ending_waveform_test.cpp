@@ -39,7 +39,7 @@ TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
   EXPECT_EQ(bench.axis("x").wait(move).end, MoveEnd::kStopped);
   const Waveform seen = read(bench, axes).at("x");
 
-  const motion::TrapezoidLimits limits = limitsOf(axes[0]);
+  const motion::MotionLimits limits = limitsOf(axes[0]);
   const std::size_t cruised = pulsesBefore(seen, stopped_ns);
   EXPECT_LT(seen.position(), kFar);
   EXPECT_EQ(seen.backward(), 0);

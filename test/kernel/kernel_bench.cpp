@@ -98,15 +98,16 @@ KernelTrace KernelBench::finish(const std::string& name) {
   return recording_.stop(name);
 }
 
-motion::TrapezoidLimits limitsOf(const axis::AxisConfig& config) {
+motion::MotionLimits limitsOf(const axis::AxisConfig& config) {
   const double scale = config.steps_per_unit;
   return {config.start_speed * scale, config.max_speed * scale, config.acceleration * scale,
-          config.deceleration * scale};
+          config.deceleration * scale, config.jerk * scale};
 }
 
 std::vector<motion::Step> plannedSteps(std::int64_t from, std::int64_t to,
-                                       const motion::TrapezoidLimits& limits) {
-  const motion::Profile profile = motion::planTrapezoid(0, from, to, limits);
+                                       const motion::MotionLimits& limits) {
+  const motion::Profile profile =
+      motion::planMove(0, {motion::fromInteger(from), 0.0, 0.0}, to, limits).profile;
   motion::StepFinder finder(profile, from);
   std::vector<motion::Step> steps;
   for (motion::Step step; finder.next(step);) steps.push_back(step);

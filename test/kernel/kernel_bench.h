@@ -10,8 +10,8 @@
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/motion/planner.h"
 #include "stepdriver_core/motion/step_finder.h"
-#include "stepdriver_core/motion/trapezoid.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "support/gpio_sim.h"
 #include "waveform.h"
@@ -81,10 +81,10 @@ class KernelBench {
 };
 
 /// What axisAt() is planned with, in microsteps.
-motion::TrapezoidLimits limitsOf(const axis::AxisConfig& config);
+motion::MotionLimits limitsOf(const axis::AxisConfig& config);
 
 /// The steps of a move, in nanoseconds after its start.
 std::vector<motion::Step> plannedSteps(std::int64_t from, std::int64_t to,
-                                       const motion::TrapezoidLimits& limits);
+                                       const motion::MotionLimits& limits);
 
 }  // namespace stepdriver::kernel

@@ -5,6 +5,7 @@
 #include <stepdriver/SetPosition.h>
 
 #include <cmath>
+#include <future>
 #include <limits>
 #include <string>
 #include <vector>
@@ -161,20 +162,43 @@ TEST(Moves, RefusesWhileAsleep) {
   EXPECT_EQ(node.pulses(), 0);
 }
 
-TEST(Moves, RefusesASecondTargetWhileMoving) {
+TEST(Moves, ReplacesATargetWhileMovingAndTellsWhoeverWaitsForTheFirst) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  auto first = std::async(std::launch::async, [&node] { return node.moveTo(0.15, true); });
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 4000; }));
+  const auto second = node.moveTo(0.01, true);
+  EXPECT_TRUE(second.success) << second.message;
+  EXPECT_NEAR(second.position, 0.01, 1e-12);
+  const auto replaced = first.get();
+  EXPECT_FALSE(replaced.success);
+  expectSays(replaced.message, "a move to 0.01 m took over");
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward.at(0) - report.pulses_backward.at(0), 800);
+  EXPECT_EQ(report.violations.at(0), 0U) << report.violation_kinds.at(0);
+}
+
+TEST(Moves, SaysWhereItPassesItsTargetFirst) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.set("axes/x/deceleration_mm_s2", 50.0);  // 100 mm to rest
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.2, false).success);
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 2400; }));
+  const auto nearer = node.moveTo(0.08, false);
+  EXPECT_TRUE(nearer.success) << nearer.message;
+  expectSays(nearer.message, "beyond, and comes back");
+}
+
+TEST(Moves, RefusesABadTargetWhileMovingAndKeepsTheOneItHas) {
   NodeUnderTest node;
   node.set("simulation/speed", 1.0);
   node.start();
   EXPECT_TRUE(node.moveTo(0.1, false).success);
-  for (const bool wait : {false, true}) {
-    const auto answer = node.moveTo(0.05, wait);
-    EXPECT_FALSE(answer.success);
-    expectSays(answer.message, "busy");
-  }
-  const auto answer = node.call<MoveRounds>("x/move_rounds", rounds(0.1));
-  EXPECT_FALSE(answer.success);
-  expectSays(answer.message, "busy");
-  // The move under way is the first one still: it ends at 0.1 m.
+  const auto beyond = node.moveTo(0.3, true);
+  EXPECT_FALSE(beyond.success);
+  expectSays(beyond.message, "soft limit");
   EXPECT_TRUE(waitUntil([&] { return node.pulses() == 8000; }));
   EXPECT_EQ(node.rig().pulses_backward.at(0), 0);
 }

@@ -124,7 +124,7 @@ TEST(WaitingClients, HoldUpNoOtherCall) {
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > 100; }));
   // Each of these has its answer long before the move ends, at 2.2 s.
   for (int i = 0; i < 10; ++i) {
-    EXPECT_FALSE(node.moveTo(0.1, true).success);
+    EXPECT_FALSE(node.moveTo(0.3, true).success);
     Microstep::Request request;
     request.microsteps = 8;
     EXPECT_FALSE(node.call<Microstep>("x/microstep", request).success);

@@ -49,6 +49,16 @@ MoveResult Axis::wait(const Move& move) {
   return *result;
 }
 
+void Axis::jog(double velocity) {
+  const Lock lock(impl_->mutex);
+  impl_->checkedJog(velocity);
+}
+
+void Axis::setSpeedOverride(double factor) {
+  const Lock lock(impl_->mutex);
+  impl_->changeOverride(factor);
+}
+
 void Axis::stop() {
   const Lock lock(impl_->mutex);
   impl_->decelerate("it was stopped");
@@ -131,7 +141,7 @@ void Axis::setMicrosteps(int microsteps) {
     axis.refuseUnlessReadyToMove();
     axis.refuseBeyondLimits(axis.positionOf(static_cast<double>(common)), "the common position");
     axis.refuseIntoEndstop(common - axis.harvest().count);
-    const Move move = axis.start(common, axis.maxSpeed());
+    const Move move = axis.startMove(common, axis.maxSpeed());
     lock.unlock();
     const MoveResult result = wait(move);
     lock.lock();
@@ -170,9 +180,12 @@ AxisState Axis::state() const {
   if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
     const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
     state.velocity = velocity / axis.stepsPerUnit();
-    state.target =
-        axis.positionOf(motion->stopped_by.empty() ? static_cast<double>(motion->target)
-                                                   : motion->profile->endPosition().value());
+    const Goal& goal = motion->goal;
+    if (goal.stops()) {
+      state.target = axis.positionOf(motion->profile->endPosition().value());
+    } else if (goal.target) {
+      state.target = axis.positionOf(static_cast<double>(*goal.target));
+    }
   }
   return state;
 }

@@ -64,7 +64,7 @@ void Axis::Impl::conclude(const pulse::ChannelState& state) {
   }
   if (state.end_abrupt && state.end != pulse::EndReason::kDone) position_valid = false;
   if (const Motion* motion = log.find(state.ended)) {
-    log.conclude(motion->move, resultOf(*motion, state));
+    if (!log.result(motion->goal.move)) log.conclude(motion->goal.move, resultOf(*motion, state));
   }
 }
 
@@ -75,8 +75,8 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
   std::string why;
   switch (state.end) {
     case pulse::EndReason::kDone:
-      result.end = motion.stopped_by.empty() ? MoveEnd::kReached : MoveEnd::kStopped;
-      why = motion.stopped_by;
+      result.end = motion.goal.stops() ? MoveEnd::kStopped : MoveEnd::kReached;
+      why = motion.goal.stopped_by;
       break;
     case pulse::EndReason::kEndstopMin:
       result.end = MoveEnd::kEndstopMin;
@@ -100,8 +100,11 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
   if (result.end == MoveEnd::kReached) {
     result.message = config.name + " reached " + show(result.position);
   } else {
-    result.message = config.name + " stands at " + show(result.position) + ", not at " +
-                     show(positionOf(static_cast<double>(motion.target))) + ": " + why;
+    result.message = config.name + " stands at " + show(result.position);
+    if (motion.goal.target) {
+      result.message += ", not at " + show(positionOf(static_cast<double>(*motion.goal.target)));
+    }
+    result.message += ": " + why;
     if (!position_valid && state.end_abrupt) {
       result.message += "; it stopped too fast for the position to be trusted";
     }
@@ -122,10 +125,10 @@ double Axis::Impl::maxSpeed() const {
   return std::min(config.max_speed, 1.0 / (period * stepsPerUnit()));
 }
 
-motion::TrapezoidLimits Axis::Impl::limits(double velocity) const {
+motion::MotionLimits Axis::Impl::limits(double velocity) const {
   const double scale = stepsPerUnit();
   return {config.start_speed * scale, velocity * scale, config.acceleration * scale,
-          config.deceleration * scale};
+          config.deceleration * scale, config.jerk * scale};
 }
 
 std::string Axis::Impl::show(double value, const char* per) const {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,7 +10,7 @@
 #include "stepdriver_core/axis/axis_lines.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/motion/trapezoid.h"
+#include "stepdriver_core/motion/planner.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 
 namespace stepdriver::axis {
@@ -31,14 +30,16 @@ class Axis::Impl {
   double maxSpeed() const;
   double positionOf(double count) const { return origin + count / stepsPerUnit(); }
   double countOf(double position) const { return (position - origin) * stepsPerUnit(); }
-  motion::TrapezoidLimits limits(double velocity) const;
+  motion::MotionLimits limits(double velocity) const;
   std::string show(double value, const char* per = "") const;
   static std::string inMilliseconds(pulse::Nanoseconds time);
 
   // Orders to the engine.
-  Move start(std::int64_t target, double velocity);
+  Move startMove(std::int64_t target, double velocity);
   Move checkedMove(double position, bool relative, double velocity);
+  void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
+  void changeOverride(double factor);
   /// Both let go of the lock while the axis comes to rest.
   void awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
   void restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
@@ -62,6 +63,7 @@ class Axis::Impl {
   void refuseUnlessOpen() const;
   void refuseWhileMoving(const std::string& what);
   void refuseUnlessReadyToMove();
+  void refuseTooFast(double speed) const;
   void refuseBeyondLimits(double position, const std::string& what) const;
   void refuseIntoEndstop(std::int64_t steps) const;
   std::optional<bool> endstopActive(int line, const std::optional<Endstop>& endstop) const;
@@ -83,12 +85,25 @@ class Axis::Impl {
   int microsteps;
   double origin = 0.0;          // [unit] the position at count 0
   std::int64_t home_count = 0;  // a count at which the translator is at Home
+  double speed_override = 1.0;
   std::string fault;
   std::string closed;
   MoveLog log;
 
  private:
-  void follow(Motion motion, const std::function<motion::Profile(std::int64_t)>& plan);
+  double checkedVelocity(double velocity) const;
+  double relativeOrigin(std::int64_t count);
+  const Motion* underWay();
+  const Motion& begin(Goal goal);
+  void follow(const Goal& goal);
+  std::uint64_t send(const Goal& goal, pulse::Nanoseconds lead);
+  std::int64_t stepsTo(const Goal& goal);
+  motion::Plan plan(const Goal& goal, std::int64_t at, const Motion* before,
+                    std::int64_t count) const;
+  motion::Profile planStopOf(const Motion& before, std::int64_t at,
+                             const motion::MotionState& from) const;
+  pulse::Nanoseconds restartInterval() const;
+  MoveResult replacedBy(const Motion& motion, std::int64_t began);
   void conclude(const pulse::ChannelState& state);
   MoveResult resultOf(const Motion& motion, const pulse::ChannelState& state);
 

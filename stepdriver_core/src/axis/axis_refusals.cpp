@@ -21,11 +21,15 @@ void Axis::Impl::refuseWhileMoving(const std::string& what) {
 
 void Axis::Impl::refuseUnlessReadyToMove() {
   refuseUnlessOpen();
-  const bool busy = moving();
+  harvest();
   if (!fault.empty()) refuse("at fault: " + fault + "; call recover first");
-  if (busy) refuse("busy: it moves; wait for the end of that move, or stop it");
   if (disabling || !enabled) refuse("disabled; enable it first");
   if (asleep) refuse("asleep; wake it first");
+}
+
+void Axis::Impl::refuseTooFast(double speed) const {
+  if (speed <= maxSpeed() * (1.0 + 1e-12)) return;
+  refuse("the velocity " + show(speed, "/s") + " is above the maximum " + show(maxSpeed(), "/s"));
 }
 
 void Axis::Impl::refuseBeyondLimits(double position, const std::string& what) const {

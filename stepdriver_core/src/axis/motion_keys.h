@@ -16,12 +16,13 @@ struct MotionKeys {
   std::string steps_per_unit;
   std::string per_round;  ///< empty: there is none
   std::string max_speed, min_speed;
-  std::string acceleration, deceleration;
+  std::string acceleration, deceleration, stop_deceleration, jerk;
   std::string min_position, max_position;
 
   std::vector<std::string> all() const {
-    std::vector<std::string> keys{steps_per_unit, max_speed,    min_speed,   acceleration,
-                                  deceleration,   min_position, max_position};
+    std::vector<std::string> keys{steps_per_unit, max_speed,    min_speed,
+                                  acceleration,   deceleration, stop_deceleration,
+                                  jerk,           min_position, max_position};
     if (!per_round.empty()) keys.push_back(per_round);
     return keys;
   }
@@ -39,14 +40,24 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "min_speed_mm_s",
                                  "acceleration_mm_s2",
                                  "deceleration_mm_s2",
+                                 "stop_deceleration_mm_s2",
+                                 "jerk_mm_s3",
                                  "min_position_mm",
                                  "max_position_mm"};
-  static const MotionKeys rotary{Kind::kRotary,         "degree",
-                                 180.0L / kPi,          360.0L,
-                                 "steps_per_degree",    "",
-                                 "max_speed_deg_s",     "min_speed_deg_s",
-                                 "acceleration_deg_s2", "deceleration_deg_s2",
-                                 "min_position_deg",    "max_position_deg"};
+  static const MotionKeys rotary{Kind::kRotary,
+                                 "degree",
+                                 180.0L / kPi,
+                                 360.0L,
+                                 "steps_per_degree",
+                                 "",
+                                 "max_speed_deg_s",
+                                 "min_speed_deg_s",
+                                 "acceleration_deg_s2",
+                                 "deceleration_deg_s2",
+                                 "stop_deceleration_deg_s2",
+                                 "jerk_deg_s3",
+                                 "min_position_deg",
+                                 "max_position_deg"};
   return kind == Kind::kLinear ? linear : rotary;
 }
 

@@ -11,13 +11,27 @@
 
 namespace stepdriver::axis {
 
-/// A profile that the pulse engine has, and the move that it belongs to.
+/// What an axis was asked to do: all that a plan for it needs, from wherever the axis is.
+struct Goal {
+  enum class Kind { kMove, kJog };
+
+  Kind kind = Kind::kMove;
+  std::uint64_t move = 0;  ///< the move that it belongs to
+  /// [microsteps] Of a move; of a jog where it has to stand at the latest, none without a limit.
+  std::optional<std::int64_t> target;
+  double velocity = 0.0;   ///< [unit/s] as asked for, before any override; of a jog with its sign
+  std::string stopped_by;  ///< what decelerates it; empty: it goes on
+
+  bool stops() const { return !stopped_by.empty(); }
+};
+
+/// A profile that the pulse engine has, and what it is for.
 struct Motion {
-  std::uint64_t serial = 0;  ///< of the command that it went out with
-  std::uint64_t move = 0;
-  std::int64_t target = 0;    ///< [microsteps]
+  std::uint64_t serial = 0;     ///< of the command that it went out with
+  std::uint64_t continues = 0;  ///< serial of the motion that it was planned to take over from
+  Goal goal;
   std::int64_t begin_ns = 0;  ///< motion time at which the move began
-  std::string stopped_by;     ///< what decelerates it; empty: it goes to its target
+  double overshoot = 0.0;     ///< [microsteps] how far it passes its end before it comes back
   std::unique_ptr<const motion::Profile> profile;
 };
 

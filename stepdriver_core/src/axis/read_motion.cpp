@@ -18,6 +18,8 @@ constexpr double kHighestScale = 1e9;
 constexpr double kLowestRate = 1e-3;          // [steps/s]
 constexpr double kLowestAcceleration = 1e-3;  // [steps/s^2]
 constexpr double kHighestAcceleration = 1e12;
+constexpr double kLowestJerk = 1e-3;  // [steps/s^3]
+constexpr double kHighestJerk = 1e15;
 constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: each step is a double of its own
 constexpr int kMostFullSteps = 1'000'000;
 // What is beyond a limit only by the rounding of units, or of the bound in a message, isn't.
@@ -73,6 +75,7 @@ class MotionReader {
     }
     readSpeeds(config);
     readAccelerations(config);
+    readJerk(config);
     readPositions(config);
   }
 
@@ -179,10 +182,35 @@ class MotionReader {
   void readAccelerations(AxisConfig& config) {
     const auto up = axis_.findNumber(keys_.acceleration, Range::positive(), presence_);
     const auto down = axis_.findNumber(keys_.deceleration, Range::positive(), Presence::kOptional);
+    const auto stop =
+        axis_.findNumber(keys_.stop_deceleration, Range::positive(), Presence::kOptional);
     if (up) checkAcceleration(keys_.acceleration, *up);
     if (down) checkAcceleration(keys_.deceleration, *down);
+    if (stop) checkAcceleration(keys_.stop_deceleration, *stop);
+    const auto& slowest = down ? down : up;
+    if (stop && slowest && *stop < *slowest) {
+      const std::string& key = down ? keys_.deceleration : keys_.acceleration;
+      axis_.issue(keys_.stop_deceleration, is(keys_.stop_deceleration) + "at least " + key +
+                                               ", which is " + axis_.shown(key) +
+                                               ": a stop must not end beyond what it stops");
+    }
     config.acceleration = si(up.value_or(0.0));
     config.deceleration = down ? si(*down) : config.acceleration;
+    if (stop) config.stop_deceleration = si(*stop);
+  }
+
+  void readJerk(AxisConfig& config) {
+    const double jerk =
+        axis_.findNumber(keys_.jerk, Range::notNegative(), Presence::kOptional).value_or(0.0);
+    config.jerk = si(jerk);
+    if (!steps_per_unit_ || jerk == 0.0) return;
+    const double steps = jerk * *steps_per_unit_;
+    if (steps * kSlack >= kLowestJerk && steps <= kHighestJerk * kSlack) return;
+    axis_.issue(keys_.jerk, is(keys_.jerk) + "0 for none, or from " +
+                                lowerBoundText(kLowestJerk / *steps_per_unit_) + " to " +
+                                upperBoundText(kHighestJerk / *steps_per_unit_) + ", which is " +
+                                numberText(kLowestJerk) + " to " + numberText(kHighestJerk) +
+                                " steps/s^3");
   }
 
   void checkAcceleration(const std::string& key, double acceleration) {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <optional>
 #include <thread>
@@ -19,6 +20,8 @@ namespace stepdriver::machine {
 namespace {
 
 constexpr std::int64_t kInputPeriodNs = 100'000'000;
+constexpr double kLeastOverride = 0.01;
+constexpr double kMostOverride = 2.0;
 
 pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 
@@ -126,6 +129,16 @@ const std::optional<pulse::Capability>& Machine::capability() const { return imp
 
 void Machine::stop() {
   impl_->forAll([](axis::Axis& axis) { axis.stop(); });
+}
+
+void Machine::setSpeedOverride(double factor) {
+  if (!(factor >= kLeastOverride && factor <= kMostOverride)) {
+    char text[96];
+    std::snprintf(text, sizeof text, "the speed override is %.9g, but must be from %g to %g",
+                  factor, kLeastOverride, kMostOverride);
+    throw Refused(text);
+  }
+  impl_->forAll([factor](axis::Axis& axis) { axis.setSpeedOverride(factor); });
 }
 
 void Machine::emergencyStop() {

@@ -58,6 +58,16 @@ bool operator<(DoubleDouble a, DoubleDouble b) {
   return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);
 }
 
+DoubleDouble abs(DoubleDouble a) { return a.hi < 0.0 ? -a : a; }
+
+DoubleDouble sqrt(DoubleDouble a) {
+  if (!(a.hi > 0.0)) return 0.0;
+  // One of Newton's steps from the double nearest to the root.
+  const double root = std::sqrt(a.hi);
+  const DoubleDouble rest = a - exactProduct(root, root);
+  return normalized(root, rest.hi / (2.0 * root));
+}
+
 Split split(DoubleDouble value) {
   const auto high = static_cast<std::int64_t>(std::nearbyint(value.hi));
   const double rest = (value.hi - static_cast<double>(high)) + value.lo;

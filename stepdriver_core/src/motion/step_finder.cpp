@@ -7,28 +7,22 @@ namespace stepdriver::motion {
 namespace {
 
 // From this time on a double's 53 bits leave more than 1/32 ns of doubt.
-constexpr double kFarNs = 281474976710656.0;  // 2^48, 78 hours
+constexpr double kFar = 281474.976710656;  // s, 2^48 ns, 78 hours
 
-// The first time after `after` and clearly before the end of the piece at which the velocity
-// changes its sign; the end where there is none. A turning point this close to an end moves
-// nothing.
-double firstTurn(const Piece& piece, double after) {
-  const double end = piece.duration.value();
-  const double margin = 1e-9 * end;
-  double first = end;
-  const auto consider = [&](double root) {
-    if (root > after + margin && root < end - margin) first = std::min(first, root);
-  };
-  if (piece.j == 0.0) {
-    if (piece.a != 0.0) consider(-piece.v0 / piece.a);
-    return first;
-  }
-  const double discriminant = piece.a * piece.a - 2.0 * piece.j * piece.v0;
-  if (discriminant <= 0.0) return first;  // never, or a touch without a change of sign
-  const double q = -(piece.a + std::copysign(std::sqrt(discriminant), piece.a));
-  consider(q / piece.j);
-  if (q != 0.0) consider(2.0 * piece.v0 / q);
-  return first;
+// Nearest integer of a number below 2^51: the sum has no bits left for a fraction. (llrint() is a
+// call into the library.)
+std::int64_t nearest(double number) {
+  constexpr double kShift = 6755399441055744.0;  // 1.5 * 2^52
+  return static_cast<std::int64_t>((number + kShift) - kShift);
+}
+
+// The first turning point or highest speed after the time `after`; the end where there is none.
+double firstCut(const Piece& piece, double after) {
+  const double turn = piece.firstTurn(after);
+  if (piece.j == 0.0) return turn;
+  const double level = -piece.a / piece.j;
+  const double margin = 1e-9 * piece.duration.value();
+  return level > after + margin && level < turn - margin ? level : turn;
 }
 
 }  // namespace
@@ -36,47 +30,69 @@ double firstTurn(const Piece& piece, double after) {
 StepFinder::StepFinder(const Profile& profile, std::int64_t count)
     : profile_(&profile), count_(count) {}
 
+// Inline: these two are the way of each step.
+inline double StepFinder::cubicTime(double way) {
+  constexpr double kNear = 1e-13;  // s
+  Stretch& s = stretch_;
+  // In the order that keeps what waits for the last step short.
+  const double before = 4.0 * s.last[2] - 6.0 * s.last[1] - s.last[3];
+  double t = before + 4.0 * s.last[0];
+  const double bend = t * s.j;
+  const double v = s.v + t * (s.a + bend * 0.5);
+  const double error = (way - t * s.v) - (t * t) * (s.a * 0.5 + bend * (1.0 / 6.0));
+  const double correction = error / v;
+  const double a = std::abs(s.a) + std::abs(bend);
+  const bool inside = s.known >= 4 && t > 0.0 && t < s.duration;
+  if (inside && a * correction * correction < kNear * v) {
+    t += correction;
+  } else {
+    t = bracketedTime(way);
+    ++s.known;
+  }
+  s.last = {t, s.last[0], s.last[1], s.last[2]};
+  return t;
+}
+
+inline double StepFinder::timeFromAnchor(double way) {
+  if (!(way > 0.0)) return 0.0;
+  const Stretch& s = stretch_;
+  switch (s.curve) {
+    case Stretch::Curve::kLine:
+      return way / s.v;
+    case Stretch::Curve::kParabola:
+      return 2.0 * way / (s.v + std::sqrt(s.v_squared + s.twice_a * way));
+    default:
+      return cubicTime(way);
+  }
+}
+
 bool StepFinder::next(Step& step) {
   while (stretch_.steps_left == 0) {
     if (!enterNext()) return false;
   }
-  Stretch& stretch = stretch_;
-  const double half = stretch.direction * 0.5;
-  const double line = static_cast<double>(count_ - stretch.anchor_position.whole) + half;
-  const double way = stretch.direction * stretch.time_sign * (line - stretch.anchor_position.rest);
-  const double t = timeFromAnchor(way);
-  std::int64_t time = 0;
-  if (t * 1e9 < kFarNs) {
-    time = stretch.anchor_ns.whole +
-           std::llrint(stretch.anchor_ns.rest + stretch.time_sign * (t * 1e9));
-  } else {
-    time = refined(t, line);
-  }
-  time = std::clamp(time, stretch.begin_ns, stretch.end_ns);
-  stretch.last = t;
-  stretch.begin_ns = time;
-  --stretch.steps_left;
+  Stretch& s = stretch_;
+  const double line = static_cast<double>(count_ - s.anchor_position.whole) + s.half;
+  const double t = timeFromAnchor(s.way_sign * (line - s.anchor_position.rest));
+  std::int64_t time =
+      t < kFar ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + t * s.ns_per_s) : refined(t, line);
+  time = std::min(std::max(time, s.begin_ns), s.end_ns);
+  s.begin_ns = time;
+  --s.steps_left;
 
-  step.time_ns = profile_->startNs() + time;
-  step.direction = stretch.direction > 0.0 ? 1 : -1;
-  count_ += step.direction;
+  step.time_ns = time;
+  step.direction = s.direction;
+  count_ += s.direction;
   return true;
 }
 
 bool StepFinder::enterNext() {
   if (profile_ == nullptr || piece_ >= profile_->pieces().size()) return false;
   const Piece& piece = profile_->pieces()[piece_];
-  const double end = piece.duration.value();
-  const double turn = firstTurn(piece, done_);
-  const DoubleDouble begin = done_;
-  const DoubleDouble stretch_end = turn < end ? DoubleDouble(turn) : piece.duration;
-  enter(piece, begin, stretch_end, profile_->pieceStart(piece_));
-  if (turn < end) {
-    done_ = turn;
-  } else {
-    ++piece_;
-    done_ = 0.0;
-  }
+  const double cut = firstCut(piece, done_);
+  const bool last = !(cut < piece.duration.value());
+  enter(piece, done_, last ? piece.duration : DoubleDouble(cut), profile_->pieceStart(piece_));
+  done_ = last ? 0.0 : cut;
+  if (last) ++piece_;
   return true;
 }
 
@@ -101,38 +117,42 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   const double v_end = direction * piece.velocityAt(end).value();
   const bool backwards = v_end < v_begin;
   const DoubleDouble anchor = backwards ? end : begin;
-  const double acceleration = piece.a + piece.j * anchor.value();
 
-  stretch_.direction = direction;
+  stretch_.direction = direction > 0.0 ? 1 : -1;
+  stretch_.half = direction * 0.5;
   stretch_.time_sign = backwards ? -1.0 : 1.0;
-  stretch_.anchor_ns = splitNanoseconds(piece_start + anchor);
+  stretch_.ns_per_s = 1e9 * stretch_.time_sign;
+  stretch_.way_sign = direction * stretch_.time_sign;
+  const auto motion_time = [&](DoubleDouble after) {
+    const Split ns = splitNanoseconds(piece_start + after);
+    return Split{profile_->startNs() + ns.whole, ns.rest};
+  };
+  stretch_.anchor_ns = motion_time(anchor);
   stretch_.anchor_position = backwards ? goal : split(from);
   stretch_.v = std::max(0.0, backwards ? v_end : v_begin);
-  stretch_.a = stretch_.time_sign * direction * acceleration;
+  stretch_.v_squared = stretch_.v * stretch_.v;
+  stretch_.a = stretch_.way_sign * piece.accelerationAt(anchor).value();
+  stretch_.twice_a = 2.0 * stretch_.a;
   stretch_.j = direction * piece.j;
+  stretch_.curve = piece.j != 0.0   ? Stretch::Curve::kCubic
+                   : piece.a != 0.0 ? Stretch::Curve::kParabola
+                                    : Stretch::Curve::kLine;
   stretch_.duration = (end - begin).value();
-  stretch_.last = backwards ? stretch_.duration : 0.0;
-  stretch_.begin_ns = splitNanoseconds(piece_start + begin).whole;
-  stretch_.end_ns = splitNanoseconds(piece_start + end).whole;
+  stretch_.last[0] = backwards ? stretch_.duration : 0.0;
+  stretch_.known = 0;
+  stretch_.begin_ns = motion_time(begin).whole;
+  stretch_.end_ns = motion_time(end).whole;
   stretch_.steps_left = steps;
 }
 
-double StepFinder::timeFromAnchor(double way) {
-  if (!(way > 0.0)) return 0.0;
+double StepFinder::bracketedTime(double way) const {
   const Stretch& s = stretch_;
-  if (s.j != 0.0) return solveCubic(way);
-  if (s.a == 0.0) return way / s.v;
-  return 2.0 * way / (s.v + std::sqrt(s.v * s.v + 2.0 * s.a * way));
-}
-
-double StepFinder::solveCubic(double way) const {
-  const Stretch& s = stretch_;
-  double low = s.time_sign > 0.0 ? s.last : 0.0;
-  double high = s.time_sign > 0.0 ? s.duration : s.last;
+  double low = s.time_sign > 0.0 ? s.last[0] : 0.0;
+  double high = s.time_sign > 0.0 ? s.duration : s.last[0];
   const auto way_at = [&s](double t) { return t * (s.v + t * (s.a / 2.0 + t * (s.j / 6.0))); };
   const auto speed_at = [&s](double t) { return s.v + t * (s.a + t * (s.j / 2.0)); };
 
-  double t = s.last;
+  double t = s.last[0];
   double speed = speed_at(t);
   // 100 halvings end at the last bit wherever Newton's steps leave the bracket every time.
   for (int i = 0; i < 100; ++i) {
@@ -150,9 +170,9 @@ double StepFinder::solveCubic(double way) const {
 
 std::int64_t StepFinder::refined(double t, double line) const {
   const Stretch& s = stretch_;
-  const Piece seen{DoubleDouble(s.duration), DoubleDouble(0.0), s.v, s.a, s.j};
-  const DoubleDouble way = DoubleDouble(s.direction * s.time_sign) *
-                           (DoubleDouble(line) - DoubleDouble(s.anchor_position.rest));
+  const Piece seen{s.duration, 0.0, s.v, s.a, s.j};
+  const DoubleDouble way =
+      DoubleDouble(s.way_sign) * (DoubleDouble(line) - DoubleDouble(s.anchor_position.rest));
   const double correction =
       (way - seen.positionAt(DoubleDouble(t))).value() / seen.velocityAt(DoubleDouble(t)).value();
   const DoubleDouble exact = DoubleDouble(t) + DoubleDouble(correction);

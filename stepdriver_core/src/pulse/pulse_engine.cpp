@@ -95,7 +95,9 @@ void PulseEngine::follow(Channel& channel, const Command& command, Nanoseconds n
   const Nanoseconds start = command.profile->startNs();
   const bool late =
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
-  if (late || channel.pins_serial != 0) {
+  const std::uint64_t latest =
+      channel.successor != nullptr ? channel.successor_serial : channel.state.following;
+  if (late || channel.pins_serial != 0 || command.continues != latest) {
     channel.state.refused = command.serial;
     return;
   }

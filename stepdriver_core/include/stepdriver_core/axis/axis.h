@@ -36,13 +36,17 @@ class Axis {
 
   const AxisConfig& config() const;
 
-  /// Starts a motion from rest to rest.
+  /// Moves to a position and rests there. A motion under way is replaced: the axis goes on from the
+  /// speed and the acceleration that it has, and whoever waits for the earlier move is told. It
+  /// doesn't pass its target, but where it can't stop before it; then it comes back, and
+  /// Move::overshoot says how far it goes.
   ///
-  /// @param position [unit] absolute, or from where the axis stands where `relative`.
+  /// @param position [unit] absolute, or, where `relative`, from where the axis stands; while it
+  ///   moves, from where that motion would have ended.
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
   /// @throw Refused where a number isn't finite, the target is beyond a soft limit, the velocity
-  ///   beyond the axis's maximum, the endstop on the way is active, the axis moves, is disabled,
-  ///   asleep or at fault, or the machine shuts down.
+  ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or
+  ///   at fault, or the machine shuts down.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
   /// Turns the motor by a number of rounds, which need not be whole.
@@ -52,6 +56,19 @@ class Axis {
 
   /// Returns when the move has ended.
   MoveResult wait(const Move& move);
+
+  /// Moves on at a velocity until it is told otherwise, or up to the soft limit, where it rests; 0
+  /// ends a jog. A motion under way is replaced. To call it again with the same velocity changes
+  /// nothing.
+  ///
+  /// @param velocity [unit/s] negative: towards min.
+  /// @throw Refused as moveTo(), and where the axis rests at the soft limit ahead.
+  void jog(double velocity);
+
+  /// Scales the velocities of all motions, of one under way too; never beyond the axis's maximum.
+  ///
+  /// @param factor above 0.
+  void setSpeedOverride(double factor);
 
   /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
   /// Without effect at rest.

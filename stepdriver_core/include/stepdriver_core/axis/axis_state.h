@@ -16,8 +16,9 @@ struct AxisState {
   int microsteps = 1;
   double position = 0.0;  ///< [unit] from the count of the edges that went out
   double velocity = 0.0;  ///< [unit/s]
-  double target = 0.0;    ///< [unit] where the motion under way ends; the position at rest
-  std::string fault;      ///< in words; empty: none
+  /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
+  double target = 0.0;
+  std::string fault;  ///< in words; empty: none
 };
 
 /// Levels of the switches as their lines read now, true where active. None where there is none.
@@ -31,12 +32,15 @@ struct Move {
   std::uint64_t id = 0;   ///< never the same twice on one axis
   double target = 0.0;    ///< [unit]
   double duration = 0.0;  ///< [s] as planned
+  double overshoot =
+      0.0;  ///< [unit] how far it passes its target first, as it can't stop before it
 };
 
 /// How a move ended.
 enum class MoveEnd {
   kReached,
   kStopped,     ///< by a stop, a disable or a shutdown; decelerated
+  kReplaced,    ///< by a later move or a jog, which took over while it was under way
   kEndstopMin,  ///< the min endstop was met
   kEndstopMax,
   kEmergencyStop,

@@ -55,6 +55,9 @@ struct AxisConfig {
   double start_speed = 0.0;   ///< [unit/s] reached without a ramp (pull-in); 0: ramps start at rest
   double acceleration = 0.0;  ///< [unit/s^2]
   double deceleration = 0.0;  ///< [unit/s^2]
+  /// [unit/s^2] Of a stop, at least the deceleration; none: that.
+  std::optional<double> stop_deceleration;
+  double jerk = 0.0;                   ///< [unit/s^3] 0: the acceleration may jump
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;
 

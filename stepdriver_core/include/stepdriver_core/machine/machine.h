@@ -62,6 +62,12 @@ class Machine {
   /// Decelerates every axis to rest.
   void stop();
 
+  /// Scales the velocities of all motions, of those under way too, within the axes' accelerations.
+  /// No axis goes beyond its maximum.
+  ///
+  /// @param factor 0.01 to 2.0. @throw Refused where it isn't; then nothing changes.
+  void setSpeedOverride(double factor);
+
   /// Lets the pulse that is out finish and sends no other. Every axis is at fault until recover();
   /// motors stay energized.
   void emergencyStop();

@@ -29,6 +29,9 @@ DoubleDouble operator*(DoubleDouble a, DoubleDouble b);
 DoubleDouble operator/(DoubleDouble a, DoubleDouble b);
 DoubleDouble operator-(DoubleDouble a);
 bool operator<(DoubleDouble a, DoubleDouble b);
+DoubleDouble abs(DoubleDouble a);
+/// @pre a >= 0
+DoubleDouble sqrt(DoubleDouble a);
 
 /// A number as the nearest integer and what is left, at most a half.
 struct Split {

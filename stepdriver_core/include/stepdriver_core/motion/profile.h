@@ -14,9 +14,16 @@ struct Piece {
   double v0 = 0.0;        ///< [microsteps/s]
   double a = 0.0;         ///< [microsteps/s^2]
   double j = 0.0;         ///< [microsteps/s^3]
+  double v0_rest = 0.0;   ///< what v0 leaves of the exact speed
+  double a_rest = 0.0;    ///< what a leaves of the exact acceleration
 
   DoubleDouble positionAt(DoubleDouble t) const;
   DoubleDouble velocityAt(DoubleDouble t) const;
+  DoubleDouble accelerationAt(DoubleDouble t) const;
+
+  /// The first time after `after` [s] and clearly before the end at which the velocity changes its
+  /// sign; the end where there is none. A turning point this close to an end moves nothing.
+  double firstTurn(double after) const;
 };
 
 /// Where a motion is at one time.
@@ -44,7 +51,7 @@ class Profile {
   std::int64_t endNs() const { return end_ns_; }
   DoubleDouble duration() const { return starts_.back(); }  ///< [s]
   DoubleDouble endPosition() const { return end_position_; }
-  /// Highest speed on the way [microsteps/s], a lower bound where a piece has a jerk.
+  /// Highest speed on the way [microsteps/s].
   double peakSpeed() const;
 
   MotionState stateAt(std::int64_t time_ns) const;

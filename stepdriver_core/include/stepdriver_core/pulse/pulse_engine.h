@@ -65,6 +65,9 @@ struct Command {
   int channel = 0;
   std::uint64_t serial = 0;
   const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
+  /// Serial of the profile that this one was planned to go on from; 0: from rest. Where the channel
+  /// has ended that, or follows another, the command is refused.
+  std::uint64_t continues = 0;
   /// Steps planned closer than this are at a speed that the motor can't start from or stop at
   /// without a ramp.
   Nanoseconds restart_interval = 0;

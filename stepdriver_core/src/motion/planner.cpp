@@ -1,0 +1,110 @@
+#include "stepdriver_core/motion/planner.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "course.h"
+#include "velocity_change.h"
+
+namespace stepdriver::motion {
+namespace {
+
+// How far a profile goes beyond its target, seen from where it begins.
+double farthestBeyond(const Profile& profile, const MotionState& from, DoubleDouble target) {
+  const double way = (target - from.position).hi;
+  double farthest = 0.0;
+  const auto consider = [&](DoubleDouble position) {
+    const double beyond = (position - target).hi;
+    farthest = std::max(farthest, way == 0.0 ? std::abs(beyond) : std::copysign(1.0, way) * beyond);
+  };
+  for (const Piece& piece : profile.pieces()) {
+    consider(piece.p0);
+    const double end = piece.duration.hi;
+    for (double t = piece.firstTurn(0.0); t < end; t = piece.firstTurn(t)) {
+      consider(piece.positionAt(t));
+    }
+  }
+  return farthest;
+}
+
+// The speed of a move of one microstep without a jerk limit, up from 0 and down again:
+// 1 = v^2/(2 a) + v^2/(2 d).
+double speedWithinMicrostep(const MotionLimits& limits) {
+  const double a = limits.acceleration;
+  const double d = limits.deceleration;
+  return std::sqrt(2.0 * a * (d / (a + d)));
+}
+
+// The limits of a stop: as fast as it is, but no slower than a crawl.
+MotionLimits stopping(const Course& course, const MotionLimits& limits) {
+  const double level = std::abs(levelVelocity({course.v(), course.a()}, limits).value());
+  const double crawl = std::max(speedWithinMicrostep(limits), limits.start_speed);
+  MotionLimits slower = limits;
+  slower.max_speed = std::min(limits.max_speed, std::max(level, crawl));
+  return slower;
+}
+
+// With a start speed a motion in the wrong direction comes to rest first.
+void restBeforeTurn(Course& course, double sign, const MotionLimits& limits) {
+  if (startSpeed(limits) == 0.0 || !(sign * course.v().hi < 0.0)) return;
+  course.moveTo(course.nextRest(limits), stopping(course, limits));
+}
+
+// The fastest motion to rest on the target, which it may pass.
+Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
+                 const MotionLimits& limits) {
+  const DoubleDouble end = fromInteger(target);
+  Course course(from, limits);
+  const Stop stop = stopFrom(course.v(), course.a(), limits);
+  const double beyond = (end - course.position() - stop.length).hi;
+  if (std::abs(beyond) > stop.doubt) {
+    restBeforeTurn(course, std::copysign(1.0, beyond), limits);
+  }
+  course.moveTo(target, limits);
+  Plan plan{course.profile(start_ns)};
+  const double farthest = farthestBeyond(plan.profile, from, end);
+  if (farthest > 2.0 * stop.doubt) plan.overshoot = farthest;
+  return plan;
+}
+
+}  // namespace
+
+Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
+              const MotionLimits& limits) {
+  Plan fastest = fastestMove(start_ns, from, target, limits);
+  const double way = (fromInteger(target) - from.position).hi;
+  const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && way != 0.0;
+  if (!fastest.overshoots() || !may_turn) return fastest;
+  // The fastest motion eases its deceleration before it turns. Without that it may turn in time.
+  Course course(from, limits);
+  if (!course.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return fastest;
+  course.moveTo(target, limits);
+  return {course.profile(start_ns)};
+}
+
+Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocity,
+                  const MotionLimits& limits, std::optional<std::int64_t> stand_at) {
+  if (velocity == 0.0) return {planStop(start_ns, from, limits, stand_at)};
+  MotionLimits bounded = limits;
+  bounded.max_speed = std::min(limits.max_speed, std::abs(velocity));
+  if (stand_at) return planMove(start_ns, from, *stand_at, bounded);
+  const double sign = std::copysign(1.0, velocity);
+  Course course(from, bounded);
+  restBeforeTurn(course, sign, bounded);
+  course.moveOn(sign, bounded);
+  return {course.profile(start_ns)};
+}
+
+Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
+                 std::optional<std::int64_t> not_beyond) {
+  const Course course(state, limits);
+  const MotionLimits slower = stopping(course, limits);
+  const std::int64_t rest = course.nextRest(limits);
+  const bool forwards = course.heading(limits) > 0.0;
+  if (not_beyond && (forwards ? *not_beyond < rest : *not_beyond > rest)) {
+    return planMove(at_ns, state, *not_beyond, slower).profile;
+  }
+  return fastestMove(at_ns, state, rest, slower).profile;
+}
+
+}  // namespace stepdriver::motion

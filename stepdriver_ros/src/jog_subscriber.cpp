@@ -1,0 +1,86 @@
+#include "jog_subscriber.h"
+
+#include <ros/console.h>
+#include <ros/transport_hints.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+// A stream of messages: one that is late is of no use when the next has come.
+constexpr std::uint32_t kQueued = 1;
+// The time-out is kept to this part of itself.
+constexpr double kTimeoutPart = 0.05;
+
+}  // namespace
+
+JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
+                             double timeout)
+    : machine_(machine), timeout_(timeout), heard_(machine.axes().size()) {
+  node.setCallbackQueue(&queues.control());
+  subscriber_ = node.subscribe("jog", kQueued, &JogSubscriber::take, this,
+                               ros::TransportHints().tcpNoDelay());
+  timer_ = node.createSteadyTimer(
+      ros::WallDuration(timeout * kTimeoutPart),
+      [this](const ros::SteadyTimerEvent& /*event*/) { endWhatIsOver(); }, false);
+}
+
+void JogSubscriber::take(const Jog::ConstPtr& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    const std::vector<std::size_t> axes = axesOf(*message);
+    for (std::size_t i = 0; i < axes.size(); ++i) jog(axes[i], message->velocity[i]);
+  } catch (const Refused& refused) {
+    ROS_WARN_THROTTLE(1.0, "jog: %s", refused.what());
+  }
+}
+
+std::vector<std::size_t> JogSubscriber::axesOf(const Jog& message) const {
+  if (message.name.size() != message.velocity.size()) {
+    throw Refused("there are " + std::to_string(message.name.size()) + " names and " +
+                  std::to_string(message.velocity.size()) +
+                  " velocities; each name must have one velocity");
+  }
+  std::vector<std::size_t> axes;
+  for (std::size_t i = 0; i < message.name.size(); ++i) {
+    const axis::Axis& wanted = machine_.axis(message.name[i]);
+    const auto found = std::find_if(machine_.axes().begin(), machine_.axes().end(),
+                                    [&wanted](const auto& axis) { return axis.get() == &wanted; });
+    const auto index = static_cast<std::size_t>(found - machine_.axes().begin());
+    if (std::find(axes.begin(), axes.end(), index) != axes.end()) {
+      throw Refused("the axis " + message.name[i] + " is named twice");
+    }
+    if (!std::isfinite(message.velocity[i])) {
+      throw Refused(message.name[i] + ": the velocity must be a finite number");
+    }
+    axes.push_back(index);
+  }
+  return axes;
+}
+
+void JogSubscriber::jog(std::size_t axis, double velocity) {
+  try {
+    machine_.axes()[axis]->jog(velocity);
+    heard_[axis] = velocity == 0.0 ? ros::SteadyTime() : ros::SteadyTime::now();
+  } catch (const Error& error) {
+    ROS_WARN_THROTTLE(1.0, "jog: %s", error.what());
+  }
+}
+
+void JogSubscriber::endWhatIsOver() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const ros::SteadyTime now = ros::SteadyTime::now();
+  for (std::size_t axis = 0; axis < heard_.size(); ++axis) {
+    if (heard_[axis].isZero() || now - heard_[axis] < timeout_) continue;
+    ROS_INFO("%s: no jog for %g s, it comes to rest", machine_.axes()[axis]->config().name.c_str(),
+             timeout_.toSec());
+    jog(axis, 0.0);
+    heard_[axis] = ros::SteadyTime();
+  }
+}
+
+}  // namespace stepdriver::ros_node
