@@ -1,0 +1,63 @@
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <memory>
+#include <string>
+
+#include "core/support/gpio_sim.h"
+#include "hardware/hardware_node.h"
+#include "hardware/line_record.h"
+#include "hardware/needs_gpio_sim.h"
+#include "support/says.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+/// A node whose axis x asks for a million steps/s, which no machine holds.
+class TooFast : public NeedsGpioSim {
+ protected:
+  void SetUp() override {
+    NeedsGpioSim::SetUp();
+    if (IsSkipped()) return;
+    const unsigned lines = HardwareNode::kLinesOfChip;
+    board = std::make_unique<test::GpioSimChip>("board", "board", lines);
+    expander = std::make_unique<test::GpioSimChip>("expander", "expander", lines);
+    record = std::make_unique<LineRecord>();
+    node = std::make_unique<HardwareNode>();
+    node->set("axes/x/max_speed_mm_s", 12500.0);
+    node->set("axes/x/timing/step_high_us", 0.1);
+    node->set("axes/x/timing/step_low_us", 0.1);
+  }
+  void TearDown() override { node.reset(); }
+
+  unsigned number(unsigned offset) const { return numberOf(board->lines(), offset); }
+
+  std::unique_ptr<test::GpioSimChip> board;
+  std::unique_ptr<test::GpioSimChip> expander;
+  std::unique_ptr<LineRecord> record;
+  std::unique_ptr<HardwareNode> node;
+};
+
+TEST_F(TooFast, DoesNotStartWhereThatIsEnforcedAndLeavesEveryLineSafe) {
+  node->set("realtime/policy", "enforce");
+  node->launch();
+  EXPECT_EQ(node->process().waitForExit(kBound).value_or(-1), 3) << node->process().output();
+  expectSays(node->process().output(), "x: asks for 1000000 steps/s");
+  const auto trace = record->read();
+  EXPECT_TRUE(trace.edges(number(HardwareNode::kX.step)).empty());
+  EXPECT_TRUE(timesSet(trace, number(HardwareNode::kX.enable), false).empty()) << "it was enabled";
+  EXPECT_FALSE(timesSet(trace, number(HardwareNode::kX.enable), true).empty());
+}
+
+TEST_F(TooFast, SaysSoAndStartsElse) {
+  node->start();
+  expectSays(node->process().output(), "x: asks for 1000000 steps/s");
+  EXPECT_TRUE(record->read().edges(number(HardwareNode::kX.step)).empty())
+      << "it measured with edges";
+  node->process().signal(SIGTERM);
+  EXPECT_EQ(node->process().waitForExit(kBound).value_or(-1), 0) << node->process().output();
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
