@@ -23,7 +23,7 @@ class Configuration : public testing::Test {
   void SetUp() override {
     if (gpio::libgpiodVersion().empty()) GTEST_SKIP() << "stepdriver was built without libgpiod";
   }
-  ~Configuration() override { std::remove(path_.c_str()); }
+  void TearDown() override { std::remove(path_.c_str()); }
 
   static constexpr const char* kAxis =
       "axes: {x: {driver: a4988, pins: {step: S, dir: D}, microsteps: 16, steps_per_mm: 80.0,\n"

@@ -71,18 +71,22 @@ TEST(Capability, TellsWhatTheCallsOfEachAxisCost) {
   LateClock clock;
   SlowBackend backend(clock);
   backend.write_cost = rising(10);
-  backend.read_cost = [](const std::string& line) { return line == "x.max" ? 5000 : 4000; };
-  axis::AxisConfig plain = linearAxis("y");
+  backend.read_cost = [](const std::string& line) {
+    return line == "x.min" ? 5000 : line == "y.max" ? 7000 : 4000;
+  };
+  axis::AxisConfig plain = linearAxis("z");
   plain.endstop_min.reset();
   plain.endstop_max.reset();
-  const Capability capability = machine::measure({linearAxis("x"), plain}, backend, clock);
-  ASSERT_EQ(capability.channels.size(), 2U);
+  const Capability capability =
+      machine::measure({linearAxis("x"), linearAxis("y"), plain}, backend, clock);
+  ASSERT_EQ(capability.channels.size(), 3U);
   EXPECT_EQ(capability.channels[0].write.count, 200U);
   EXPECT_EQ(capability.channels[0].write.median, 1020) << "the first of 201 isn't counted";
   EXPECT_EQ(capability.channels[0].write.p99, 1990);
   EXPECT_EQ(capability.channels[0].read.p99, 5000) << "the slower endstop counts";
-  EXPECT_EQ(capability.channels[1].write.median, 3030);
-  EXPECT_EQ(capability.channels[1].read.count, 0U);
+  EXPECT_EQ(capability.channels[1].read.p99, 7000);
+  EXPECT_EQ(capability.channels[2].write.median, 5040);
+  EXPECT_EQ(capability.channels[2].read.count, 0U);
 }
 
 TEST(Capability, IsMeasuredWithoutAnEdge) {

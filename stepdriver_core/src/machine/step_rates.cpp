@@ -1,6 +1,7 @@
 #include "stepdriver_core/machine/step_rates.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 
@@ -101,9 +102,7 @@ std::string inMicroseconds(double ns) {
   return text;
 }
 
-std::string percentText(double share) {
-  return std::to_string(static_cast<int>(share * 100.0 + 0.5)) + " %";
-}
+std::string percentText(double share) { return std::to_string(std::lround(share * 100.0)) + " %"; }
 
 std::string reasonOf(const Interval& interval, const Load& load, const Others& others,
                      pulse::Nanoseconds guard) {

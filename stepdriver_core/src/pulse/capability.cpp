@@ -1,6 +1,7 @@
 #include "stepdriver_core/pulse/capability.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <thread>
@@ -103,7 +104,7 @@ Spread spreadOf(std::vector<Nanoseconds> samples) {
   std::sort(samples.begin(), samples.end());
   const auto at = [&samples](double part) {
     const auto last = static_cast<double>(samples.size() - 1);
-    return samples[static_cast<std::size_t>(part * last + 0.5)];
+    return samples[static_cast<std::size_t>(std::lround(part * last))];
   };
   return {at(0.5), at(0.9), at(0.99), samples.back(), samples.size()};
 }

@@ -22,7 +22,10 @@ class Reasons {
   std::string text() const {
     std::string all;
     for (const auto& [reason, lines] : reasons_) {
-      all += "  " + (lines.empty() ? reason : lines + ": " + reason) + "\n";
+      all += "  ";
+      if (!lines.empty()) all += lines + ": ";
+      all += reason;
+      all += '\n';
     }
     return all;
   }

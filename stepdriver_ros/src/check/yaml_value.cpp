@@ -52,13 +52,13 @@ class Converter {
   static bool isPlain(const YAML::Node& node) { return node.Tag().empty() || node.Tag() == "?"; }
 
   ConfigValue scalar(const YAML::Node& node) const {
-    static const std::string kStandard = "tag:yaml.org,2002:";
+    static const std::string standard = "tag:yaml.org,2002:";
     const std::string& tag = node.Tag();
     try {
       if (isPlain(node)) return resolveScalar(node.Scalar());
       if (tag == "!") return {node.Scalar()};  // quoted
-      if (tag.rfind(kStandard, 0) == 0) {
-        return resolveTagged(node.Scalar(), tag.substr(kStandard.size()));
+      if (tag.rfind(standard, 0) == 0) {
+        return resolveTagged(node.Scalar(), tag.substr(standard.size()));
       }
     } catch (const Error& error) {
       fail(node.Mark(), error.what());
