@@ -131,6 +131,8 @@ GPIO_SIM=$work/gpio_sim.sh /usr/bin/env -0 >"$work/environment"
   echo 'set -eu; export PATH=/usr/bin:/bin:/usr/sbin:/sbin LC_ALL=C'
   for folder in "${tmpfs[@]}"; do printf 'mount -t tmpfs tmpfs %q\n' "$folder"; done
   for chip in "${chips[@]}"; do printf 'bash %s/gpio_sim.sh create %q\n' "$work" "$chip"; done
+  # Virtual time begins at the boot, and until the first ticks the timers are as coarse as those.
+  [[ -z $mode ]] || echo 'sleep 0.1'
   [[ -z $trace ]] || printf 'bash %s/gpio_trace.sh start\n' "$work"
 } >"$work/before"
 {

@@ -1,0 +1,73 @@
+#include "stepdriver_core/motion/profile_peaks.h"
+
+#include <cmath>
+#include <cstddef>
+
+namespace stepdriver::motion {
+namespace {
+
+void takeFurthest(Peak& peak, double value, double time_s) {
+  if (std::abs(value) > std::abs(peak.value)) peak = {value, time_s};
+}
+
+void takePosition(ProfilePeaks& peaks, double position, double time_s) {
+  if (position < peaks.lowest.value) peaks.lowest = {position, time_s};
+  if (position > peaks.highest.value) peaks.highest = {position, time_s};
+}
+
+// Where the velocity is 0 inside the piece, the position may have an extremum.
+void takeTurns(ProfilePeaks& peaks, const Piece& piece, double start) {
+  const double end = piece.duration.value();
+  const auto consider = [&](double t) {
+    if (t > 0.0 && t < end) takePosition(peaks, piece.positionAt(t).value(), start + t);
+  };
+  if (piece.j == 0.0) {
+    if (piece.a != 0.0) consider(-piece.v0 / piece.a);
+    return;
+  }
+  const double discriminant = piece.a * piece.a - 2.0 * piece.j * piece.v0;
+  if (discriminant < 0.0) return;
+  // Without the difference of two close numbers that the textbook's formula has.
+  const double q = -(piece.a + std::copysign(std::sqrt(discriminant), piece.a));
+  consider(q / piece.j);
+  if (q != 0.0) consider(2.0 * piece.v0 / q);
+}
+
+void takePiece(ProfilePeaks& peaks, const Piece& piece, double start) {
+  const double end = piece.duration.value();
+  takePosition(peaks, piece.p0.value(), start);
+  takeTurns(peaks, piece, start);
+  takePosition(peaks, piece.positionAt(piece.duration).value(), start + end);
+
+  takeFurthest(peaks.velocity, piece.v0, start);
+  const double middle = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
+  if (middle > 0.0 && middle < end) {
+    takeFurthest(peaks.velocity, piece.velocityAt(middle).value(), start + middle);
+  }
+  takeFurthest(peaks.velocity, piece.velocityAt(piece.duration).value(), start + end);
+
+  takeFurthest(peaks.acceleration, piece.a, start);
+  takeFurthest(peaks.acceleration, piece.a + piece.j * end, start + end);
+}
+
+}  // namespace
+
+ProfilePeaks profilePeaks(const Profile& profile, double velocity_before) {
+  const double first = profile.pieces().empty() ? profile.endPosition().value()
+                                                : profile.pieces().front().p0.value();
+  ProfilePeaks peaks;
+  peaks.lowest.value = first;
+  peaks.highest.value = first;
+  double velocity = velocity_before;
+  for (std::size_t index = 0; index < profile.pieces().size(); ++index) {
+    const Piece& piece = profile.pieces()[index];
+    const double start = profile.pieceStart(index).value();
+    takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
+    takePiece(peaks, piece, start);
+    velocity = piece.velocityAt(piece.duration).value();
+  }
+  takeFurthest(peaks.velocity_jump, -velocity, profile.duration().value());
+  return peaks;
+}
+
+}  // namespace stepdriver::motion

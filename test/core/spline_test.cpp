@@ -1,0 +1,223 @@
+#include "stepdriver_core/motion/spline.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/motion/profile_peaks.h"
+#include "stepdriver_core/motion/step_finder.h"
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+// The textbook's polynomial of one segment over t/T, in long double.
+struct Textbook {
+  long double duration;
+  long double c[6] = {};
+
+  Textbook(const Waypoint& begin, const Waypoint& end)
+      : duration((end.time_ns - begin.time_ns) / 1e9L) {
+    const long double way = static_cast<long double>(end.position) - begin.position;
+    c[0] = begin.position;
+    if (!begin.velocity || !end.velocity) {
+      c[1] = way;
+      return;
+    }
+    const long double v0 = *begin.velocity * duration;
+    const long double v1 = *end.velocity * duration;
+    c[1] = v0;
+    if (!begin.acceleration || !end.acceleration) {
+      c[2] = 3.0L * way - 2.0L * v0 - v1;
+      c[3] = -2.0L * way + v0 + v1;
+      return;
+    }
+    const long double a0 = *begin.acceleration * duration * duration;
+    const long double a1 = *end.acceleration * duration * duration;
+    c[2] = a0 / 2.0L;
+    c[3] = 10.0L * way - 6.0L * v0 - 4.0L * v1 - 1.5L * a0 + 0.5L * a1;
+    c[4] = -15.0L * way + 8.0L * v0 + 7.0L * v1 + 1.5L * a0 - a1;
+    c[5] = 6.0L * way - 3.0L * v0 - 3.0L * v1 - 0.5L * a0 + 0.5L * a1;
+  }
+
+  long double at(long double t) const {
+    const long double u = t / duration;
+    return c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))));
+  }
+  bool quintic() const { return c[4] != 0.0L || c[5] != 0.0L; }
+};
+
+MotionState restAt(double position) { return {position, 0.0, 0.0}; }
+
+// At 40 times of each segment; to rounding for lines and cubics, to the stated error for quintics.
+void expectTextbook(const Profile& profile, Waypoint begin, std::vector<Waypoint> waypoints) {
+  waypoints.back().position = std::nearbyint(waypoints.back().position);
+  for (std::size_t index = 0; index < waypoints.size(); ++index) {
+    const Waypoint& end = waypoints[index];
+    const Textbook textbook(begin, end);
+    const double allowed = textbook.quintic() ? kQuinticError + 1e-9 : 1e-9;
+    for (std::int64_t k = 0; k <= 40; ++k) {
+      const std::int64_t time = (end.time_ns - begin.time_ns) / 40 * k;
+      const DoubleDouble position =
+          profile.stateAt(profile.startNs() + begin.time_ns + time).position;
+      const long double error =
+          static_cast<long double>(position.hi) + position.lo - textbook.at(time / 1e9L);
+      ASSERT_LE(std::abs(error), allowed) << "segment " << index << ", time " << time;
+    }
+    begin = end;
+  }
+}
+
+void expectContinuous(const Profile& profile) {
+  const auto& pieces = profile.pieces();
+  for (std::size_t k = 1; k < pieces.size(); ++k) {
+    const Piece& before = pieces[k - 1];
+    const double gap = (before.positionAt(before.duration) - pieces[k].p0).value();
+    ASSERT_LE(std::abs(gap), 1e-10) << "piece " << k;
+  }
+}
+
+std::vector<Waypoint> randomWaypoints(std::mt19937_64& random, std::size_t count) {
+  std::uniform_real_distribution<double> spread(-1.0, 1.0);
+  std::vector<Waypoint> waypoints;
+  std::int64_t time = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    time += 1'000'000 + static_cast<std::int64_t>(5e8 * std::abs(spread(random)));
+    Waypoint waypoint{time, 300.0 * spread(random), std::nullopt, std::nullopt};
+    if (spread(random) > -0.7) waypoint.velocity = 1000.0 * spread(random);
+    if (spread(random) > -0.3) waypoint.acceleration = 5000.0 * spread(random);
+    waypoints.push_back(waypoint);
+  }
+  return waypoints;
+}
+
+TEST(Spline, FollowsRandomTrajectoriesLikeTheTextbook) {
+  std::mt19937_64 random(20261121);
+  for (int round = 0; round < 5000; ++round) {
+    SCOPED_TRACE(round);
+    const auto waypoints = randomWaypoints(random, 1 + static_cast<std::size_t>(round % 6));
+    const Profile profile = planSpline(77, {3.0, -20.0, 50.0}, waypoints);
+    ASSERT_EQ(profile.endNs(), 77 + waypoints.back().time_ns);
+    ASSERT_NO_FATAL_FAILURE(expectTextbook(profile, {0, 3.0, -20.0, 50.0}, waypoints));
+    ASSERT_NO_FATAL_FAILURE(expectContinuous(profile));
+    StepFinder finder(profile, 3);
+    Step step;
+    std::int64_t last = 77;
+    while (finder.next(step)) {
+      ASSERT_GE(step.time_ns, last);
+      last = step.time_ns;
+    }
+    ASSERT_EQ(finder.count(), std::llrint(waypoints.back().position));
+  }
+}
+
+TEST(Spline, StepsOfACubicComeWithinANanosecond) {
+  const std::vector<Waypoint> waypoints{{2 * kSecond, 10000.0, 0.0, std::nullopt}};
+  const Textbook textbook({0, 0.0, 0.0, std::nullopt}, waypoints[0]);
+  const Profile profile = planSpline(0, restAt(0.0), waypoints);
+  StepFinder finder(profile, 0);
+  Step step;
+  for (int k = 0; k < 10000; ++k) {
+    ASSERT_TRUE(finder.next(step));
+    long double low = 0.0L;
+    long double high = 2.0L;
+    for (int i = 0; i < 100; ++i) {
+      const long double middle = (low + high) / 2.0L;
+      (textbook.at(middle) < k + 0.5L ? low : high) = middle;
+    }
+    ASSERT_LE(std::abs(step.time_ns - low * 1e9L), 1.0L) << "step " << k;
+  }
+  EXPECT_FALSE(finder.next(step));
+}
+
+TEST(Spline, StaysOnItsWaypointsOver10000) {
+  std::mt19937_64 random(7);
+  const auto waypoints = randomWaypoints(random, 10000);
+  const Profile profile = planSpline(0, restAt(0.0), waypoints);
+  EXPECT_EQ(profile.endNs(), waypoints.back().time_ns);
+  expectTextbook(profile, {0, 0.0, 0.0, 0.0}, waypoints);
+}
+
+TEST(Spline, HoldsWhereThePositionStays) {
+  const Profile profile =
+      planSpline(0, restAt(5.0), {{kSecond, 5.0, {}, {}}, {2 * kSecond, 5.0, 0.0, 0.0}});
+  Step step;
+  EXPECT_FALSE(StepFinder(profile, 5).next(step));
+}
+
+TEST(Spline, LeavesOutAFirstWaypointAtTime0) {
+  const Profile profile = planSpline(0, restAt(1.0), {{0, 9.0, {}, {}}, {kSecond, 3.0, {}, {}}});
+  ASSERT_EQ(profile.pieces().size(), 1U);
+  EXPECT_EQ(profile.pieces()[0].v0, 2.0);
+}
+
+TEST(ProfilePeaks, AreThoseOfDenseSampling) {
+  std::mt19937_64 random(11);
+  for (int round = 0; round < 300; ++round) {
+    const Profile profile = planSpline(0, restAt(0.0), randomWaypoints(random, 3));
+    const ProfilePeaks peaks = profilePeaks(profile);
+    double velocity = 0.0;
+    double lowest = 0.0;
+    double highest = 0.0;
+    double acceleration = 0.0;
+    for (const Piece& piece : profile.pieces()) {
+      for (int k = 0; k <= 400; ++k) {
+        const double t = piece.duration.value() / 400.0 * k;
+        const double position = piece.positionAt(t).value();
+        velocity = std::max(velocity, std::abs(piece.velocityAt(t).value()));
+        acceleration = std::max(acceleration, std::abs(piece.a + piece.j * t));
+        lowest = std::min(lowest, position);
+        highest = std::max(highest, position);
+      }
+    }
+    ASSERT_NEAR(acceleration, std::abs(peaks.acceleration.value), 1e-6 * acceleration);
+    ASSERT_LE(velocity, std::abs(peaks.velocity.value) + 1e-6);
+    ASSERT_GE(velocity, std::abs(peaks.velocity.value) * 0.999);
+    ASSERT_LE(peaks.lowest.value, lowest + 1e-9);
+    ASSERT_NEAR(peaks.lowest.value, lowest, 0.02);
+    ASSERT_GE(peaks.highest.value, highest - 1e-9);
+    ASSERT_NEAR(peaks.highest.value, highest, 0.02);
+  }
+}
+
+TEST(ProfilePeaks, NameTheJumpBetweenTwoLines) {
+  const Profile profile =
+      planSpline(0, restAt(0.0), {{kSecond, 10.0, {}, {}}, {2 * kSecond, -20.0, {}, {}}});
+  const ProfilePeaks peaks = profilePeaks(profile);
+  EXPECT_DOUBLE_EQ(peaks.velocity_jump.value, -40.0);
+  EXPECT_DOUBLE_EQ(peaks.velocity_jump.time_s, 1.0);
+}
+
+void expectRefused(const std::vector<Waypoint>& waypoints, const std::string& words) {
+  try {
+    planSpline(0, restAt(0.0), waypoints);
+    ADD_FAILURE() << "accepted; expected: " << words;
+  } catch (const std::exception& error) {
+    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+  }
+}
+
+TEST(Spline, RefusesWhatItCannotFollow) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  expectRefused({}, "0 waypoints");
+  expectRefused({{0, 1.0, {}, {}}}, "at least 1 ns");
+  expectRefused({{-1, 1.0, {}, {}}}, "waypoint 0 is -1 ns");
+  expectRefused({{5, 1.0, {}, {}}, {5, 1.0, {}, {}}}, "waypoint 1 is 5 ns");
+  expectRefused({{5, std::nan(""), {}, {}}}, "position of waypoint 0 is nan");
+  expectRefused({{5, 1e15, {}, {}}}, "position of waypoint 0 is 1000000000000000");
+  expectRefused({{5, 1.0, infinity, {}}}, "velocity of waypoint 0 is inf");
+  expectRefused({{5, 1.0, 0.0, -infinity}}, "acceleration of waypoint 0 is -inf");
+  expectRefused({{kSecond, 1.0, 1e300, {}}}, "on the way to waypoint 0");
+  expectRefused({{kSecond, 1.0, 1.0, 1e300}}, "on the way to waypoint 0");
+  expectRefused({{4'000'000'000 * kSecond, 1.0, {}, {}}}, "126 years");
+}
+
+}  // namespace
+}  // namespace stepdriver::motion
