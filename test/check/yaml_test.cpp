@@ -124,6 +124,10 @@ TEST(Yaml, SaysWhereItIsWrong) {
   EXPECT_EQ(errorOf("a: !!int x\n"), "axis.yaml:1:4: x isn't what its tag !!int says");
   EXPECT_EQ(errorOf("a: !mine x\n"), "axis.yaml:1:4: the tag !mine can't be a ROS parameter");
   EXPECT_EQ(errorOf("[1]: x\n"), "axis.yaml:1:1: a key must be a word");
+  EXPECT_EQ(errorOf("a: {on: x}\n"),
+            "axis.yaml:1:5: the key on is read as true, but must be a word: put it in quotes");
+  EXPECT_EQ(errorOf("7: x\n").rfind("axis.yaml:1:1: the key 7 is read as 7", 0), 0U);
+  EXPECT_EQ(errorOf("'on': x\n'7': y\n"), "none");
   EXPECT_EQ(errorOf("a: 1\n---\nb: 2\n").rfind("axis.yaml:3:1: a second document", 0), 0U);
   EXPECT_NE(errorOf("a: &a [*a]\n").find("alias of what it is in"), std::string::npos);
 }

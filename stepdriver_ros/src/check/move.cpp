@@ -51,7 +51,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   const double off = axis.state().position - start;
   const machine::EngineFigures after = machine.figures();
   say("  " + config.name + ": " + std::to_string(after.pulses - before.pulses) + " pulses, " +
-      std::to_string(after.slips - before.slips) + " slips, worst lateness " +
+      std::to_string(after.slips - before.slips) + " slips, worst lateness so far " +
       numberText(after.worst_lateness * 1e6) + " us; " +
       (off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
   if (config.pins.enable.wired()) axis.enable(false);
@@ -93,6 +93,7 @@ bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clo
       all_back = moveAxis(machine, *axis, stroke, say) && all_back;
     } catch (const Refused& refused) {
       say(std::string("  ") + refused.what());
+      if (!watch.interrupted() && axis->config().pins.enable.wired()) axis->enable(false);
       all_back = false;
     }
   }

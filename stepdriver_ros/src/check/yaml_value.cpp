@@ -66,12 +66,20 @@ class Converter {
     fail(node.Mark(), "the tag " + tag + " can't be a ROS parameter");
   }
 
+  // A plain `on` or 7 is no word to PyYAML, and then rosparam can't load the file.
+  std::string keyOf(const YAML::Node& node) const {
+    const ConfigValue key = scalar(node);
+    if (const auto* word = key.as<std::string>()) return *word;
+    fail(node.Mark(), "the key " + node.Scalar() + " is read as " + key.shown() +
+                          ", but must be a word: put it in quotes");
+  }
+
   ConfigValue::Map map(const YAML::Node& node, int depth) {
     ConfigValue::Map result;
     ConfigValue::Map merged;
     for (const auto& entry : node) {
       if (!entry.first.IsScalar()) fail(entry.first.Mark(), "a key must be a word");
-      const std::string& key = entry.first.Scalar();
+      const std::string key = keyOf(entry.first);
       if (key == "<<" && isPlain(entry.first)) {
         merge(entry.second, depth, merged);
       } else if (!result.emplace(key, convert(entry.second, depth + 1)).second) {
