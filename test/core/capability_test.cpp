@@ -96,8 +96,8 @@ TEST(Capability, IsMeasuredWithoutAnEdge) {
     axis::AxisConfig config = linearAxis("x");
     config.pins.step.inverted = inverted;
     machine::measure({config}, backend, clock);
-    EXPECT_EQ(backend.writes.size(), 201U);
-    for (const SlowBackend::Write& write : backend.writes) {
+    EXPECT_EQ(backend.written.size(), 201U);
+    for (const SlowBackend::Write& write : backend.written) {
       EXPECT_FALSE(write.edge);
       EXPECT_EQ(write.line, "x.step");
     }

@@ -201,7 +201,7 @@ TEST_F(MachineOnSlowHardware, RefusesIfAskedToAndReleasesEveryLineUnmoved) {
     EXPECT_NE(text.find("x: asks for 50001"), std::string::npos) << text;
   }
   EXPECT_FALSE(backend.held);
-  for (const SlowBackend::Write& write : backend.writes) EXPECT_FALSE(write.edge) << write.line;
+  for (const SlowBackend::Write& write : backend.written) EXPECT_FALSE(write.edge) << write.line;
 }
 
 TEST_F(MachineOnSlowHardware, MeasuresNothingUnasked) {

@@ -61,7 +61,7 @@ class SlowBackend : public gpio::Backend {
     bool level;
     bool edge;  ///< it had the other level
   };
-  std::vector<Write> writes;
+  std::vector<Write> written;
   bool held = false;
 
  private:
@@ -83,7 +83,7 @@ class SlowBackend::Held : public gpio::Lines {
     backend_.clock_.pass(backend_.write_cost());
     for (std::size_t i = 0; i < count; ++i) {
       const auto output = static_cast<std::size_t>(writes[i].output);
-      backend_.writes.push_back(
+      backend_.written.push_back(
           {outputs_[output].line, writes[i].level, levels_[output] != writes[i].level});
       levels_[output] = writes[i].level;
     }
