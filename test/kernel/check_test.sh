@@ -14,6 +14,8 @@ END_OF_USAGE
 
 here=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd -P)
 this=$here/$(basename "${BASH_SOURCE[0]}")
+# shellcheck source=test/kernel/run_tests.sh
+source "$here/run_tests.sh"
 
 fail() {
   printf 'FAILED: %s\n' "$*" >&2
@@ -207,18 +209,8 @@ bash "$here/run.sh" --check || exit
 scratch=$(mktemp -d /var/tmp/stepdriver-check-test.XXXXXX)
 trap 'rm -rf "$scratch"' EXIT
 
-failed=0
-for test in finds_everything_in_order_without_an_edge \
+run_tests finds_everything_in_order_without_an_edge \
   says_who_holds_a_line_and_measures_the_wake_ups \
   says_which_chips_there_are_where_one_is_missing says_which_axis_asks_for_too_much \
   lists_what_is_wrong_in_the_configuration moves_nothing_on_the_simulated_rig \
-  moves_exactly_forth_and_back ends_a_move_disabled_where_it_is_interrupted; do
-  start=$EPOCHREALTIME status=0
-  # In the background `set -e` holds inside it.
-  (set -e; "$test") &
-  wait $! || status=$?
-  took=$((${EPOCHREALTIME/./} - ${start/./}))
-  printf '%-6s %5d ms  %s\n' "$( ((status == 0)) && echo ok || echo FAILED)" $((took / 1000)) "$test"
-  ((status == 0)) || failed=$((failed + 1))
-done
-((failed == 0))
+  moves_exactly_forth_and_back ends_a_move_disabled_where_it_is_interrupted
