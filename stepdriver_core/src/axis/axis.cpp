@@ -143,8 +143,7 @@ void Axis::setMicrosteps(int microsteps) {
   if (common != axis.harvest().count) {
     if (!axis.config.align_on_microstep_change) {
       axis.refuse("1/" + std::to_string(microsteps) + " has no position at " +
-                  axis.show(axis.positionOf(static_cast<double>(axis.harvest().count))) +
-                  "; the nearest that both modes have is " +
+                  axis.show(axis.position()) + "; the nearest that both modes have is " +
                   axis.show(axis.positionOf(static_cast<double>(common))) +
                   ": move there first, or configure align_on_microstep_change");
     }
@@ -167,7 +166,7 @@ void Axis::setPosition(double position) {
   axis.refuseWhileMoving("its position is set");
   if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
   axis.refuseBeyondLimits(position, "the position");
-  axis.origin = position - static_cast<double>(axis.harvest().count) / axis.stepsPerUnit();
+  axis.origin = position - static_cast<double>(axis.jointCount()) / axis.stepsPerUnit();
   axis.position_valid = true;
 }
 
@@ -185,7 +184,7 @@ AxisState Axis::state() const {
   state.homed = axis.homed;
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
-  state.position = axis.positionOf(static_cast<double>(channel.count));
+  state.position = axis.positionOf(static_cast<double>(channel.count - channel.slack));
   state.target = state.position;
   state.fault = axis.fault;
   if (axis.held && axis.held->goal.target) {
@@ -193,10 +192,12 @@ AxisState Axis::state() const {
   }
   if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
     const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
-    state.velocity = velocity / axis.stepsPerUnit();
+    // While the backlash is taken up, the joint stands.
+    const bool joint_moves = channel.slack == (velocity > 0.0 ? axis.backlash() : 0);
+    state.velocity = joint_moves ? velocity / axis.stepsPerUnit() : 0.0;
     const Goal& goal = motion->goal;
     if (goal.stops()) {
-      state.target = axis.positionOf(motion->profile->endPosition().value());
+      state.target = axis.positionOf(axis.jointAt(motion->profile->endPosition().value()));
     } else if (goal.target) {
       state.target = axis.positionOf(static_cast<double>(*goal.target));
     }

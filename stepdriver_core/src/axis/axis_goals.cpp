@@ -21,7 +21,7 @@ double Axis::Impl::checkedVelocity(double velocity) const {
 std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
   refuseUnlessReadyToMove();
   if (!std::isfinite(position)) refuse("the position must be a finite number");
-  const double goal = relative ? positionOf(relativeOrigin(harvest().count)) + position : position;
+  const double goal = relative ? positionOf(relativeOrigin()) + position : position;
   refuseBeyondLimits(goal, "the position");
   return std::llround(countOf(goal));
 }
@@ -29,14 +29,14 @@ std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
 Move Axis::Impl::checkedMove(double position, bool relative, double velocity) {
   const std::int64_t target = checkedTarget(position, relative);
   const double speed = checkedVelocity(velocity);
-  if (!moving()) refuseIntoEndstop(target - harvest().count);
+  if (!moving()) refuseIntoEndstop(target - jointCount());
   return startMove(target, speed);
 }
 
-double Axis::Impl::relativeOrigin(std::int64_t count) {
+double Axis::Impl::relativeOrigin() {
   const Motion* current = underWay();
-  if (current == nullptr) return static_cast<double>(count);
-  if (current->goal.stops()) return current->profile->endPosition().value();
+  if (current == nullptr) return static_cast<double>(jointCount());
+  if (current->goal.stops()) return jointAt(current->profile->endPosition().value());
   if (!current->goal.target) refuse("busy: it jogs without an end; give an absolute position");
   return static_cast<double>(*current->goal.target);
 }
@@ -62,7 +62,7 @@ void Axis::Impl::checkedJog(double velocity) {
   goal.velocity = velocity;
   const auto& limit = velocity > 0.0 ? config.max_position : config.min_position;
   if (limit) goal.target = std::llround(countOf(*limit));
-  const std::int64_t count = harvest().count;
+  const std::int64_t count = jointCount();
   if (!moving()) {
     const std::int64_t sign = velocity > 0.0 ? 1 : -1;
     if (goal.target && (*goal.target - count) * sign <= 0) {
@@ -74,6 +74,20 @@ void Axis::Impl::checkedJog(double velocity) {
     return;  // it does so already
   }
   begin({{this, goal}});
+}
+
+void Axis::Impl::takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way) {
+  const std::int64_t wanted = way > 0 ? backlash() : 0;
+  if (way == 0 || harvest().slack == wanted) return;
+  Goal goal;
+  goal.target = jointCount();
+  goal.velocity = maxSpeed();
+  goal.take_up = way > 0 ? 1 : -1;
+  begin({{this, goal}});
+  lock.unlock();
+  driver.waitFor([this] { return driver.engine().channel(channel).following == 0; });
+  lock.lock();
+  harvest();
 }
 
 Orders Axis::Impl::ordersOf(const Goal& goal) {
@@ -148,7 +162,7 @@ void Axis::Impl::dropHeld(MoveEnd end, const std::string& why) {
     MoveResult result;
     result.end = axis == this ? end : MoveEnd::kCompanion;
     const pulse::ChannelState state = driver.engine().channel(axis->channel);
-    result.position = axis->positionOf(static_cast<double>(state.count));
+    result.position = axis->positionOf(static_cast<double>(state.count - state.slack));
     result.duration = std::max(0.0, static_cast<double>(state.end_time - given_up.begin_ns) * 1e-9);
     result.message = axis->standsAt(
         given_up.goal,
@@ -221,7 +235,7 @@ std::vector<Move> Axis::Impl::begin(Orders orders) {
       axis.log.conclude(before.move, axis.replacedBy(motion, replaced[i].began));
     }
     const motion::Profile& profile = *motion.profile;
-    moves.push_back({motion.goal.move, axis.positionOf(profile.endPosition().value()),
+    moves.push_back({motion.goal.move, axis.positionOf(axis.jointAt(profile.endPosition().value())),
                      static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9,
                      motion.overshoot / axis.stepsPerUnit()});
   }
@@ -249,7 +263,7 @@ void Axis::Impl::leaveCourse(const Goal& goal, const std::string& left_by) {
 MoveResult Axis::Impl::replacedBy(const Motion& motion, std::int64_t began) {
   MoveResult result;
   result.end = MoveEnd::kReplaced;
-  result.position = positionOf(static_cast<double>(harvest().count));
+  result.position = position();
   result.duration = std::max(0.0, static_cast<double>(motion.profile->startNs() - began) * 1e-9);
   result.message = config.name + " was at " + show(result.position) + " when ";
   if (motion.goal.kind == Goal::Kind::kJog) {

@@ -1,6 +1,7 @@
 #include "axis_impl.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -79,7 +80,7 @@ void Axis::Impl::conclude(const pulse::ChannelState& state) {
 
 MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState& state) {
   MoveResult result;
-  result.position = positionOf(static_cast<double>(state.count));
+  result.position = positionOf(static_cast<double>(state.count - state.slack));
   result.duration = std::max(0.0, static_cast<double>(state.end_time - motion.begin_ns) * 1e-9);
   std::string why;
   switch (state.end) {
@@ -122,7 +123,8 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
 }
 
 std::string Axis::Impl::standsAt(const Goal& goal, const std::string& why) const {
-  const double count = static_cast<double>(driver.engine().channel(channel).count);
+  const pulse::ChannelState state = driver.engine().channel(channel);
+  const double count = static_cast<double>(state.count - state.slack);
   std::string text = config.name + " stands at " + show(positionOf(count));
   if (goal.target) text += ", not at " + show(positionOf(static_cast<double>(*goal.target)));
   return text + ": " + why;
@@ -150,6 +152,19 @@ double Axis::Impl::maxSpeed() const {
   const double period =
       static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
   return std::min(config.max_speed, 1.0 / (period * stepsPerUnit()));
+}
+
+std::int64_t Axis::Impl::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
+
+std::int64_t Axis::Impl::jointCount() {
+  const pulse::ChannelState state = harvest();
+  return state.count - state.slack;
+}
+
+double Axis::Impl::jointAt(double motor) {
+  const pulse::ChannelState state = harvest();
+  const double slack = static_cast<double>(state.slack) + motor - static_cast<double>(state.count);
+  return motor - std::clamp(slack, 0.0, static_cast<double>(backlash()));
 }
 
 motion::MotionLimits Axis::Impl::limits(double velocity) const {

@@ -38,6 +38,12 @@ class Axis::Impl {
   double maxSpeed() const;
   double positionOf(double count) const { return origin + count / stepsPerUnit(); }
   double countOf(double position) const { return (position - origin) * stepsPerUnit(); }
+  /// Counts as above are the joint's. The motor's are off by what is taken up of the backlash.
+  std::int64_t jointCount();
+  /// [microsteps] The joint's place where the motor has come to one, straight on from where it is.
+  double jointAt(double motor);
+  std::int64_t backlash() const;
+  double position() { return positionOf(static_cast<double>(jointCount())); }
   motion::MotionLimits limits(double velocity) const;
   /// [microsteps/s^2]
   double stopDeceleration() const;
@@ -54,6 +60,9 @@ class Axis::Impl {
   Move checkedMove(double position, bool relative, double velocity);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
+  /// Brings the motor to where the joint moves with its first step of a way. At rest; lets go of
+  /// the lock while it does so.
+  void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
   void changeOverride(double factor);
   void hold();
   void resume();
@@ -62,7 +71,8 @@ class Axis::Impl {
   /// Both let go of the lock while the axis comes to rest.
   void awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
   void restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
-  void writePins(const pulse::PinSequence& sequence, std::optional<std::int64_t> count = {});
+  void writePins(const pulse::PinSequence& sequence,
+                 std::optional<pulse::Command::Scale> scale = {});
   void restorePins();
   void resetFaultyChip();
 
@@ -113,10 +123,10 @@ class Axis::Impl {
   std::optional<Held> held;
 
   /// [microsteps] Where a relative motion begins.
-  double relativeOrigin(std::int64_t count);
+  double relativeOrigin();
   /// The motion that the engine has; nullptr at rest.
   const Motion* underWay();
-  /// [microsteps] Where it will be at a motion time.
+  /// [microsteps] Where the motor will be at a motion time.
   motion::MotionState stateAt(std::int64_t at);
 
  private:
@@ -132,8 +142,9 @@ class Axis::Impl {
                  const std::shared_ptr<const motion::Profile>& path);
   void leaveCourse(const Goal& goal, const std::string& left_by);
   std::int64_t stepsTo(const Goal& goal);
-  motion::Plan plan(const Goal& goal, std::int64_t at, const Motion* before,
-                    std::int64_t count) const;
+  motion::Plan plan(const Goal& goal, std::int64_t at);
+  std::int64_t motorTarget(const Goal& goal, const motion::MotionState& from,
+                           const motion::MotionLimits& within);
   motion::Profile planStopOf(const Motion& before, std::int64_t at,
                              const motion::MotionState& from) const;
   pulse::Nanoseconds restartInterval() const;

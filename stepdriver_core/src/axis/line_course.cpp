@@ -20,8 +20,9 @@ LineCourse::LineCourse(std::vector<Axis::Impl*> own_axes, const std::vector<std:
                        double velocity)
     : Course(std::move(own_axes)) {
   for (std::size_t i = 0; i < axes().size(); ++i) {
+    // The backlash is taken up, so that the motor makes the way of the joint.
     origins_.push_back(axes()[i]->harvest().count);
-    ways_.push_back(targets[i] - origins_[i]);
+    ways_.push_back(targets[i] - axes()[i]->jointCount());
     length_ = std::max<std::int64_t>(length_, std::abs(ways_[i]));
   }
   takeLimits();

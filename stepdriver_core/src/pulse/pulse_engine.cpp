@@ -146,7 +146,7 @@ void PulseEngine::startPins(Channel& channel, const Command& command, Nanosecond
   channel.pins = command.pins;
   channel.pin = 0;
   channel.pins_serial = command.serial;
-  channel.pins_count = command.count;
+  channel.pins_scale = command.scale;
   channel.faulty = false;  // to be read anew when the pins have done what they do
   channel.pin_due = now;
   if (channel.state.pulses != 0) {
@@ -276,6 +276,8 @@ void PulseEngine::written(Channel& channel, bool done) {
   (fall ? channel.fell : channel.rose) = clock_.now();
   if (fall || !done) return;
   channel.state.count += channel.direction;
+  channel.state.slack =
+      std::clamp<std::int64_t>(channel.state.slack + channel.direction, 0, channel.config.backlash);
   ++channel.state.pulses;
   channel.running = true;
   ++state_.pulses;
@@ -335,7 +337,11 @@ void PulseEngine::writePin(Channel& channel, Nanoseconds now) {
 
 void PulseEngine::pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now) {
   channel.state.ready = std::max(channel.state.ready, now + then_wait);
-  if (channel.pins_count) channel.state.count = *channel.pins_count;
+  if (const auto& scale = channel.pins_scale) {
+    channel.state.count = scale->count;
+    channel.state.slack = scale->slack;
+    channel.config.backlash = scale->backlash;
+  }
   channel.state.pins_done = channel.pins_serial;
   channel.pins_serial = 0;
   channel.published.store(channel.state);

@@ -34,6 +34,8 @@ struct ChannelConfig {
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
   Nanoseconds mode_hold = 0;
+  std::int64_t backlash =
+      0;  ///< microsteps that the motor makes at a reversal before the joint moves
 };
 
 /// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
@@ -74,7 +76,7 @@ struct Follow {
 struct Command {
   enum class Kind {
     kFollow,  ///< follow the profiles, all of them, or where one can't be taken none
-    kPins,    ///< write the pins, at rest; then, where count is given, stand there
+    kPins,    ///< write the pins, at rest; then, where a scale is given, take that
   };
 
   Kind kind = Kind::kFollow;
@@ -83,7 +85,13 @@ struct Command {
   int channel = 0;  ///< of kPins, as all below
   std::uint64_t serial = 0;
   PinSequence pins;
-  std::optional<std::int64_t> count;
+  /// Where the motor stands then, in the microsteps of a new mode.
+  struct Scale {
+    std::int64_t count = 0;
+    std::int64_t slack = 0;
+    std::int64_t backlash = 0;
+  };
+  std::optional<Scale> scale;
 };
 
 enum class EndReason {
@@ -106,7 +114,10 @@ struct LineFailure {
 
 /// What a channel does and has done.
 struct ChannelState {
-  std::int64_t count = 0;       ///< microsteps: active STEP edges forward less those backward
+  std::int64_t count = 0;  ///< microsteps: active STEP edges forward less those backward
+  /// Of the backlash, what is taken up towards max: from 0 to all of it. The joint stands at count
+  /// less this.
+  std::int64_t slack = 0;
   std::uint64_t pulses = 0;     ///< active STEP edges
   std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
   std::uint64_t refused = 0;    ///< serial of the last command that came too late or found it busy
@@ -190,7 +201,7 @@ class PulseEngine {
     PinSequence pins;
     std::size_t pin = 0;
     std::uint64_t pins_serial = 0;  // of the sequence under way; 0: none
-    std::optional<std::int64_t> pins_count;
+    std::optional<Command::Scale> pins_scale;
     Nanoseconds pin_due = 0;
 
     // Clock times by which the last edges had happened.
