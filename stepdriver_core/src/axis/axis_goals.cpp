@@ -210,7 +210,13 @@ const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr;
 
 motion::MotionState Axis::Impl::stateAt(std::int64_t at) {
   if (const Motion* motion = underWay()) return motion->profile->stateAt(at);
-  return {motion::fromInteger(harvest().count), 0.0, 0.0};
+  const pulse::ChannelState state = harvest();
+  const motion::DoubleDouble count = motion::fromInteger(state.count);
+  // A stop on a path rests between two microsteps: the next motion goes on from there.
+  const Motion* last = log.find(state.ended);
+  if (last == nullptr || state.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
+  const motion::DoubleDouble rest = last->profile->endPosition();
+  return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
 }
 
 std::vector<Move> Axis::Impl::begin(Orders orders) {
