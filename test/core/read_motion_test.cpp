@@ -47,7 +47,10 @@ TEST(ReadMotion, TakesNoJerkLimitAndNoDecelerationOfAStopWhereNoneIsGiven) {
 TEST(ReadMotion, ChecksTheJerkAndTheDecelerationOfAStop) {
   expectIssues(
       linearAxis(),
-      {{"jerk_mm_s3", 0, ""},
+      {{"backlash_mm", 0.2, ""},
+       {"backlash_mm", -0.1, "is -0.1, but must be 0 or more"},
+       {"backlash_mm", 12501.0, "is 12501.0, but must be at most 12500, which is 1000000 steps"},
+       {"jerk_mm_s3", 0, ""},
        {"jerk_mm_s3", -1.0, "is -1.0, but must be 0 or more"},
        {"jerk_mm_s3", kNan, "is nan, but must be a finite number of 0 or more"},
        {"jerk_mm_s3", 1e-6,

@@ -17,12 +17,13 @@ struct MotionKeys {
   std::string per_round, wheel_diameter;  ///< empty: there is none
   std::string max_speed, min_speed;
   std::string acceleration, deceleration, stop_deceleration, jerk;
+  std::string backlash;
   std::string min_position, max_position;
 
   std::vector<std::string> all() const {
-    std::vector<std::string> keys{steps_per_unit, max_speed,    min_speed,
-                                  acceleration,   deceleration, stop_deceleration,
-                                  jerk,           min_position, max_position};
+    std::vector<std::string> keys{steps_per_unit, max_speed,         min_speed, acceleration,
+                                  deceleration,   stop_deceleration, jerk,      backlash,
+                                  min_position,   max_position};
     for (const std::string& key : {per_round, wheel_diameter}) {
       if (!key.empty()) keys.push_back(key);
     }
@@ -46,6 +47,7 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "deceleration_mm_s2",
                                  "stop_deceleration_mm_s2",
                                  "jerk_mm_s3",
+                                 "backlash_mm",
                                  "min_position_mm",
                                  "max_position_mm"};
   static const MotionKeys rotary{Kind::kRotary,
@@ -61,6 +63,7 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "deceleration_deg_s2",
                                  "stop_deceleration_deg_s2",
                                  "jerk_deg_s3",
+                                 "backlash_deg",
                                  "min_position_deg",
                                  "max_position_deg"};
   return kind == Kind::kLinear ? linear : rotary;

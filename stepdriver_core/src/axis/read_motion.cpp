@@ -18,7 +18,8 @@ constexpr double kHighestScale = 1e9;
 constexpr double kLowestRate = 1e-3;          // [steps/s]
 constexpr double kLowestAcceleration = 1e-3;  // [steps/s^2]
 constexpr double kHighestAcceleration = 1e12;
-constexpr double kLowestJerk = 1e-3;  // [steps/s^3]
+constexpr double kMostBacklash = 1e6;  // steps
+constexpr double kLowestJerk = 1e-3;   // [steps/s^3]
 constexpr double kHighestJerk = 1e15;
 constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: each step is a double of its own
 constexpr int kMostFullSteps = 1'000'000;
@@ -76,6 +77,7 @@ class MotionReader {
     readSpeeds(config);
     readAccelerations(config);
     readJerk(config);
+    readBacklash(config);
     readPositions(config);
   }
 
@@ -237,6 +239,16 @@ class MotionReader {
                                 upperBoundText(kHighestJerk / *steps_per_unit_) + ", which is " +
                                 numberText(kLowestJerk) + " to " + numberText(kHighestJerk) +
                                 " steps/s^3");
+  }
+
+  void readBacklash(AxisConfig& config) {
+    const double backlash =
+        axis_.findNumber(keys_.backlash, Range::notNegative(), Presence::kOptional).value_or(0.0);
+    config.backlash = si(backlash);
+    if (!steps_per_unit_ || backlash * *steps_per_unit_ <= kMostBacklash) return;
+    axis_.issue(keys_.backlash, is(keys_.backlash) + "at most " +
+                                    upperBoundText(kMostBacklash / *steps_per_unit_) +
+                                    ", which is " + numberText(kMostBacklash) + " steps");
   }
 
   void checkAcceleration(const std::string& key, double acceleration) {

@@ -133,6 +133,7 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     min_speed_mm_s: 0.0       # reached without a ramp; default: 0
 ///     acceleration_mm_s2: 500.0
 ///     deceleration_mm_s2: 500.0 # default: the acceleration
+///     backlash_mm: 0.0          # that a reversal loses, and that is made up for; default: 0
 ///     min_position_mm: 0.0      # default: no limit
 ///     max_position_mm: 200.0
 ///     endstops:                 # both optional
