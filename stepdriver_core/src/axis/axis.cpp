@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "axis_impl.h"
+#include "homing.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::axis {
@@ -14,8 +15,8 @@ using Lock = std::lock_guard<std::mutex>;
 }  // namespace
 
 Axis::Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-           pulse::PulseDriver& driver)
-    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver)) {}
+           EdgeLog& edges, pulse::PulseDriver& driver)
+    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, edges, driver)) {}
 
 Axis::~Axis() = default;
 
@@ -172,6 +173,7 @@ AxisState Axis::state() const {
   state.asleep = axis.asleep;
   state.moving = channel.following != 0;
   state.homed = axis.homed;
+  if (axis.homing != nullptr) state.homing = axis.homing->phase();
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
   state.position = axis.positionOf(static_cast<double>(channel.count));
@@ -211,6 +213,7 @@ void Axis::recover() {
 void Axis::noteEmergencyStop() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
+  axis.interruptHoming("emergency stop");
   axis.driver.waitFor([&axis] { return !axis.moving(); });
   axis.fault = "emergency stop";
 }

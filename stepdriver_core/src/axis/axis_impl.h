@@ -8,6 +8,7 @@
 #include "move_log.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/axis/axis_lines.h"
+#include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/motion/planner.h"
@@ -15,11 +16,13 @@
 
 namespace stepdriver::axis {
 
+class Homing;
+
 /// The state of an Axis under its mutex. Every member function wants the lock held.
 class Axis::Impl {
  public:
   Impl(AxisConfig axis_config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver);
+       EdgeLog& edges, pulse::PulseDriver& driver);
 
   // What the engine has done since it was last looked at, taken into this state.
   pulse::ChannelState harvest();
@@ -39,6 +42,10 @@ class Axis::Impl {
   Move checkedMove(double position, bool relative, double velocity);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
+  /// The same, of a motion alone: a homing goes on.
+  void slowDown(const std::string& stopped_by);
+  /// The move that was accepted last; 0: none was.
+  std::uint64_t lastMove() const { return moves_; }
   void changeOverride(double factor);
   /// Both let go of the lock while the axis comes to rest.
   void awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
@@ -52,6 +59,10 @@ class Axis::Impl {
   std::int64_t nearestCommon(int wanted);
   void changeMicrosteps(int wanted);
 
+  // Homing.
+  const HomingConfig& homingConfig() const;
+  void interruptHoming(const std::string& why) const;
+
   // A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const;
   int readInput(int line) const;
@@ -63,6 +74,7 @@ class Axis::Impl {
   void refuseUnlessOpen() const;
   void refuseWhileMoving(const std::string& what);
   void refuseUnlessReadyToMove();
+  void refuseUnlessHomed() const;
   void refuseTooFast(double speed) const;
   void refuseBeyondLimits(double position, const std::string& what) const;
   void refuseIntoEndstop(std::int64_t steps) const;
@@ -73,6 +85,7 @@ class Axis::Impl {
   const AxisLines axis_lines;
   const ChipPins pins;
   gpio::Lines& lines;
+  EdgeLog& edges;
   pulse::PulseDriver& driver;
   const int channel;
 
@@ -81,6 +94,7 @@ class Axis::Impl {
   bool asleep = false;
   bool disabling = false;
   bool homed = false;
+  Homing* homing = nullptr;  // the one under way
   bool position_valid = false;
   int microsteps;
   double origin = 0.0;          // [unit] the position at count 0

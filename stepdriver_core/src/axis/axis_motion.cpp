@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "axis_impl.h"
+#include "restart_speed.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -26,6 +27,7 @@ double Axis::Impl::checkedVelocity(double velocity) const {
 
 Move Axis::Impl::checkedMove(double position, bool relative, double velocity) {
   refuseUnlessReadyToMove();
+  if (!relative) refuseUnlessHomed();
   if (!std::isfinite(position)) refuse("the position must be a finite number");
   const double speed = checkedVelocity(velocity);
   const std::int64_t count = harvest().count;
@@ -84,6 +86,11 @@ void Axis::Impl::checkedJog(double velocity) {
 }
 
 void Axis::Impl::decelerate(const std::string& stopped_by) {
+  interruptHoming(stopped_by);
+  slowDown(stopped_by);
+}
+
+void Axis::Impl::slowDown(const std::string& stopped_by) {
   const Motion* current = underWay();
   if (current == nullptr || current->goal.stops()) return;
   Goal goal = current->goal;
@@ -108,6 +115,7 @@ void Axis::Impl::awaitRest(std::unique_lock<std::mutex>& lock, const std::string
 
 void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by) {
   if (!enabled) return;
+  interruptHoming(stopped_by);
   disabling = true;
   try {
     awaitRest(lock, stopped_by);
@@ -177,13 +185,7 @@ motion::Profile Axis::Impl::planStopOf(const Motion& before, std::int64_t at,
 }
 
 pulse::Nanoseconds Axis::Impl::restartInterval() const {
-  // The speed that the motor takes and leaves without a ramp: the start speed, but at least what a
-  // ramp from rest has after its first full step.
-  const motion::MotionLimits speeds = limits(maxSpeed());
-  const double restart =
-      std::max(speeds.start_speed,
-               std::sqrt(2.0 * std::min(speeds.acceleration, speeds.deceleration) * microsteps));
-  return static_cast<pulse::Nanoseconds>(1e9 / restart);
+  return static_cast<pulse::Nanoseconds>(1e9 / (restartSpeed(config) * stepsPerUnit()));
 }
 
 // A plan for a moment a little ahead; one that comes too late is made again for a later moment.

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/axis/homing.h"
 
 namespace stepdriver::gpio {
 class Lines;
@@ -18,18 +21,19 @@ class PulseDriver;
 namespace stepdriver::axis {
 
 struct AxisLines;
+class EdgeLog;
 
 /// One axis: units in, pulses out. Made by the Machine that it belongs to.
 ///
-/// All calls are safe from any thread, and none of them but wait() takes longer than the chip does
-/// to wake, to be reset or to be enabled. Every command either is accepted whole or throws Refused
-/// and changes nothing. A unit is m on a linear axis, rad on a rotary one.
+/// All calls are safe from any thread, and none of them but wait() and home() takes longer than the
+/// chip does to wake, to be reset or to be enabled. Every command either is accepted whole or
+/// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
   /// @param channel of the engine, as made from lines.
-  /// @param lines, driver outlive the axis.
+  /// @param lines, edges, driver outlive the axis.
   Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver);
+       EdgeLog& edges, pulse::PulseDriver& driver);
   ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
@@ -46,7 +50,8 @@ class Axis {
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
   /// @throw Refused where a number isn't finite, the target is beyond a soft limit, the velocity
   ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or
-  ///   at fault, or the machine shuts down.
+  ///   at fault, or the machine shuts down; an absolute position also where the axis isn't homed,
+  ///   but has to be.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
   /// Turns the motor by a number of rounds, which need not be whole.
@@ -73,6 +78,23 @@ class Axis {
   /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
   /// Without effect at rest.
   void stop();
+
+  /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when that is
+  /// over. Soft limits don't count meanwhile. Where it fails, the axis stands, enabled as before,
+  /// and isn't homed: the result says why. Stops end it; other motions take over from it.
+  ///
+  /// @param cancelled asked often, from the calling thread: true decelerates and ends it.
+  /// @throw Refused where homing isn't configured, while moving, and as moveTo().
+  HomingResult home(const std::function<bool()>& cancelled = {});
+
+  /// The same for several axes of one machine at once.
+  ///
+  /// @throw Refused where one of them can't be homed; then none moves.
+  static std::vector<HomingResult> homeTogether(const std::vector<Axis*>& axes,
+                                                const std::function<bool()>& cancelled = {});
+
+  /// @throw Refused where home() would be, now.
+  void checkHoming() const;
 
   /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
   /// ends the trust in the position: nothing holds the motor.
@@ -128,6 +150,7 @@ class Axis {
   void shutDown();
 
  private:
+  friend class Homing;
   class Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "stepdriver_core/axis/homing.h"
+
 namespace stepdriver::axis {
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
@@ -12,7 +14,8 @@ struct AxisState {
   bool asleep = false;
   bool moving = false;
   bool homed = false;
-  bool position_valid = false;  ///< the position can be trusted
+  HomingPhase homing = HomingPhase::kNone;  ///< what a homing under way does
+  bool position_valid = false;              ///< the position can be trusted
   int microsteps = 1;
   double position = 0.0;  ///< [unit] from the count of the edges that went out
   double velocity = 0.0;  ///< [unit/s]
