@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "home_in_order.h"
 #include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
@@ -130,6 +131,18 @@ const std::optional<pulse::Capability>& Machine::capability() const { return imp
 
 void Machine::stop() {
   impl_->forAll([](axis::Axis& axis) { axis.stop(); });
+}
+
+std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
+                                              const std::function<bool()>& cancelled) {
+  std::vector<axis::Axis*> axes;
+  for (const std::string& name : names) axes.push_back(&axis(name));
+  if (names.empty()) {
+    for (const auto& axis : impl_->axes_) {
+      if (axis->config().homing) axes.push_back(axis.get());
+    }
+  }
+  return homeInOrder(axes, cancelled);
 }
 
 void Machine::setSpeedOverride(double factor) {
