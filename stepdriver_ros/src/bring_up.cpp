@@ -55,6 +55,9 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
   if (!issues.empty()) throw ConfigError(issues);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     ROS_INFO("%s", limitsText(config.axes[i], sources[i]).c_str());
+    if (sources[i].limited_though_continuous) {
+      ROS_WARN("%s", continuousJointText(config.axes[i]).c_str());
+    }
   }
   return config;
 }

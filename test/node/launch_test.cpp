@@ -42,6 +42,7 @@ TEST(Launch, BringsUpEachExampleWithItsOwnScale) {
   expectMoves("/right/motor", "x", 0.5, std::llround(0.5 * 9600 / (2 * std::acos(-1.0))));
   expectMoves("/screw/stepdriver", "x", 0.01, 8000);
   expectMoves("/module/stepdriver", "x", 0.01, 3200);
+  expectMoves("/cart/stepdriver", "x", 0.5, std::llround(0.5 * 1600 / (0.1 * std::acos(-1.0))));
 }
 
 TEST(Launch, KeepsNodesInNamespacesApart) {

@@ -188,8 +188,7 @@ void Homing::enter(HomingPhase phase) {
   phase_ = phase;
   phase_began_ = now();
   const double direction = leaves() ? -towards_ : towards_;
-  bound_ =
-      axis_.harvest().count + std::llround(direction * config_.max_travel * axis_.stepsPerUnit());
+  bound_ = axis_.jointCount() + std::llround(direction * config_.max_travel * axis_.stepsPerUnit());
   resume();
 }
 
@@ -227,7 +226,7 @@ void Homing::sample() {
                 " it still hasn't been at rest for debounce_ms, " +
                 Axis::Impl::inMilliseconds(debounce_));
   }
-  stroke(axis_.harvest().count, config_.latch_speed);
+  stroke(axis_.jointCount(), config_.latch_speed);
 }
 
 // What did not last is a glitch: the phase goes on.
@@ -269,15 +268,16 @@ std::optional<std::int64_t> Homing::triggerEdge() const {
 }
 
 double Homing::triggerCount() const {
+  const auto slack = static_cast<double>(latched_.slack);
   const double count = towards_ * static_cast<double>(latched_.count);
   const auto edge = triggerEdge();
   // An edge may be lost. The switch has closed between the last step and the one that wasn't made.
-  if (!edge || !course_) return towards_ * count;
+  if (!edge || !course_) return towards_ * count - slack;
   double at = towards_ * course_->stateAt(*edge - slipped_).position.value();
   at = std::min(at, count + 0.5);
   // When in the latch the timeline slid isn't known; by how many steps it could matter is.
   if (slipped_ != slipped_before_) at = std::max(at, count - 0.5);
-  return towards_ * at;
+  return towards_ * at - slack;
 }
 
 void Homing::pullOff() {
@@ -314,7 +314,7 @@ void Homing::succeed() {
 
 void Homing::finish(const std::string& message) {
   result_.axis = axis_.config.name;
-  result_.position = axis_.positionOf(static_cast<double>(axis_.harvest().count));
+  result_.position = axis_.position();
   result_.message = message;
   if (!isReplaced()) result_.message += axis_.show(result_.position);
   over_ = true;

@@ -90,8 +90,9 @@ class Homing {
   pulse::Nanoseconds deadline_ = 0;
 
   std::uint64_t stroke_ = 0;  // the move that is under way or was the last; 0: none yet
-  std::int64_t bound_ = 0;    // the count at which the strokes of this phase end at the latest
-  bool slowing_ = false;      // the switch has opened
+  std::int64_t bound_ =
+      0;                  // the joint's count at which the strokes of this phase end at the latest
+  bool slowing_ = false;  // the switch has opened
   pulse::Nanoseconds phase_began_ = 0;
 
   // While the switch settles.
@@ -105,7 +106,7 @@ class Homing {
   pulse::ChannelState latched_;
   pulse::Nanoseconds slipped_before_ = 0;
   pulse::Nanoseconds slipped_ = 0;
-  double trigger_ = 0.0;  // [microsteps]
+  double trigger_ = 0.0;  // [microsteps] of the joint
 };
 
 }  // namespace stepdriver::axis

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 #include <string>
 
 #include "stepdriver_core/error.h"
@@ -12,16 +11,11 @@ namespace {
 
 using Group = std::vector<axis::Axis*>;
 
-/// The axes by their order. @throw Refused where there are none, or not each once.
+/// The axes by their order. @throw Refused where one can't be homed.
 std::map<int, Group> groupsOf(const std::vector<axis::Axis*>& axes) {
-  if (axes.empty()) throw Refused("no axis has a homing");
-  std::set<const axis::Axis*> seen;
   std::map<int, Group> groups;
   for (axis::Axis* axis : axes) {
     axis->checkHoming();
-    if (!seen.insert(axis).second) {
-      throw Refused("the axis " + axis->config().name + " is named twice");
-    }
     groups[axis->config().homing->order].push_back(axis);
   }
   return groups;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -30,10 +31,14 @@ class EdgeLog;
 /// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
+  class Impl;  ///< for this room only
+
   /// @param channel of the engine, as made from lines.
-  /// @param lines, edges, driver outlive the axis.
+  /// @param lines, edges, driver, mutex outlive the axis. The mutex is that of all axes of a
+  /// machine:
+  ///   motions of several are planned under it.
   Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       EdgeLog& edges, pulse::PulseDriver& driver);
+       EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex);
   ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
@@ -76,8 +81,17 @@ class Axis {
   void setSpeedOverride(double factor);
 
   /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
-  /// Without effect at rest.
+  /// The axes that move together with this one stop with it, along their path. What is held is
+  /// given up. Without effect else at rest.
   void stop();
+
+  /// Feed hold: decelerates to rest, along the path of axes that move together, and keeps the goal;
+  /// who waits for the move goes on waiting. A jog just ends. Until resume() or stop() other
+  /// motions are refused.
+  void hold();
+
+  /// Goes on with what is held. @throw Refused as moveTo().
+  void resume();
 
   /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when that is
   /// over. Soft limits don't count meanwhile. Where it fails, the axis stands, enabled as before,
@@ -150,8 +164,7 @@ class Axis {
   void shutDown();
 
  private:
-  friend class Homing;
-  class Impl;
+  friend class Coordination;
   std::unique_ptr<Impl> impl_;
 };
 

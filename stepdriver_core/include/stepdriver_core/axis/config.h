@@ -59,6 +59,7 @@ struct AxisConfig {
   /// [unit/s^2] Of a stop, at least the deceleration; none: that.
   std::optional<double> stop_deceleration;
   double jerk = 0.0;                   ///< [unit/s^3] 0: the acceleration may jump
+  double backlash = 0.0;               ///< [unit] that a reversal loses; made up for
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;
 
