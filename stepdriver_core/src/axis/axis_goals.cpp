@@ -20,6 +20,7 @@ double Axis::Impl::checkedVelocity(double velocity) const {
 
 std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
   refuseUnlessReadyToMove();
+  if (!relative) refuseUnlessHomed();
   if (!std::isfinite(position)) refuse("the position must be a finite number");
   const double goal = relative ? positionOf(relativeOrigin()) + position : position;
   refuseBeyondLimits(goal, "the position");
@@ -103,6 +104,11 @@ Orders Axis::Impl::ordersOf(const Goal& goal) {
 }
 
 void Axis::Impl::decelerate(const std::string& stopped_by) {
+  interruptHoming(stopped_by);
+  slowDown(stopped_by);
+}
+
+void Axis::Impl::slowDown(const std::string& stopped_by) {
   const Motion* current = underWay();
   if (current == nullptr) {
     dropHeld(MoveEnd::kStopped, stopped_by);
@@ -190,6 +196,7 @@ void Axis::Impl::awaitRest(std::unique_lock<std::mutex>& lock, const std::string
 
 void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by) {
   if (!enabled) return;
+  interruptHoming(stopped_by);
   disabling = true;
   try {
     awaitRest(lock, stopped_by);
