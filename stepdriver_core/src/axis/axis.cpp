@@ -146,13 +146,14 @@ void Axis::setMicrosteps(int microsteps) {
     if (!axis.config.align_on_microstep_change) {
       axis.refuse("1/" + std::to_string(microsteps) + " has no position at " +
                   axis.show(axis.position()) + "; the nearest that both modes have is " +
-                  axis.show(axis.positionOf(static_cast<double>(common))) +
+                  axis.show(axis.positionOf(axis.jointAt(static_cast<double>(common)))) +
                   ": move there first, or configure align_on_microstep_change");
     }
     axis.refuseUnlessReadyToMove();
-    axis.refuseBeyondLimits(axis.positionOf(static_cast<double>(common)), "the common position");
+    axis.refuseBeyondLimits(axis.positionOf(axis.jointAt(static_cast<double>(common))),
+                            "the common position");
     axis.refuseIntoEndstop(common - axis.harvest().count);
-    const Move move = axis.startMove(common, axis.maxSpeed());
+    const Move move = axis.moveMotor(common);
     lock.unlock();
     const MoveResult result = wait(move);
     lock.lock();
