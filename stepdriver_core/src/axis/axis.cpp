@@ -14,8 +14,8 @@ using Lock = std::lock_guard<std::mutex>;
 }  // namespace
 
 Axis::Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-           pulse::PulseDriver& driver)
-    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver)) {}
+           pulse::PulseDriver& driver, std::mutex& mutex)
+    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver, mutex)) {}
 
 Axis::~Axis() = default;
 
@@ -62,6 +62,16 @@ void Axis::setSpeedOverride(double factor) {
 void Axis::stop() {
   const Lock lock(impl_->mutex);
   impl_->decelerate("it was stopped");
+}
+
+void Axis::hold() {
+  const Lock lock(impl_->mutex);
+  impl_->hold();
+}
+
+void Axis::resume() {
+  const Lock lock(impl_->mutex);
+  impl_->resume();
 }
 
 // ---- the chip ----
@@ -171,12 +181,16 @@ AxisState Axis::state() const {
   state.enabled = axis.enabled;
   state.asleep = axis.asleep;
   state.moving = channel.following != 0;
+  state.held = axis.held.has_value();
   state.homed = axis.homed;
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
   state.position = axis.positionOf(static_cast<double>(channel.count));
   state.target = state.position;
   state.fault = axis.fault;
+  if (axis.held && axis.held->goal.target) {
+    state.target = axis.positionOf(static_cast<double>(*axis.held->goal.target));
+  }
   if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
     const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
     state.velocity = velocity / axis.stepsPerUnit();
@@ -213,6 +227,7 @@ void Axis::noteEmergencyStop() {
   Impl& axis = *impl_;
   axis.driver.waitFor([&axis] { return !axis.moving(); });
   axis.fault = "emergency stop";
+  axis.dropHeld(MoveEnd::kEmergencyStop, axis.fault);
 }
 
 void Axis::close(const std::string& reason) {

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "course.h"
+
 namespace stepdriver::axis {
 namespace {
 
@@ -13,7 +15,7 @@ constexpr const char* kChipFault =
 }  // namespace
 
 Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& own_lines,
-                 gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver)
+                 gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver, std::mutex& all_mutex)
     : config(std::move(axis_config)),
       chip(chip::chipOf(config.driver)),
       axis_lines(own_lines),
@@ -21,6 +23,7 @@ Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& ow
       lines(all_lines),
       driver(pulse_driver),
       channel(engine_channel),
+      mutex(all_mutex),
       enabled(!pins.hasEnable()),
       microsteps(config.microsteps) {}
 
@@ -46,6 +49,7 @@ pulse::ChannelState Axis::Impl::harvest() {
     conclude(state);
   }
   log.dropBefore(state.following != 0 ? state.following : state.ended);
+  if (held && !fault.empty()) dropHeld(MoveEnd::kFault, fault);
   return state;
 }
 
@@ -63,9 +67,14 @@ void Axis::Impl::conclude(const pulse::ChannelState& state) {
       break;
   }
   if (state.end_abrupt && state.end != pulse::EndReason::kDone) position_valid = false;
-  if (const Motion* motion = log.find(state.ended)) {
-    if (!log.result(motion->goal.move)) log.conclude(motion->goal.move, resultOf(*motion, state));
+  const Motion* motion = log.find(state.ended);
+  if (motion == nullptr || log.result(motion->goal.move)) return;
+  if (state.end != pulse::EndReason::kDone) {
+    held.reset();
+  } else if (motion->goal.held) {
+    return;  // it goes on later
   }
+  log.conclude(motion->goal.move, resultOf(*motion, state));
 }
 
 MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState& state) {
@@ -96,20 +105,38 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
       result.end = MoveEnd::kFault;
       why = fault;
       break;
+    case pulse::EndReason::kCompanion:
+      result.end = MoveEnd::kCompanion;
+      why = endedWith(motion.goal);
+      break;
   }
   if (result.end == MoveEnd::kReached) {
     result.message = config.name + " reached " + show(result.position);
   } else {
-    result.message = config.name + " stands at " + show(result.position);
-    if (motion.goal.target) {
-      result.message += ", not at " + show(positionOf(static_cast<double>(*motion.goal.target)));
-    }
-    result.message += ": " + why;
+    result.message = standsAt(motion.goal, why);
     if (!position_valid && state.end_abrupt) {
       result.message += "; it stopped too fast for the position to be trusted";
     }
   }
   return result;
+}
+
+std::string Axis::Impl::standsAt(const Goal& goal, const std::string& why) const {
+  const double count = static_cast<double>(driver.engine().channel(channel).count);
+  std::string text = config.name + " stands at " + show(positionOf(count));
+  if (goal.target) text += ", not at " + show(positionOf(static_cast<double>(*goal.target)));
+  return text + ": " + why;
+}
+
+std::string Axis::Impl::endedWith(const Goal& goal) const {
+  for (const Impl* other : goal.course->axes()) {
+    const pulse::ChannelState state = driver.engine().channel(other->channel);
+    if (other != this && state.end != pulse::EndReason::kDone &&
+        state.end != pulse::EndReason::kCompanion) {
+      return "it moved together with " + other->config.name + ", which was stopped";
+    }
+  }
+  return "an axis that it moved together with was stopped";
 }
 
 // ---- scales ----
@@ -129,6 +156,10 @@ motion::MotionLimits Axis::Impl::limits(double velocity) const {
   const double scale = stepsPerUnit();
   return {config.start_speed * scale, velocity * scale, config.acceleration * scale,
           config.deceleration * scale, config.jerk * scale};
+}
+
+double Axis::Impl::stopDeceleration() const {
+  return config.stop_deceleration.value_or(config.deceleration) * stepsPerUnit();
 }
 
 std::string Axis::Impl::show(double value, const char* per) const {

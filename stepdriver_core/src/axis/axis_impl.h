@@ -3,6 +3,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "chip_pins.h"
 #include "move_log.h"
@@ -15,11 +16,18 @@
 
 namespace stepdriver::axis {
 
-/// The state of an Axis under its mutex. Every member function wants the lock held.
+/// What an axis is to do. Orders of one course go out together.
+struct Order {
+  Axis::Impl* axis = nullptr;
+  Goal goal;
+};
+using Orders = std::vector<Order>;
+
+/// The state of an Axis under the lock of all axes. Every member function wants that held.
 class Axis::Impl {
  public:
   Impl(AxisConfig axis_config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver);
+       pulse::PulseDriver& driver, std::mutex& mutex);
 
   // What the engine has done since it was last looked at, taken into this state.
   pulse::ChannelState harvest();
@@ -31,15 +39,26 @@ class Axis::Impl {
   double positionOf(double count) const { return origin + count / stepsPerUnit(); }
   double countOf(double position) const { return (position - origin) * stepsPerUnit(); }
   motion::MotionLimits limits(double velocity) const;
+  /// [microsteps/s^2]
+  double stopDeceleration() const;
   std::string show(double value, const char* per = "") const;
   static std::string inMilliseconds(pulse::Nanoseconds time);
 
   // Orders to the engine.
+  /// Gives each order a move of its own and has them carried out; who waits for what they replace
+  /// is told.
+  static std::vector<Move> begin(Orders orders);
   Move startMove(std::int64_t target, double velocity);
+  /// [microsteps] @throw Refused where it isn't one to move to.
+  std::int64_t checkedTarget(double position, bool relative);
   Move checkedMove(double position, bool relative, double velocity);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
   void changeOverride(double factor);
+  void hold();
+  void resume();
+  /// Gives up what a hold has kept, of all axes of its course.
+  void dropHeld(MoveEnd end, const std::string& why);
   /// Both let go of the lock while the axis comes to rest.
   void awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
   void restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
@@ -63,6 +82,8 @@ class Axis::Impl {
   void refuseUnlessOpen() const;
   void refuseWhileMoving(const std::string& what);
   void refuseUnlessReadyToMove();
+  void refuseUnlessReady();
+  void refuseWhileHeld() const;
   void refuseTooFast(double speed) const;
   void refuseBeyondLimits(double position, const std::string& what) const;
   void refuseIntoEndstop(std::int64_t steps) const;
@@ -76,7 +97,7 @@ class Axis::Impl {
   pulse::PulseDriver& driver;
   const int channel;
 
-  mutable std::mutex mutex;
+  std::mutex& mutex;
   bool enabled = false;
   bool asleep = false;
   bool disabling = false;
@@ -89,14 +110,27 @@ class Axis::Impl {
   std::string fault;
   std::string closed;
   MoveLog log;
+  std::optional<Held> held;
+
+  /// [microsteps] Where a relative motion begins.
+  double relativeOrigin(std::int64_t count);
+  /// The motion that the engine has; nullptr at rest.
+  const Motion* underWay();
+  /// [microsteps] Where it will be at a motion time.
+  motion::MotionState stateAt(std::int64_t at);
 
  private:
   double checkedVelocity(double velocity) const;
-  double relativeOrigin(std::int64_t count);
-  const Motion* underWay();
-  const Motion& begin(Goal goal);
-  void follow(const Goal& goal);
-  std::uint64_t send(const Goal& goal, pulse::Nanoseconds lead);
+  /// The orders that the axes of a motion have now.
+  Orders ordersOf(const Goal& goal);
+  static void carryOut(const Orders& orders);
+  static std::vector<pulse::Follow> send(const Orders& orders, pulse::Nanoseconds lead);
+  static std::shared_ptr<const motion::Profile> planPath(const Orders& orders, std::int64_t at);
+  bool taken(const pulse::Follow& follow) const;
+  pulse::Nanoseconds earliest(pulse::Nanoseconds now, pulse::Nanoseconds lead);
+  Motion planned(const Goal& goal, std::int64_t at,
+                 const std::shared_ptr<const motion::Profile>& path);
+  void leaveCourse(const Goal& goal, const std::string& left_by);
   std::int64_t stepsTo(const Goal& goal);
   motion::Plan plan(const Goal& goal, std::int64_t at, const Motion* before,
                     std::int64_t count) const;
@@ -106,6 +140,8 @@ class Axis::Impl {
   MoveResult replacedBy(const Motion& motion, std::int64_t began);
   void conclude(const pulse::ChannelState& state);
   MoveResult resultOf(const Motion& motion, const pulse::ChannelState& state);
+  std::string standsAt(const Goal& goal, const std::string& why) const;
+  std::string endedWith(const Goal& goal) const;
 
   std::uint64_t serial_ = 0;
   std::uint64_t moves_ = 0;

@@ -10,6 +10,7 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
   for (std::size_t i = 0; i < channels.size(); ++i) channels_[i].config = channels[i];
   writes_.reserve(channels.size());
   writers_.reserve(channels.size());
+  errors_.resize(channels.size());
 }
 
 bool PulseEngine::post(const Command& command) {
@@ -77,38 +78,63 @@ bool PulseEngine::isFast(const Channel& channel) {
 void PulseEngine::takeMail(Nanoseconds now) {
   if (mail_.front() == nullptr) return;
   while (const Command* command = mail_.front()) {
-    Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
     if (command->kind == Command::Kind::kFollow) {
-      follow(channel, *command, now);
+      followAll(*command, now);
     } else {
+      Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
       startPins(channel, *command, now);
+      channel.state.taken = command->serial;
+      channel.published.store(channel.state);
     }
-    channel.state.taken = command->serial;
-    channel.published.store(channel.state);
     mail_.pop();
   }
   // All of them: an order may slide the timeline, and then no step may go out by its old time.
   scheduleAll();
 }
 
-void PulseEngine::follow(Channel& channel, const Command& command, Nanoseconds now) {
-  const Nanoseconds start = command.profile->startNs();
+void PulseEngine::followAll(const Command& command, Nanoseconds now) {
+  bool may = true;
+  for (std::size_t i = 0; i < command.follow_count; ++i) {
+    may = may && mayFollow(command.follows[i], now);
+  }
+  for (std::size_t i = 0; i < command.follow_count; ++i) {
+    const Follow& order = command.follows[i];
+    Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
+    if (may) {
+      follow(channel, order);
+    } else {
+      channel.state.refused = order.serial;
+    }
+  }
+  // What they wait for is there for all at once: `follows` is not read any more.
+  for (std::size_t i = command.follow_count; i-- > 0;) {
+    const Follow& order = command.follows[i];
+    Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
+    channel.state.taken = order.serial;
+    channel.published.store(channel.state);
+  }
+}
+
+bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
+  const Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
+  const Nanoseconds start = order.profile->startNs();
   const bool late =
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
   const std::uint64_t latest =
       channel.successor != nullptr ? channel.successor_serial : channel.state.following;
-  if (late || channel.pins_serial != 0 || command.continues != latest) {
-    channel.state.refused = command.serial;
-    return;
-  }
-  channel.restart_interval = command.restart_interval;
+  return !late && channel.pins_serial == 0 && order.continues == latest;
+}
+
+void PulseEngine::follow(Channel& channel, const Follow& order) {
+  channel.restart_interval = order.restart_interval;
+  channel.group = order.group;
   if (channel.profile == nullptr) {
-    adopt(channel, *command.profile, command.serial);
-    channel.last_planned = start;
+    adopt(channel, *order.profile, order.serial);
+    channel.last_planned = order.profile->startNs();
     channel.running = false;
   } else {
-    channel.successor = command.profile;
-    channel.successor_serial = command.serial;
+    channel.successor = order.profile;
+    channel.successor_serial = order.serial;
   }
 }
 
@@ -216,41 +242,46 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     writes_.push_back({step.line, fall ? !step.active : step.active});
     writers_.push_back(&channel);
   }
+  // The reads of the switches took time, and a stop may have come in it; and what ended one channel
+  // may have ended others.
+  if (emergencyStopped()) stopAll(now);
+  dropEnded();
   if (writes_.empty()) return;
-  // The reads of the switches took time, and a stop may have come in it.
-  if (emergencyStopped()) {
-    stopAll(now);
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < writers_.size(); ++i) {
-      if (!writers_[i]->high) continue;
-      writes_[kept] = writes_[i];
-      writers_[kept++] = writers_[i];
-    }
-    writes_.resize(kept);
-    writers_.resize(kept);
-    if (kept == 0) return;
-  }
   const int error = lines_.write(writes_.data(), writes_.size());
   for (std::size_t i = 0; i < writers_.size(); ++i) {
-    Channel* const channel = writers_[i];
     // One by one it shows whose line it is. What the write has set already keeps its level.
-    const int own_error = error != 0 && writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
-    const bool fall = channel->high;
-    channel->high = !fall && own_error == 0;
-    (fall ? channel->fell : channel->rose) = clock_.now();
-    if (own_error != 0) {
-      fail(*channel, {own_error, writes_[i].output}, now);
-    } else if (!fall) {
-      channel->state.count += channel->direction;
-      ++channel->state.pulses;
-      channel->running = true;
-      ++state_.pulses;
-      channel->last_planned = channel->next->time_ns;
-      pullNext(*channel);
-      channel->published.store(channel->state);
-    }
+    errors_[i] = error != 0 && writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
+    written(*writers_[i], errors_[i] == 0);
+  }
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    if (errors_[i] != 0) fail(*writers_[i], {errors_[i], writes_[i].output}, now);
   }
   figures_.store(state_);
+}
+
+void PulseEngine::dropEnded() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    if (!writers_[i]->high && !writers_[i]->next) continue;
+    writes_[kept] = writes_[i];
+    writers_[kept++] = writers_[i];
+  }
+  writes_.resize(kept);
+  writers_.resize(kept);
+}
+
+void PulseEngine::written(Channel& channel, bool done) {
+  const bool fall = channel.high;
+  channel.high = !fall && done;
+  (fall ? channel.fell : channel.rose) = clock_.now();
+  if (fall || !done) return;
+  channel.state.count += channel.direction;
+  ++channel.state.pulses;
+  channel.running = true;
+  ++state_.pulses;
+  channel.last_planned = channel.next->time_ns;
+  pullNext(channel);
+  channel.published.store(channel.state);
 }
 
 void PulseEngine::writeOthers(Nanoseconds now) {
@@ -317,6 +348,18 @@ void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds
 }
 
 void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
+  const bool together =
+      channel.group != 0 && channel.profile != nullptr && reason != EndReason::kDone;
+  endOne(channel, reason, now);
+  if (!together) return;
+  for (Channel& other : channels_) {
+    if (other.profile != nullptr && other.group == channel.group) {
+      endOne(other, EndReason::kCompanion, now);
+    }
+  }
+}
+
+void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
   // What fails after the motion was over leaves that motion's end as it was.
   if (channel.profile != nullptr) {
     channel.state.end = reason;

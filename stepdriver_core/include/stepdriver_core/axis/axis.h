@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "stepdriver_core/axis/axis_state.h"
@@ -26,10 +27,13 @@ struct AxisLines;
 /// and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
+  class Impl;  ///< for this room only
+
   /// @param channel of the engine, as made from lines.
-  /// @param lines, driver outlive the axis.
+  /// @param lines, driver, mutex outlive the axis. The mutex is that of all axes of a machine:
+  ///   motions of several are planned under it.
   Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver);
+       pulse::PulseDriver& driver, std::mutex& mutex);
   ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
@@ -71,8 +75,17 @@ class Axis {
   void setSpeedOverride(double factor);
 
   /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
-  /// Without effect at rest.
+  /// The axes that move together with this one stop with it, along their path. What is held is
+  /// given up. Without effect else at rest.
   void stop();
+
+  /// Feed hold: decelerates to rest, along the path of axes that move together, and keeps the goal;
+  /// who waits for the move goes on waiting. A jog just ends. Until resume() or stop() other
+  /// motions are refused.
+  void hold();
+
+  /// Goes on with what is held. @throw Refused as moveTo().
+  void resume();
 
   /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
   /// ends the trust in the position: nothing holds the motor.
@@ -128,7 +141,7 @@ class Axis {
   void shutDown();
 
  private:
-  class Impl;
+  friend class Coordination;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -11,6 +11,7 @@ struct AxisState {
   bool enabled = false;
   bool asleep = false;
   bool moving = false;
+  bool held = false;  ///< by a feed hold: it will go on when it is told to
   bool homed = false;
   bool position_valid = false;  ///< the position can be trusted
   int microsteps = 1;
@@ -44,7 +45,8 @@ enum class MoveEnd {
   kEndstopMin,  ///< the min endstop was met
   kEndstopMax,
   kEmergencyStop,
-  kFault,  ///< pulses too late, or a line that failed
+  kFault,      ///< pulses too late, or a line that failed
+  kCompanion,  ///< an axis that it moved together with was stopped by one of these
 };
 
 struct MoveResult {

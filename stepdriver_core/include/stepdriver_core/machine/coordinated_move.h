@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/coordination.h"
 
 namespace stepdriver::machine {
 
@@ -21,12 +22,7 @@ struct LineRequest {
 };
 
 /// Where a trajectory wants its axes to be at one time.
-struct TrajectoryPoint {
-  double time = 0.0;                  ///< [s] after the start, growing from each to the next
-  std::vector<double> positions;      ///< [unit] one for each name
-  std::vector<double> velocities;     ///< [unit/s] one for each name, or none
-  std::vector<double> accelerations;  ///< [unit/s^2] one for each name, or none
-};
+using TrajectoryPoint = axis::CoursePoint;
 
 struct TrajectoryRequest {
   std::vector<std::string> names;  ///< of the axes, each once; need not be all

@@ -9,6 +9,7 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -61,6 +62,28 @@ class Machine {
 
   /// Decelerates every axis to rest.
   void stop();
+
+  /// A straight line of several axes: all begin and end together, each within its own limits. Axes
+  /// that move come to rest first. What ends one of them ends all, a stop or a hold of one slows
+  /// all of them down along the line.
+  ///
+  /// @throw Refused as Axis::moveTo(), and where the request isn't one; then nothing moves.
+  CoordinatedMove moveLine(const LineRequest& request);
+
+  /// Several axes through the points of a trajectory, from whatever they do, which it replaces.
+  /// axis::Coordination::follow() says what it keeps to. Else as moveLine().
+  CoordinatedMove followTrajectory(const TrajectoryRequest& request);
+
+  /// How a motion of several axes ended; none where it hasn't.
+  std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
+  /// Returns when it has ended.
+  CoordinatedResult wait(const CoordinatedMove& move) const;
+
+  /// Feed hold: every axis decelerates to rest along its path, and keeps its goal.
+  void hold();
+
+  /// Goes on with what is held.
+  void resume();
 
   /// Scales the velocities of all motions, of those under way too, within the axes' accelerations.
   /// No axis goes beyond its maximum.
