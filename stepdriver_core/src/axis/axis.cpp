@@ -1,5 +1,6 @@
 #include "stepdriver_core/axis/axis.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -176,7 +177,9 @@ void Axis::setPosition(double position) {
 AxisState Axis::state() const {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
+  const pulse::Nanoseconds before = axis.driver.motionNow();
   const pulse::ChannelState channel = axis.harvest();
+  const pulse::Nanoseconds after = axis.driver.motionNow();
   AxisState state;
   state.enabled = axis.enabled;
   state.asleep = axis.asleep;
@@ -186,14 +189,18 @@ AxisState Axis::state() const {
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
   state.position = axis.positionOf(static_cast<double>(channel.count));
+  state.planned = state.position;
   state.target = state.position;
   state.fault = axis.fault;
   if (axis.held && axis.held->goal.target) {
     state.target = axis.positionOf(static_cast<double>(*axis.held->goal.target));
   }
   if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
-    const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
-    state.velocity = velocity / axis.stepsPerUnit();
+    const motion::MotionState now = motion->profile->stateAt(after);
+    const auto [low, high] =
+        std::minmax({motion->profile->stateAt(before).position.value(), now.position.value()});
+    state.planned = axis.positionOf(std::clamp(static_cast<double>(channel.count), low, high));
+    state.velocity = now.velocity / axis.stepsPerUnit();
     const Goal& goal = motion->goal;
     if (goal.stops()) {
       state.target = axis.positionOf(motion->profile->endPosition().value());
