@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "axis_impl.h"
+#include "homing.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::axis {
@@ -15,8 +16,9 @@ using Lock = std::lock_guard<std::mutex>;
 }  // namespace
 
 Axis::Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-           pulse::PulseDriver& driver, std::mutex& mutex)
-    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver, mutex)) {}
+           EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex)
+    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, edges, driver,
+                                   mutex)) {}
 
 Axis::~Axis() = default;
 
@@ -144,8 +146,7 @@ void Axis::setMicrosteps(int microsteps) {
   if (common != axis.harvest().count) {
     if (!axis.config.align_on_microstep_change) {
       axis.refuse("1/" + std::to_string(microsteps) + " has no position at " +
-                  axis.show(axis.positionOf(static_cast<double>(axis.harvest().count))) +
-                  "; the nearest that both modes have is " +
+                  axis.show(axis.position()) + "; the nearest that both modes have is " +
                   axis.show(axis.positionOf(static_cast<double>(common))) +
                   ": move there first, or configure align_on_microstep_change");
     }
@@ -168,7 +169,7 @@ void Axis::setPosition(double position) {
   axis.refuseWhileMoving("its position is set");
   if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
   axis.refuseBeyondLimits(position, "the position");
-  axis.origin = position - static_cast<double>(axis.harvest().count) / axis.stepsPerUnit();
+  axis.origin = position - static_cast<double>(axis.jointCount()) / axis.stepsPerUnit();
   axis.position_valid = true;
 }
 
@@ -186,9 +187,10 @@ AxisState Axis::state() const {
   state.moving = channel.following != 0;
   state.held = axis.held.has_value();
   state.homed = axis.homed;
+  if (axis.homing != nullptr) state.homing = axis.homing->phase();
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
-  state.position = axis.positionOf(static_cast<double>(channel.count));
+  state.position = axis.positionOf(static_cast<double>(channel.count - channel.slack));
   state.planned = state.position;
   state.target = state.position;
   state.fault = axis.fault;
@@ -199,11 +201,14 @@ AxisState Axis::state() const {
     const motion::MotionState now = motion->profile->stateAt(after);
     const auto [low, high] =
         std::minmax({motion->profile->stateAt(before).position.value(), now.position.value()});
-    state.planned = axis.positionOf(std::clamp(static_cast<double>(channel.count), low, high));
-    state.velocity = now.velocity / axis.stepsPerUnit();
+    const double planned = std::clamp(static_cast<double>(channel.count), low, high);
+    state.planned = axis.positionOf(planned - static_cast<double>(channel.slack));
+    // While the backlash is taken up, the joint stands.
+    const bool joint_moves = channel.slack == (now.velocity > 0.0 ? axis.backlash() : 0);
+    state.velocity = joint_moves ? now.velocity / axis.stepsPerUnit() : 0.0;
     const Goal& goal = motion->goal;
     if (goal.stops()) {
-      state.target = axis.positionOf(motion->profile->endPosition().value());
+      state.target = axis.positionOf(axis.jointAt(motion->profile->endPosition().value()));
     } else if (goal.target) {
       state.target = axis.positionOf(static_cast<double>(*goal.target));
     }
@@ -232,6 +237,7 @@ void Axis::recover() {
 void Axis::noteEmergencyStop() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
+  axis.interruptHoming("emergency stop");
   axis.driver.waitFor([&axis] { return !axis.moving(); });
   axis.fault = "emergency stop";
   axis.dropHeld(MoveEnd::kEmergencyStop, axis.fault);

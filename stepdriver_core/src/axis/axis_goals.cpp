@@ -20,8 +20,9 @@ double Axis::Impl::checkedVelocity(double velocity) const {
 
 std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
   refuseUnlessReadyToMove();
+  if (!relative) refuseUnlessHomed();
   if (!std::isfinite(position)) refuse("the position must be a finite number");
-  const double goal = relative ? positionOf(relativeOrigin(harvest().count)) + position : position;
+  const double goal = relative ? positionOf(relativeOrigin()) + position : position;
   refuseBeyondLimits(goal, "the position");
   return std::llround(countOf(goal));
 }
@@ -29,14 +30,14 @@ std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
 Move Axis::Impl::checkedMove(double position, bool relative, double velocity) {
   const std::int64_t target = checkedTarget(position, relative);
   const double speed = checkedVelocity(velocity);
-  if (!moving()) refuseIntoEndstop(target - harvest().count);
+  if (!moving()) refuseIntoEndstop(target - jointCount());
   return startMove(target, speed);
 }
 
-double Axis::Impl::relativeOrigin(std::int64_t count) {
+double Axis::Impl::relativeOrigin() {
   const Motion* current = underWay();
-  if (current == nullptr) return static_cast<double>(count);
-  if (current->goal.stops()) return current->profile->endPosition().value();
+  if (current == nullptr) return static_cast<double>(jointCount());
+  if (current->goal.stops()) return jointAt(current->profile->endPosition().value());
   if (!current->goal.target) refuse("busy: it jogs without an end; give an absolute position");
   return static_cast<double>(*current->goal.target);
 }
@@ -62,7 +63,7 @@ void Axis::Impl::checkedJog(double velocity) {
   goal.velocity = velocity;
   const auto& limit = velocity > 0.0 ? config.max_position : config.min_position;
   if (limit) goal.target = std::llround(countOf(*limit));
-  const std::int64_t count = harvest().count;
+  const std::int64_t count = jointCount();
   if (!moving()) {
     const std::int64_t sign = velocity > 0.0 ? 1 : -1;
     if (goal.target && (*goal.target - count) * sign <= 0) {
@@ -74,6 +75,20 @@ void Axis::Impl::checkedJog(double velocity) {
     return;  // it does so already
   }
   begin({{this, goal}});
+}
+
+void Axis::Impl::takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way) {
+  const std::int64_t wanted = way > 0 ? backlash() : 0;
+  if (way == 0 || harvest().slack == wanted) return;
+  Goal goal;
+  goal.target = jointCount();
+  goal.velocity = maxSpeed();
+  goal.take_up = way > 0 ? 1 : -1;
+  begin({{this, goal}});
+  lock.unlock();
+  driver.waitFor([this] { return driver.engine().channel(channel).following == 0; });
+  lock.lock();
+  harvest();
 }
 
 Orders Axis::Impl::ordersOf(const Goal& goal) {
@@ -89,6 +104,11 @@ Orders Axis::Impl::ordersOf(const Goal& goal) {
 }
 
 void Axis::Impl::decelerate(const std::string& stopped_by) {
+  interruptHoming(stopped_by);
+  slowDown(stopped_by);
+}
+
+void Axis::Impl::slowDown(const std::string& stopped_by) {
   const Motion* current = underWay();
   if (current == nullptr) {
     dropHeld(MoveEnd::kStopped, stopped_by);
@@ -148,7 +168,7 @@ void Axis::Impl::dropHeld(MoveEnd end, const std::string& why) {
     MoveResult result;
     result.end = axis == this ? end : MoveEnd::kCompanion;
     const pulse::ChannelState state = driver.engine().channel(axis->channel);
-    result.position = axis->positionOf(static_cast<double>(state.count));
+    result.position = axis->positionOf(static_cast<double>(state.count - state.slack));
     result.duration = std::max(0.0, static_cast<double>(state.end_time - given_up.begin_ns) * 1e-9);
     result.message = axis->standsAt(
         given_up.goal,
@@ -176,6 +196,7 @@ void Axis::Impl::awaitRest(std::unique_lock<std::mutex>& lock, const std::string
 
 void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by) {
   if (!enabled) return;
+  interruptHoming(stopped_by);
   disabling = true;
   try {
     awaitRest(lock, stopped_by);
@@ -196,7 +217,13 @@ const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr;
 
 motion::MotionState Axis::Impl::stateAt(std::int64_t at) {
   if (const Motion* motion = underWay()) return motion->profile->stateAt(at);
-  return {motion::fromInteger(harvest().count), 0.0, 0.0};
+  const pulse::ChannelState state = harvest();
+  const motion::DoubleDouble count = motion::fromInteger(state.count);
+  // A stop on a path rests between two microsteps: the next motion goes on from there.
+  const Motion* last = log.find(state.ended);
+  if (last == nullptr || state.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
+  const motion::DoubleDouble rest = last->profile->endPosition();
+  return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
 }
 
 std::vector<Move> Axis::Impl::begin(Orders orders) {
@@ -221,7 +248,7 @@ std::vector<Move> Axis::Impl::begin(Orders orders) {
       axis.log.conclude(before.move, axis.replacedBy(motion, replaced[i].began));
     }
     const motion::Profile& profile = *motion.profile;
-    moves.push_back({motion.goal.move, axis.positionOf(profile.endPosition().value()),
+    moves.push_back({motion.goal.move, axis.positionOf(axis.jointAt(profile.endPosition().value())),
                      static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9,
                      motion.overshoot / axis.stepsPerUnit()});
   }
@@ -249,7 +276,7 @@ void Axis::Impl::leaveCourse(const Goal& goal, const std::string& left_by) {
 MoveResult Axis::Impl::replacedBy(const Motion& motion, std::int64_t began) {
   MoveResult result;
   result.end = MoveEnd::kReplaced;
-  result.position = positionOf(static_cast<double>(harvest().count));
+  result.position = position();
   result.duration = std::max(0.0, static_cast<double>(motion.profile->startNs() - began) * 1e-9);
   result.message = config.name + " was at " + show(result.position) + " when ";
   if (motion.goal.kind == Goal::Kind::kJog) {

@@ -1,6 +1,7 @@
 #include "axis_impl.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -15,12 +16,14 @@ constexpr const char* kChipFault =
 }  // namespace
 
 Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& own_lines,
-                 gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver, std::mutex& all_mutex)
+                 gpio::Lines& all_lines, EdgeLog& all_edges, pulse::PulseDriver& pulse_driver,
+                 std::mutex& all_mutex)
     : config(std::move(axis_config)),
       chip(chip::chipOf(config.driver)),
       axis_lines(own_lines),
       pins(config, own_lines),
       lines(all_lines),
+      edges(all_edges),
       driver(pulse_driver),
       channel(engine_channel),
       mutex(all_mutex),
@@ -48,6 +51,7 @@ pulse::ChannelState Axis::Impl::harvest() {
     ended_seen_ = state.ended;
     conclude(state);
   }
+  if (!position_valid) homed = false;
   log.dropBefore(state.following != 0 ? state.following : state.ended);
   if (held && !fault.empty()) dropHeld(MoveEnd::kFault, fault);
   return state;
@@ -79,7 +83,7 @@ void Axis::Impl::conclude(const pulse::ChannelState& state) {
 
 MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState& state) {
   MoveResult result;
-  result.position = positionOf(static_cast<double>(state.count));
+  result.position = positionOf(static_cast<double>(state.count - state.slack));
   result.duration = std::max(0.0, static_cast<double>(state.end_time - motion.begin_ns) * 1e-9);
   std::string why;
   switch (state.end) {
@@ -122,7 +126,8 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
 }
 
 std::string Axis::Impl::standsAt(const Goal& goal, const std::string& why) const {
-  const double count = static_cast<double>(driver.engine().channel(channel).count);
+  const pulse::ChannelState state = driver.engine().channel(channel);
+  const double count = static_cast<double>(state.count - state.slack);
   std::string text = config.name + " stands at " + show(positionOf(count));
   if (goal.target) text += ", not at " + show(positionOf(static_cast<double>(*goal.target)));
   return text + ": " + why;
@@ -150,6 +155,19 @@ double Axis::Impl::maxSpeed() const {
   const double period =
       static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
   return std::min(config.max_speed, 1.0 / (period * stepsPerUnit()));
+}
+
+std::int64_t Axis::Impl::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
+
+std::int64_t Axis::Impl::jointCount() {
+  const pulse::ChannelState state = harvest();
+  return state.count - state.slack;
+}
+
+double Axis::Impl::jointAt(double motor) {
+  const pulse::ChannelState state = harvest();
+  const double slack = static_cast<double>(state.slack) + motor - static_cast<double>(state.count);
+  return motor - std::clamp(slack, 0.0, static_cast<double>(backlash()));
 }
 
 motion::MotionLimits Axis::Impl::limits(double velocity) const {

@@ -9,12 +9,15 @@
 #include "move_log.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/axis/axis_lines.h"
+#include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/motion/planner.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 
 namespace stepdriver::axis {
+
+class Homing;
 
 /// What an axis is to do. Orders of one course go out together.
 struct Order {
@@ -27,7 +30,7 @@ using Orders = std::vector<Order>;
 class Axis::Impl {
  public:
   Impl(AxisConfig axis_config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver, std::mutex& mutex);
+       EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex);
 
   // What the engine has done since it was last looked at, taken into this state.
   pulse::ChannelState harvest();
@@ -38,6 +41,12 @@ class Axis::Impl {
   double maxSpeed() const;
   double positionOf(double count) const { return origin + count / stepsPerUnit(); }
   double countOf(double position) const { return (position - origin) * stepsPerUnit(); }
+  /// Counts as above are the joint's. The motor's are off by what is taken up of the backlash.
+  std::int64_t jointCount();
+  /// [microsteps] The joint's place where the motor has come to one, straight on from where it is.
+  double jointAt(double motor);
+  std::int64_t backlash() const;
+  double position() { return positionOf(static_cast<double>(jointCount())); }
   motion::MotionLimits limits(double velocity) const;
   /// [microsteps/s^2]
   double stopDeceleration() const;
@@ -54,6 +63,13 @@ class Axis::Impl {
   Move checkedMove(double position, bool relative, double velocity);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
+  /// The same, of a motion alone: a homing goes on.
+  void slowDown(const std::string& stopped_by);
+  /// The move that was accepted last; 0: none was.
+  std::uint64_t lastMove() const { return moves_; }
+  /// Brings the motor to where the joint moves with its first step of a way. At rest; lets go of
+  /// the lock while it does so.
+  void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
   void changeOverride(double factor);
   void hold();
   void resume();
@@ -62,7 +78,8 @@ class Axis::Impl {
   /// Both let go of the lock while the axis comes to rest.
   void awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
   void restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by);
-  void writePins(const pulse::PinSequence& sequence, std::optional<std::int64_t> count = {});
+  void writePins(const pulse::PinSequence& sequence,
+                 std::optional<pulse::Command::Scale> scale = {});
   void restorePins();
   void resetFaultyChip();
 
@@ -70,6 +87,10 @@ class Axis::Impl {
   void refuseMicrosteps(int wanted);
   std::int64_t nearestCommon(int wanted);
   void changeMicrosteps(int wanted);
+
+  // Homing.
+  const HomingConfig& homingConfig() const;
+  void interruptHoming(const std::string& why) const;
 
   // A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const;
@@ -82,6 +103,7 @@ class Axis::Impl {
   void refuseUnlessOpen() const;
   void refuseWhileMoving(const std::string& what);
   void refuseUnlessReadyToMove();
+  void refuseUnlessHomed() const;
   void refuseUnlessReady();
   void refuseWhileHeld() const;
   void refuseTooFast(double speed) const;
@@ -94,6 +116,7 @@ class Axis::Impl {
   const AxisLines axis_lines;
   const ChipPins pins;
   gpio::Lines& lines;
+  EdgeLog& edges;
   pulse::PulseDriver& driver;
   const int channel;
 
@@ -102,6 +125,7 @@ class Axis::Impl {
   bool asleep = false;
   bool disabling = false;
   bool homed = false;
+  Homing* homing = nullptr;  // the one under way
   bool position_valid = false;
   int microsteps;
   double origin = 0.0;          // [unit] the position at count 0
@@ -113,10 +137,10 @@ class Axis::Impl {
   std::optional<Held> held;
 
   /// [microsteps] Where a relative motion begins.
-  double relativeOrigin(std::int64_t count);
+  double relativeOrigin();
   /// The motion that the engine has; nullptr at rest.
   const Motion* underWay();
-  /// [microsteps] Where it will be at a motion time.
+  /// [microsteps] Where the motor will be at a motion time.
   motion::MotionState stateAt(std::int64_t at);
 
  private:
@@ -132,8 +156,9 @@ class Axis::Impl {
                  const std::shared_ptr<const motion::Profile>& path);
   void leaveCourse(const Goal& goal, const std::string& left_by);
   std::int64_t stepsTo(const Goal& goal);
-  motion::Plan plan(const Goal& goal, std::int64_t at, const Motion* before,
-                    std::int64_t count) const;
+  motion::Plan plan(const Goal& goal, std::int64_t at);
+  std::int64_t motorTarget(const Goal& goal, const motion::MotionState& from,
+                           const motion::MotionLimits& within);
   motion::Profile planStopOf(const Motion& before, std::int64_t at,
                              const motion::MotionState& from) const;
   pulse::Nanoseconds restartInterval() const;

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "axis_impl.h"
 #include "course.h"
+#include "restart_speed.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -17,18 +19,36 @@ constexpr pulse::Nanoseconds kLongestLead = 2'000'000'000;
 
 // ---- plans ----
 
-motion::Plan Axis::Impl::plan(const Goal& goal, std::int64_t at, const Motion* before,
-                              std::int64_t count) const {
-  const motion::MotionState from = before != nullptr
-                                       ? before->profile->stateAt(at)
-                                       : motion::MotionState{motion::fromInteger(count), 0.0, 0.0};
-  if (goal.slowsDown()) return {planStopOf(*before, at, from)};
+motion::Plan Axis::Impl::plan(const Goal& goal, std::int64_t at) {
+  const motion::MotionState from = stateAt(at);
+  if (goal.slowsDown()) return {planStopOf(*underWay(), at, from)};
   const double velocity = std::min(std::abs(goal.velocity) * speed_override, maxSpeed());
-  if (goal.kind == Goal::Kind::kMove) {
-    return motion::planMove(at, from, *goal.target, limits(velocity));
+  const motion::MotionLimits within = limits(velocity);
+  if (goal.kind == Goal::Kind::kJog) {
+    std::optional<std::int64_t> stand_at = goal.target;
+    if (stand_at && goal.velocity > 0.0) *stand_at += backlash();
+    return motion::planVelocity(at, from, std::copysign(velocity * stepsPerUnit(), goal.velocity),
+                                within, stand_at);
   }
-  return motion::planVelocity(at, from, std::copysign(velocity * stepsPerUnit(), goal.velocity),
-                              limits(velocity), goal.target);
+  return motion::planMove(at, from, motorTarget(goal, from, within), within);
+}
+
+// A joint that is to come to its target upwards has all of the backlash taken up there, downwards
+// none of it. At rest on its target it stays, and a moving one comes to it from where it would
+// stop.
+std::int64_t Axis::Impl::motorTarget(const Goal& goal, const motion::MotionState& from,
+                                     const motion::MotionLimits& within) {
+  const std::int64_t down = *goal.target;
+  if (backlash() == 0) return down;
+  const std::int64_t up = down + backlash();
+  if (goal.take_up != 0) return goal.take_up > 0 ? up : down;
+  if (underWay() == nullptr) {
+    const std::int64_t way = down - jointCount();
+    return way > 0 ? up : way < 0 ? down : harvest().count;
+  }
+  const double rest = motion::planStop(0, from, within).endPosition().value();
+  if (from.velocity > 0.0) return rest <= static_cast<double>(up) ? up : down;
+  return rest >= static_cast<double>(down) ? down : up;
 }
 
 motion::Profile Axis::Impl::planStopOf(const Motion& before, std::int64_t at,
@@ -36,19 +56,14 @@ motion::Profile Axis::Impl::planStopOf(const Motion& before, std::int64_t at,
   motion::MotionLimits stopping = limits(maxSpeed());
   stopping.deceleration = stopDeceleration();
   const motion::DoubleDouble end = before.profile->endPosition();
-  const bool ends_ahead = (end - from.position).value() * from.velocity >= 0.0;
+  // What hasn't begun to move has nothing ahead.
+  const bool ends_ahead = (end - from.position).value() * from.velocity > 0.0;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
   return motion::planStop(at, from, stopping, std::llround(end.value()));
 }
 
 pulse::Nanoseconds Axis::Impl::restartInterval() const {
-  // The speed that the motor takes and leaves without a ramp: the start speed, but at least what a
-  // ramp from rest has after its first full step.
-  const motion::MotionLimits speeds = limits(maxSpeed());
-  const double restart =
-      std::max(speeds.start_speed,
-               std::sqrt(2.0 * std::min(speeds.acceleration, speeds.deceleration) * microsteps));
-  return static_cast<pulse::Nanoseconds>(1e9 / restart);
+  return static_cast<pulse::Nanoseconds>(1e9 / (restartSpeed(config) * stepsPerUnit()));
 }
 
 // The path that the orders of one course share.
@@ -74,7 +89,6 @@ std::shared_ptr<const motion::Profile> Axis::Impl::planPath(const Orders& orders
 
 Motion Axis::Impl::planned(const Goal& goal, std::int64_t at,
                            const std::shared_ptr<const motion::Profile>& path) {
-  const pulse::ChannelState state = harvest();
   const Motion* before = underWay();
   Motion motion;
   motion.goal = goal;
@@ -89,7 +103,7 @@ Motion Axis::Impl::planned(const Goal& goal, std::int64_t at,
         std::make_unique<const motion::Profile>(goal.course->profileOf(goal.member, *path));
     return motion;
   }
-  motion::Plan own = plan(goal, at, before, state.count);
+  motion::Plan own = plan(goal, at);
   motion.overshoot = own.overshoot;
   motion.profile = std::make_unique<const motion::Profile>(std::move(own.profile));
   return motion;
@@ -133,7 +147,7 @@ bool Axis::Impl::taken(const pulse::Follow& follow) const {
 
 std::int64_t Axis::Impl::stepsTo(const Goal& goal) {
   if (goal.kind == Goal::Kind::kJog) return goal.velocity > 0.0 ? 1 : -1;
-  return *goal.target - harvest().count;
+  return *goal.target - jointCount();
 }
 
 // The first motion time at which a new profile may begin.

@@ -58,7 +58,10 @@ std::vector<Move> Coordination::moveLine(const std::vector<Axis*>& axes,
   for (Axis::Impl* axis : impls) axis->awaitRest(lock, "a line was to begin");
   for (std::size_t i = 0; i < impls.size(); ++i) {
     impls[i]->refuseUnlessReadyToMove();
-    impls[i]->refuseIntoEndstop(targets[i] - impls[i]->harvest().count);
+    impls[i]->refuseIntoEndstop(targets[i] - impls[i]->jointCount());
+  }
+  for (std::size_t i = 0; i < impls.size(); ++i) {
+    impls[i]->takeUpBacklash(lock, targets[i] - impls[i]->jointCount());
   }
   const auto course = std::make_shared<LineCourse>(impls, targets, velocity);
   if (duration > 0.0) course->stretchTo(duration);
@@ -69,7 +72,13 @@ std::vector<Move> Coordination::follow(const std::vector<Axis*>& axes,
                                        const std::vector<CoursePoint>& points) {
   const std::vector<Axis::Impl*> impls = implsOf(axes);
   const std::lock_guard<std::mutex> lock(impls.front()->mutex);
-  for (Axis::Impl* axis : impls) axis->refuseUnlessReadyToMove();
+  for (Axis::Impl* axis : impls) {
+    axis->refuseUnlessReadyToMove();
+    axis->refuseUnlessHomed();
+    if (axis->backlash() == 0) continue;
+    axis->refuse(
+        "it has a backlash, which a trajectory has no time to take up: use moves or lines");
+  }
   const auto course = std::make_shared<TrajectoryCourse>(impls, points);
   return Axis::Impl::begin(ordersFor(course, course->targets()));
 }

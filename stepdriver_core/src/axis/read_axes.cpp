@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "read_homing.h"
 #include "read_motion.h"
 #include "read_pins.h"
 #include "stepdriver_core/axis/config_reader.h"
@@ -81,11 +82,7 @@ class AxesReader {
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
     config.name = name;
-    if (!isAxisName(name)) {
-      axis.issue("", "has the name \"" + name +
-                         "\", but an axis's name must begin with a letter and go on with letters, "
-                         "digits and _ only");
-    }
+    checkAxisName(name, axis);
     const chip::Chip* chip = readDriver(axis);
     MotionContext context;
     context.microsteps = readMicrosteps(axis, chip);
@@ -101,7 +98,7 @@ class AxesReader {
     config.joint = readJoint(name, axis);
     readPins(axis, chip, config, used_);
     readEndstops(axis, config, used_);
-    readMotion(axis, context, config);
+    readHoming(axis, readMotion(axis, context, config), config);
     config.enable_on_start = axis.boolean("enable_on_start", config.enable_on_start);
     config.disable_on_shutdown = axis.boolean("disable_on_shutdown", config.disable_on_shutdown);
     config.align_on_microstep_change =
@@ -134,6 +131,13 @@ class AxesReader {
 };
 
 }  // namespace
+
+void checkAxisName(const std::string& name, ConfigReader& axis) {
+  if (isAxisName(name)) return;
+  axis.issue("", "has the name \"" + name +
+                     "\", but an axis's name must begin with a letter and go on with letters, "
+                     "digits and _ only");
+}
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues) {

@@ -119,7 +119,7 @@ void TrajectoryCourse::requireStart(std::size_t member) const {
   Axis::Impl& axis = *axes()[member];
   const motion::Waypoint& first = waypoints_[member].front();
   if (first.time_ns != 0 || waypoints_[member].size() == 1) return;
-  const double count = static_cast<double>(axis.harvest().count);
+  const double count = static_cast<double>(axis.jointCount());
   if (std::abs(first.position - count) <= axis.microsteps) return;
   axis.refuse("the trajectory begins at " + axis.show(axis.positionOf(first.position)) +
               ", but the axis stands at " + axis.show(axis.positionOf(count)) +

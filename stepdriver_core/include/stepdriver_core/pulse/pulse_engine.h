@@ -34,6 +34,8 @@ struct ChannelConfig {
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
   Nanoseconds mode_hold = 0;
+  std::int64_t backlash =
+      0;  ///< microsteps that the motor makes at a reversal before the joint moves
 };
 
 /// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
@@ -59,8 +61,8 @@ struct Follow {
   int channel = 0;
   std::uint64_t serial = 0;
   const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
-  /// Serial of the profile that this one was planned to go on from; 0: from rest. Where the channel
-  /// has ended that, or follows another, it can't be taken.
+  /// Serial of the profile that this one was planned to go on from, the last one that was ordered;
+  /// 0: from rest. Where the channel has ended that, it can't be taken.
   std::uint64_t continues = 0;
   /// Steps planned closer than this are at a speed that the motor can't start from or stop at
   /// without a ramp.
@@ -74,7 +76,7 @@ struct Follow {
 struct Command {
   enum class Kind {
     kFollow,  ///< follow the profiles, all of them, or where one can't be taken none
-    kPins,    ///< write the pins, at rest; then, where count is given, stand there
+    kPins,    ///< write the pins, at rest; then, where a scale is given, take that
   };
 
   Kind kind = Kind::kFollow;
@@ -83,7 +85,13 @@ struct Command {
   int channel = 0;  ///< of kPins, as all below
   std::uint64_t serial = 0;
   PinSequence pins;
-  std::optional<std::int64_t> count;
+  /// Where the motor stands then, in the microsteps of a new mode.
+  struct Scale {
+    std::int64_t count = 0;
+    std::int64_t slack = 0;
+    std::int64_t backlash = 0;
+  };
+  std::optional<Scale> scale;
 };
 
 enum class EndReason {
@@ -106,7 +114,10 @@ struct LineFailure {
 
 /// What a channel does and has done.
 struct ChannelState {
-  std::int64_t count = 0;       ///< microsteps: active STEP edges forward less those backward
+  std::int64_t count = 0;  ///< microsteps: active STEP edges forward less those backward
+  /// Of the backlash, what is taken up towards max: from 0 to all of it. The joint stands at count
+  /// less this.
+  std::int64_t slack = 0;
   std::uint64_t pulses = 0;     ///< active STEP edges
   std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
   std::uint64_t refused = 0;    ///< serial of the last command that came too late or found it busy
@@ -173,14 +184,33 @@ class PulseEngine {
   std::size_t channels() const { return channels_.size(); }
 
  private:
+  /// Profiles that take over, one after the other, each at its start time. One that was planned
+  /// before another has taken over goes on from that other: none may be left out.
+  struct Successors {
+    struct Entry {
+      const motion::Profile* profile = nullptr;
+      std::uint64_t serial = 0;
+    };
+    static constexpr std::size_t kCapacity = 16;
+    std::array<Entry, kCapacity> entries{};
+    std::size_t size = 0;
+
+    bool empty() const { return size == 0; }
+    /// Room for one that begins then: those that would begin no earlier have no time left.
+    bool hasRoom(Nanoseconds start) const {
+      return size < kCapacity || entries[size - 1].profile->startNs() >= start;
+    }
+    void add(const motion::Profile& profile, std::uint64_t serial);
+    Entry takeFirst();
+  };
+
   struct Channel {
     ChannelConfig config;
     ChannelState state;
     Snapshot<ChannelState> published;
 
-    const motion::Profile* profile = nullptr;    // the one that is followed
-    const motion::Profile* successor = nullptr;  // takes over at its start time
-    std::uint64_t successor_serial = 0;
+    const motion::Profile* profile = nullptr;  // the one that is followed
+    Successors successors;
     std::uint64_t group = 0;  // of the order that came last; 0: alone
     Nanoseconds restart_interval = 0;
     motion::StepFinder finder;
@@ -190,7 +220,7 @@ class PulseEngine {
     PinSequence pins;
     std::size_t pin = 0;
     std::uint64_t pins_serial = 0;  // of the sequence under way; 0: none
-    std::optional<std::int64_t> pins_count;
+    std::optional<Command::Scale> pins_scale;
     Nanoseconds pin_due = 0;
 
     // Clock times by which the last edges had happened.
@@ -231,6 +261,7 @@ class PulseEngine {
   void writeOthers(Nanoseconds now);
   void turn(Channel& channel, Nanoseconds now);
   void writePin(Channel& channel, Nanoseconds now);
+  static std::uint64_t latest(const Channel& channel);
   void pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
