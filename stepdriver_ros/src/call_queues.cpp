@@ -14,6 +14,7 @@ CallQueues::CallQueues(std::size_t axes) : axes_(axes) {}
 
 void CallQueues::start() {
   for (ros::CallbackQueue& queue : axes_) spinners_.emplace_back(kThreadsPerAxis, &queue);
+  spinners_.emplace_back(kThreadsPerAxis, &together_);
   spinners_.emplace_back(kControlThreads, &control_);
   spinners_.emplace_back(1, &emergency_);
   for (ros::AsyncSpinner& spinner : spinners_) spinner.start();
@@ -30,7 +31,7 @@ void CallQueues::finish(std::chrono::milliseconds bound) {
 
 bool CallQueues::allAnswered() {
   // A queue is empty when nothing is in it and nothing from it is being called.
-  bool empty = control_.isEmpty() && emergency_.isEmpty();
+  bool empty = together_.isEmpty() && control_.isEmpty() && emergency_.isEmpty();
   for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
   return empty;
 }

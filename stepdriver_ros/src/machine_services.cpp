@@ -1,14 +1,41 @@
 #include "machine_services.h"
 
 #include <ros/console.h>
+#include <stepdriver/HomeAxes.h>
 #include <stepdriver/SpeedOverride.h>
 
+#include <algorithm>
 #include <exception>
 
 #include "answer.h"
 #include "text.h"
 
 namespace stepdriver::ros_node {
+namespace {
+
+bool areAllHomed(const std::vector<axis::HomingResult>& results) {
+  return std::all_of(results.begin(), results.end(), [](const axis::HomingResult& result) {
+    return result.end == axis::HomingEnd::kHomed;
+  });
+}
+
+std::string messageOf(const std::vector<axis::HomingResult>& results) {
+  std::string text;
+  for (const axis::HomingResult& result : results) {
+    text += (text.empty() ? "" : "; ") + result.message;
+  }
+  return text;
+}
+
+void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names) {
+  try {
+    ROS_INFO("%s", messageOf(machine.home(names)).c_str());
+  } catch (const std::exception& error) {
+    ROS_ERROR("%s", error.what());
+  }
+}
+
+}  // namespace
 
 MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& machine,
                                  CallQueues& queues)
@@ -18,6 +45,7 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
             [&machine] { machine.emergencyStop(); });
   advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
   advertiseSpeedOverride(machine);
+  advertiseHome(machine);
 }
 
 void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
@@ -31,6 +59,25 @@ void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
       };
   node_.setCallbackQueue(&queues_.control());
   servers_.push_back(node_.advertiseService("speed_override", handler));
+}
+
+void MachineServices::advertiseHome(machine::Machine& machine) {
+  const boost::function<bool(HomeAxes::Request&, HomeAxes::Response&)> handler =
+      [this, &machine](HomeAxes::Request& request, HomeAxes::Response& response) {
+        return answer(response, [&] {
+          if (request.wait != 0) {
+            const auto results = machine.home(request.name);
+            response.success = areAllHomed(results);
+            response.message = messageOf(results);
+            return;
+          }
+          background_.start([&] { machine.checkHoming(request.name); },
+                            [&machine, names = request.name] { homeAndLog(machine, names); });
+          response.message = "the axes are being homed";
+        });
+      };
+  node_.setCallbackQueue(&queues_.together());
+  servers_.push_back(node_.advertiseService("home", handler));
 }
 
 void MachineServices::advertise(const std::string& name, ros::CallbackQueue& queue,

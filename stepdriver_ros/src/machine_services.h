@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "background.h"
 #include "call_queues.h"
 #include "simulation.h"
 #include "stepdriver_core/machine/machine.h"
@@ -19,7 +20,7 @@ namespace stepdriver::ros_node {
 class MachineServices {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the services.
+  /// @param machine, queues outlive the services; before their end the machine has been shut down.
   MachineServices(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
 
   /// Adds the report of the simulated rig. @param simulation outlives the services.
@@ -32,8 +33,10 @@ class MachineServices {
   ros::NodeHandle node_;
   CallQueues& queues_;
   void advertiseSpeedOverride(machine::Machine& machine);
+  void advertiseHome(machine::Machine& machine);
 
   std::vector<ros::ServiceServer> servers_;
+  Background background_;
 };
 
 }  // namespace stepdriver::ros_node

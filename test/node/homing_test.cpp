@@ -4,6 +4,7 @@
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Home.h>
 #include <stepdriver/HomeAction.h>
+#include <stepdriver/HomeAxes.h>
 
 #include <future>
 #include <memory>
@@ -124,6 +125,25 @@ TEST_F(Homing, DoesNotStartWithABadConfiguration) {
   EXPECT_EQ(process.waitForExit(kBound), 1);
   expectSays(process.output(), "axes/x/homing/latch_speed_mm_s is 500.0, but must be at most");
   expectSays(process.output(), "axes/x/homing/sped is not known");
+}
+
+TEST_F(Homing, HomesAllAxesThatHaveAHomingOrThoseThatAreNamed) {
+  node.start();
+  HomeAxes::Request request;
+  request.wait = true;
+  const auto all = node.call<HomeAxes>("home", request);
+  EXPECT_TRUE(all.success) << all.message;
+  expectStandsHomed(0.002);
+  request.name = {"x"};
+  EXPECT_TRUE(node.call<HomeAxes>("home", request).success);
+  request.name = {"x", "w"};
+  const auto unknown = node.call<HomeAxes>("home", request);
+  EXPECT_FALSE(unknown.success);
+  expectSays(unknown.message, "there is no axis w");
+  request.name = {"x"};
+  request.wait = false;
+  const auto accepted = node.call<HomeAxes>("home", request);
+  EXPECT_TRUE(accepted.success) << accepted.message;
 }
 
 TEST_F(Homing, EndsWithAStopWhileAnotherCallWaitsForIt) {
