@@ -1,11 +1,11 @@
 #include "machine_services.h"
 
 #include <ros/console.h>
-#include <stepdriver/HomeAxes.h>
+#include <stepdriver/MoveLine.h>
 #include <stepdriver/SpeedOverride.h>
 
-#include <algorithm>
 #include <exception>
+#include <utility>
 
 #include "answer.h"
 #include "text.h"
@@ -13,26 +13,35 @@
 namespace stepdriver::ros_node {
 namespace {
 
-bool areAllHomed(const std::vector<axis::HomingResult>& results) {
-  return std::all_of(results.begin(), results.end(), [](const axis::HomingResult& result) {
-    return result.end == axis::HomingEnd::kHomed;
-  });
+machine::LineRequest lineRequest(const MoveLine::Request& request) {
+  machine::LineRequest line;
+  line.names = request.name;
+  line.positions = request.position;
+  line.relative = request.relative != 0;
+  line.velocity = request.velocity;
+  line.duration = request.duration;
+  return line;
 }
 
-std::string messageOf(const std::vector<axis::HomingResult>& results) {
-  std::string text;
-  for (const axis::HomingResult& result : results) {
-    text += (text.empty() ? "" : "; ") + result.message;
+void moveLine(machine::Machine& machine, const MoveLine::Request& request,
+              MoveLine::Response& response) {
+  const machine::CoordinatedMove move = machine.moveLine(lineRequest(request));
+  if (request.wait != 0) {
+    machine::CoordinatedResult result = machine.wait(move);
+    response.success = result.end == axis::MoveEnd::kReached;
+    response.message = std::move(result.message);
+    response.position = std::move(result.positions);
+    response.duration = result.duration;
+    return;
   }
-  return text;
-}
-
-void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names) {
-  try {
-    ROS_INFO("%s", messageOf(machine.home(names)).c_str());
-  } catch (const std::exception& error) {
-    ROS_ERROR("%s", error.what());
+  for (const auto& [name, own] : move.members) {
+    const axis::Kind kind = machine.axis(name).config().kind;
+    response.message += (response.message.empty() ? "" : ", ") + name + " to " +
+                        numberText(own.target) + " " + unitOf(kind);
+    response.position.push_back(own.target);
   }
+  response.message = "a line: " + response.message + " in " + numberText(move.duration) + " s";
+  response.duration = move.duration;
 }
 
 }  // namespace
@@ -44,8 +53,20 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
   advertise("emergency_stop", queues.emergency(), "all axes are stopped; recover ends that",
             [&machine] { machine.emergencyStop(); });
   advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
+  advertise("hold", queues.control(), "all axes come to rest and keep their goals",
+            [&machine] { machine.hold(); });
+  advertise("resume", queues.control(), "all axes go on", [&machine] { machine.resume(); });
   advertiseSpeedOverride(machine);
-  advertiseHome(machine);
+  advertiseMoveLine(machine);
+}
+
+void MachineServices::advertiseMoveLine(machine::Machine& machine) {
+  const boost::function<bool(MoveLine::Request&, MoveLine::Response&)> handler =
+      [&machine](MoveLine::Request& request, MoveLine::Response& response) {
+        return answer(response, [&] { moveLine(machine, request, response); });
+      };
+  node_.setCallbackQueue(&queues_.lines());
+  servers_.push_back(node_.advertiseService("move_line", handler));
 }
 
 void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
@@ -59,25 +80,6 @@ void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
       };
   node_.setCallbackQueue(&queues_.control());
   servers_.push_back(node_.advertiseService("speed_override", handler));
-}
-
-void MachineServices::advertiseHome(machine::Machine& machine) {
-  const boost::function<bool(HomeAxes::Request&, HomeAxes::Response&)> handler =
-      [this, &machine](HomeAxes::Request& request, HomeAxes::Response& response) {
-        return answer(response, [&] {
-          if (request.wait != 0) {
-            const auto results = machine.home(request.name);
-            response.success = areAllHomed(results);
-            response.message = messageOf(results);
-            return;
-          }
-          background_.start([&] { machine.checkHoming(request.name); },
-                            [&machine, names = request.name] { homeAndLog(machine, names); });
-          response.message = "the axes are being homed";
-        });
-      };
-  node_.setCallbackQueue(&queues_.together());
-  servers_.push_back(node_.advertiseService("home", handler));
 }
 
 void MachineServices::advertise(const std::string& name, ros::CallbackQueue& queue,

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "background.h"
 #include "call_queues.h"
 #include "simulation.h"
 #include "stepdriver_core/machine/machine.h"
@@ -20,7 +19,7 @@ namespace stepdriver::ros_node {
 class MachineServices {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the services; before their end the machine has been shut down.
+  /// @param machine, queues outlive the services.
   MachineServices(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
 
   /// Adds the report of the simulated rig. @param simulation outlives the services.
@@ -30,13 +29,12 @@ class MachineServices {
   void advertise(const std::string& name, ros::CallbackQueue& queue, const std::string& done,
                  const std::function<void()>& action);
 
+  void advertiseSpeedOverride(machine::Machine& machine);
+  void advertiseMoveLine(machine::Machine& machine);
+
   ros::NodeHandle node_;
   CallQueues& queues_;
-  void advertiseSpeedOverride(machine::Machine& machine);
-  void advertiseHome(machine::Machine& machine);
-
   std::vector<ros::ServiceServer> servers_;
-  Background background_;
 };
 
 }  // namespace stepdriver::ros_node

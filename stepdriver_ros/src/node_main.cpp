@@ -1,6 +1,5 @@
 #include <ros/console.h>
 #include <ros/init.h>
-#include <ros/master.h>
 #include <ros/node_handle.h>
 
 #include <cstdio>
@@ -16,11 +15,15 @@
 #include "hardware.h"
 #include "homing_server.h"
 #include "jog_subscriber.h"
+#include "machine_homing.h"
 #include "machine_services.h"
+#include "node_start.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/machine/step_rates.h"
+#include "trajectory_action.h"
+#include "trajectory_command.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -31,7 +34,6 @@ constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
 constexpr int kExitUsage = 64;
 
-constexpr std::chrono::milliseconds kMasterPoll{200};
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
@@ -45,8 +47,10 @@ lines.
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override
+              ~move_line  ~hold  ~resume
               ~rig/report (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states  ~jog (subscribed)
+  topics      joint_states  ~endstops  ~axis_states  ~jog, ~command (subscribed)
+  action      ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~simulation
               robot_description
 
@@ -55,19 +59,11 @@ Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had 
 Start it with: roslaunch stepdriver axis.launch
 )";
 
-/// @return false: the node was asked to end before there was a master.
-bool waitForMaster(EndRequests& end_requests) {
-  while (!ros::master::check()) {
-    ROS_WARN_ONCE("Waiting for the ROS master at %s", ros::master::getURI().c_str());
-    if (!end_requests.waitFor(kMasterPoll).empty()) return false;
-  }
-  return true;
-}
-
 /// Refuses new commands, decelerates, disables, and lets every client have its answer.
 ///
 /// @return the exit code.
-int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publisher) {
+int shutDown(machine::Machine& machine, CallQueues& queues, TrajectoryAction& trajectory_action,
+             StatePublisher& publisher) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -75,6 +71,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publ
     ROS_ERROR("Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
   }
+  trajectory_action.tellEnded();
   queues.finish(kLastAnswers);
   publisher.stop();
   return exit_code;
@@ -115,9 +112,12 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
+  const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
+  const TrajectoryCommand trajectory_command(private_node, machine, queues);
+  TrajectoryAction trajectory_action(private_node, machine, queues);
   queues.start();
   publisher.start();
   ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
@@ -127,7 +127,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   std::string who;
   while (who.empty()) who = end_requests.waitFor(kPoll);
   ROS_INFO("Ending on %s", who.c_str());
-  return shutDown(machine, queues, publisher);
+  return shutDown(machine, queues, trajectory_action, publisher);
 }
 
 int runOrExplain(EndRequests& end_requests) {
@@ -139,12 +139,7 @@ int runOrExplain(EndRequests& end_requests) {
   try {
     return run(node, private_node, end_requests);
   } catch (const ConfigError& error) {
-    const std::size_t count = error.issues().size();
-    ROS_FATAL("Not started, no line was touched: %zu %s wrong in the parameters", count,
-              count == 1 ? "thing is" : "things are");
-    for (const ConfigIssue& issue : error.issues()) {
-      ROS_ERROR("%s %s", issue.key.c_str(), issue.message.c_str());
-    }
+    explain(error, "Not started, no line was touched");
     return kExitConfig;
   } catch (const GpioError& error) {
     ROS_FATAL("Not started: %s", error.what());

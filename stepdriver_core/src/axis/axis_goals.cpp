@@ -77,14 +77,18 @@ void Axis::Impl::checkedJog(double velocity) {
   begin({{this, goal}});
 }
 
+Move Axis::Impl::moveMotor(std::int64_t target) {
+  Goal goal;
+  goal.target = target;
+  goal.velocity = maxSpeed();
+  goal.of_motor = true;
+  return begin({{this, goal}}).front();
+}
+
 void Axis::Impl::takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way) {
   const std::int64_t wanted = way > 0 ? backlash() : 0;
   if (way == 0 || harvest().slack == wanted) return;
-  Goal goal;
-  goal.target = jointCount();
-  goal.velocity = maxSpeed();
-  goal.take_up = way > 0 ? 1 : -1;
-  begin({{this, goal}});
+  moveMotor(jointCount() + wanted);
   lock.unlock();
   driver.waitFor([this] { return driver.engine().channel(channel).following == 0; });
   lock.lock();
@@ -217,7 +221,13 @@ const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr;
 
 motion::MotionState Axis::Impl::stateAt(std::int64_t at) {
   if (const Motion* motion = underWay()) return motion->profile->stateAt(at);
-  return {motion::fromInteger(harvest().count), 0.0, 0.0};
+  const pulse::ChannelState state = harvest();
+  const motion::DoubleDouble count = motion::fromInteger(state.count);
+  // A stop on a path rests between two microsteps: the next motion goes on from there.
+  const Motion* last = log.find(state.ended);
+  if (last == nullptr || state.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
+  const motion::DoubleDouble rest = last->profile->endPosition();
+  return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
 }
 
 std::vector<Move> Axis::Impl::begin(Orders orders) {

@@ -82,11 +82,7 @@ class AxesReader {
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
     config.name = name;
-    if (!isAxisName(name)) {
-      axis.issue("", "has the name \"" + name +
-                         "\", but an axis's name must begin with a letter and go on with letters, "
-                         "digits and _ only");
-    }
+    checkAxisName(name, axis);
     const chip::Chip* chip = readDriver(axis);
     MotionContext context;
     context.microsteps = readMicrosteps(axis, chip);
@@ -135,6 +131,13 @@ class AxesReader {
 };
 
 }  // namespace
+
+void checkAxisName(const std::string& name, ConfigReader& axis) {
+  if (isAxisName(name)) return;
+  axis.issue("", "has the name \"" + name +
+                     "\", but an axis's name must begin with a letter and go on with letters, "
+                     "digits and _ only");
+}
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues) {

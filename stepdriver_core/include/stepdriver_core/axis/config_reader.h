@@ -98,6 +98,9 @@ class ConfigReader {
   std::set<std::string> known_;
 };
 
+/// Makes an issue of a map with a name that no axis can have: it is a part of ROS names.
+void checkAxisName(const std::string& name, ConfigReader& axis);
+
 /// Reads the map of axes.
 ///
 /// @code{.yaml}
