@@ -13,7 +13,9 @@
 #include "call_queues.h"
 #include "end_requests.h"
 #include "hardware.h"
+#include "homing_server.h"
 #include "jog_subscriber.h"
+#include "machine_homing.h"
 #include "machine_services.h"
 #include "node_start.h"
 #include "state_publisher.h"
@@ -106,6 +108,11 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
+  std::deque<HomingServer> homing_servers;
+  for (std::size_t i = 0; i < machine.axes().size(); ++i) {
+    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
+  }
+  const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);

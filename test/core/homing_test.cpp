@@ -124,6 +124,29 @@ TEST_F(HomingTest, LatchesAtItsOwnSpeed) {
   EXPECT_NEAR(static_cast<double>(*last - *std::prev(last)), 1e9 / 400.0, 2.0);
 }
 
+TEST_F(HomingTest, FindsTheTriggerPointInATimelineThatHasSlid) {
+  x().moveTo(0.05);
+  bench->machine->advance(0.1);
+  bench->clock.waitUntil(bench->clock.now() + 4'000'000);
+  bench->machine->advance(1.0);
+  ASSERT_GT(bench->machine->figures().slipped, 0.003);
+  expectHomed(x().home());
+  EXPECT_NEAR(x().state().position - -0.1, carriage() + 0.1 - 0.5 * kStep, 1e-9);
+}
+
+TEST_F(HomingTest, KnowsTheTriggerPointToAStepWhereTheTimelineSlidesAfterIt) {
+  bool closed = false;
+  expectHomed(x().home([&] {
+    if (!closed && x().state().homing == HomingPhase::kLatching && *x().endstops().min) {
+      closed = true;
+      bench->clock.waitUntil(bench->clock.now() + 100'000'000);  // forty steps of the latch
+    }
+    return false;
+  }));
+  EXPECT_TRUE(closed);
+  EXPECT_GT(bench->machine->figures().slipped, 0.09);
+}
+
 // ---- failures ----
 
 class HomingFailure : public HomingTest {

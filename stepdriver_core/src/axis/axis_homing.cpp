@@ -10,6 +10,7 @@ HomingResult Axis::home(const std::function<bool()>& cancelled) {
 std::vector<HomingResult> Axis::homeTogether(const std::vector<Axis*>& axes,
                                              const std::function<bool()>& cancelled) {
   std::vector<std::unique_ptr<Homing>> homings;
+  homings.reserve(axes.size());
   for (Axis* axis : axes) homings.push_back(std::make_unique<Homing>(*axis->impl_));
   return Homing::run(homings, cancelled);
 }

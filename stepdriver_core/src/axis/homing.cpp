@@ -63,22 +63,23 @@ void Homing::refuseUnlessReady(Axis::Impl& axis) {
 
 std::vector<HomingResult> Homing::run(const std::vector<std::unique_ptr<Homing>>& homings,
                                       const std::function<bool()>& cancelled) {
-  const auto isDue = [](const auto& homing) { return homing->isDue(); };
-  const auto isOver = [](const auto& homing) { return homing->isOver(); };
+  const auto is_due = [](const auto& homing) { return homing->isDue(); };
+  const auto is_over = [](const auto& homing) { return homing->isOver(); };
   bool to_cancel = false;
-  while (!std::all_of(homings.begin(), homings.end(), isOver)) {
+  while (!std::all_of(homings.begin(), homings.end(), is_over)) {
     for (const auto& homing : homings) {
       if (to_cancel) homing->cancel();
       homing->advance();
     }
     homings.front()->axis_.driver.waitFor([&] {
       to_cancel = to_cancel || (cancelled && cancelled());
-      return std::any_of(homings.begin(), homings.end(), isDue) ||
-             std::all_of(homings.begin(), homings.end(), isOver) ||
+      return std::any_of(homings.begin(), homings.end(), is_due) ||
+             std::all_of(homings.begin(), homings.end(), is_over) ||
              (to_cancel && !homings.front()->cancelled_);
     });
   }
   std::vector<HomingResult> results;
+  results.reserve(homings.size());
   for (const auto& homing : homings) results.push_back(homing->result_);
   return results;
 }

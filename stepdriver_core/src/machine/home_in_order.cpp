@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "stepdriver_core/error.h"
 
@@ -11,11 +12,10 @@ namespace {
 
 using Group = std::vector<axis::Axis*>;
 
-/// The axes by their order. @throw Refused where one can't be homed.
+/// The axes by their order.
 std::map<int, Group> groupsOf(const std::vector<axis::Axis*>& axes) {
   std::map<int, Group> groups;
   for (axis::Axis* axis : axes) {
-    axis->checkHoming();
     groups[axis->config().homing->order].push_back(axis);
   }
   return groups;
@@ -24,9 +24,15 @@ std::map<int, Group> groupsOf(const std::vector<axis::Axis*>& axes) {
 std::vector<axis::HomingResult> notHomed(const Group& group, axis::HomingEnd end,
                                          const std::string& why) {
   std::vector<axis::HomingResult> results;
+  results.reserve(group.size());
   for (const axis::Axis* axis : group) {
-    const std::string& name = axis->config().name;
-    results.push_back({name, end, name + " isn't homed: " + why, axis->state().position});
+    axis::HomingResult result;
+    result.axis = axis->config().name;
+    result.end = end;
+    result.message = result.axis;
+    result.message += " isn't homed: " + why;
+    result.position = axis->state().position;
+    results.push_back(std::move(result));
   }
   return results;
 }

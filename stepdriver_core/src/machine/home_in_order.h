@@ -7,7 +7,7 @@
 
 namespace stepdriver::machine {
 
-/// Machine::home() of these axes.
+/// Machine::home() of these axes, each of which has a homing.
 std::vector<axis::HomingResult> homeInOrder(const std::vector<axis::Axis*>& axes,
                                             const std::function<bool()>& cancelled);
 

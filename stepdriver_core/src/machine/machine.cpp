@@ -101,6 +101,16 @@ class Machine::Impl {
     return axes;
   }
 
+  std::vector<axis::Axis*> axesToHome(const std::vector<std::string>& names) const {
+    if (!names.empty()) return axesOf(names);
+    std::vector<axis::Axis*> axes;
+    for (const auto& axis : axes_) {
+      if (axis->config().homing) axes.push_back(axis.get());
+    }
+    if (axes.empty()) throw Refused("no axis has a homing");
+    return axes;
+  }
+
   static CoordinatedMove moveOf(const std::vector<std::string>& names,
                                 const std::vector<axis::Move>& moves) {
     CoordinatedMove move;
@@ -208,13 +218,12 @@ void Machine::resume() {
 
 std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
                                               const std::function<bool()>& cancelled) {
-  if (!names.empty()) return homeInOrder(impl_->axesOf(names), cancelled);
-  std::vector<axis::Axis*> axes;
-  for (const auto& axis : impl_->axes_) {
-    if (axis->config().homing) axes.push_back(axis.get());
-  }
-  if (axes.empty()) throw Refused("no axis has a homing");
-  return homeInOrder(axes, cancelled);
+  checkHoming(names);
+  return homeInOrder(impl_->axesToHome(names), cancelled);
+}
+
+void Machine::checkHoming(const std::vector<std::string>& names) const {
+  for (const axis::Axis* axis : impl_->axesToHome(names)) axis->checkHoming();
 }
 
 void Machine::setSpeedOverride(double factor) {

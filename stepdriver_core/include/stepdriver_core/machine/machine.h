@@ -97,6 +97,9 @@ class Machine {
   std::vector<axis::HomingResult> home(const std::vector<std::string>& names = {},
                                        const std::function<bool()>& cancelled = {});
 
+  /// @throw Refused where home() would be, now.
+  void checkHoming(const std::vector<std::string>& names = {}) const;
+
   /// Scales the velocities of all motions, of those under way too, within the axes' accelerations.
   /// No axis goes beyond its maximum.
   ///
