@@ -93,6 +93,8 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   std::string pins;
   for (const NamedLine& line : linesOf({config})) pins += line.pin + "=" + line.line + " ";
   EXPECT_EQ(pins, "x/step=S x/m0=M x/endstops/min=E x/fault=F ");
+  const auto with_stop = linesOf({config}, axis::InputSwitch{"T", true, gpio::Bias::kAsIs});
+  EXPECT_EQ(with_stop.back().pin + "=" + with_stop.back().line, "emergency_stop=T");
 }
 
 SystemFacts facts() {

@@ -118,6 +118,21 @@ const std::vector<BadBringUp> kBadBringUps = {
      "joint_state_rte",
      {"did you mean joint_state_rate"}},
     {"RateOutOfRange", setting("joint_state_rate", 2000), "joint_state_rate", {"2000", "1000"}},
+    {"EmergencyStopWithoutALevel",
+     setting("emergency_stop/pin", "stop"),
+     "emergency_stop/active_level",
+     {"missing", "low or high"}},
+    {"EmergencyStopOnALineOfAnAxis",
+     [](NodeUnderTest& node) {
+       node.set("emergency_stop/pin", "x_endstop_min");
+       node.set("emergency_stop/active_level", "high");
+     },
+     "emergency_stop/pin",
+     {"\"x_endstop_min\"", "axes/x/endstops/min/pin already"}},
+    {"ButtonWithoutAnEmergencyStop",
+     setting("simulation/emergency_stop", true),
+     "simulation/emergency_stop",
+     {"true", "is missing"}},
     {"LatenessOfZero",
      setting("realtime/max_lateness_ms", 0.0),
      "realtime/max_lateness_ms",

@@ -70,7 +70,8 @@ void Axis::bringUp() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
   if (const auto sequence = axis.pins.bringUp(); sequence.size > 0) axis.writePins(sequence);
-  if (axis.config.enable_on_start && axis.pins.hasEnable()) {
+  axis.harvest();
+  if (axis.config.enable_on_start && axis.pins.hasEnable() && axis.fault.empty()) {
     axis.writePins(axis.pins.enable(true));
     axis.enabled = true;
   }
@@ -205,6 +206,7 @@ void Axis::recover() {
   if (axis.fault.empty()) return;
   axis.restorePins();
   axis.resetFaultyChip();
+  if (axis.driver.engine().emergencyStopped()) axis.refuse("an emergency stop has come meanwhile");
   axis.fault.clear();
 }
 
@@ -212,7 +214,7 @@ void Axis::noteEmergencyStop() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
   axis.driver.waitFor([&axis] { return !axis.moving(); });
-  axis.fault = "emergency stop";
+  if (axis.fault != Impl::kEmergencyStopInput) axis.fault = Impl::kEmergencyStop;
 }
 
 void Axis::close(const std::string& reason) {

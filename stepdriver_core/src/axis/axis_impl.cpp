@@ -41,6 +41,11 @@ pulse::ChannelState Axis::Impl::harvest() {
       position_valid = false;
     }
   }
+  // Read after the state: what the input has ended is known to be its doing.
+  if (const std::uint64_t stops = driver.engine().inputStops(); stops != input_stops_seen_) {
+    input_stops_seen_ = stops;
+    fault = kEmergencyStopInput;
+  }
   if (state.ended != ended_seen_) {
     ended_seen_ = state.ended;
     conclude(state);
@@ -52,7 +57,7 @@ pulse::ChannelState Axis::Impl::harvest() {
 void Axis::Impl::conclude(const pulse::ChannelState& state) {
   switch (state.end) {
     case pulse::EndReason::kEmergencyStop:
-      fault = "emergency stop";
+      if (fault != kEmergencyStopInput) fault = kEmergencyStop;
       break;
     case pulse::EndReason::kTooLate:
       fault = "a pulse was " + inMilliseconds(state.end_lateness) +
@@ -88,7 +93,7 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
       break;
     case pulse::EndReason::kEmergencyStop:
       result.end = MoveEnd::kEmergencyStop;
-      why = "emergency stop";
+      why = fault;
       break;
     case pulse::EndReason::kChipFault:
     case pulse::EndReason::kTooLate:

@@ -21,6 +21,9 @@ class Axis::Impl {
   Impl(AxisConfig axis_config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
        pulse::PulseDriver& driver);
 
+  static constexpr const char* kEmergencyStop = "emergency stop";
+  static constexpr const char* kEmergencyStopInput = "emergency stop input";
+
   // What the engine has done since it was last looked at, taken into this state.
   pulse::ChannelState harvest();
   bool moving() { return harvest().following != 0; }
@@ -112,6 +115,7 @@ class Axis::Impl {
   std::uint64_t ended_seen_ = 0;
   std::uint64_t line_errors_seen_ = 0;
   std::uint64_t chip_faults_seen_ = 0;
+  std::uint64_t input_stops_seen_ = 0;
   bool pins_doubtful_ = false;  // a write failed: they may be as wanted or not
   int mode_failed_ = 0;         // the mode whose pins could not all be written; 0: none
 };

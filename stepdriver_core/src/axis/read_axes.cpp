@@ -76,7 +76,7 @@ std::optional<int> readMicrosteps(ConfigReader& axis, const chip::Chip* chip) {
 
 class AxesReader {
  public:
-  explicit AxesReader(std::vector<ConfigIssue>& issues) : used_(issues) {}
+  explicit AxesReader(UsedLines& used) : used_(used) {}
 
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
@@ -129,7 +129,7 @@ class AxesReader {
     return joint;
   }
 
-  UsedLines used_;
+  UsedLines& used_;
   std::map<std::string, std::string> joints_;  ///< joint -> full name of its axis
 };
 
@@ -137,6 +137,12 @@ class AxesReader {
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues) {
+  UsedLines used(issues);
+  return readAxes(axes, name, issues, used);
+}
+
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues, UsedLines& used) {
   if (axes.isNothing()) {
     issues.push_back({name, "is missing; it must be a map of at least one axis"});
     return {};
@@ -146,7 +152,7 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
   if (!reader.isMap()) return configs;
   const auto& map = *axes.as<ConfigValue::Map>();
   if (map.empty()) reader.issue("", "is empty, but must be a map of at least one axis");
-  AxesReader each(issues);
+  AxesReader each(used);
   for (const auto& entry : map) configs.push_back(each.read(entry.first, reader.map(entry.first)));
   return configs;
 }

@@ -223,19 +223,19 @@ class PinsReader {
   std::optional<FaultPin> fault_;
 };
 
-std::optional<Endstop> readEndstop(ConfigReader& endstops, const std::string& key,
-                                   UsedLines& used) {
-  ConfigReader reader = endstops.map(key);
-  if (!endstops.has(key)) return {};
-  Endstop endstop;
-  endstop.line = readLine(reader, "pin", Presence::kRequired, used).value_or("");
-  endstop.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
-  endstop.bias = readBias(reader, "bias");
-  reader.rejectUnknown();
-  return endstop;
-}
-
 }  // namespace
+
+std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
+                                           UsedLines& used) {
+  ConfigReader reader = parent.map(key);
+  if (!parent.has(key)) return {};
+  InputSwitch input;
+  input.line = readLine(reader, "pin", Presence::kRequired, used).value_or("");
+  input.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
+  input.bias = readBias(reader, "bias");
+  reader.rejectUnknown();
+  return input;
+}
 
 void UsedLines::add(const std::string& key, const std::string& line) {
   const auto [user, is_new] = users_.emplace(line, key);
@@ -250,8 +250,8 @@ void readPins(ConfigReader& axis, const chip::Chip* chip, AxisConfig& config, Us
 
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used) {
   ConfigReader endstops = axis.map("endstops");
-  config.endstop_min = readEndstop(endstops, "min", used);
-  config.endstop_max = readEndstop(endstops, "max", used);
+  config.endstop_min = readInputSwitch(endstops, "min", used);
+  config.endstop_max = readInputSwitch(endstops, "max", used);
   endstops.rejectUnknown();
 }
 

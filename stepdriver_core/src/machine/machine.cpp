@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
@@ -31,15 +32,16 @@ class Machine::Impl {
  public:
   Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options) {
-    const Wiring wiring(configs);
+    const Wiring wiring(configs, options.emergency_stop);
+    emergency_stop_ = wiring.emergency_stop;
     lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
       capability_ = pulse::measureCapability(*lines_, clock, wiring.channels);
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
       if (!why.empty()) throw Refused(why);
     }
-    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
-                                                   nanoseconds(options.max_lateness));
+    engine_ = std::make_unique<pulse::PulseEngine>(
+        *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
       axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),
@@ -84,6 +86,15 @@ class Machine::Impl {
     watcher_.join();
   }
 
+  void refuseWhileEmergencyStopInput() const {
+    if (!emergency_stop_) return;
+    const int level = lines_->read(emergency_stop_->line);
+    const std::string input =
+        "the emergency stop input " + lines_->inputName(emergency_stop_->line);
+    if (level < 0) throw Refused(input + " can't be read: " + gpio::errorText(-level));
+    if ((level != 0) == emergency_stop_->active) throw Refused(input + " is active; release it");
+  }
+
   // Does it for each axis, whatever happens to the others, and then tells all that went wrong.
   void forAll(const std::function<void(axis::Axis&)>& action) {
     std::string errors;
@@ -99,6 +110,7 @@ class Machine::Impl {
 
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
+  std::optional<pulse::Signal> emergency_stop_;
   std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<pulse::PulseDriver> driver_;
@@ -149,7 +161,9 @@ void Machine::emergencyStop() {
 bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped(); }
 
 void Machine::recover() {
+  impl_->refuseWhileEmergencyStopInput();
   impl_->engine_->clearEmergencyStop();
+  impl_->engine_->inputsChanged();
   impl_->forAll([](axis::Axis& axis) { axis.recover(); });
 }
 
@@ -166,6 +180,9 @@ EngineFigures Machine::figures() const {
   return figures;
 }
 
-void Machine::advance(double seconds) { impl_->driver_->advance(nanoseconds(seconds)); }
+void Machine::advance(double seconds) {
+  impl_->engine_->inputsChanged();  // nobody watches them
+  impl_->driver_->advance(nanoseconds(seconds));
+}
 
 }  // namespace stepdriver::machine

@@ -54,7 +54,8 @@ std::string holderOf(const gpio::LineInfo& info) {
 
 }  // namespace
 
-std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes) {
+std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes,
+                               const std::optional<axis::InputSwitch>& emergency_stop) {
   std::vector<NamedLine> lines;
   for (const axis::AxisConfig& axis : axes) {
     const auto add = [&](const char* pin, const std::string& line) {
@@ -74,6 +75,7 @@ std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes) {
     if (axis.endstop_max) add("endstops/max", axis.endstop_max->line);
     if (axis.fault) add("fault", axis.fault->line);
   }
+  if (emergency_stop) lines.push_back({"emergency_stop", emergency_stop->line});
   return lines;
 }
 

@@ -107,7 +107,8 @@ class Axis {
 
   // What follows is the machine's side.
 
-  /// Wakes the chip, ends its reset, and enables it where the configuration says so.
+  /// Wakes the chip, ends its reset, and enables it where the configuration says so and the
+  /// emergency-stop input isn't active.
   /// @throw GpioError
   void bringUp();
 
@@ -115,7 +116,7 @@ class Axis {
   /// where RESET is wired.
   ///
   /// @throw GpioError where a line still fails. @throw Refused where the chip still reports a
-  /// fault.
+  /// fault, or an emergency stop has come since the engine was told that the last one is over.
   void recover();
 
   /// Latches the fault of an emergency stop that the engine has been told of.

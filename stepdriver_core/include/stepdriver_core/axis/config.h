@@ -25,11 +25,14 @@ struct Pins {
   Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
 };
 
-struct Endstop {
+/// A switch on an input line: an endstop, or the emergency stop of the whole machine.
+struct InputSwitch {
   std::string line;
   bool active_level = false;  ///< level of the line while the switch is pressed
   gpio::Bias bias = gpio::Bias::kAsIs;
 };
+
+using Endstop = InputSwitch;
 
 /// The chip's nFAULT: an open drain that is pulled low at over-current or over-temperature.
 struct FaultPin {

@@ -8,6 +8,7 @@
 
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/axis/used_lines.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::axis {
@@ -145,8 +146,17 @@ class ConfigReader {
 ///
 /// @param name full name of the map, as `/stepdriver/axes`.
 /// @param issues everything that is wrong is added here.
+/// @param used the lines of the axes are added here, for what else names lines.
 /// @return the axes in the order of their names; to be used only where no issue was added.
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues, UsedLines& used);
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues);
+
+/// Reads `{pin: "gpiochip0:25", active_level: high, bias: as_is}`; bias is optional.
+///
+/// @return none where the key is missing.
+std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
+                                           UsedLines& used);
 
 }  // namespace stepdriver::axis
