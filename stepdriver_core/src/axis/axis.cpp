@@ -88,6 +88,7 @@ void Axis::enable(bool on) {
   if (on) {
     if (!axis.fault.empty()) axis.refuse("at fault: " + axis.fault + "; call recover first");
     if (axis.disabling) axis.refuse("busy: it is being disabled");
+    axis.wake();
     if (axis.enabled) return;
     axis.writePins(axis.pins.enable(true));
     axis.enabled = true;
@@ -104,12 +105,14 @@ void Axis::sleep(bool asleep) {
     axis.refuse(axis.chip.has_sleep ? "pins/sleep isn't configured"
                                     : "a " + axis.chip.title + " has no SLEEP pin");
   }
+  if (!asleep) axis.wake();
   if (axis.asleep == asleep) return;
   axis.writePins(axis.pins.sleep(asleep));
+  if (axis.enabled != axis.isEnabled()) axis.writePins(axis.pins.enable(axis.enabled));
+  axis.idle = false;
   axis.asleep = asleep;
-  // Asleep nothing holds the motor, and the chip wakes at Home.
-  axis.position_valid = false;
-  axis.home_count = axis.harvest().count;
+  axis.noteUnpowered();
+  axis.noteHome();
 }
 
 void Axis::reset() {
@@ -121,8 +124,8 @@ void Axis::reset() {
                                     : "a " + axis.chip.title + " has no RESET pin");
   }
   axis.writePins(axis.pins.reset());
-  axis.position_valid = false;
-  axis.home_count = axis.harvest().count;
+  axis.noteUnpowered();
+  axis.noteHome();
 }
 
 void Axis::setMicrosteps(int microsteps) {
@@ -169,8 +172,9 @@ AxisState Axis::state() const {
   Impl& axis = *impl_;
   const pulse::ChannelState channel = axis.harvest();
   AxisState state;
-  state.enabled = axis.enabled;
-  state.asleep = axis.asleep;
+  state.enabled = axis.isEnabled();
+  state.asleep = axis.isAsleep();
+  state.idle = axis.idle;
   state.moving = channel.following != 0;
   state.homed = axis.homed;
   state.position_valid = axis.position_valid;
@@ -198,6 +202,11 @@ EndstopState Axis::endstops() const {
 }
 
 // ---- the machine's side ----
+
+pulse::Nanoseconds Axis::supervise() {
+  const Lock lock(impl_->mutex);
+  return impl_->superviseIdle();
+}
 
 void Axis::recover() {
   const Lock lock(impl_->mutex);

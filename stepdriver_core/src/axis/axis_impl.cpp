@@ -36,7 +36,7 @@ pulse::ChannelState Axis::Impl::harvest() {
   }
   if (state.chip_faults != chip_faults_seen_) {
     chip_faults_seen_ = state.chip_faults;
-    if (!asleep) {
+    if (!isAsleep()) {
       fault = kChipFault;
       position_valid = false;
     }
@@ -48,6 +48,7 @@ pulse::ChannelState Axis::Impl::harvest() {
   }
   if (state.ended != ended_seen_) {
     ended_seen_ = state.ended;
+    rest_since = std::min(driver.clock().now(), state.end_time + driver.engine().state().slipped);
     conclude(state);
   }
   log.dropBefore(state.following != 0 ? state.following : state.ended);

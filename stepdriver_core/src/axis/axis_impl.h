@@ -50,6 +50,16 @@ class Axis::Impl {
   void restorePins();
   void resetFaultyChip();
 
+  // The motor's current.
+  bool isEnabled() const {
+    return enabled && !(idle && config.idle_action == IdleAction::kDisable);
+  }
+  bool isAsleep() const { return asleep || (idle && config.idle_action == IdleAction::kSleep); }
+  pulse::Nanoseconds superviseIdle();
+  void wake();
+  void noteUnpowered();
+  void noteHome();
+
   // Microstep modes.
   void refuseMicrosteps(int wanted);
   std::int64_t nearestCommon(int wanted);
@@ -80,14 +90,17 @@ class Axis::Impl {
   const int channel;
 
   mutable std::mutex mutex;
+  // As was commanded; while the axis is idle its pins are otherwise.
   bool enabled = false;
   bool asleep = false;
+  bool idle = false;
   bool disabling = false;
   bool homed = false;
   bool position_valid = false;
   int microsteps;
-  double origin = 0.0;          // [unit] the position at count 0
-  std::int64_t home_count = 0;  // a count at which the translator is at Home
+  double origin = 0.0;                // [unit] the position at count 0
+  std::int64_t home_count = 0;        // a count at which the translator is at Home
+  pulse::Nanoseconds rest_since = 0;  // clock time of the last thing that it did
   double speed_override = 1.0;
   std::string fault;
   std::string closed;

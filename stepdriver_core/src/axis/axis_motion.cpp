@@ -111,14 +111,16 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
   disabling = true;
   try {
     awaitRest(lock, stopped_by);
-    if (enabled) writePins(pins.enable(false));
+    if (isEnabled()) writePins(pins.enable(false));
+    if (asleep != isAsleep()) writePins(pins.sleep(asleep));
   } catch (...) {
     disabling = false;
     throw;
   }
   disabling = false;
   enabled = false;
-  position_valid = false;  // nothing holds the motor
+  idle = false;
+  noteUnpowered();
 }
 
 // ---- orders to the engine ----
@@ -126,6 +128,7 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
 const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr; }
 
 const Motion& Axis::Impl::begin(Goal goal) {
+  wake();
   goal.move = ++moves_;
   const Motion* before = underWay();
   const std::uint64_t replaced = before != nullptr ? before->goal.move : 0;

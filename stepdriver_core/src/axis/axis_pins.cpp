@@ -16,6 +16,7 @@ void Axis::Impl::writePins(const pulse::PinSequence& sequence, std::optional<std
     return state.pins_done == command.serial || state.pins_failed == command.serial ||
            state.refused == command.serial;
   });
+  rest_since = driver.clock().now();
   harvest();
   if (state.pins_failed == command.serial) {
     throw GpioError(config.name + ": " + failureText(state.failure));
@@ -25,7 +26,7 @@ void Axis::Impl::writePins(const pulse::PinSequence& sequence, std::optional<std
 
 void Axis::Impl::restorePins() {
   if (!pins_doubtful_) return;
-  writePins(pins.restore(enabled, asleep));
+  writePins(pins.restore(isEnabled(), isAsleep()));
   // Each pin on the way back that the failed change did not reach is where it should be already.
   if (mode_failed_ != 0) writePins(pins.mode(mode_failed_, microsteps));
   mode_failed_ = 0;
@@ -33,13 +34,13 @@ void Axis::Impl::restorePins() {
 }
 
 void Axis::Impl::resetFaultyChip() {
-  if (!config.fault || asleep) return;
+  if (!config.fault || isAsleep()) return;
   const auto faulty = [this] { return readInput(axis_lines.fault) == 0; };
   if (!faulty()) return;
   if (pins.hasReset()) {
     writePins(pins.reset());
-    position_valid = false;
-    home_count = harvest().count;
+    noteUnpowered();
+    noteHome();
     driver.waitFor(
         [this] { return driver.clock().now() >= driver.engine().channel(channel).ready; });
   }

@@ -7,6 +7,7 @@
 
 #include "read_motion.h"
 #include "read_pins.h"
+#include "read_power.h"
 #include "stepdriver_core/axis/config_reader.h"
 
 namespace stepdriver::axis {
@@ -76,7 +77,8 @@ std::optional<int> readMicrosteps(ConfigReader& axis, const chip::Chip* chip) {
 
 class AxesReader {
  public:
-  explicit AxesReader(UsedLines& used) : used_(used) {}
+  AxesReader(const std::vector<ConfigIssue>& issues, UsedLines& used)
+      : issues_(issues), used_(used) {}
 
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
@@ -99,11 +101,11 @@ class AxesReader {
     config.microsteps = context.microsteps.value_or(1);
     config.timing = context.timing.value_or(chip::Timing{});
     config.joint = readJoint(name, axis);
+    const std::size_t issues_before = issues_.size();
     readPins(axis, chip, config, used_);
+    readPower(axis, issues_.size() == issues_before, config);
     readEndstops(axis, config, used_);
     readMotion(axis, context, config);
-    config.enable_on_start = axis.boolean("enable_on_start", config.enable_on_start);
-    config.disable_on_shutdown = axis.boolean("disable_on_shutdown", config.disable_on_shutdown);
     config.align_on_microstep_change =
         axis.boolean("align_on_microstep_change", config.align_on_microstep_change);
     axis.rejectUnknown();
@@ -129,6 +131,7 @@ class AxesReader {
     return joint;
   }
 
+  const std::vector<ConfigIssue>& issues_;
   UsedLines& used_;
   std::map<std::string, std::string> joints_;  ///< joint -> full name of its axis
 };
@@ -152,7 +155,7 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
   if (!reader.isMap()) return configs;
   const auto& map = *axes.as<ConfigValue::Map>();
   if (map.empty()) reader.issue("", "is empty, but must be a map of at least one axis");
-  AxesReader each(used);
+  AxesReader each(issues, used);
   for (const auto& entry : map) configs.push_back(each.read(entry.first, reader.map(entry.first)));
   return configs;
 }

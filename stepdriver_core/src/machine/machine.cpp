@@ -1,5 +1,6 @@
 #include "stepdriver_core/machine/machine.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -26,6 +27,11 @@ constexpr double kMostOverride = 2.0;
 
 pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 
+bool anyGoesIdle(const std::vector<axis::AxisConfig>& axes) {
+  return std::any_of(axes.begin(), axes.end(),
+                     [](const axis::AxisConfig& axis) { return axis.idle_timeout > 0.0; });
+}
+
 }  // namespace
 
 class Machine::Impl {
@@ -48,7 +54,7 @@ class Machine::Impl {
                                                    wiring.axis_lines[i], *lines_, *driver_));
     }
     for (const auto& axis : axes_) axis->bringUp();
-    if (options.threaded && !wiring.inputs.empty())
+    if (options.threaded && (!wiring.inputs.empty() || anyGoesIdle(configs)))
       watcher_ = std::thread([this] { watchInputs(); });
   }
 
@@ -76,7 +82,15 @@ class Machine::Impl {
       // Where waiting fails, reading will fail too, and say so.
       if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
       engine_->inputsChanged();
+      supervise();
     }
+  }
+
+  // What falls due by time alone. @return the clock time at which it wants to be called again.
+  pulse::Nanoseconds supervise() {
+    pulse::Nanoseconds due = pulse::kNever;
+    for (const auto& axis : axes_) due = std::min(due, axis->supervise());
+    return due;
   }
 
   void stopWatching() {
@@ -182,7 +196,14 @@ EngineFigures Machine::figures() const {
 
 void Machine::advance(double seconds) {
   impl_->engine_->inputsChanged();  // nobody watches them
-  impl_->driver_->advance(nanoseconds(seconds));
+  pulse::Clock& clock = impl_->driver_->clock();
+  const pulse::Nanoseconds end = clock.now() + nanoseconds(seconds);
+  for (;;) {
+    const pulse::Nanoseconds due = std::min(end, impl_->supervise());
+    impl_->driver_->advance(due - clock.now());
+    if (clock.now() >= end) break;
+  }
+  impl_->supervise();
 }
 
 }  // namespace stepdriver::machine

@@ -8,8 +8,9 @@ namespace stepdriver::axis {
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
 struct AxisState {
-  bool enabled = false;
+  bool enabled = false;  ///< ENABLE is asserted
   bool asleep = false;
+  bool idle = false;  ///< disabled or asleep since it stood for long; the next motion ends that
   bool moving = false;
   bool homed = false;
   bool position_valid = false;  ///< the position can be trusted

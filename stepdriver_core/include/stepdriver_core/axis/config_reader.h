@@ -142,6 +142,9 @@ class ConfigReader {
 ///     enable_on_start: false
 ///     disable_on_shutdown: true
 ///     align_on_microstep_change: false
+///     idle_timeout_s: 0.0       # at rest, then idle; 0: never
+///     idle_action: disable      # or sleep
+///     holds_position_unpowered: false
 /// @endcode
 ///
 /// @param name full name of the map, as `/stepdriver/axes`.
