@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "node_start.h"
 #include "robot_description.h"
 #include "simulation.h"
 #include "stepdriver_core/error.h"
@@ -13,13 +14,6 @@
 
 namespace stepdriver::ros_node {
 namespace {
-
-/// @return the node's private parameters as one map, empty where there are none.
-axis::ConfigValue privateParameters(const ros::NodeHandle& private_node) {
-  XmlRpc::XmlRpcValue tree;
-  if (!ros::param::get(private_node.getNamespace(), tree)) return axis::ConfigValue::Map{};
-  return configValue(tree);
-}
 
 std::vector<LimitSources> applyDescriptionParameter(const ros::NodeHandle& node,
                                                     std::vector<axis::AxisConfig>& axes,
@@ -55,6 +49,9 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
   if (!issues.empty()) throw ConfigError(issues);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     ROS_INFO("%s", limitsText(config.axes[i], sources[i]).c_str());
+    if (sources[i].limited_though_continuous) {
+      ROS_WARN("%s", continuousJointText(config.axes[i]).c_str());
+    }
   }
   return config;
 }

@@ -1,6 +1,5 @@
 #include <ros/console.h>
 #include <ros/init.h>
-#include <ros/master.h>
 #include <ros/node_handle.h>
 
 #include <cstdio>
@@ -16,6 +15,7 @@
 #include "hardware.h"
 #include "jog_subscriber.h"
 #include "machine_services.h"
+#include "node_start.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
@@ -30,7 +30,6 @@ constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
 constexpr int kExitUsage = 64;
 
-constexpr std::chrono::milliseconds kMasterPoll{200};
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
@@ -53,15 +52,6 @@ Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had 
 3 the machine is too slow for its axes and ~realtime is enforce.
 Start it with: roslaunch stepdriver axis.launch
 )";
-
-/// @return false: the node was asked to end before there was a master.
-bool waitForMaster(EndRequests& end_requests) {
-  while (!ros::master::check()) {
-    ROS_WARN_ONCE("Waiting for the ROS master at %s", ros::master::getURI().c_str());
-    if (!end_requests.waitFor(kMasterPoll).empty()) return false;
-  }
-  return true;
-}
 
 /// Refuses new commands, decelerates, disables, and lets every client have its answer.
 ///
@@ -138,12 +128,7 @@ int runOrExplain(EndRequests& end_requests) {
   try {
     return run(node, private_node, end_requests);
   } catch (const ConfigError& error) {
-    const std::size_t count = error.issues().size();
-    ROS_FATAL("Not started, no line was touched: %zu %s wrong in the parameters", count,
-              count == 1 ? "thing is" : "things are");
-    for (const ConfigIssue& issue : error.issues()) {
-      ROS_ERROR("%s %s", issue.key.c_str(), issue.message.c_str());
-    }
+    explain(error, "Not started, no line was touched");
     return kExitConfig;
   } catch (const GpioError& error) {
     ROS_FATAL("Not started: %s", error.what());

@@ -90,6 +90,8 @@ class JointFitter {
   }
 
   void tighten(const urdf::Joint& joint) {
+    const bool continuous = joint.type == urdf::Joint::CONTINUOUS;
+    sources_.limited_though_continuous = continuous && (axis_.min_position || axis_.max_position);
     if (!joint.limits) return;
     const urdf::JointLimits& limits = *joint.limits;
     if (limits.velocity < axis_.max_speed) {
@@ -97,7 +99,7 @@ class JointFitter {
       axis_.start_speed = std::min(axis_.start_speed, axis_.max_speed);
       sources_.max_speed = "joint";
     }
-    if (joint.type == urdf::Joint::CONTINUOUS) return;
+    if (continuous) return;
     if (!axis_.min_position || limits.lower > *axis_.min_position) {
       axis_.min_position = limits.lower;
       sources_.min_position = "joint";
@@ -143,6 +145,14 @@ std::vector<LimitSources> applyRobotDescription(const std::string& urdf, const s
     sources.push_back(JointFitter(axis, name, issues).fit(joint.get()));
   }
   return sources;
+}
+
+std::string continuousJointText(const AxisConfig& axis) {
+  return "axis " + axis.name + " has soft limits, but its joint " + axis.joint +
+         " is continuous in the robot description: the limits hold, and whoever plans by the "
+         "description will ask for positions that are refused. Make the joint revolute, or take "
+         "the "
+         "limits away";
 }
 
 std::string limitsText(const AxisConfig& axis, const LimitSources& sources) {

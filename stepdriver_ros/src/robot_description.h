@@ -13,6 +13,7 @@ struct LimitSources {
   const char* min_position = "axis";
   const char* max_position = "axis";
   const char* max_speed = "axis";
+  bool limited_though_continuous = false;  ///< soft limits that the URDF says nothing of
 };
 
 /// Tightens the limits of the axes to those of their joints in a URDF.
@@ -25,6 +26,9 @@ struct LimitSources {
 std::vector<LimitSources> applyRobotDescription(const std::string& urdf, const std::string& name,
                                                 std::vector<axis::AxisConfig>& axes,
                                                 std::vector<ConfigIssue>& issues);
+
+/// What is to be said of a continuous joint whose axis has soft limits.
+std::string continuousJointText(const axis::AxisConfig& axis);
 
 /// A sentence with the limits of an axis that hold, and where each came from.
 std::string limitsText(const axis::AxisConfig& axis, const LimitSources& sources);

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -40,14 +41,17 @@ class PulseEngineTest : public testing::Test {
   /// @param continues serial of the profile that this one goes on from.
   std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
     profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
-    Command command;
-    command.channel = channel;
-    command.serial = ++serial;
-    command.continues = continues;
-    command.profile = profiles.back().get();
-    command.restart_interval = restart_interval;
-    EXPECT_TRUE(engine->post(command));
+    follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval});
+    postFollows(1);
     return serial;
+  }
+
+  // The last so many of `follows` in one order.
+  void postFollows(std::size_t count) {
+    Command command;
+    command.follows = &follows[follows.size() - count];
+    command.follow_count = count;
+    EXPECT_TRUE(engine->post(command));
   }
 
   // Serves until nothing is left to do, each time `late` after it is due.
@@ -100,6 +104,7 @@ class PulseEngineTest : public testing::Test {
   RecordingLines lines{clock};
   std::unique_ptr<PulseEngine> engine;
   std::vector<std::unique_ptr<motion::Profile>> profiles;
+  std::deque<Follow> follows;
   std::uint64_t serial = 0;
   Nanoseconds restart_interval = 0;
 };
@@ -382,6 +387,99 @@ TEST_F(PulseEngineTest, GoesOnWithTheOthersWhereOneLineOfAWriteFails) {
   EXPECT_EQ(failed.failure.line, 2);
   EXPECT_EQ(failed.count, before);
   EXPECT_EQ(failed.line_errors, 1U);
+}
+
+TEST_F(PulseEngineTest, FollowsEachProfileFromItsStartThoughTheNextOneIsThereAlready) {
+  make({config(0)});
+  const auto first = follow(cruise(1'000'000, 0, 100, 1000.0));
+  const auto rest = follow(motion::Profile(11'200'000, 10.2), 0, first);
+  follow(cruise(11'700'000, 10, 0, 1000.0), 0, rest);
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(0).count, 0);
+  // The step that the first one has at 11.5 ms is none any more.
+  EXPECT_EQ(lines.rises(0).size(), 20U);
+}
+
+TEST_F(PulseEngineTest, RefusesMoreSuccessorsThanItHasRoomForAndKeepsThose) {
+  make({config(0)});
+  auto last = follow(cruise(1'000'000, 0, 1000, 1000.0));
+  for (int i = 0; i < 16; ++i) {
+    last = follow(cruise(100'000'000 + i * 2'000'000, 98 + 2 * i, 1000, 1000.0), 0, last);
+  }
+  engine->serve();
+  EXPECT_EQ(engine->channel(0).refused, 0U);
+  const auto one_too_many = follow(cruise(140'000'000, 138, 1000, 1000.0), 0, last);
+  engine->serve();
+  EXPECT_EQ(engine->channel(0).refused, one_too_many);
+  runOut();
+  EXPECT_EQ(engine->channel(0).count, 1000);
+  EXPECT_EQ(engine->channel(0).ended, last);
+}
+
+class PulseEngineGroup : public PulseEngineTest {
+ protected:
+  void order(motion::Profile profile, int channel, std::uint64_t continues = 0) {
+    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
+    follows.push_back({channel, ++serial, profiles.back().get(), continues, 2'000'000, 7});
+  }
+};
+
+TEST_F(PulseEngineGroup, TakesAllProfilesOfAnOrderOrNone) {
+  make({config(0), config(1)});
+  order(cruise(1'000'000, 0, 100, 1000.0), 0);
+  order(cruise(1'000'000, 0, 100, 1000.0), 1, 99);  // goes on from a profile that isn't there
+  std::swap(follows[0], follows[1]);
+  postFollows(2);
+  runOut();
+  for (const int channel : {0, 1}) {
+    EXPECT_EQ(engine->channel(channel).following, 0U);
+    EXPECT_EQ(engine->channel(channel).refused, engine->channel(channel).taken);
+    EXPECT_NE(engine->channel(channel).refused, 0U);
+  }
+  EXPECT_TRUE(lines.edges.empty());
+}
+
+TEST_F(PulseEngineGroup, EndsAllWhereOneLineFailsWithTheStepsOfThatInstantCounted) {
+  make({config(0), config(1), config(2)});
+  for (const int channel : {0, 1, 2}) order(cruise(1'000'000, 0, 100, 1000.0), channel);
+  follows[2].group = 8;
+  postFollows(3);
+  runUntil(50'300'000);
+  lines.broken = 0;
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kLineError);
+  EXPECT_EQ(engine->channel(1).end, EndReason::kCompanion);
+  EXPECT_TRUE(engine->channel(1).end_abrupt);
+  EXPECT_EQ(engine->channel(2).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(2).count, 100);
+  for (const int channel : {0, 1}) {
+    const auto sent = lines.rises(channel * kLinesPerChannel).size();
+    EXPECT_EQ(engine->channel(channel).count, static_cast<std::int64_t>(sent)) << channel;
+    EXPECT_LT(sent, 60U) << channel;
+  }
+}
+
+TEST_F(PulseEngineGroup, SendsNoStepOfTheInstantAtWhichAnotherMeetsItsEndstop) {
+  // Both orders: the one that meets it is looked at before the other one, or after it.
+  for (const int meets : {0, 1}) {
+    SCOPED_TRACE(meets);
+    lines.inputs[0] = 0;
+    std::vector<ChannelConfig> both{config(0), config(1)};
+    both[static_cast<std::size_t>(meets)].endstop_max = Signal{0, true};
+    make(both);
+    const Nanoseconds start = clock.now() + 1'000'000;
+    for (const int channel : {0, 1}) order(cruise(start, 0, 100, 1000.0), channel);
+    postFollows(2);
+    runUntil(start + 50'300'000);
+    const std::int64_t before = engine->channel(0).count;
+    lines.inputs[0] = 1;
+    runOut();
+    EXPECT_EQ(engine->channel(meets).end, EndReason::kEndstopMax);
+    EXPECT_EQ(engine->channel(1 - meets).end, EndReason::kCompanion);
+    EXPECT_EQ(engine->channel(0).count, before);
+    EXPECT_EQ(engine->channel(1).count, before);
+  }
 }
 
 }  // namespace

@@ -180,7 +180,8 @@ TEST(ReadAxes, NamesWhatIsMissing) {
                  {"pins/dir", "a line: chip:offset, as \"gpiochip0:17\", or a line's name"},
                  {"microsteps", "1, 2, 4, 8 or 16"},
                  {"steps_per_mm",
-                  "a number above 0, or else full_steps_per_round and mm_per_round must be given"},
+                  "a number above 0, or else full_steps_per_round and mm_per_round or "
+                  "wheel_diameter_mm must be given"},
                  {"max_speed_mm_s", "a number above 0"},
                  {"acceleration_mm_s2", "a number above 0"}});
   expectMissing(rotaryAxis(), {{"steps_per_degree",

@@ -47,7 +47,10 @@ TEST(ReadMotion, TakesNoJerkLimitAndNoDecelerationOfAStopWhereNoneIsGiven) {
 TEST(ReadMotion, ChecksTheJerkAndTheDecelerationOfAStop) {
   expectIssues(
       linearAxis(),
-      {{"jerk_mm_s3", 0, ""},
+      {{"backlash_mm", 0.2, ""},
+       {"backlash_mm", -0.1, "is -0.1, but must be 0 or more"},
+       {"backlash_mm", 12501.0, "is 12501.0, but must be at most 12500, which is 1000000 steps"},
+       {"jerk_mm_s3", 0, ""},
        {"jerk_mm_s3", -1.0, "is -1.0, but must be 0 or more"},
        {"jerk_mm_s3", kNan, "is nan, but must be a finite number of 0 or more"},
        {"jerk_mm_s3", 1e-6,
@@ -113,9 +116,52 @@ TEST(ReadMotion, ScalesALinearAxisByTheRoundsOfItsMotor) {
                        "is 200.0 (a number with a decimal point), but must be an integer from 1 to "
                        "1000000"},
                       {"full_steps_per_round", 0, "is 0, but must be from 1 to 1000000"}});
-  expectMissing(axis, {{"mm_per_round", "a number above 0"},
-                       {"full_steps_per_round",
-                        "an integer of 1 or more, as the axis is scaled by mm_per_round"}});
+  expectMissing(
+      axis,
+      {{"mm_per_round", "a number above 0, or else wheel_diameter_mm must be given"},
+       {"full_steps_per_round", "an integer of 1 or more, as the axis is scaled by mm_per_round"}});
+}
+
+TEST(ReadMotion, ScalesAWheelByItsDiameter) {
+  ConfigValue axis = linearAxis();
+  drop(axis, "steps_per_mm");
+  put(axis, "microsteps", 8);
+  put(axis, "full_steps_per_round", 200);
+  put(axis, "wheel_diameter_mm", 100);
+  const AxisConfig wheel = readX(axis);
+  EXPECT_EQ(wheel.kind, Kind::kLinear);
+  EXPECT_NEAR(1000.0 / wheel.steps_per_unit, 0.19635, 1e-6) << "mm a pulse of 10 cm at 1600 pulses";
+  EXPECT_DOUBLE_EQ(wheel.steps_per_unit, 1600.0 / (0.1 * kPi));
+  EXPECT_EQ(wheel.steps_per_round, 1600.0);
+  put(axis, "gear_ratio", 2.5);
+  EXPECT_DOUBLE_EQ(readX(axis).steps_per_unit, 4000.0 / (0.1 * kPi));
+
+  const std::string beyond =
+      ", which makes 1.27324e-10 steps per mm, but must make from 1e-09 to 1000000000";
+  expectIssues(axis,
+               {{"wheel_diameter_mm", 0.0, "is 0.0, but must be above 0"},
+                {"wheel_diameter_mm", -65, "is -65, but must be above 0"},
+                {"wheel_diameter_mm", kNan, "is nan, but must be a finite number above 0"},
+                {"wheel_diameter_mm", "big", "is \"big\" (a string), but must be a number above 0"},
+                {"wheel_diameter_mm", 1e13, "is 10000000000000.0" + beyond},
+                {"wheel_diamter_mm", 65, "is not known; did you mean wheel_diameter_mm?"}});
+  expectMissing(axis, {{"full_steps_per_round",
+                        "an integer of 1 or more, as the axis is scaled by wheel_diameter_mm"}});
+}
+
+TEST(ReadMotion, RefusesAWheelWithAnotherTravelOrInDegrees) {
+  ConfigValue axis = linearAxis();
+  drop(axis, "steps_per_mm");
+  put(axis, "full_steps_per_round", 200);
+  put(axis, "mm_per_round", 40);
+  expectIssues(axis, {{"wheel_diameter_mm", 65.0,
+                       "is 65.0, but mm_per_round must not be given with it: a round travels "
+                       "either that or pi times the diameter"}});
+  ConfigValue rotary = rotaryAxis();
+  put(rotary, "wheel_diameter_mm", 65.0);
+  EXPECT_EQ(issuesOfX(rotary),
+            Lines{"/axes/x: has wheel_diameter_mm and steps_per_degree, but must be either linear, "
+                  "with all of it in mm, or rotary, with all of it in degrees"});
 }
 
 TEST(ReadMotion, ScalesARotaryAxisByTheRoundsOfItsMotor) {
@@ -145,6 +191,11 @@ TEST(ReadMotion, RefusesTwoScales) {
             Lines{"/axes/x/steps_per_mm: is 80.0, but full_steps_per_round, mm_per_round and "
                   "gear_ratio" +
                   rest});
+  drop(axis, "mm_per_round");
+  put(axis, "wheel_diameter_mm", 65.0);
+  EXPECT_EQ(issuesOfX(axis), Lines{"/axes/x/steps_per_mm: is 80.0, but full_steps_per_round, "
+                                   "wheel_diameter_mm and gear_ratio" +
+                                   rest});
 }
 
 TEST(ReadMotion, ChecksTheStepsOfARound) {

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <ros/master.h>
+#include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
+#include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/RigReport.h>
@@ -42,6 +44,7 @@ TEST(Launch, BringsUpEachExampleWithItsOwnScale) {
   expectMoves("/right/motor", "x", 0.5, std::llround(0.5 * 9600 / (2 * std::acos(-1.0))));
   expectMoves("/screw/stepdriver", "x", 0.01, 8000);
   expectMoves("/module/stepdriver", "x", 0.01, 3200);
+  expectMoves("/cart/stepdriver", "x", 0.5, std::llround(0.5 * 1600 / (0.1 * std::acos(-1.0))));
 }
 
 TEST(Launch, KeepsNodesInNamespacesApart) {
@@ -80,6 +83,23 @@ TEST(Launch, BringsUpTwoAxesThatMoveAtTheSameTime) {
   EXPECT_TRUE(states.waitForLatest([](const JointState& s) {
     return std::abs(s.position.at(0) - 1.0) < 1e-3 && std::abs(s.position.at(1) - 0.05) < 1e-4;
   }));
+}
+
+TEST(Launch, JogsTwoAxesByAJoystick) {
+  const std::string node = "/both/stepdriver";
+  const auto before = callWhenThere<RigReport>(node + "/rig/report");
+  std_srvs::SetBool::Request on;
+  on.data = true;
+  EXPECT_TRUE(callWhenThere<std_srvs::SetBool>(node + "/x/enable", on).success);
+  auto joy = ros::NodeHandle().advertise<sensor_msgs::Joy>("/both/joy", 1);
+  sensor_msgs::Joy sticks;
+  sticks.axes = {0.5F, 0.5F};
+  EXPECT_TRUE(waitUntil([&] {
+    joy.publish(sticks);
+    const auto now = callWhenThere<RigReport>(node + "/rig/report");
+    return now.pulses_backward.at(0) > before.pulses_backward.at(0) &&
+           now.pulses_forward.at(1) > before.pulses_forward.at(1);
+  })) << "r is inverted, and enabled by the joystick's node";
 }
 
 TEST(Launch, StartsARobotStatePublisher) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -85,7 +86,25 @@ TEST(RobotDescription, LeavesAContinuousJointWithoutPositionLimits) {
   node.describe(robot("continuous", ""));
   node.start();
   expectSays(node.process().output(), "max position without limit");
+  EXPECT_EQ(node.process().output().find("has soft limits"), std::string::npos);
   EXPECT_TRUE(node.moveTo(10.0, true).success);
+  EXPECT_EQ(node.pulses(), std::llround(10.0 * 3200 / (2 * std::acos(-1.0))));
+}
+
+TEST(RobotDescription, WarnsOfAContinuousJointWhoseAxisHasSoftLimits) {
+  NodeUnderTest node;
+  makeRotary(node);
+  node.set("axes/x/max_position_deg", 90.0);
+  node.describe(robot("continuous", R"(<limit velocity="2" effort="1"/>)"));
+  node.start();
+  expectSays(
+      node.process().output(),
+      "axis x has soft limits, but its joint x_joint is continuous in the robot description");
+  expectSays(node.process().output(), "speed 2 rad/s (joint)");
+  const auto beyond = node.moveTo(1.6, true);
+  EXPECT_FALSE(beyond.success);
+  expectSays(beyond.message, "above the soft limit max_position");
+  EXPECT_TRUE(node.moveTo(-7.0, true).success) << "on that side it has none";
 }
 
 struct BadDescription {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "axis_impl.h"
+#include "homing.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::axis {
@@ -14,8 +15,9 @@ using Lock = std::lock_guard<std::mutex>;
 }  // namespace
 
 Axis::Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-           pulse::PulseDriver& driver)
-    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver)) {}
+           EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex)
+    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, edges, driver,
+                                   mutex)) {}
 
 Axis::~Axis() = default;
 
@@ -62,6 +64,16 @@ void Axis::setSpeedOverride(double factor) {
 void Axis::stop() {
   const Lock lock(impl_->mutex);
   impl_->decelerate("it was stopped");
+}
+
+void Axis::hold() {
+  const Lock lock(impl_->mutex);
+  impl_->hold();
+}
+
+void Axis::resume() {
+  const Lock lock(impl_->mutex);
+  impl_->resume();
 }
 
 // ---- the chip ----
@@ -137,8 +149,7 @@ void Axis::setMicrosteps(int microsteps) {
   if (common != axis.harvest().count) {
     if (!axis.config.align_on_microstep_change) {
       axis.refuse("1/" + std::to_string(microsteps) + " has no position at " +
-                  axis.show(axis.positionOf(static_cast<double>(axis.harvest().count))) +
-                  "; the nearest that both modes have is " +
+                  axis.show(axis.position()) + "; the nearest that both modes have is " +
                   axis.show(axis.positionOf(static_cast<double>(common))) +
                   ": move there first, or configure align_on_microstep_change");
     }
@@ -161,7 +172,7 @@ void Axis::setPosition(double position) {
   axis.refuseWhileMoving("its position is set");
   if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
   axis.refuseBeyondLimits(position, "the position");
-  axis.origin = position - static_cast<double>(axis.harvest().count) / axis.stepsPerUnit();
+  axis.origin = position - static_cast<double>(axis.jointCount()) / axis.stepsPerUnit();
   axis.position_valid = true;
 }
 
@@ -176,18 +187,25 @@ AxisState Axis::state() const {
   state.asleep = axis.isAsleep();
   state.idle = axis.idle;
   state.moving = channel.following != 0;
+  state.held = axis.held.has_value();
   state.homed = axis.homed;
+  if (axis.homing != nullptr) state.homing = axis.homing->phase();
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
-  state.position = axis.positionOf(static_cast<double>(channel.count));
+  state.position = axis.positionOf(static_cast<double>(channel.count - channel.slack));
   state.target = state.position;
   state.fault = axis.fault;
+  if (axis.held && axis.held->goal.target) {
+    state.target = axis.positionOf(static_cast<double>(*axis.held->goal.target));
+  }
   if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
     const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
-    state.velocity = velocity / axis.stepsPerUnit();
+    // While the backlash is taken up, the joint stands.
+    const bool joint_moves = channel.slack == (velocity > 0.0 ? axis.backlash() : 0);
+    state.velocity = joint_moves ? velocity / axis.stepsPerUnit() : 0.0;
     const Goal& goal = motion->goal;
     if (goal.stops()) {
-      state.target = axis.positionOf(motion->profile->endPosition().value());
+      state.target = axis.positionOf(axis.jointAt(motion->profile->endPosition().value()));
     } else if (goal.target) {
       state.target = axis.positionOf(static_cast<double>(*goal.target));
     }
@@ -222,8 +240,10 @@ void Axis::recover() {
 void Axis::noteEmergencyStop() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
+  axis.interruptHoming("emergency stop");
   axis.driver.waitFor([&axis] { return !axis.moving(); });
   if (axis.fault != Impl::kEmergencyStopInput) axis.fault = Impl::kEmergencyStop;
+  axis.dropHeld(MoveEnd::kEmergencyStop, axis.fault);
 }
 
 void Axis::close(const std::string& reason) {

@@ -8,7 +8,8 @@ namespace stepdriver::axis {
 pulse::Nanoseconds Axis::Impl::superviseIdle() {
   if (config.idle_timeout <= 0.0) return pulse::kNever;
   const bool moves = moving();
-  const bool stays = idle || disabling || !enabled || asleep || !fault.empty() || !closed.empty();
+  const bool stays = idle || held || homing != nullptr || disabling || !enabled || asleep ||
+                     !fault.empty() || !closed.empty();
   const auto timeout = static_cast<pulse::Nanoseconds>(std::llround(config.idle_timeout * 1e9));
   const pulse::Nanoseconds now = driver.clock().now();
   if (moves || stays) return now + timeout;

@@ -1,8 +1,11 @@
 #include "axis_impl.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
+
+#include "course.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -13,14 +16,17 @@ constexpr const char* kChipFault =
 }  // namespace
 
 Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& own_lines,
-                 gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver)
+                 gpio::Lines& all_lines, EdgeLog& all_edges, pulse::PulseDriver& pulse_driver,
+                 std::mutex& all_mutex)
     : config(std::move(axis_config)),
       chip(chip::chipOf(config.driver)),
       axis_lines(own_lines),
       pins(config, own_lines),
       lines(all_lines),
+      edges(all_edges),
       driver(pulse_driver),
       channel(engine_channel),
+      mutex(all_mutex),
       enabled(!pins.hasEnable()),
       microsteps(config.microsteps) {}
 
@@ -51,7 +57,11 @@ pulse::ChannelState Axis::Impl::harvest() {
     rest_since = std::min(driver.clock().now(), state.end_time + driver.engine().state().slipped);
     conclude(state);
   }
+  if (!position_valid) homed = false;
   log.dropBefore(state.following != 0 ? state.following : state.ended);
+  if (held && !fault.empty()) {
+    dropHeld(fault == kEmergencyStopInput ? MoveEnd::kEmergencyStop : MoveEnd::kFault, fault);
+  }
   return state;
 }
 
@@ -69,14 +79,19 @@ void Axis::Impl::conclude(const pulse::ChannelState& state) {
       break;
   }
   if (state.end_abrupt && state.end != pulse::EndReason::kDone) position_valid = false;
-  if (const Motion* motion = log.find(state.ended)) {
-    if (!log.result(motion->goal.move)) log.conclude(motion->goal.move, resultOf(*motion, state));
+  const Motion* motion = log.find(state.ended);
+  if (motion == nullptr || log.result(motion->goal.move)) return;
+  if (state.end != pulse::EndReason::kDone) {
+    held.reset();
+  } else if (motion->goal.held) {
+    return;  // it goes on later
   }
+  log.conclude(motion->goal.move, resultOf(*motion, state));
 }
 
 MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState& state) {
   MoveResult result;
-  result.position = positionOf(static_cast<double>(state.count));
+  result.position = positionOf(static_cast<double>(state.count - state.slack));
   result.duration = std::max(0.0, static_cast<double>(state.end_time - motion.begin_ns) * 1e-9);
   std::string why;
   switch (state.end) {
@@ -102,20 +117,39 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
       result.end = MoveEnd::kFault;
       why = fault;
       break;
+    case pulse::EndReason::kCompanion:
+      result.end = MoveEnd::kCompanion;
+      why = endedWith(motion.goal);
+      break;
   }
   if (result.end == MoveEnd::kReached) {
     result.message = config.name + " reached " + show(result.position);
   } else {
-    result.message = config.name + " stands at " + show(result.position);
-    if (motion.goal.target) {
-      result.message += ", not at " + show(positionOf(static_cast<double>(*motion.goal.target)));
-    }
-    result.message += ": " + why;
+    result.message = standsAt(motion.goal, why);
     if (!position_valid && state.end_abrupt) {
       result.message += "; it stopped too fast for the position to be trusted";
     }
   }
   return result;
+}
+
+std::string Axis::Impl::standsAt(const Goal& goal, const std::string& why) const {
+  const pulse::ChannelState state = driver.engine().channel(channel);
+  const double count = static_cast<double>(state.count - state.slack);
+  std::string text = config.name + " stands at " + show(positionOf(count));
+  if (goal.target) text += ", not at " + show(positionOf(static_cast<double>(*goal.target)));
+  return text + ": " + why;
+}
+
+std::string Axis::Impl::endedWith(const Goal& goal) const {
+  for (const Impl* other : goal.course->axes()) {
+    const pulse::ChannelState state = driver.engine().channel(other->channel);
+    if (other != this && state.end != pulse::EndReason::kDone &&
+        state.end != pulse::EndReason::kCompanion) {
+      return "it moved together with " + other->config.name + ", which was stopped";
+    }
+  }
+  return "an axis that it moved together with was stopped";
 }
 
 // ---- scales ----
@@ -131,10 +165,27 @@ double Axis::Impl::maxSpeed() const {
   return std::min(config.max_speed, 1.0 / (period * stepsPerUnit()));
 }
 
+std::int64_t Axis::Impl::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
+
+std::int64_t Axis::Impl::jointCount() {
+  const pulse::ChannelState state = harvest();
+  return state.count - state.slack;
+}
+
+double Axis::Impl::jointAt(double motor) {
+  const pulse::ChannelState state = harvest();
+  const double slack = static_cast<double>(state.slack) + motor - static_cast<double>(state.count);
+  return motor - std::clamp(slack, 0.0, static_cast<double>(backlash()));
+}
+
 motion::MotionLimits Axis::Impl::limits(double velocity) const {
   const double scale = stepsPerUnit();
   return {config.start_speed * scale, velocity * scale, config.acceleration * scale,
           config.deceleration * scale, config.jerk * scale};
+}
+
+double Axis::Impl::stopDeceleration() const {
+  return config.stop_deceleration.value_or(config.deceleration) * stepsPerUnit();
 }
 
 std::string Axis::Impl::show(double value, const char* per) const {

@@ -1,5 +1,7 @@
 #include "stepdriver_core/axis/axis_lines.h"
 
+#include <cmath>
+
 namespace stepdriver::axis {
 
 AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest>& outputs,
@@ -52,6 +54,7 @@ pulse::ChannelConfig channelConfig(const AxisConfig& config, const AxisLines& li
   channel.dir_setup = config.timing.dir_setup_ns;
   channel.dir_hold = config.timing.dir_hold_ns;
   channel.mode_hold = config.timing.mode_hold_ns;
+  channel.backlash = std::llround(config.backlash * config.steps_per_unit);
   return channel;
 }
 

@@ -35,13 +35,18 @@ std::int64_t Axis::Impl::nearestCommon(int wanted) {
 }
 
 void Axis::Impl::changeMicrosteps(int wanted) {
-  const std::int64_t count = harvest().count;
-  const double position = positionOf(static_cast<double>(count));
+  const pulse::ChannelState state = harvest();
+  const std::int64_t count = state.count;
+  const double kept = position();
   const std::int64_t index = (count - home_count) * wanted / microsteps;
   const bool home_stays = home_count * wanted % microsteps == 0;
   const std::int64_t new_home = home_stays ? home_count * wanted / microsteps : 0;
+  const double scale = static_cast<double>(wanted) / microsteps;
+  const std::int64_t play = std::llround(config.backlash * stepsPerUnit() * scale);
+  const std::int64_t slack =
+      std::min<std::int64_t>(std::llround(static_cast<double>(state.slack) * scale), play);
   try {
-    writePins(pins.mode(microsteps, wanted), new_home + index);
+    writePins(pins.mode(microsteps, wanted), {{new_home + index, slack, play}});
   } catch (const GpioError&) {
     mode_failed_ = wanted;
     throw;
@@ -49,8 +54,10 @@ void Axis::Impl::changeMicrosteps(int wanted) {
   microsteps = wanted;
   home_count = new_home;
   // Where Home has no count in the new mode, the counting starts anew from it, at the same
-  // position.
-  if (!home_stays) origin = position - static_cast<double>(index) / stepsPerUnit();
+  // position; and what is taken up of the backlash need not be whole microsteps of it.
+  if (!home_stays || state.slack != 0) {
+    origin = kept - static_cast<double>(new_home + index - slack) / stepsPerUnit();
+  }
 }
 
 }  // namespace stepdriver::axis

@@ -2,13 +2,14 @@
 
 namespace stepdriver::axis {
 
-void Axis::Impl::writePins(const pulse::PinSequence& sequence, std::optional<std::int64_t> count) {
+void Axis::Impl::writePins(const pulse::PinSequence& sequence,
+                           std::optional<pulse::Command::Scale> scale) {
   pulse::Command command;
   command.kind = pulse::Command::Kind::kPins;
   command.channel = channel;
   command.serial = ++serial_;
   command.pins = sequence;
-  command.count = count;
+  command.scale = scale;
   driver.post(command);
   pulse::ChannelState state;
   driver.waitFor([&] {

@@ -16,10 +16,21 @@ void Axis::Impl::refuseUnlessOpen() const {
 
 void Axis::Impl::refuseWhileMoving(const std::string& what) {
   refuseUnlessOpen();
+  if (homing != nullptr) refuse("busy: it is being homed; " + what + " at rest");
   if (moving()) refuse("busy: it moves; " + what + " at rest");
+  refuseWhileHeld();
+}
+
+void Axis::Impl::refuseWhileHeld() const {
+  if (held) refuse("held; resume or stop it first");
 }
 
 void Axis::Impl::refuseUnlessReadyToMove() {
+  refuseUnlessReady();
+  refuseWhileHeld();
+}
+
+void Axis::Impl::refuseUnlessReady() {
   refuseUnlessOpen();
   harvest();
   if (!fault.empty()) refuse("at fault: " + fault + "; call recover first");

@@ -11,9 +11,11 @@
 
 namespace stepdriver::axis {
 
+class Course;
+
 /// What an axis was asked to do: all that a plan for it needs, from wherever the axis is.
 struct Goal {
-  enum class Kind { kMove, kJog };
+  enum class Kind { kMove, kJog, kTogether };
 
   Kind kind = Kind::kMove;
   std::uint64_t move = 0;  ///< the move that it belongs to
@@ -21,8 +23,13 @@ struct Goal {
   std::optional<std::int64_t> target;
   double velocity = 0.0;   ///< [unit/s] as asked for, before any override; of a jog with its sign
   std::string stopped_by;  ///< what decelerates it; empty: it goes on
+  bool held = false;       ///< decelerates, to go on later
+  int take_up = 0;         ///< the joint stays, the motor takes up the backlash: +1, -1, or 0: no
+  std::shared_ptr<Course> course;  ///< of kTogether, shared with the other axes
+  std::size_t member = 0;          ///< which of its axes this is
 
   bool stops() const { return !stopped_by.empty(); }
+  bool slowsDown() const { return held || stops(); }
 };
 
 /// A profile that the pulse engine has, and what it is for.
@@ -33,6 +40,14 @@ struct Motion {
   std::int64_t begin_ns = 0;  ///< motion time at which the move began
   double overshoot = 0.0;     ///< [microsteps] how far it passes its end before it comes back
   std::unique_ptr<const motion::Profile> profile;
+  std::shared_ptr<const motion::Profile> path;  ///< of kTogether: along its course
+};
+
+/// What a feed hold keeps of a motion.
+struct Held {
+  Goal goal;
+  std::int64_t begin_ns = 0;
+  std::shared_ptr<const motion::Profile> path;
 };
 
 /// The motions that the engine may still look at, and how the last moves ended.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "read_homing.h"
 #include "read_motion.h"
 #include "read_pins.h"
 #include "read_power.h"
@@ -83,11 +84,7 @@ class AxesReader {
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
     config.name = name;
-    if (!isAxisName(name)) {
-      axis.issue("", "has the name \"" + name +
-                         "\", but an axis's name must begin with a letter and go on with letters, "
-                         "digits and _ only");
-    }
+    checkAxisName(name, axis);
     const chip::Chip* chip = readDriver(axis);
     MotionContext context;
     context.microsteps = readMicrosteps(axis, chip);
@@ -105,7 +102,7 @@ class AxesReader {
     readPins(axis, chip, config, used_);
     readPower(axis, issues_.size() == issues_before, config);
     readEndstops(axis, config, used_);
-    readMotion(axis, context, config);
+    readHoming(axis, readMotion(axis, context, config), config);
     config.align_on_microstep_change =
         axis.boolean("align_on_microstep_change", config.align_on_microstep_change);
     axis.rejectUnknown();
@@ -137,6 +134,13 @@ class AxesReader {
 };
 
 }  // namespace
+
+void checkAxisName(const std::string& name, ConfigReader& axis) {
+  if (isAxisName(name)) return;
+  axis.issue("", "has the name \"" + name +
+                     "\", but an axis's name must begin with a letter and go on with letters, "
+                     "digits and _ only");
+}
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues) {

@@ -18,7 +18,8 @@ constexpr double kHighestScale = 1e9;
 constexpr double kLowestRate = 1e-3;          // [steps/s]
 constexpr double kLowestAcceleration = 1e-3;  // [steps/s^2]
 constexpr double kHighestAcceleration = 1e12;
-constexpr double kLowestJerk = 1e-3;  // [steps/s^3]
+constexpr double kMostBacklash = 1e6;  // steps
+constexpr double kLowestJerk = 1e-3;   // [steps/s^3]
 constexpr double kHighestJerk = 1e15;
 constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: each step is a double of its own
 constexpr int kMostFullSteps = 1'000'000;
@@ -76,6 +77,7 @@ class MotionReader {
     readSpeeds(config);
     readAccelerations(config);
     readJerk(config);
+    readBacklash(config);
     readPositions(config);
   }
 
@@ -88,45 +90,70 @@ class MotionReader {
 
   bool scaleIsGivenBy(const std::string& key) const { return !key.empty() && axis_.has(key); }
 
+  /// Those of the keys of a scale by rounds that are given.
+  std::vector<std::string> givenOfRounds() const {
+    std::vector<std::string> given;
+    for (const std::string& key :
+         {std::string(kFullSteps), keys_.per_round, keys_.wheel_diameter, std::string(kGear)}) {
+      if (scaleIsGivenBy(key)) given.push_back(key);
+    }
+    return given;
+  }
+
   /// @return [microsteps/unit]; none where something that it needs is missing or wrong.
   std::optional<long double> readScale(std::optional<int> full_steps, std::optional<double> gear) {
-    const bool by_rounds =
-        scaleIsGivenBy(kFullSteps) || scaleIsGivenBy(kGear) || scaleIsGivenBy(keys_.per_round);
-    if (axis_.has(keys_.steps_per_unit) || !by_rounds) return readDirectScale(by_rounds);
-    std::optional<long double> per_round = keys_.units_per_round;
-    if (!keys_.per_round.empty()) {
-      per_round = axis_.findNumber(keys_.per_round, Range::positive(), presence_);
-    }
+    const std::vector<std::string> by_rounds = givenOfRounds();
+    if (axis_.has(keys_.steps_per_unit) || by_rounds.empty()) return readDirectScale(by_rounds);
+    const std::optional<long double> per_round = readTravel(presence_);
     if (presence_ == Presence::kRequired && !axis_.has(kFullSteps)) {
       axis_.issue(kFullSteps,
                   "is missing; it must be an integer of 1 or more, as the axis is scaled by " +
-                      (axis_.has(keys_.per_round) ? keys_.per_round : kGear));
+                      by_rounds.front());
     }
     if (!full_steps || !gear || !per_round || !context_.microsteps) return {};
     return static_cast<long double>(*full_steps) * *context_.microsteps * *gear / *per_round;
   }
 
-  std::optional<long double> readDirectScale(bool by_rounds) {
+  /// @return [unit] what one round behind the gear travels; none where that is missing or wrong.
+  std::optional<long double> readTravel(Presence presence) {
+    if (keys_.per_round.empty()) return keys_.units_per_round;
+    const bool by_wheel = axis_.has(keys_.wheel_diameter);
+    const bool by_travel = axis_.has(keys_.per_round);
+    if (!by_wheel && !by_travel && presence == Presence::kRequired) {
+      axis_.issue(keys_.per_round, "is missing; it must be a number above 0, or else " +
+                                       keys_.wheel_diameter + " must be given");
+    }
+    const auto travel = axis_.findNumber(keys_.per_round, Range::positive(), Presence::kOptional);
+    const auto diameter =
+        axis_.findNumber(keys_.wheel_diameter, Range::positive(), Presence::kOptional);
+    if (by_wheel && by_travel) {
+      axis_.issue(keys_.wheel_diameter,
+                  "is " + axis_.shown(keys_.wheel_diameter) + ", but " + keys_.per_round +
+                      " must not be given with it: a round travels either that or pi times the "
+                      "diameter");
+      return {};
+    }
+    if (diameter) return kPi * static_cast<long double>(*diameter);
+    return travel;
+  }
+
+  /// @param by_rounds the keys of the other way that are given; they are not to be.
+  std::optional<long double> readDirectScale(const std::vector<std::string>& by_rounds) {
     const std::string& key = keys_.steps_per_unit;
     if (!axis_.has(key)) {
       if (presence_ == Presence::kRequired) {
-        axis_.issue(
-            key, "is missing; it must be a number above 0, or else " + std::string(kFullSteps) +
-                     (keys_.per_round.empty() ? "" : " and " + keys_.per_round) + " must be given");
+        const std::string travel = keys_.per_round.empty()
+                                       ? ""
+                                       : " and " + keys_.per_round + " or " + keys_.wheel_diameter;
+        axis_.issue(key, "is missing; it must be a number above 0, or else " +
+                             std::string(kFullSteps) + travel + " must be given");
       }
       return {};
     }
     const auto scale = axis_.findNumber(key, Range::positive(), presence_);
-    if (!by_rounds) return scale;
-    std::vector<std::string> given;
-    for (const std::string& other :
-         {std::string(kFullSteps), keys_.per_round, std::string(kGear)}) {
-      if (scaleIsGivenBy(other)) given.push_back(other);
-    }
-    if (!keys_.per_round.empty()) {
-      axis_.findNumber(keys_.per_round, Range::positive(), Presence::kOptional);
-    }
-    axis_.issue(key, "is " + axis_.shown(key) + ", but " + listText(given, "and") +
+    if (by_rounds.empty()) return scale;
+    readTravel(Presence::kOptional);
+    axis_.issue(key, "is " + axis_.shown(key) + ", but " + listText(by_rounds, "and") +
                          " must not be given with it: the axis is scaled by either (the motor's "
                          "own steps can be given as " +
                          kStepsPerRound + ")");
@@ -136,7 +163,8 @@ class MotionReader {
   bool checkScale(long double scale) {
     if (scale >= kLowestScale && scale <= kHighestScale) return true;
     std::string key = kFullSteps;
-    for (const std::string& other : {std::string(kGear), keys_.per_round, keys_.steps_per_unit}) {
+    for (const std::string& other :
+         {std::string(kGear), keys_.per_round, keys_.wheel_diameter, keys_.steps_per_unit}) {
       if (scaleIsGivenBy(other)) key = other;
     }
     axis_.issue(key, "is " + axis_.shown(key) + ", which makes " +
@@ -213,6 +241,16 @@ class MotionReader {
                                 " steps/s^3");
   }
 
+  void readBacklash(AxisConfig& config) {
+    const double backlash =
+        axis_.findNumber(keys_.backlash, Range::notNegative(), Presence::kOptional).value_or(0.0);
+    config.backlash = si(backlash);
+    if (!steps_per_unit_ || backlash * *steps_per_unit_ <= kMostBacklash) return;
+    axis_.issue(keys_.backlash, is(keys_.backlash) + "at most " +
+                                    upperBoundText(kMostBacklash / *steps_per_unit_) +
+                                    ", which is " + numberText(kMostBacklash) + " steps");
+  }
+
   void checkAcceleration(const std::string& key, double acceleration) {
     if (!steps_per_unit_) return;
     const double steps = acceleration * *steps_per_unit_;
@@ -272,7 +310,8 @@ double readStepsPerRound(ConfigReader& axis, std::optional<int> full_steps,
 
 }  // namespace
 
-void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config) {
+std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
+                               AxisConfig& config) {
   for (const Kind kind : {Kind::kLinear, Kind::kRotary}) {
     for (const std::string& key : motionKeys(kind).all()) axis.allow(key);
   }
@@ -284,12 +323,13 @@ void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& co
   const auto kind = readKind(axis);
   if (kind) {
     MotionReader(axis, context, *kind, Presence::kRequired).read(full_steps, gear, config);
-    return;
+    return kind;
   }
   // Each value that is there can be right or wrong by itself.
   for (const Kind each : {Kind::kLinear, Kind::kRotary}) {
     MotionReader(axis, context, each, Presence::kOptional).read(full_steps, gear, config);
   }
+  return {};
 }
 
 }  // namespace stepdriver::axis

@@ -1,16 +1,19 @@
 #include "stepdriver_core/machine/machine.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 
+#include "home_in_order.h"
+#include "stepdriver_core/axis/coordination.h"
+#include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/machine/step_rates.h"
@@ -49,9 +52,11 @@ class Machine::Impl {
     engine_ = std::make_unique<pulse::PulseEngine>(
         *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
+    edges_ = std::make_unique<axis::EdgeLog>(*lines_, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
       axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),
-                                                   wiring.axis_lines[i], *lines_, *driver_));
+                                                   wiring.axis_lines[i], *lines_, *edges_, *driver_,
+                                                   planning_));
     }
     for (const auto& axis : axes_) axis->bringUp();
     if (options.threaded && (!wiring.inputs.empty() || anyGoesIdle(configs)))
@@ -67,6 +72,73 @@ class Machine::Impl {
     driver_->stop();
   }
 
+  axis::Axis& axis(const std::string& name) const {
+    std::string names;
+    for (const auto& axis : axes_) {
+      if (axis->config().name == name) return *axis;
+      names += (names.empty() ? "" : ", ") + axis->config().name;
+    }
+    throw Refused("there is no axis " + name + "; there are " + names);
+  }
+
+  CoordinatedMove moveLine(const LineRequest& request) {
+    const std::vector<axis::Axis*> axes = axesOf(request.names);
+    if (request.positions.size() != axes.size()) {
+      throw Refused("there are " + std::to_string(axes.size()) + " names, but " +
+                    std::to_string(request.positions.size()) + " positions");
+    }
+    return moveOf(request.names,
+                  axis::Coordination::moveLine(axes, request.positions, request.relative,
+                                               request.velocity, request.duration));
+  }
+
+  CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
+    return moveOf(request.names, axis::Coordination::follow(axesOf(request.names), request.points));
+  }
+
+  std::vector<axis::Axis*> axesOf(const std::vector<std::string>& names) const {
+    if (names.empty()) throw Refused("no axis is named");
+    std::vector<axis::Axis*> axes;
+    for (const std::string& name : names) {
+      axes.push_back(&axis(name));
+      if (std::find(axes.begin(), axes.end() - 1, axes.back()) != axes.end() - 1) {
+        throw Refused("the axis " + name + " is named twice");
+      }
+    }
+    return axes;
+  }
+
+  static CoordinatedMove moveOf(const std::vector<std::string>& names,
+                                const std::vector<axis::Move>& moves) {
+    CoordinatedMove move;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      move.members.push_back({names[i], moves[i]});
+      move.duration = std::max(move.duration, moves[i].duration);
+    }
+    return move;
+  }
+
+  std::optional<CoordinatedResult> result(const CoordinatedMove& move) const {
+    CoordinatedResult result;
+    int worst = -1;
+    for (const CoordinatedMove::Member& member : move.members) {
+      const auto own = axis::Coordination::result(axis(member.axis), member.move);
+      if (!own) return std::nullopt;
+      result.positions.push_back(own->position);
+      result.duration = std::max(result.duration, own->duration);
+      // What ended the first of them says more than that it took the others along.
+      const int weight = own->end == axis::MoveEnd::kReached     ? 0
+                         : own->end == axis::MoveEnd::kCompanion ? 1
+                                                                 : 2;
+      if (weight <= worst) continue;
+      worst = weight;
+      result.end = own->end;
+      result.message = own->message;
+    }
+    if (result.end == axis::MoveEnd::kReached) result.message = "all axes reached their targets";
+    return result;
+  }
+
   void shutdown() {
     if (shut_.exchange(true)) return;
     for (const auto& axis : axes_) axis->close("the machine was shut down");
@@ -76,9 +148,8 @@ class Machine::Impl {
   // An edge is only a wake-up: the engine reads the levels. One that was lost, or a chip that was
   // waking when it came, is made good by asking again after a while.
   void watchInputs() {
-    std::array<gpio::EdgeEvent, 16> events{};
     while (!watching_ended_) {
-      const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
+      const int count = edges_->watch(kInputPeriodNs);
       // Where waiting fails, reading will fail too, and say so.
       if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
       engine_->inputsChanged();
@@ -125,9 +196,11 @@ class Machine::Impl {
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
   std::optional<pulse::Signal> emergency_stop_;
+  std::unique_ptr<axis::EdgeLog> edges_;
   std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<pulse::PulseDriver> driver_;
+  std::mutex planning_;  // of all axes
   std::vector<std::unique_ptr<axis::Axis>> axes_;
   std::atomic<bool> shut_{false};
   std::atomic<bool> watching_ended_{false};
@@ -142,19 +215,31 @@ Machine::~Machine() = default;
 
 const std::vector<std::unique_ptr<axis::Axis>>& Machine::axes() const { return impl_->axes_; }
 
-axis::Axis& Machine::axis(const std::string& name) const {
-  std::string names;
-  for (const auto& axis : impl_->axes_) {
-    if (axis->config().name == name) return *axis;
-    names += (names.empty() ? "" : ", ") + axis->config().name;
-  }
-  throw Refused("there is no axis " + name + "; there are " + names);
-}
+axis::Axis& Machine::axis(const std::string& name) const { return impl_->axis(name); }
 
 const std::optional<pulse::Capability>& Machine::capability() const { return impl_->capability_; }
 
 void Machine::stop() {
   impl_->forAll([](axis::Axis& axis) { axis.stop(); });
+}
+
+void Machine::hold() {
+  impl_->forAll([](axis::Axis& axis) { axis.hold(); });
+}
+
+void Machine::resume() {
+  impl_->forAll([](axis::Axis& axis) { axis.resume(); });
+}
+
+std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
+                                              const std::function<bool()>& cancelled) {
+  if (!names.empty()) return homeInOrder(impl_->axesOf(names), cancelled);
+  std::vector<axis::Axis*> axes;
+  for (const auto& axis : impl_->axes_) {
+    if (axis->config().homing) axes.push_back(axis.get());
+  }
+  if (axes.empty()) throw Refused("no axis has a homing");
+  return homeInOrder(axes, cancelled);
 }
 
 void Machine::setSpeedOverride(double factor) {
@@ -165,6 +250,25 @@ void Machine::setSpeedOverride(double factor) {
     throw Refused(text);
   }
   impl_->forAll([factor](axis::Axis& axis) { axis.setSpeedOverride(factor); });
+}
+
+CoordinatedMove Machine::moveLine(const LineRequest& request) { return impl_->moveLine(request); }
+
+CoordinatedMove Machine::followTrajectory(const TrajectoryRequest& request) {
+  return impl_->followTrajectory(request);
+}
+
+std::optional<CoordinatedResult> Machine::result(const CoordinatedMove& move) const {
+  return impl_->result(move);
+}
+
+CoordinatedResult Machine::wait(const CoordinatedMove& move) const {
+  std::optional<CoordinatedResult> result;
+  impl_->driver_->waitFor([&] {
+    result = impl_->result(move);
+    return result.has_value();
+  });
+  return *result;
 }
 
 void Machine::emergencyStop() {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "hermite.h"
 #include "spline_refusals.h"
 
 namespace stepdriver::motion {
@@ -59,35 +60,17 @@ Piece line(DoubleDouble duration, DoubleDouble from, DoubleDouble to) {
   return {duration, from, ((to - from) / duration).value(), 0.0, 0.0};
 }
 
-// The cubic that has these positions and velocities at its ends. The jerk is taken last, and makes
-// up for what rounding took from the acceleration: the piece ends where the next one begins.
-Piece cubic(DoubleDouble duration, DoubleDouble from, double v0, DoubleDouble to, double v1) {
-  const DoubleDouble mean = (to - from) / duration;
-  const DoubleDouble twice_v0 = 2.0 * v0;
-  const DoubleDouble a =
-      DoubleDouble(2.0) * (DoubleDouble(3.0) * mean - twice_v0 - DoubleDouble(v1)) / duration;
-  const DoubleDouble rest = mean - DoubleDouble(v0) - duration * DoubleDouble(a.value() / 2.0);
-  const DoubleDouble j = DoubleDouble(6.0) * rest / (duration * duration);
-  return {duration, from, v0, a.value(), j.value()};
-}
-
 double reach(const Piece& piece) {
   const double t = piece.duration.value();
   return std::abs(piece.v0) * t + std::abs(piece.a) * t * t / 2.0 +
          std::abs(piece.j) * t * t * t / 6.0;
 }
 
-// Of the error bound (h/T)^4/384 max|p''''|, with p'''' over T^4.
-double cubicsFor(const Quintic& curve) {
-  const double pieces = std::pow(curve.largestFourthDerivative() / (384.0 * kQuinticError), 0.25);
-  return std::max(1.0, std::ceil(pieces));
-}
-
 void appendQuintic(std::vector<Piece>& pieces, DoubleDouble duration, const Knot& begin,
                    const Knot& end, std::size_t index) {
   const Quintic curve = quintic(duration, begin, end);
   requireReach(curve.reach(), index);
-  const double count = cubicsFor(curve);
+  const double count = cubicsFor(1.0, curve.largestFourthDerivative(), kQuinticError);
   const DoubleDouble part = duration / DoubleDouble(count);
   DoubleDouble from = begin.position;
   double v0 = *begin.velocity;

@@ -15,6 +15,7 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
   for (std::size_t i = 0; i < channels.size(); ++i) channels_[i].config = channels[i];
   writes_.reserve(channels.size());
   writers_.reserve(channels.size());
+  errors_.resize(channels.size());
   readEmergencyStop();
 }
 
@@ -73,41 +74,83 @@ bool PulseEngine::isFast(const Channel& channel) {
 
 // ---- orders ----
 
+void PulseEngine::Successors::add(const motion::Profile& profile, std::uint64_t serial) {
+  while (size > 0 && entries[size - 1].profile->startNs() >= profile.startNs()) --size;
+  entries[size++] = {&profile, serial};
+}
+
+PulseEngine::Successors::Entry PulseEngine::Successors::takeFirst() {
+  const Entry first = entries[0];
+  std::copy(entries.begin() + 1, entries.begin() + static_cast<std::ptrdiff_t>(size),
+            entries.begin());
+  --size;
+  return first;
+}
+
+std::uint64_t PulseEngine::latest(const Channel& channel) {
+  const Successors& successors = channel.successors;
+  return successors.empty() ? channel.state.following
+                            : successors.entries[successors.size - 1].serial;
+}
+
 void PulseEngine::takeMail(Nanoseconds now) {
   if (mail_.front() == nullptr) return;
   while (const Command* command = mail_.front()) {
-    Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
     if (command->kind == Command::Kind::kFollow) {
-      follow(channel, *command, now);
+      followAll(*command, now);
     } else {
+      Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
       startPins(channel, *command, now);
+      channel.state.taken = command->serial;
+      channel.published.store(channel.state);
     }
-    channel.state.taken = command->serial;
-    channel.published.store(channel.state);
     mail_.pop();
   }
   // All of them: an order may slide the timeline, and then no step may go out by its old time.
   scheduleAll();
 }
 
-void PulseEngine::follow(Channel& channel, const Command& command, Nanoseconds now) {
-  const Nanoseconds start = command.profile->startNs();
+void PulseEngine::followAll(const Command& command, Nanoseconds now) {
+  bool may = true;
+  for (std::size_t i = 0; i < command.follow_count; ++i) {
+    may = may && mayFollow(command.follows[i], now);
+  }
+  for (std::size_t i = 0; i < command.follow_count; ++i) {
+    const Follow& order = command.follows[i];
+    Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
+    if (may) {
+      follow(channel, order);
+    } else {
+      channel.state.refused = order.serial;
+    }
+  }
+  // What they wait for is there for all at once: `follows` is not read any more.
+  for (std::size_t i = command.follow_count; i-- > 0;) {
+    const Follow& order = command.follows[i];
+    Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
+    channel.state.taken = order.serial;
+    channel.published.store(channel.state);
+  }
+}
+
+bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
+  const Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
+  const Nanoseconds start = order.profile->startNs();
   const bool late =
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
-  const std::uint64_t latest =
-      channel.successor != nullptr ? channel.successor_serial : channel.state.following;
-  if (late || channel.pins_serial != 0 || command.continues != latest) {
-    channel.state.refused = command.serial;
-    return;
-  }
-  channel.restart_interval = command.restart_interval;
+  return !late && channel.pins_serial == 0 && order.continues == latest(channel) &&
+         channel.successors.hasRoom(start);
+}
+
+void PulseEngine::follow(Channel& channel, const Follow& order) {
+  channel.restart_interval = order.restart_interval;
+  channel.group = order.group;
   if (channel.profile == nullptr) {
-    adopt(channel, *command.profile, command.serial);
-    channel.last_planned = start;
+    adopt(channel, *order.profile, order.serial);
+    channel.last_planned = order.profile->startNs();
     channel.running = false;
   } else {
-    channel.successor = command.profile;
-    channel.successor_serial = command.serial;
+    channel.successors.add(*order.profile, order.serial);
   }
 }
 
@@ -119,7 +162,7 @@ void PulseEngine::startPins(Channel& channel, const Command& command, Nanosecond
   channel.pins = command.pins;
   channel.pin = 0;
   channel.pins_serial = command.serial;
-  channel.pins_count = command.count;
+  channel.pins_scale = command.scale;
   channel.faulty = false;  // to be read anew when the pins have done what they do
   channel.pin_due = now;
   if (channel.state.pulses != 0) {
@@ -217,41 +260,48 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     writes_.push_back({step.line, fall ? !step.active : step.active});
     writers_.push_back(&channel);
   }
+  // The reads of the switches took time, and a stop may have come in it; and what ended one channel
+  // may have ended others.
+  if (emergencyStopped()) stopAll(now);
+  dropEnded();
   if (writes_.empty()) return;
-  // The reads of the switches took time, and a stop may have come in it.
-  if (emergencyStopped()) {
-    stopAll(now);
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < writers_.size(); ++i) {
-      if (!writers_[i]->high) continue;
-      writes_[kept] = writes_[i];
-      writers_[kept++] = writers_[i];
-    }
-    writes_.resize(kept);
-    writers_.resize(kept);
-    if (kept == 0) return;
-  }
   const int error = lines_.write(writes_.data(), writes_.size());
   for (std::size_t i = 0; i < writers_.size(); ++i) {
-    Channel* const channel = writers_[i];
     // One by one it shows whose line it is. What the write has set already keeps its level.
-    const int own_error = error != 0 && writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
-    const bool fall = channel->high;
-    channel->high = !fall && own_error == 0;
-    (fall ? channel->fell : channel->rose) = clock_.now();
-    if (own_error != 0) {
-      fail(*channel, {own_error, writes_[i].output}, now);
-    } else if (!fall) {
-      channel->state.count += channel->direction;
-      ++channel->state.pulses;
-      channel->running = true;
-      ++state_.pulses;
-      channel->last_planned = channel->next->time_ns;
-      pullNext(*channel);
-      channel->published.store(channel->state);
-    }
+    errors_[i] = error != 0 && writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
+    written(*writers_[i], errors_[i] == 0);
+  }
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    if (errors_[i] != 0) fail(*writers_[i], {errors_[i], writes_[i].output}, now);
   }
   figures_.store(state_);
+}
+
+void PulseEngine::dropEnded() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    if (!writers_[i]->high && !writers_[i]->next) continue;
+    writes_[kept] = writes_[i];
+    writers_[kept++] = writers_[i];
+  }
+  writes_.resize(kept);
+  writers_.resize(kept);
+}
+
+void PulseEngine::written(Channel& channel, bool done) {
+  const bool fall = channel.high;
+  channel.high = !fall && done;
+  (fall ? channel.fell : channel.rose) = clock_.now();
+  if (fall || !done) return;
+  channel.state.count += channel.direction;
+  channel.state.slack =
+      std::clamp<std::int64_t>(channel.state.slack + channel.direction, 0, channel.config.backlash);
+  ++channel.state.pulses;
+  channel.running = true;
+  ++state_.pulses;
+  channel.last_planned = channel.next->time_ns;
+  pullNext(channel);
+  channel.published.store(channel.state);
 }
 
 void PulseEngine::writeOthers(Nanoseconds now) {
@@ -305,7 +355,11 @@ void PulseEngine::writePin(Channel& channel, Nanoseconds now) {
 
 void PulseEngine::pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now) {
   channel.state.ready = std::max(channel.state.ready, now + then_wait);
-  if (channel.pins_count) channel.state.count = *channel.pins_count;
+  if (const auto& scale = channel.pins_scale) {
+    channel.state.count = scale->count;
+    channel.state.slack = scale->slack;
+    channel.config.backlash = scale->backlash;
+  }
   channel.state.pins_done = channel.pins_serial;
   channel.pins_serial = 0;
   channel.published.store(channel.state);
@@ -318,17 +372,28 @@ void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds
 }
 
 void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
+  const bool together =
+      channel.group != 0 && channel.profile != nullptr && reason != EndReason::kDone;
+  endOne(channel, reason, now);
+  if (!together) return;
+  for (Channel& other : channels_) {
+    if (other.profile != nullptr && other.group == channel.group) {
+      endOne(other, EndReason::kCompanion, now);
+    }
+  }
+}
+
+void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
   // What fails after the motion was over leaves that motion's end as it was.
   if (channel.profile != nullptr) {
     channel.state.end = reason;
     channel.state.end_abrupt = isFast(channel);
-    channel.state.ended =
-        channel.successor != nullptr ? channel.successor_serial : channel.state.following;
+    channel.state.ended = latest(channel);
     channel.state.end_time = now - state_.slipped;
   }
   channel.state.following = 0;
   channel.profile = nullptr;
-  channel.successor = nullptr;
+  channel.successors.size = 0;
   channel.next.reset();
   channel.published.store(channel.state);
 }
@@ -346,11 +411,11 @@ void PulseEngine::scheduleAll() {
 }
 
 bool PulseEngine::schedule(Channel& channel) {
-  if (channel.successor != nullptr && !channel.high &&
-      (!channel.next || channel.next->time_ns >= channel.successor->startNs())) {
-    const motion::Profile& profile = *channel.successor;
-    channel.successor = nullptr;
-    adopt(channel, profile, channel.successor_serial);
+  while (!channel.successors.empty() && !channel.high &&
+         (!channel.next ||
+          channel.next->time_ns >= channel.successors.entries[0].profile->startNs())) {
+    const Successors::Entry first = channel.successors.takeFirst();
+    adopt(channel, *first.profile, first.serial);
     channel.published.store(channel.state);
   }
   const ChannelConfig& config = channel.config;

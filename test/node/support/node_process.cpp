@@ -19,8 +19,11 @@ constexpr int kCannotExecute = 127;
 
 }  // namespace
 
-NodeProcess::NodeProcess(const std::vector<std::string>& arguments) {
-  std::vector<std::string> words{STEPDRIVER_NODE};
+const char* const kStepdriverNode = STEPDRIVER_NODE;
+const char* const kStepdriverJoystick = STEPDRIVER_JOYSTICK;
+
+NodeProcess::NodeProcess(const std::vector<std::string>& arguments, const std::string& program) {
+  std::vector<std::string> words{program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   argv.reserve(words.size() + 1);

@@ -11,10 +11,15 @@
 
 namespace stepdriver::node_test {
 
-/// A running stepdriver_node, and all that it prints. Killed at the end where it still runs.
+// The package's nodes, by the full names of their files.
+extern const char* const kStepdriverNode;
+extern const char* const kStepdriverJoystick;
+
+/// A running node, and all that it prints. Killed at the end where it still runs.
 class NodeProcess {
  public:
-  explicit NodeProcess(const std::vector<std::string>& arguments);
+  explicit NodeProcess(const std::vector<std::string>& arguments,
+                       const std::string& program = kStepdriverNode);
   ~NodeProcess();
   NodeProcess(const NodeProcess&) = delete;
   NodeProcess& operator=(const NodeProcess&) = delete;

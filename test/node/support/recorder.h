@@ -26,6 +26,9 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
+  /// Whether anyone publishes what it keeps.
+  bool connected() const { return subscriber_.getNumPublishers() > 0; }
+
   std::vector<Message> messages() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return messages_;

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/axis/homing.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::gpio {
@@ -19,18 +23,23 @@ class PulseDriver;
 namespace stepdriver::axis {
 
 struct AxisLines;
+class EdgeLog;
 
 /// One axis: units in, pulses out. Made by the Machine that it belongs to.
 ///
-/// All calls are safe from any thread, and none of them but wait() takes longer than the chip does
-/// to wake, to be reset or to be enabled. Every command either is accepted whole or throws Refused
-/// and changes nothing. A unit is m on a linear axis, rad on a rotary one.
+/// All calls are safe from any thread, and none of them but wait() and home() takes longer than the
+/// chip does to wake, to be reset or to be enabled. Every command either is accepted whole or
+/// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
+  class Impl;  ///< for this room only
+
   /// @param channel of the engine, as made from lines.
-  /// @param lines, driver outlive the axis.
+  /// @param lines, edges, driver, mutex outlive the axis. The mutex is that of all axes of a
+  /// machine:
+  ///   motions of several are planned under it.
   Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver);
+       EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex);
   ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
@@ -47,7 +56,8 @@ class Axis {
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
   /// @throw Refused where a number isn't finite, the target is beyond a soft limit, the velocity
   ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or
-  ///   at fault, or the machine shuts down.
+  ///   at fault, or the machine shuts down; an absolute position also where the axis isn't homed,
+  ///   but has to be.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
   /// Turns the motor by a number of rounds, which need not be whole.
@@ -72,8 +82,34 @@ class Axis {
   void setSpeedOverride(double factor);
 
   /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
-  /// Without effect at rest.
+  /// The axes that move together with this one stop with it, along their path. What is held is
+  /// given up. Without effect else at rest.
   void stop();
+
+  /// Feed hold: decelerates to rest, along the path of axes that move together, and keeps the goal;
+  /// who waits for the move goes on waiting. A jog just ends. Until resume() or stop() other
+  /// motions are refused.
+  void hold();
+
+  /// Goes on with what is held. @throw Refused as moveTo().
+  void resume();
+
+  /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when that is
+  /// over. Soft limits don't count meanwhile. Where it fails, the axis stands, enabled as before,
+  /// and isn't homed: the result says why. Stops end it; other motions take over from it.
+  ///
+  /// @param cancelled asked often, from the calling thread: true decelerates and ends it.
+  /// @throw Refused where homing isn't configured, while moving, and as moveTo().
+  HomingResult home(const std::function<bool()>& cancelled = {});
+
+  /// The same for several axes of one machine at once.
+  ///
+  /// @throw Refused where one of them can't be homed; then none moves.
+  static std::vector<HomingResult> homeTogether(const std::vector<Axis*>& axes,
+                                                const std::function<bool()>& cancelled = {});
+
+  /// @throw Refused where home() would be, now.
+  void checkHoming() const;
 
   /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
   /// ends the trust in the position, but with AxisConfig::holds_position_unpowered: nothing holds
@@ -139,7 +175,7 @@ class Axis {
   void shutDown();
 
  private:
-  class Impl;
+  friend class Coordination;
   std::unique_ptr<Impl> impl_;
 };
 

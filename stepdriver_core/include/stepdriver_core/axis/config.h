@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "stepdriver_core/axis/homing.h"
 #include "stepdriver_core/chip/chip.h"
 #include "stepdriver_core/gpio/lines.h"
 
@@ -64,12 +65,16 @@ struct AxisConfig {
   /// [unit/s^2] Of a stop, at least the deceleration; none: that.
   std::optional<double> stop_deceleration;
   double jerk = 0.0;                   ///< [unit/s^3] 0: the acceleration may jump
+  double backlash = 0.0;               ///< [unit] that a reversal loses; made up for
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;
 
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
   std::optional<FaultPin> fault;
+
+  std::optional<HomingConfig> homing;
+  bool require_homing = false;  ///< absolute moves are refused before it is homed
 
   bool enable_on_start = false;
   bool disable_on_shutdown = true;

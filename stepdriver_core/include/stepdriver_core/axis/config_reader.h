@@ -99,6 +99,9 @@ class ConfigReader {
   std::set<std::string> known_;
 };
 
+/// Makes an issue of a map with a name that no axis can have: it is a part of ROS names.
+void checkAxisName(const std::string& name, ConfigReader& axis);
+
 /// Reads the map of axes.
 ///
 /// @code{.yaml}
@@ -123,6 +126,7 @@ class ConfigReader {
 ///     # or
 ///     full_steps_per_round: 200
 ///     mm_per_round: 40.0        # [mm] per round behind the gear; linear axes only
+///     wheel_diameter_mm: 65.0   # in place of mm_per_round: a round travels pi times that
 ///     gear_ratio: 1.0           # motor rounds per round behind the gear
 ///     # end of the ways
 ///     steps_per_round: 3200     # [microsteps] per motor round; default: from full_steps_per_round
@@ -130,6 +134,7 @@ class ConfigReader {
 ///     min_speed_mm_s: 0.0       # reached without a ramp; default: 0
 ///     acceleration_mm_s2: 500.0
 ///     deceleration_mm_s2: 500.0 # default: the acceleration
+///     backlash_mm: 0.0          # that a reversal loses, and that is made up for; default: 0
 ///     min_position_mm: 0.0      # default: no limit
 ///     max_position_mm: 200.0
 ///     endstops:                 # both optional

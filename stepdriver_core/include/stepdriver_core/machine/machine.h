@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -64,6 +66,39 @@ class Machine {
 
   /// Decelerates every axis to rest.
   void stop();
+
+  /// A straight line of several axes: all begin and end together, each within its own limits. Axes
+  /// that move come to rest first. What ends one of them ends all, a stop or a hold of one slows
+  /// all of them down along the line.
+  ///
+  /// @throw Refused as Axis::moveTo(), and where the request isn't one; then nothing moves.
+  CoordinatedMove moveLine(const LineRequest& request);
+
+  /// Several axes through the points of a trajectory, from whatever they do, which it replaces.
+  /// axis::Coordination::follow() says what it keeps to. Else as moveLine().
+  CoordinatedMove followTrajectory(const TrajectoryRequest& request);
+
+  /// How a motion of several axes ended; none where it hasn't.
+  std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
+  /// Returns when it has ended.
+  CoordinatedResult wait(const CoordinatedMove& move) const;
+
+  /// Feed hold: every axis decelerates to rest along its path, and keeps its goal.
+  void hold();
+
+  /// Goes on with what is held.
+  void resume();
+
+  /// Homes several axes, by HomingConfig::order: the lowest first, those with the same at once.
+  /// Where one fails, those that come later aren't homed. Returns when all is over.
+  ///
+  /// @param names empty: all that have a homing.
+  /// @param cancelled as for Axis::home().
+  /// @return how each ended, in the order in which they came.
+  /// @throw Refused where a name isn't known or comes twice, or one of the axes can't be homed now;
+  ///   then none moves.
+  std::vector<axis::HomingResult> home(const std::vector<std::string>& names = {},
+                                       const std::function<bool()>& cancelled = {});
 
   /// Scales the velocities of all motions, of those under way too, within the axes' accelerations.
   /// No axis goes beyond its maximum.

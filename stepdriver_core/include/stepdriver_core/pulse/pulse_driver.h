@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -46,6 +47,9 @@ class PulseDriver {
   /// Clock time less all slips: the time that profiles are planned in.
   Nanoseconds motionNow() const { return clock_.now() - engine_.state().slipped; }
 
+  /// A number for Follow::group that no other group has.
+  std::uint64_t newGroup() { return ++groups_; }
+
   /// What the thread asked for and was given.
   RealtimeRights rights() const;
 
@@ -55,6 +59,7 @@ class PulseDriver {
   PulseEngine& engine_;
   Clock& clock_;
   std::mutex posting_;
+  std::atomic<std::uint64_t> groups_{0};
   std::atomic<bool> stopping_{false};
   std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not asked for
   std::atomic<int> lock_error_{-1};

@@ -34,6 +34,8 @@ struct ChannelConfig {
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
   Nanoseconds mode_hold = 0;
+  std::int64_t backlash =
+      0;  ///< microsteps that the motor makes at a reversal before the joint moves
 };
 
 /// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
@@ -54,25 +56,42 @@ struct PinSequence {
   }
 };
 
-/// An order to the pulse thread. Serials rise by one on each channel.
-struct Command {
-  enum class Kind {
-    kFollow,  ///< follow the profile from its start time on, instead of the one before it
-    kPins,    ///< write the pins, at rest; then, where count is given, stand there
-  };
-
-  Kind kind = Kind::kFollow;
+/// A profile that a channel is to follow from its start time on, instead of the one before it.
+struct Follow {
   int channel = 0;
   std::uint64_t serial = 0;
   const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
-  /// Serial of the profile that this one was planned to go on from; 0: from rest. Where the channel
-  /// has ended that, or follows another, the command is refused.
+  /// Serial of the profile that this one was planned to go on from, the last one that was ordered;
+  /// 0: from rest. Where the channel has ended that, it can't be taken.
   std::uint64_t continues = 0;
   /// Steps planned closer than this are at a speed that the motor can't start from or stop at
   /// without a ramp.
   Nanoseconds restart_interval = 0;
+  /// Channels of one group that isn't 0 end together: what ends one of them before its time ends
+  /// all others at once.
+  std::uint64_t group = 0;
+};
+
+/// An order to the pulse thread. Serials rise by one on each channel.
+struct Command {
+  enum class Kind {
+    kFollow,  ///< follow the profiles, all of them, or where one can't be taken none
+    kPins,    ///< write the pins, at rest; then, where a scale is given, take that
+  };
+
+  Kind kind = Kind::kFollow;
+  const Follow* follows = nullptr;  ///< of kFollow; live until the channels have taken the order
+  std::size_t follow_count = 0;
+  int channel = 0;  ///< of kPins, as all below
+  std::uint64_t serial = 0;
   PinSequence pins;
-  std::optional<std::int64_t> count;
+  /// Where the motor stands then, in the microsteps of a new mode.
+  struct Scale {
+    std::int64_t count = 0;
+    std::int64_t slack = 0;
+    std::int64_t backlash = 0;
+  };
+  std::optional<Scale> scale;
 };
 
 enum class EndReason {
@@ -83,6 +102,7 @@ enum class EndReason {
   kChipFault,  ///< the chip's fault line became active
   kTooLate,    ///< a pulse came too late to go on at this speed
   kLineError,  ///< a line could not be written or read
+  kCompanion,  ///< another channel of the group was ended
 };
 
 /// A write or a read that failed.
@@ -94,7 +114,10 @@ struct LineFailure {
 
 /// What a channel does and has done.
 struct ChannelState {
-  std::int64_t count = 0;       ///< microsteps: active STEP edges forward less those backward
+  std::int64_t count = 0;  ///< microsteps: active STEP edges forward less those backward
+  /// Of the backlash, what is taken up towards max: from 0 to all of it. The joint stands at count
+  /// less this.
+  std::int64_t slack = 0;
   std::uint64_t pulses = 0;     ///< active STEP edges
   std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
   std::uint64_t refused = 0;    ///< serial of the last command that came too late or found it busy
@@ -132,6 +155,7 @@ struct EngineState {
 ///   interval; what is more than that slides the timeline of all channels (a slip).
 /// - Where a write for several channels fails, those whose own lines can be written go on.
 /// - Before a step towards an endstop the switch is read; none goes out while it reads active.
+/// - Channels of a group start together and end together (Follow::group).
 class PulseEngine {
  public:
   /// @param lines, clock outlive the engine. STEP lines are at their inactive level, DIR lines at
@@ -165,14 +189,34 @@ class PulseEngine {
   std::size_t channels() const { return channels_.size(); }
 
  private:
+  /// Profiles that take over, one after the other, each at its start time. One that was planned
+  /// before another has taken over goes on from that other: none may be left out.
+  struct Successors {
+    struct Entry {
+      const motion::Profile* profile = nullptr;
+      std::uint64_t serial = 0;
+    };
+    static constexpr std::size_t kCapacity = 16;
+    std::array<Entry, kCapacity> entries{};
+    std::size_t size = 0;
+
+    bool empty() const { return size == 0; }
+    /// Room for one that begins then: those that would begin no earlier have no time left.
+    bool hasRoom(Nanoseconds start) const {
+      return size < kCapacity || entries[size - 1].profile->startNs() >= start;
+    }
+    void add(const motion::Profile& profile, std::uint64_t serial);
+    Entry takeFirst();
+  };
+
   struct Channel {
     ChannelConfig config;
     ChannelState state;
     Snapshot<ChannelState> published;
 
-    const motion::Profile* profile = nullptr;    // the one that is followed
-    const motion::Profile* successor = nullptr;  // takes over at its start time
-    std::uint64_t successor_serial = 0;
+    const motion::Profile* profile = nullptr;  // the one that is followed
+    Successors successors;
+    std::uint64_t group = 0;  // of the order that came last; 0: alone
     Nanoseconds restart_interval = 0;
     motion::StepFinder finder;
     std::optional<motion::Step> next;
@@ -181,7 +225,7 @@ class PulseEngine {
     PinSequence pins;
     std::size_t pin = 0;
     std::uint64_t pins_serial = 0;  // of the sequence under way; 0: none
-    std::optional<std::int64_t> pins_count;
+    std::optional<Command::Scale> pins_scale;
     Nanoseconds pin_due = 0;
 
     // Clock times by which the last edges had happened.
@@ -204,7 +248,9 @@ class PulseEngine {
   static bool isFast(const Channel& channel);
 
   void takeMail(Nanoseconds now);
-  void follow(Channel& channel, const Command& command, Nanoseconds now);
+  void followAll(const Command& command, Nanoseconds now);
+  bool mayFollow(const Follow& order, Nanoseconds now) const;
+  void follow(Channel& channel, const Follow& order);
   void startPins(Channel& channel, const Command& command, Nanoseconds now);
   void adopt(Channel& channel, const motion::Profile& profile, std::uint64_t serial);
   static void pullNext(Channel& channel);
@@ -216,12 +262,16 @@ class PulseEngine {
   void meetLateness(Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
   void writeSteps(Nanoseconds now);
+  void dropEnded();
+  void written(Channel& channel, bool done);
   void writeOthers(Nanoseconds now);
   void turn(Channel& channel, Nanoseconds now);
   void writePin(Channel& channel, Nanoseconds now);
+  static std::uint64_t latest(const Channel& channel);
   void pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
+  void endOne(Channel& channel, EndReason reason, Nanoseconds now);
 
   void scheduleAll();
   bool schedule(Channel& channel);
@@ -235,6 +285,7 @@ class PulseEngine {
   std::vector<Channel> channels_;
   std::vector<gpio::LineWrite> writes_;  // of one pass, with the channels that they are for
   std::vector<Channel*> writers_;
+  std::vector<int> errors_;
   Mailbox<Command, 64> mail_;
   std::atomic<bool> emergency_{false};
   std::atomic<std::uint64_t> input_stops_{0};

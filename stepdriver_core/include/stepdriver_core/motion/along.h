@@ -1,0 +1,30 @@
+#pragma once
+
+#include "stepdriver_core/motion/profile.h"
+
+namespace stepdriver::motion {
+
+/// What one axis does on a straight line while the path is run through: origin + scale * path.
+/// Exact but for the rounding of the pieces' accelerations and jerks to doubles; the profiles of
+/// one path begin and end at the same nanosecond.
+///
+/// @param origin [microsteps of the axis]
+/// @param scale [microsteps of the axis/unit of the path]
+Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale);
+
+/// What one axis does on a curve q(s) while s runs as `path` says: q(s(t)).
+///
+/// Where s runs at a constant rate this is exact. Where the rate changes evenly, s(t) is a parabola
+/// and q(s(t)) has a degree of 6; it is cut into cubics of h that have its position and velocity at
+/// both ends, which leave it by at most h^4/384 max|d^4 q/dt^4| <= kAlongError, with
+/// d^4 q/dt^4 = 3 q'' s''^2 + 6 q''' s'^2 s''.
+///
+/// @param course q(s), with s in seconds from its start.
+/// @param path s(t), in seconds: from 0 to the course's duration, never backwards, and without a
+///   jerk.
+Profile along(const Profile& course, const Profile& path);
+
+/// [microsteps]
+constexpr double kAlongError = 0.01;
+
+}  // namespace stepdriver::motion

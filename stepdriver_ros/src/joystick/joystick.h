@@ -1,0 +1,60 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/steady_timer.h>
+#include <ros/subscriber.h>
+#include <ros/time.h>
+#include <sensor_msgs/Joy.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "enable_client.h"
+#include "jog_sequence.h"
+#include "joystick_config.h"
+
+namespace stepdriver::joystick {
+
+/// From the topic `joy` to the driver's `jog`, and to the `enable` services of its axes.
+///
+/// Sticks that are out are repeated at the configured rate; each message of the joystick takes
+/// effect at once. A message that can't be understood, and none for the configured time, end all
+/// jogs. Its callbacks run in one thread, which also makes it and calls rest().
+class Joystick {
+ public:
+  /// @param driver full name of the node that drives the axes.
+  Joystick(ros::NodeHandle node, const std::string& driver, JoystickConfig config);
+  Joystick(const Joystick&) = delete;
+  Joystick& operator=(const Joystick&) = delete;
+
+  /// Ends all jogs.
+  void rest();
+
+ private:
+  struct Jogged {
+    JogAxis config;
+    std::string service;
+    double velocity = 0.0;
+    JogSequence sequence;
+    std::unique_ptr<EnableClient> enable;  ///< where it is disabled in the dead band
+  };
+
+  void take(const sensor_msgs::Joy& message);
+  /// @return what is wrong with a message; empty: nothing.
+  std::string mistakeIn(const sensor_msgs::Joy& message) const;
+  bool deadmanHeld(const sensor_msgs::Joy& message) const;
+  void endWithoutMessages();
+  void send();
+  void takeAnswer(Jogged& axis, double now);
+
+  const JoystickConfig config_;
+  std::vector<Jogged> axes_;
+  ros::SteadyTime heard_;  // the last message; zero: none, or its time is over
+  ros::Publisher publisher_;
+  ros::Subscriber subscriber_;
+  ros::SteadyTimer timer_;
+};
+
+}  // namespace stepdriver::joystick

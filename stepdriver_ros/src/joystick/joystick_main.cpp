@@ -1,0 +1,119 @@
+#include <ros/callback_queue.h>
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/names.h>
+#include <ros/node_handle.h>
+#include <ros/param.h>
+
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "../end_requests.h"
+#include "../node_start.h"
+#include "joystick.h"
+#include "joystick_config.h"
+
+namespace stepdriver::joystick {
+namespace {
+
+using ros_node::EndRequests;
+
+constexpr int kExitOk = 0;
+constexpr int kExitConfig = 1;
+constexpr int kExitUsage = 64;
+
+constexpr double kPoll = 0.02;  // [s]
+// For the last message, which roscpp sends in a thread of its own.
+constexpr std::chrono::milliseconds kLastWords{50};
+// So many messages should come in the driver's jog_timeout: one that is late ends no jog.
+constexpr double kMessagesInTimeout = 3.0;
+
+constexpr const char* kUsage = R"(usage: stepdriver_joystick [--help] [name:=value ...]
+
+Jogs the axes of a stepdriver_node by the sticks of a joystick.
+
+  topics      joy (subscribed)  DRIVER/jog
+  services    DRIVER/AXIS/enable (called, where disable_in_dead_band is configured)
+  parameters  ~driver  ~rate  ~joy_timeout  ~deadman_button  ~axes
+
+Exit codes: 0 ended as asked, 1 wrong configuration.
+Start it with: roslaunch stepdriver joystick.launch
+)";
+
+JoystickConfig readParameters(const ros::NodeHandle& private_node) {
+  std::vector<ConfigIssue> issues;
+  const std::string& name = private_node.getNamespace();
+  JoystickConfig config =
+      readJoystickConfig(ros_node::privateParameters(private_node), name, issues);
+  std::string why;
+  if (config.driver.empty() || !ros::names::validate(config.driver, why)) {
+    issues.push_back({name + "/driver", "is \"" + config.driver +
+                                            "\", but must be the name of a node" +
+                                            (why.empty() ? "" : ": " + why)});
+  }
+  if (!issues.empty()) throw ConfigError(issues);
+  return config;
+}
+
+void warnOfTooLowRate(const std::string& driver, double rate) {
+  double timeout = 0.0;
+  if (!ros::param::get(driver + "/jog_timeout", timeout)) return;
+  if (rate * timeout >= kMessagesInTimeout) return;
+  ROS_WARN(
+      "~rate is %g Hz, and %s/jog_timeout %g s: the driver ends a jog when a message is late. "
+      "Take %g Hz or more",
+      rate, driver.c_str(), timeout, kMessagesInTimeout / timeout);
+}
+
+int run(EndRequests& end_requests) {
+  const ros::NodeHandle node;
+  const ros::NodeHandle private_node("~");
+  end_requests.takeOverShutdownCall();
+  try {
+    const JoystickConfig config = readParameters(private_node);
+    const std::string driver = node.resolveName(config.driver);
+    warnOfTooLowRate(driver, config.rate);
+    Joystick joystick(node, driver, config);
+    ROS_INFO("Ready: %s jogs %zu %s of %s", node.resolveName("joy").c_str(), config.axes.size(),
+             config.axes.size() == 1 ? "axis" : "axes", driver.c_str());
+    std::string who;
+    while (who.empty()) {
+      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kPoll));
+      who = end_requests.waitFor(std::chrono::milliseconds(0));
+    }
+    ROS_INFO("Ending on %s", who.c_str());
+    joystick.rest();
+    std::this_thread::sleep_for(kLastWords);
+    ros::shutdown();  // also ends the calls that nobody answers
+    return kExitOk;
+  } catch (const ConfigError& error) {
+    ros_node::explain(error, "Not started");
+  } catch (const std::exception& error) {
+    ROS_FATAL("Not started: %s", error.what());
+  }
+  return kExitConfig;
+}
+
+}  // namespace
+}  // namespace stepdriver::joystick
+
+int main(int argc, char** argv) {
+  namespace joystick = stepdriver::joystick;
+  stepdriver::ros_node::EndRequests end_requests;
+  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  if (arguments.size() > 1) {
+    const bool help = arguments[1] == "--help" || arguments[1] == "-h";
+    std::fputs(joystick::kUsage, help ? stdout : stderr);
+    return help ? joystick::kExitOk : joystick::kExitUsage;
+  }
+  ros::init(argc, argv, "joystick", ros::init_options::NoSigintHandler);
+  if (!stepdriver::ros_node::waitForMaster(end_requests)) return joystick::kExitOk;
+  return joystick::run(end_requests);
+}
