@@ -84,7 +84,7 @@ void Axis::bringUp() {
   if (const auto sequence = axis.pins.bringUp(); sequence.size > 0) axis.writePins(sequence);
   axis.harvest();
   if (axis.config.enable_on_start && axis.pins.hasEnable() && axis.fault.empty()) {
-    axis.writePins(axis.pins.enable(true));
+    axis.writeEnable(true);
     axis.enabled = true;
   }
 }
@@ -102,7 +102,7 @@ void Axis::enable(bool on) {
     if (axis.disabling) axis.refuse("busy: it is being disabled");
     axis.wake();
     if (axis.enabled) return;
-    axis.writePins(axis.pins.enable(true));
+    axis.writeEnable(true);
     axis.enabled = true;
     return;
   }
@@ -120,7 +120,7 @@ void Axis::sleep(bool asleep) {
   if (!asleep) axis.wake();
   if (axis.asleep == asleep) return;
   axis.writePins(axis.pins.sleep(asleep));
-  if (axis.enabled != axis.isEnabled()) axis.writePins(axis.pins.enable(axis.enabled));
+  if (axis.enabled != axis.isEnabled()) axis.writeEnable(axis.enabled);
   axis.idle = false;
   axis.asleep = asleep;
   axis.noteUnpowered();

@@ -201,7 +201,7 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
   try {
     awaitRest(lock, stopped_by);
     dropHeld(MoveEnd::kStopped, stopped_by);
-    if (isEnabled()) writePins(pins.enable(false));
+    if (isEnabled()) writeEnable(false);
     if (asleep != isAsleep()) writePins(pins.sleep(asleep));
   } catch (...) {
     disabling = false;
@@ -210,7 +210,6 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
   disabling = false;
   enabled = false;
   idle = false;
-  noteUnpowered();
 }
 
 // ---- one goal after another ----

@@ -16,21 +16,38 @@ pulse::Nanoseconds Axis::Impl::superviseIdle() {
   if (now < rest_since + timeout) return rest_since + timeout;
   const bool sleeps = config.idle_action == IdleAction::kSleep;
   try {
-    writePins(sleeps ? pins.sleep(true) : pins.enable(false));
+    if (sleeps) {
+      writePins(pins.sleep(true));
+    } else {
+      writeEnable(false);
+    }
   } catch (const GpioError&) {  // NOLINT(bugprone-empty-catch): it is the axis's fault from now on
     return now + timeout;
   }
   idle = true;
-  noteUnpowered();
-  if (sleeps) noteHome();
+  if (sleeps) {
+    noteUnpowered();
+    noteHome();
+  }
   return now + timeout;
 }
 
 void Axis::Impl::wake() {
   if (!idle) return;
-  const bool sleeps = config.idle_action == IdleAction::kSleep;
-  writePins(sleeps ? pins.sleep(false) : pins.enable(true));
+  if (config.idle_action == IdleAction::kSleep) {
+    writePins(pins.sleep(false));
+  } else {
+    writeEnable(true);
+  }
   idle = false;
+}
+
+// A line that another axis wants stays as it is, and this motor keeps its current.
+void Axis::Impl::writeEnable(bool on) {
+  EnableLine& line = *axis_lines.enable_line;
+  if (on || !line.isWantedByOthers(on_enable_line_)) writePins(pins.enable(on));
+  line.note(on_enable_line_, on);
+  harvest();
 }
 
 void Axis::Impl::noteUnpowered() {

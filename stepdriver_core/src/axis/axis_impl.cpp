@@ -28,7 +28,9 @@ Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& ow
       channel(engine_channel),
       mutex(all_mutex),
       enabled(!pins.hasEnable()),
-      microsteps(config.microsteps) {}
+      microsteps(config.microsteps) {
+  if (pins.hasEnable()) on_enable_line_ = axis_lines.enable_line->join();
+}
 
 // ---- what the engine has done ----
 
@@ -46,6 +48,10 @@ pulse::ChannelState Axis::Impl::harvest() {
       fault = kChipFault;
       position_valid = false;
     }
+  }
+  if (pins.hasEnable() && axis_lines.enable_line->releases() != releases_seen_) {
+    releases_seen_ = axis_lines.enable_line->releases();
+    noteUnpowered();
   }
   // Read after the state: what the input has ended is known to be its doing.
   if (const std::uint64_t stops = driver.engine().inputStops(); stops != input_stops_seen_) {

@@ -93,6 +93,7 @@ class Axis::Impl {
   bool isAsleep() const { return asleep || (idle && config.idle_action == IdleAction::kSleep); }
   pulse::Nanoseconds superviseIdle();
   void wake();
+  void writeEnable(bool on);
   void noteUnpowered();
   void noteHome();
 
@@ -190,6 +191,8 @@ class Axis::Impl {
   std::uint64_t line_errors_seen_ = 0;
   std::uint64_t chip_faults_seen_ = 0;
   std::uint64_t input_stops_seen_ = 0;
+  std::size_t on_enable_line_ = 0;  // its number there
+  std::uint64_t releases_seen_ = 0;
   bool pins_doubtful_ = false;  // a write failed: they may be as wanted or not
   int mode_failed_ = 0;         // the mode whose pins could not all be written; 0: none
 };

@@ -27,7 +27,9 @@ void Axis::Impl::writePins(const pulse::PinSequence& sequence,
 
 void Axis::Impl::restorePins() {
   if (!pins_doubtful_) return;
-  writePins(pins.restore(isEnabled(), isAsleep()));
+  const bool by_others =
+      pins.hasEnable() && axis_lines.enable_line->isWantedByOthers(on_enable_line_);
+  writePins(pins.restore(isEnabled() || by_others, isAsleep()));
   // Each pin on the way back that the failed change did not reach is where it should be already.
   if (mode_failed_ != 0) writePins(pins.mode(mode_failed_, microsteps));
   mode_failed_ = 0;

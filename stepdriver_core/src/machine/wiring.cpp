@@ -7,7 +7,7 @@ namespace stepdriver::machine {
 Wiring::Wiring(const std::vector<axis::AxisConfig>& axes,
                const std::optional<axis::InputSwitch>& emergency) {
   for (const axis::AxisConfig& axis : axes) {
-    axis_lines.push_back(axis::requestLines(axis, outputs, inputs));
+    axis_lines.push_back(axis::requestLines(axis, axis_lines, outputs, inputs));
     channels.push_back(axis::channelConfig(axis, axis_lines.back()));
   }
   if (!emergency) return;

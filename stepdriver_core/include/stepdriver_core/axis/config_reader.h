@@ -109,7 +109,7 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///   x:                          # [a-zA-Z][a-zA-Z0-9_]*
 ///     driver: a4988             # a4988, drv8825 or tb6600
 ///     joint: x_joint            # default: the axis's name
-///     pins:                     # `chip:offset` or the name of a line; each line once only
+///     pins:                     # `chip:offset` or the name of a line; each once only, but enable
 ///       step: "gpiochip0:17"
 ///       dir: "gpiochip0:27"
 ///       enable: "gpiochip0:22"  # this and all below: optional
