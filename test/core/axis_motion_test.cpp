@@ -70,6 +70,15 @@ class AxisMotion : public testing::Test {
 // The planned times begin 1 ms after the call.
 constexpr double kLead = 0.001;
 
+TEST_F(AxisMotion, MakesNoStepWhereItIsStoppedBeforeItBegins) {
+  for (const double target : {1.0, -1.0}) {
+    const axis::Move move = x().moveTo(target);
+    x().stop();
+    EXPECT_EQ(x().wait(move).end, MoveEnd::kStopped);
+    EXPECT_EQ(bench->report().pulses_forward + bench->report().pulses_backward, 0);
+  }
+}
+
 TEST_F(AxisMotion, TakesTheTimeOfTheClosedFormWithAJerkLimitToo) {
   EXPECT_NEAR(x().moveTo(1.0).duration, 1.5, 1e-9);
   axis::AxisConfig smooth = config();

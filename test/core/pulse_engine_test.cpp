@@ -389,6 +389,34 @@ TEST_F(PulseEngineTest, GoesOnWithTheOthersWhereOneLineOfAWriteFails) {
   EXPECT_EQ(failed.line_errors, 1U);
 }
 
+TEST_F(PulseEngineTest, FollowsEachProfileFromItsStartThoughTheNextOneIsThereAlready) {
+  make({config(0)});
+  const auto first = follow(cruise(1'000'000, 0, 100, 1000.0));
+  const auto rest = follow(motion::Profile(11'200'000, 10.2), 0, first);
+  follow(cruise(11'700'000, 10, 0, 1000.0), 0, rest);
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(0).count, 0);
+  // The step that the first one has at 11.5 ms is none any more.
+  EXPECT_EQ(lines.rises(0).size(), 20U);
+}
+
+TEST_F(PulseEngineTest, RefusesMoreSuccessorsThanItHasRoomForAndKeepsThose) {
+  make({config(0)});
+  auto last = follow(cruise(1'000'000, 0, 1000, 1000.0));
+  for (int i = 0; i < 16; ++i) {
+    last = follow(cruise(100'000'000 + i * 2'000'000, 98 + 2 * i, 1000, 1000.0), 0, last);
+  }
+  engine->serve();
+  EXPECT_EQ(engine->channel(0).refused, 0U);
+  const auto one_too_many = follow(cruise(140'000'000, 138, 1000, 1000.0), 0, last);
+  engine->serve();
+  EXPECT_EQ(engine->channel(0).refused, one_too_many);
+  runOut();
+  EXPECT_EQ(engine->channel(0).count, 1000);
+  EXPECT_EQ(engine->channel(0).ended, last);
+}
+
 class PulseEngineGroup : public PulseEngineTest {
  protected:
   void order(motion::Profile profile, int channel, std::uint64_t continues = 0) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "axis_impl.h"
+#include "homing.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::axis {
@@ -14,8 +15,9 @@ using Lock = std::lock_guard<std::mutex>;
 }  // namespace
 
 Axis::Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-           pulse::PulseDriver& driver, std::mutex& mutex)
-    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, driver, mutex)) {}
+           EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex)
+    : impl_(std::make_unique<Impl>(std::move(config), channel, axis_lines, lines, edges, driver,
+                                   mutex)) {}
 
 Axis::~Axis() = default;
 
@@ -182,6 +184,7 @@ AxisState Axis::state() const {
   state.moving = channel.following != 0;
   state.held = axis.held.has_value();
   state.homed = axis.homed;
+  if (axis.homing != nullptr) state.homing = axis.homing->phase();
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
   state.position = axis.positionOf(static_cast<double>(channel.count - channel.slack));
@@ -226,6 +229,7 @@ void Axis::recover() {
 void Axis::noteEmergencyStop() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
+  axis.interruptHoming("emergency stop");
   axis.driver.waitFor([&axis] { return !axis.moving(); });
   axis.fault = "emergency stop";
   axis.dropHeld(MoveEnd::kEmergencyStop, axis.fault);

@@ -20,6 +20,7 @@ double Axis::Impl::checkedVelocity(double velocity) const {
 
 std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
   refuseUnlessReadyToMove();
+  if (!relative) refuseUnlessHomed();
   if (!std::isfinite(position)) refuse("the position must be a finite number");
   const double goal = relative ? positionOf(relativeOrigin()) + position : position;
   refuseBeyondLimits(goal, "the position");
@@ -103,6 +104,11 @@ Orders Axis::Impl::ordersOf(const Goal& goal) {
 }
 
 void Axis::Impl::decelerate(const std::string& stopped_by) {
+  interruptHoming(stopped_by);
+  slowDown(stopped_by);
+}
+
+void Axis::Impl::slowDown(const std::string& stopped_by) {
   const Motion* current = underWay();
   if (current == nullptr) {
     dropHeld(MoveEnd::kStopped, stopped_by);
@@ -190,6 +196,7 @@ void Axis::Impl::awaitRest(std::unique_lock<std::mutex>& lock, const std::string
 
 void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::string& stopped_by) {
   if (!enabled) return;
+  interruptHoming(stopped_by);
   disabling = true;
   try {
     awaitRest(lock, stopped_by);
@@ -210,7 +217,13 @@ const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr;
 
 motion::MotionState Axis::Impl::stateAt(std::int64_t at) {
   if (const Motion* motion = underWay()) return motion->profile->stateAt(at);
-  return {motion::fromInteger(harvest().count), 0.0, 0.0};
+  const pulse::ChannelState state = harvest();
+  const motion::DoubleDouble count = motion::fromInteger(state.count);
+  // A stop on a path rests between two microsteps: the next motion goes on from there.
+  const Motion* last = log.find(state.ended);
+  if (last == nullptr || state.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
+  const motion::DoubleDouble rest = last->profile->endPosition();
+  return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
 }
 
 std::vector<Move> Axis::Impl::begin(Orders orders) {

@@ -16,12 +16,14 @@ constexpr const char* kChipFault =
 }  // namespace
 
 Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& own_lines,
-                 gpio::Lines& all_lines, pulse::PulseDriver& pulse_driver, std::mutex& all_mutex)
+                 gpio::Lines& all_lines, EdgeLog& all_edges, pulse::PulseDriver& pulse_driver,
+                 std::mutex& all_mutex)
     : config(std::move(axis_config)),
       chip(chip::chipOf(config.driver)),
       axis_lines(own_lines),
       pins(config, own_lines),
       lines(all_lines),
+      edges(all_edges),
       driver(pulse_driver),
       channel(engine_channel),
       mutex(all_mutex),
@@ -49,6 +51,7 @@ pulse::ChannelState Axis::Impl::harvest() {
     ended_seen_ = state.ended;
     conclude(state);
   }
+  if (!position_valid) homed = false;
   log.dropBefore(state.following != 0 ? state.following : state.ended);
   if (held && !fault.empty()) dropHeld(MoveEnd::kFault, fault);
   return state;

@@ -9,12 +9,15 @@
 #include "move_log.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/axis/axis_lines.h"
+#include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/motion/planner.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 
 namespace stepdriver::axis {
+
+class Homing;
 
 /// What an axis is to do. Orders of one course go out together.
 struct Order {
@@ -27,7 +30,7 @@ using Orders = std::vector<Order>;
 class Axis::Impl {
  public:
   Impl(AxisConfig axis_config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver, std::mutex& mutex);
+       EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex);
 
   // What the engine has done since it was last looked at, taken into this state.
   pulse::ChannelState harvest();
@@ -60,6 +63,10 @@ class Axis::Impl {
   Move checkedMove(double position, bool relative, double velocity);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
+  /// The same, of a motion alone: a homing goes on.
+  void slowDown(const std::string& stopped_by);
+  /// The move that was accepted last; 0: none was.
+  std::uint64_t lastMove() const { return moves_; }
   /// Brings the motor to where the joint moves with its first step of a way. At rest; lets go of
   /// the lock while it does so.
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
@@ -81,6 +88,10 @@ class Axis::Impl {
   std::int64_t nearestCommon(int wanted);
   void changeMicrosteps(int wanted);
 
+  // Homing.
+  const HomingConfig& homingConfig() const;
+  void interruptHoming(const std::string& why) const;
+
   // A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const;
   int readInput(int line) const;
@@ -92,6 +103,7 @@ class Axis::Impl {
   void refuseUnlessOpen() const;
   void refuseWhileMoving(const std::string& what);
   void refuseUnlessReadyToMove();
+  void refuseUnlessHomed() const;
   void refuseUnlessReady();
   void refuseWhileHeld() const;
   void refuseTooFast(double speed) const;
@@ -104,6 +116,7 @@ class Axis::Impl {
   const AxisLines axis_lines;
   const ChipPins pins;
   gpio::Lines& lines;
+  EdgeLog& edges;
   pulse::PulseDriver& driver;
   const int channel;
 
@@ -112,6 +125,7 @@ class Axis::Impl {
   bool asleep = false;
   bool disabling = false;
   bool homed = false;
+  Homing* homing = nullptr;  // the one under way
   bool position_valid = false;
   int microsteps;
   double origin = 0.0;          // [unit] the position at count 0

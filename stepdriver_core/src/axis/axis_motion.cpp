@@ -6,6 +6,7 @@
 
 #include "axis_impl.h"
 #include "course.h"
+#include "restart_speed.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -55,19 +56,14 @@ motion::Profile Axis::Impl::planStopOf(const Motion& before, std::int64_t at,
   motion::MotionLimits stopping = limits(maxSpeed());
   stopping.deceleration = stopDeceleration();
   const motion::DoubleDouble end = before.profile->endPosition();
-  const bool ends_ahead = (end - from.position).value() * from.velocity >= 0.0;
+  // What hasn't begun to move has nothing ahead.
+  const bool ends_ahead = (end - from.position).value() * from.velocity > 0.0;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
   return motion::planStop(at, from, stopping, std::llround(end.value()));
 }
 
 pulse::Nanoseconds Axis::Impl::restartInterval() const {
-  // The speed that the motor takes and leaves without a ramp: the start speed, but at least what a
-  // ramp from rest has after its first full step.
-  const motion::MotionLimits speeds = limits(maxSpeed());
-  const double restart =
-      std::max(speeds.start_speed,
-               std::sqrt(2.0 * std::min(speeds.acceleration, speeds.deceleration) * microsteps));
-  return static_cast<pulse::Nanoseconds>(1e9 / restart);
+  return static_cast<pulse::Nanoseconds>(1e9 / (restartSpeed(config) * stepsPerUnit()));
 }
 
 // The path that the orders of one course share.

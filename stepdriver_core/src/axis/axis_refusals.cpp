@@ -16,6 +16,7 @@ void Axis::Impl::refuseUnlessOpen() const {
 
 void Axis::Impl::refuseWhileMoving(const std::string& what) {
   refuseUnlessOpen();
+  if (homing != nullptr) refuse("busy: it is being homed; " + what + " at rest");
   if (moving()) refuse("busy: it moves; " + what + " at rest");
   refuseWhileHeld();
 }

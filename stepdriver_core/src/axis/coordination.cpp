@@ -74,6 +74,7 @@ std::vector<Move> Coordination::follow(const std::vector<Axis*>& axes,
   const std::lock_guard<std::mutex> lock(impls.front()->mutex);
   for (Axis::Impl* axis : impls) {
     axis->refuseUnlessReadyToMove();
+    axis->refuseUnlessHomed();
     if (axis->backlash() == 0) continue;
     axis->refuse(
         "it has a backlash, which a trajectory has no time to take up: use moves or lines");

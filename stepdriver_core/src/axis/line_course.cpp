@@ -20,17 +20,19 @@ LineCourse::LineCourse(std::vector<Axis::Impl*> own_axes, const std::vector<std:
                        double velocity)
     : Course(std::move(own_axes)) {
   for (std::size_t i = 0; i < axes().size(); ++i) {
+    Axis::Impl& axis = *axes()[i];
+    origins_.push_back(axis.stateAt(0).position);
     // The backlash is taken up, so that the motor makes the way of the joint.
-    origins_.push_back(axes()[i]->harvest().count);
-    ways_.push_back(targets[i] - axes()[i]->jointCount());
-    length_ = std::max<std::int64_t>(length_, std::abs(ways_[i]));
+    const std::int64_t slack = axis.harvest().slack;
+    ways_.push_back(motion::fromInteger(targets[i] + slack) - origins_[i]);
+    length_ = std::max(length_, static_cast<std::int64_t>(std::ceil(std::abs(ways_[i].value()))));
   }
   takeLimits();
   speed_ = velocity > 0.0 ? std::min(limits_.max_speed, pathSpeed(velocity)) : limits_.max_speed;
 }
 
 double LineCourse::scale(std::size_t member) const {
-  return std::abs(static_cast<double>(ways_[member]) / static_cast<double>(length_));
+  return std::abs(ways_[member].value()) / static_cast<double>(length_);
 }
 
 // Each axis does its scale of what the path does.
@@ -41,7 +43,7 @@ void LineCourse::takeLimits() {
   double jerk = kNone;
   const auto lower = [](double& limit, double other) { limit = std::min(limit, other); };
   for (std::size_t i = 0; i < axes().size(); ++i) {
-    if (ways_[i] == 0) continue;
+    if (ways_[i].value() == 0.0) continue;
     const Axis::Impl& axis = *axes()[i];
     const motion::MotionLimits own = axis.limits(axis.maxSpeed());
     const double share = scale(i);
@@ -61,7 +63,7 @@ double LineCourse::pathSpeed(double velocity) const {
   double rotary = 0.0;
   for (std::size_t i = 0; i < axes().size(); ++i) {
     const Axis::Impl& axis = *axes()[i];
-    const double way = static_cast<double>(ways_[i]) / axis.stepsPerUnit();
+    const double way = ways_[i].value() / axis.stepsPerUnit();
     (axis.config.kind == Kind::kLinear ? linear : rotary) += way * way;
   }
   return velocity * static_cast<double>(length_) / std::sqrt(linear > 0.0 ? linear : rotary);
@@ -92,10 +94,10 @@ void LineCourse::stretchTo(double duration) {
   speed_ = high;
 }
 
-void LineCourse::start(std::int64_t) {
+void LineCourse::start(std::int64_t at) {
   for (std::size_t i = 0; i < axes().size(); ++i) {
     Axis::Impl& axis = *axes()[i];
-    if (axis.moving() || axis.harvest().count != origins_[i]) {
+    if (axis.moving() || (axis.stateAt(at).position - origins_[i]).value() != 0.0) {
       axis.refuse("busy: another motion began before the line");
     }
   }
@@ -117,10 +119,9 @@ motion::Profile LineCourse::planStop(std::int64_t at, const motion::MotionState&
 }
 
 motion::Profile LineCourse::profileOf(std::size_t member, const motion::Profile& path) const {
-  const motion::DoubleDouble origin = motion::fromInteger(origins_[member]);
-  if (ways_[member] == 0) return motion::scaled(path, origin, 0.0);
-  return motion::scaled(path, origin,
-                        motion::fromInteger(ways_[member]) / motion::fromInteger(length_));
+  const motion::DoubleDouble scale =
+      length_ == 0 ? motion::DoubleDouble() : ways_[member] / motion::fromInteger(length_);
+  return motion::scaled(path, origins_[member], scale);
 }
 
 }  // namespace stepdriver::axis

@@ -8,8 +8,8 @@
 
 namespace stepdriver::axis {
 
-/// A straight line from where the axes rest. The path's unit is a microstep of the axis that makes
-/// the most of them.
+/// A straight line from where the axes rest. The path's unit is about a microstep of the axis
+/// that makes the most of them.
 class LineCourse : public Course {
  public:
   /// @param axes at rest. @param targets [microsteps] of each.
@@ -33,9 +33,9 @@ class LineCourse : public Course {
   double durationAt(double speed) const;
   double scale(std::size_t member) const;
 
-  std::vector<std::int64_t> origins_;  // microsteps
-  std::vector<std::int64_t> ways_;
-  std::int64_t length_ = 0;      // of the path
+  std::vector<motion::DoubleDouble> origins_;  // microsteps of the motor
+  std::vector<motion::DoubleDouble> ways_;
+  std::int64_t length_ = 0;      // of the path: the longest way, and up to a microstep more
   motion::MotionLimits limits_;  // as the axes allow
   double stop_deceleration_ = 0.0;
   double speed_ = 0.0;  // wanted, at a speed override of 1

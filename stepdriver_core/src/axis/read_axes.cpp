@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "read_homing.h"
 #include "read_motion.h"
 #include "read_pins.h"
 #include "stepdriver_core/axis/config_reader.h"
@@ -97,7 +98,7 @@ class AxesReader {
     config.joint = readJoint(name, axis);
     readPins(axis, chip, config, used_);
     readEndstops(axis, config, used_);
-    readMotion(axis, context, config);
+    readHoming(axis, readMotion(axis, context, config), config);
     config.enable_on_start = axis.boolean("enable_on_start", config.enable_on_start);
     config.disable_on_shutdown = axis.boolean("disable_on_shutdown", config.disable_on_shutdown);
     config.align_on_microstep_change =

@@ -310,7 +310,8 @@ double readStepsPerRound(ConfigReader& axis, std::optional<int> full_steps,
 
 }  // namespace
 
-void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config) {
+std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
+                               AxisConfig& config) {
   for (const Kind kind : {Kind::kLinear, Kind::kRotary}) {
     for (const std::string& key : motionKeys(kind).all()) axis.allow(key);
   }
@@ -322,12 +323,13 @@ void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& co
   const auto kind = readKind(axis);
   if (kind) {
     MotionReader(axis, context, *kind, Presence::kRequired).read(full_steps, gear, config);
-    return;
+    return kind;
   }
   // Each value that is there can be right or wrong by itself.
   for (const Kind each : {Kind::kLinear, Kind::kRotary}) {
     MotionReader(axis, context, each, Presence::kOptional).read(full_steps, gear, config);
   }
+  return {};
 }
 
 }  // namespace stepdriver::axis

@@ -18,6 +18,8 @@ struct MotionContext {
 /// Reads the kind of the axis, its scale, speeds, accelerations and soft limits.
 ///
 /// The unit of the keys tells the kind; in the configuration a unit is mm or a degree.
-void readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config);
+///
+/// @return the kind; none where it can't be told, which is an issue.
+std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config);
 
 }  // namespace stepdriver::axis

@@ -1,7 +1,6 @@
 #include "stepdriver_core/machine/machine.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -12,7 +11,9 @@
 #include <thread>
 #include <utility>
 
+#include "home_in_order.h"
 #include "stepdriver_core/axis/coordination.h"
+#include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
@@ -44,9 +45,11 @@ class Machine::Impl {
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness));
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
+    edges_ = std::make_unique<axis::EdgeLog>(*lines_, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
-      axes_.push_back(std::make_unique<axis::Axis>(
-          configs[i], static_cast<int>(i), wiring.axis_lines[i], *lines_, *driver_, planning_));
+      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),
+                                                   wiring.axis_lines[i], *lines_, *edges_, *driver_,
+                                                   planning_));
     }
     for (const auto& axis : axes_) axis->bringUp();
     if (options.threaded && !wiring.inputs.empty())
@@ -138,9 +141,8 @@ class Machine::Impl {
   // An edge is only a wake-up: the engine reads the levels. One that was lost, or a chip that was
   // waking when it came, is made good by asking again after a while.
   void watchInputs() {
-    std::array<gpio::EdgeEvent, 16> events{};
     while (!watching_ended_) {
-      const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
+      const int count = edges_->watch(kInputPeriodNs);
       // Where waiting fails, reading will fail too, and say so.
       if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
       engine_->inputsChanged();
@@ -169,6 +171,7 @@ class Machine::Impl {
 
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
+  std::unique_ptr<axis::EdgeLog> edges_;
   std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<pulse::PulseDriver> driver_;
@@ -201,6 +204,17 @@ void Machine::hold() {
 
 void Machine::resume() {
   impl_->forAll([](axis::Axis& axis) { axis.resume(); });
+}
+
+std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
+                                              const std::function<bool()>& cancelled) {
+  if (!names.empty()) return homeInOrder(impl_->axesOf(names), cancelled);
+  std::vector<axis::Axis*> axes;
+  for (const auto& axis : impl_->axes_) {
+    if (axis->config().homing) axes.push_back(axis.get());
+  }
+  if (axes.empty()) throw Refused("no axis has a homing");
+  return homeInOrder(axes, cancelled);
 }
 
 void Machine::setSpeedOverride(double factor) {

@@ -75,6 +75,25 @@ bool PulseEngine::isFast(const Channel& channel) {
 
 // ---- orders ----
 
+void PulseEngine::Successors::add(const motion::Profile& profile, std::uint64_t serial) {
+  while (size > 0 && entries[size - 1].profile->startNs() >= profile.startNs()) --size;
+  entries[size++] = {&profile, serial};
+}
+
+PulseEngine::Successors::Entry PulseEngine::Successors::takeFirst() {
+  const Entry first = entries[0];
+  std::copy(entries.begin() + 1, entries.begin() + static_cast<std::ptrdiff_t>(size),
+            entries.begin());
+  --size;
+  return first;
+}
+
+std::uint64_t PulseEngine::latest(const Channel& channel) {
+  const Successors& successors = channel.successors;
+  return successors.empty() ? channel.state.following
+                            : successors.entries[successors.size - 1].serial;
+}
+
 void PulseEngine::takeMail(Nanoseconds now) {
   if (mail_.front() == nullptr) return;
   while (const Command* command = mail_.front()) {
@@ -120,9 +139,8 @@ bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const Nanoseconds start = order.profile->startNs();
   const bool late =
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
-  const std::uint64_t latest =
-      channel.successor != nullptr ? channel.successor_serial : channel.state.following;
-  return !late && channel.pins_serial == 0 && order.continues == latest;
+  return !late && channel.pins_serial == 0 && order.continues == latest(channel) &&
+         channel.successors.hasRoom(start);
 }
 
 void PulseEngine::follow(Channel& channel, const Follow& order) {
@@ -133,8 +151,7 @@ void PulseEngine::follow(Channel& channel, const Follow& order) {
     channel.last_planned = order.profile->startNs();
     channel.running = false;
   } else {
-    channel.successor = order.profile;
-    channel.successor_serial = order.serial;
+    channel.successors.add(*order.profile, order.serial);
   }
 }
 
@@ -370,13 +387,12 @@ void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
   if (channel.profile != nullptr) {
     channel.state.end = reason;
     channel.state.end_abrupt = isFast(channel);
-    channel.state.ended =
-        channel.successor != nullptr ? channel.successor_serial : channel.state.following;
+    channel.state.ended = latest(channel);
     channel.state.end_time = now - state_.slipped;
   }
   channel.state.following = 0;
   channel.profile = nullptr;
-  channel.successor = nullptr;
+  channel.successors.size = 0;
   channel.next.reset();
   channel.published.store(channel.state);
 }
@@ -394,11 +410,11 @@ void PulseEngine::scheduleAll() {
 }
 
 bool PulseEngine::schedule(Channel& channel) {
-  if (channel.successor != nullptr && !channel.high &&
-      (!channel.next || channel.next->time_ns >= channel.successor->startNs())) {
-    const motion::Profile& profile = *channel.successor;
-    channel.successor = nullptr;
-    adopt(channel, profile, channel.successor_serial);
+  while (!channel.successors.empty() && !channel.high &&
+         (!channel.next ||
+          channel.next->time_ns >= channel.successors.entries[0].profile->startNs())) {
+    const Successors::Entry first = channel.successors.takeFirst();
+    adopt(channel, *first.profile, first.serial);
     channel.published.store(channel.state);
   }
   const ChannelConfig& config = channel.config;

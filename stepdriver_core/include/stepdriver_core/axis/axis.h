@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/axis/homing.h"
 
 namespace stepdriver::gpio {
 class Lines;
@@ -19,21 +22,23 @@ class PulseDriver;
 namespace stepdriver::axis {
 
 struct AxisLines;
+class EdgeLog;
 
 /// One axis: units in, pulses out. Made by the Machine that it belongs to.
 ///
-/// All calls are safe from any thread, and none of them but wait() takes longer than the chip does
-/// to wake, to be reset or to be enabled. Every command either is accepted whole or throws Refused
-/// and changes nothing. A unit is m on a linear axis, rad on a rotary one.
+/// All calls are safe from any thread, and none of them but wait() and home() takes longer than the
+/// chip does to wake, to be reset or to be enabled. Every command either is accepted whole or
+/// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
   class Impl;  ///< for this room only
 
   /// @param channel of the engine, as made from lines.
-  /// @param lines, driver, mutex outlive the axis. The mutex is that of all axes of a machine:
+  /// @param lines, edges, driver, mutex outlive the axis. The mutex is that of all axes of a
+  /// machine:
   ///   motions of several are planned under it.
   Axis(AxisConfig config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
-       pulse::PulseDriver& driver, std::mutex& mutex);
+       EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex);
   ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
@@ -50,7 +55,8 @@ class Axis {
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
   /// @throw Refused where a number isn't finite, the target is beyond a soft limit, the velocity
   ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or
-  ///   at fault, or the machine shuts down.
+  ///   at fault, or the machine shuts down; an absolute position also where the axis isn't homed,
+  ///   but has to be.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
   /// Turns the motor by a number of rounds, which need not be whole.
@@ -86,6 +92,23 @@ class Axis {
 
   /// Goes on with what is held. @throw Refused as moveTo().
   void resume();
+
+  /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when that is
+  /// over. Soft limits don't count meanwhile. Where it fails, the axis stands, enabled as before,
+  /// and isn't homed: the result says why. Stops end it; other motions take over from it.
+  ///
+  /// @param cancelled asked often, from the calling thread: true decelerates and ends it.
+  /// @throw Refused where homing isn't configured, while moving, and as moveTo().
+  HomingResult home(const std::function<bool()>& cancelled = {});
+
+  /// The same for several axes of one machine at once.
+  ///
+  /// @throw Refused where one of them can't be homed; then none moves.
+  static std::vector<HomingResult> homeTogether(const std::vector<Axis*>& axes,
+                                                const std::function<bool()>& cancelled = {});
+
+  /// @throw Refused where home() would be, now.
+  void checkHoming() const;
 
   /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
   /// ends the trust in the position: nothing holds the motor.

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "stepdriver_core/axis/homing.h"
+
 namespace stepdriver::axis {
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
@@ -13,7 +15,8 @@ struct AxisState {
   bool moving = false;
   bool held = false;  ///< by a feed hold: it will go on when it is told to
   bool homed = false;
-  bool position_valid = false;  ///< the position can be trusted
+  HomingPhase homing = HomingPhase::kNone;  ///< what a homing under way does
+  bool position_valid = false;              ///< the position can be trusted
   int microsteps = 1;
   double position = 0.0;  ///< [unit] from the count of the edges that went out
   double velocity = 0.0;  ///< [unit/s]

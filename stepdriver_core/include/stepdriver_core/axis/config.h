@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "stepdriver_core/axis/homing.h"
 #include "stepdriver_core/chip/chip.h"
 #include "stepdriver_core/gpio/lines.h"
 
@@ -65,6 +66,9 @@ struct AxisConfig {
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
   std::optional<FaultPin> fault;
+
+  std::optional<HomingConfig> homing;
+  bool require_homing = false;  ///< absolute moves are refused before it is homed
 
   bool enable_on_start = false;
   bool disable_on_shutdown = true;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -84,6 +85,17 @@ class Machine {
 
   /// Goes on with what is held.
   void resume();
+
+  /// Homes several axes, by HomingConfig::order: the lowest first, those with the same at once.
+  /// Where one fails, those that come later aren't homed. Returns when all is over.
+  ///
+  /// @param names empty: all that have a homing.
+  /// @param cancelled as for Axis::home().
+  /// @return how each ended, in the order in which they came.
+  /// @throw Refused where a name isn't known or comes twice, or one of the axes can't be homed now;
+  ///   then none moves.
+  std::vector<axis::HomingResult> home(const std::vector<std::string>& names = {},
+                                       const std::function<bool()>& cancelled = {});
 
   /// Scales the velocities of all motions, of those under way too, within the axes' accelerations.
   /// No axis goes beyond its maximum.

@@ -61,8 +61,8 @@ struct Follow {
   int channel = 0;
   std::uint64_t serial = 0;
   const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
-  /// Serial of the profile that this one was planned to go on from; 0: from rest. Where the channel
-  /// has ended that, or follows another, it can't be taken.
+  /// Serial of the profile that this one was planned to go on from, the last one that was ordered;
+  /// 0: from rest. Where the channel has ended that, it can't be taken.
   std::uint64_t continues = 0;
   /// Steps planned closer than this are at a speed that the motor can't start from or stop at
   /// without a ramp.
@@ -184,14 +184,33 @@ class PulseEngine {
   std::size_t channels() const { return channels_.size(); }
 
  private:
+  /// Profiles that take over, one after the other, each at its start time. One that was planned
+  /// before another has taken over goes on from that other: none may be left out.
+  struct Successors {
+    struct Entry {
+      const motion::Profile* profile = nullptr;
+      std::uint64_t serial = 0;
+    };
+    static constexpr std::size_t kCapacity = 16;
+    std::array<Entry, kCapacity> entries{};
+    std::size_t size = 0;
+
+    bool empty() const { return size == 0; }
+    /// Room for one that begins then: those that would begin no earlier have no time left.
+    bool hasRoom(Nanoseconds start) const {
+      return size < kCapacity || entries[size - 1].profile->startNs() >= start;
+    }
+    void add(const motion::Profile& profile, std::uint64_t serial);
+    Entry takeFirst();
+  };
+
   struct Channel {
     ChannelConfig config;
     ChannelState state;
     Snapshot<ChannelState> published;
 
-    const motion::Profile* profile = nullptr;    // the one that is followed
-    const motion::Profile* successor = nullptr;  // takes over at its start time
-    std::uint64_t successor_serial = 0;
+    const motion::Profile* profile = nullptr;  // the one that is followed
+    Successors successors;
     std::uint64_t group = 0;  // of the order that came last; 0: alone
     Nanoseconds restart_interval = 0;
     motion::StepFinder finder;
@@ -242,6 +261,7 @@ class PulseEngine {
   void writeOthers(Nanoseconds now);
   void turn(Channel& channel, Nanoseconds now);
   void writePin(Channel& channel, Nanoseconds now);
+  static std::uint64_t latest(const Channel& channel);
   void pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
