@@ -228,6 +228,8 @@ check_install() {
   done
   "$build/install/lib/stepdriver/stepdriver_node" --help >"$build/log/node-help.log" ||
     die "stepdriver_node --help doesn't work"
+  rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
+    die "stepdriver_joystick --help doesn't work"
   rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
     >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then
