@@ -206,11 +206,13 @@ TEST_F(JoystickTest, JogsOtherAxesWhileAServiceWaits) {
   set("axes/slow/disable_in_dead_band", true);
   std::atomic<bool> asked{false};
   std::atomic<bool> free{false};
+  std::atomic<bool> answered{false};
   const auto slow =
       ros::NodeHandle().advertiseService<std_srvs::SetBoolRequest, std_srvs::SetBoolResponse>(
           node.beside("other/slow/enable"), [&](auto& /*request*/, auto& response) {
             asked = true;
             waitUntil([&] { return free.load(); });
+            answered = true;
             response.success = true;
             return true;
           });
@@ -229,6 +231,7 @@ TEST_F(JoystickTest, JogsOtherAxesWhileAServiceWaits) {
   ASSERT_TRUE(holdBothUntil([&] { return asked.load(); }));
   const std::size_t before = sent.count();
   EXPECT_TRUE(holdBothUntil([&] { return sent.count() > before + 10; }));
+  EXPECT_FALSE(answered) << "they came while the service was waiting";
   EXPECT_EQ(sent.messages().back().name, std::vector<std::string>{"x"});
   free = true;
   EXPECT_TRUE(holdBothUntil([&] { return sent.messages().back().name.size() == 2; }));
