@@ -6,6 +6,8 @@ namespace stepdriver::ros_node {
 namespace {
 
 constexpr int kControlThreads = 2;
+constexpr int kTrajectoryThreads = 2;
+constexpr int kSpareLineThreads = 3;
 constexpr std::chrono::milliseconds kPoll{5};
 
 }  // namespace
@@ -14,6 +16,8 @@ CallQueues::CallQueues(std::size_t axes) : axes_(axes) {}
 
 void CallQueues::start() {
   for (ros::CallbackQueue& queue : axes_) spinners_.emplace_back(kThreadsPerAxis, &queue);
+  spinners_.emplace_back(static_cast<std::uint32_t>(axes_.size()) + kSpareLineThreads, &lines_);
+  spinners_.emplace_back(kTrajectoryThreads, &trajectories_);
   spinners_.emplace_back(kControlThreads, &control_);
   spinners_.emplace_back(1, &emergency_);
   for (ros::AsyncSpinner& spinner : spinners_) spinner.start();
@@ -30,7 +34,7 @@ void CallQueues::finish(std::chrono::milliseconds bound) {
 
 bool CallQueues::allAnswered() {
   // A queue is empty when nothing is in it and nothing from it is being called.
-  bool empty = control_.isEmpty() && emergency_.isEmpty();
+  bool empty = control_.isEmpty() && emergency_.isEmpty() && lines_.isEmpty();
   for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
   return empty;
 }

@@ -14,8 +14,10 @@ namespace stepdriver::ros_node {
 ///
 /// Each axis has a queue of its own. Of its threads a waiting move takes one, as an axis moves once
 /// at a time, and a disable or a microstep change that waits for rest another; calls that find the
-/// rest taken wait no longer than a chip takes to wake or to be reset. What stops or recovers
-/// shares no thread with what may wait, and the emergency stop shares its thread with nothing.
+/// rest taken wait no longer than a chip takes to wake or to be reset. Lines of several axes have a
+/// thread for each axis, as each moves in one line at a time, and some for lines that wait for
+/// their axes to rest. What stops or recovers shares no thread with what may wait, nor do
+/// trajectories, and the emergency stop shares its thread with nothing.
 ///
 /// Made and used by one thread; the queues themselves may be used by any.
 class CallQueues {
@@ -27,6 +29,10 @@ class CallQueues {
 
   /// Calls that may take as long as a motion of this axis.
   ros::CallbackQueue& ofAxis(std::size_t axis) { return axes_.at(axis); }
+  /// Calls that may take as long as a motion of several axes.
+  ros::CallbackQueue& lines() { return lines_; }
+  /// Trajectories: goals, messages, cancels and what becomes of them. To plan one takes a while.
+  ros::CallbackQueue& trajectories() { return trajectories_; }
   /// Calls that stop or recover, and all that answers at once.
   ros::CallbackQueue& control() { return control_; }
   ros::CallbackQueue& emergency() { return emergency_; }
@@ -42,6 +48,8 @@ class CallQueues {
   bool allAnswered();
 
   std::deque<ros::CallbackQueue> axes_;
+  ros::CallbackQueue lines_;
+  ros::CallbackQueue trajectories_;
   ros::CallbackQueue control_;
   ros::CallbackQueue emergency_;
   std::vector<ros::AsyncSpinner> spinners_;

@@ -1,14 +1,50 @@
 #include "machine_services.h"
 
 #include <ros/console.h>
+#include <stepdriver/MoveLine.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <exception>
+#include <utility>
 
 #include "answer.h"
 #include "text.h"
 
 namespace stepdriver::ros_node {
+namespace {
+
+machine::LineRequest lineRequest(const MoveLine::Request& request) {
+  machine::LineRequest line;
+  line.names = request.name;
+  line.positions = request.position;
+  line.relative = request.relative != 0;
+  line.velocity = request.velocity;
+  line.duration = request.duration;
+  return line;
+}
+
+void moveLine(machine::Machine& machine, const MoveLine::Request& request,
+              MoveLine::Response& response) {
+  const machine::CoordinatedMove move = machine.moveLine(lineRequest(request));
+  if (request.wait != 0) {
+    machine::CoordinatedResult result = machine.wait(move);
+    response.success = result.end == axis::MoveEnd::kReached;
+    response.message = std::move(result.message);
+    response.position = std::move(result.positions);
+    response.duration = result.duration;
+    return;
+  }
+  for (const auto& [name, own] : move.members) {
+    const axis::Kind kind = machine.axis(name).config().kind;
+    response.message += (response.message.empty() ? "" : ", ") + name + " to " +
+                        numberText(own.target) + " " + unitOf(kind);
+    response.position.push_back(own.target);
+  }
+  response.message = "a line: " + response.message + " in " + numberText(move.duration) + " s";
+  response.duration = move.duration;
+}
+
+}  // namespace
 
 MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& machine,
                                  CallQueues& queues)
@@ -17,7 +53,20 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
   advertise("emergency_stop", queues.emergency(), "all axes are stopped; recover ends that",
             [&machine] { machine.emergencyStop(); });
   advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
+  advertise("hold", queues.control(), "all axes come to rest and keep their goals",
+            [&machine] { machine.hold(); });
+  advertise("resume", queues.control(), "all axes go on", [&machine] { machine.resume(); });
   advertiseSpeedOverride(machine);
+  advertiseMoveLine(machine);
+}
+
+void MachineServices::advertiseMoveLine(machine::Machine& machine) {
+  const boost::function<bool(MoveLine::Request&, MoveLine::Response&)> handler =
+      [&machine](MoveLine::Request& request, MoveLine::Response& response) {
+        return answer(response, [&] { moveLine(machine, request, response); });
+      };
+  node_.setCallbackQueue(&queues_.lines());
+  servers_.push_back(node_.advertiseService("move_line", handler));
 }
 
 void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {

@@ -29,10 +29,11 @@ class MachineServices {
   void advertise(const std::string& name, ros::CallbackQueue& queue, const std::string& done,
                  const std::function<void()>& action);
 
+  void advertiseSpeedOverride(machine::Machine& machine);
+  void advertiseMoveLine(machine::Machine& machine);
+
   ros::NodeHandle node_;
   CallQueues& queues_;
-  void advertiseSpeedOverride(machine::Machine& machine);
-
   std::vector<ros::ServiceServer> servers_;
 };
 

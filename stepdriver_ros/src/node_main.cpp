@@ -20,6 +20,8 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/machine/step_rates.h"
+#include "trajectory_action.h"
+#include "trajectory_command.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -43,8 +45,10 @@ lines.
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override
+              ~move_line  ~hold  ~resume
               ~rig/report (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states  ~jog (subscribed)
+  topics      joint_states  ~endstops  ~axis_states  ~jog, ~command (subscribed)
+  action      ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~simulation
               robot_description
 
@@ -56,7 +60,8 @@ Start it with: roslaunch stepdriver axis.launch
 /// Refuses new commands, decelerates, disables, and lets every client have its answer.
 ///
 /// @return the exit code.
-int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publisher) {
+int shutDown(machine::Machine& machine, CallQueues& queues, TrajectoryAction& trajectory_action,
+             StatePublisher& publisher) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -64,6 +69,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, StatePublisher& publ
     ROS_ERROR("Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
   }
+  trajectory_action.tellEnded();
   queues.finish(kLastAnswers);
   publisher.stop();
   return exit_code;
@@ -103,6 +109,8 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
+  const TrajectoryCommand trajectory_command(private_node, machine, queues);
+  TrajectoryAction trajectory_action(private_node, machine, queues);
   queues.start();
   publisher.start();
   ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
@@ -112,7 +120,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   std::string who;
   while (who.empty()) who = end_requests.waitFor(kPoll);
   ROS_INFO("Ending on %s", who.c_str());
-  return shutDown(machine, queues, publisher);
+  return shutDown(machine, queues, trajectory_action, publisher);
 }
 
 int runOrExplain(EndRequests& end_requests) {

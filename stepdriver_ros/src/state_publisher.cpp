@@ -25,9 +25,9 @@ Time nextTime(Time last, Duration period, Time now) {
 /// Whether anything but the progress of a motion differs.
 bool differ(const AxisStates& one, const AxisStates& other) {
   return one.enabled != other.enabled || one.asleep != other.asleep || one.moving != other.moving ||
-         one.homed != other.homed || one.position_valid != other.position_valid ||
-         one.microsteps != other.microsteps || one.target != other.target ||
-         one.fault != other.fault;
+         one.held != other.held || one.homed != other.homed ||
+         one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
+         one.target != other.target || one.fault != other.fault;
 }
 
 AxisStates read(const machine::Machine& machine) {
@@ -39,6 +39,7 @@ AxisStates read(const machine::Machine& machine) {
     states.enabled.push_back(state.enabled);
     states.asleep.push_back(state.asleep);
     states.moving.push_back(state.moving);
+    states.held.push_back(state.held);
     states.homed.push_back(state.homed);
     states.position_valid.push_back(state.position_valid);
     states.microsteps.push_back(state.microsteps);

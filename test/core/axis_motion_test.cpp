@@ -92,6 +92,20 @@ TEST_F(AxisMotion, TakesTheTimeOfTheClosedFormWithAJerkLimitToo) {
   expectCleanAt(1000);
 }
 
+TEST_F(AxisMotion, SaysWhereItsPlanHasIt) {
+  EXPECT_EQ(x().state().planned, x().state().position);
+  const axis::Move move = x().moveTo(1.0);
+  advance(0.25 + kLead);
+  EXPECT_NEAR(x().state().planned, 0.0625, 1e-6) << "0.25 s at 2 m/s^2";
+  for (int i = 0; i < 500; ++i) {
+    advance(1.7e-3);
+    const axis::AxisState state = x().state();
+    EXPECT_NEAR(state.position, state.planned, 0.0005 + 1e-9) << "half a step";
+  }
+  EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(x().state().planned, x().state().position);
+}
+
 TEST_F(AxisMotion, GoesOnToATargetFartherAheadWithoutSlowingDown) {
   const std::int64_t begin = bench->clock.now();
   const axis::Move first = x().moveTo(2.0);

@@ -133,6 +133,7 @@ TEST_F(Backlash, KeepsThePositionOverAMicrostepChange) {
   }
   moveTo(0.010);
   EXPECT_EQ(motor() - 784, 16 + kBacklash);
+  EXPECT_REFUSED(x().setMicrosteps(4), "1/4 has no position at 0.01 m");
   expectClean();
 }
 

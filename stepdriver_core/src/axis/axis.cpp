@@ -1,5 +1,6 @@
 #include "stepdriver_core/axis/axis.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -146,13 +147,14 @@ void Axis::setMicrosteps(int microsteps) {
     if (!axis.config.align_on_microstep_change) {
       axis.refuse("1/" + std::to_string(microsteps) + " has no position at " +
                   axis.show(axis.position()) + "; the nearest that both modes have is " +
-                  axis.show(axis.positionOf(static_cast<double>(common))) +
+                  axis.show(axis.positionOf(axis.jointAt(static_cast<double>(common)))) +
                   ": move there first, or configure align_on_microstep_change");
     }
     axis.refuseUnlessReadyToMove();
-    axis.refuseBeyondLimits(axis.positionOf(static_cast<double>(common)), "the common position");
+    axis.refuseBeyondLimits(axis.positionOf(axis.jointAt(static_cast<double>(common))),
+                            "the common position");
     axis.refuseIntoEndstop(common - axis.harvest().count);
-    const Move move = axis.startMove(common, axis.maxSpeed());
+    const Move move = axis.moveMotor(common);
     lock.unlock();
     const MoveResult result = wait(move);
     lock.lock();
@@ -177,7 +179,9 @@ void Axis::setPosition(double position) {
 AxisState Axis::state() const {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
+  const pulse::Nanoseconds before = axis.driver.motionNow();
   const pulse::ChannelState channel = axis.harvest();
+  const pulse::Nanoseconds after = axis.driver.motionNow();
   AxisState state;
   state.enabled = axis.enabled;
   state.asleep = axis.asleep;
@@ -188,16 +192,21 @@ AxisState Axis::state() const {
   state.position_valid = axis.position_valid;
   state.microsteps = axis.microsteps;
   state.position = axis.positionOf(static_cast<double>(channel.count - channel.slack));
+  state.planned = state.position;
   state.target = state.position;
   state.fault = axis.fault;
   if (axis.held && axis.held->goal.target) {
     state.target = axis.positionOf(static_cast<double>(*axis.held->goal.target));
   }
   if (const Motion* motion = axis.log.find(channel.following); motion && state.moving) {
-    const double velocity = motion->profile->stateAt(axis.driver.motionNow()).velocity;
+    const motion::MotionState now = motion->profile->stateAt(after);
+    const auto [low, high] =
+        std::minmax({motion->profile->stateAt(before).position.value(), now.position.value()});
+    const double planned = std::clamp(static_cast<double>(channel.count), low, high);
+    state.planned = axis.positionOf(planned - static_cast<double>(channel.slack));
     // While the backlash is taken up, the joint stands.
-    const bool joint_moves = channel.slack == (velocity > 0.0 ? axis.backlash() : 0);
-    state.velocity = joint_moves ? velocity / axis.stepsPerUnit() : 0.0;
+    const bool joint_moves = channel.slack == (now.velocity > 0.0 ? axis.backlash() : 0);
+    state.velocity = joint_moves ? now.velocity / axis.stepsPerUnit() : 0.0;
     const Goal& goal = motion->goal;
     if (goal.stops()) {
       state.target = axis.positionOf(axis.jointAt(motion->profile->endPosition().value()));

@@ -77,14 +77,18 @@ void Axis::Impl::checkedJog(double velocity) {
   begin({{this, goal}});
 }
 
+Move Axis::Impl::moveMotor(std::int64_t target) {
+  Goal goal;
+  goal.target = target;
+  goal.velocity = maxSpeed();
+  goal.of_motor = true;
+  return begin({{this, goal}}).front();
+}
+
 void Axis::Impl::takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way) {
   const std::int64_t wanted = way > 0 ? backlash() : 0;
   if (way == 0 || harvest().slack == wanted) return;
-  Goal goal;
-  goal.target = jointCount();
-  goal.velocity = maxSpeed();
-  goal.take_up = way > 0 ? 1 : -1;
-  begin({{this, goal}});
+  moveMotor(jointCount() + wanted);
   lock.unlock();
   driver.waitFor([this] { return driver.engine().channel(channel).following == 0; });
   lock.lock();

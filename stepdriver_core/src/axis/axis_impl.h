@@ -58,6 +58,8 @@ class Axis::Impl {
   /// is told.
   static std::vector<Move> begin(Orders orders);
   Move startMove(std::int64_t target, double velocity);
+  /// Moves to a count of the motor's, whatever the backlash.
+  Move moveMotor(std::int64_t target);
   /// [microsteps] @throw Refused where it isn't one to move to.
   std::int64_t checkedTarget(double position, bool relative);
   Move checkedMove(double position, bool relative, double velocity);

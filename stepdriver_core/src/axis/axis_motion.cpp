@@ -39,9 +39,8 @@ motion::Plan Axis::Impl::plan(const Goal& goal, std::int64_t at) {
 std::int64_t Axis::Impl::motorTarget(const Goal& goal, const motion::MotionState& from,
                                      const motion::MotionLimits& within) {
   const std::int64_t down = *goal.target;
-  if (backlash() == 0) return down;
+  if (backlash() == 0 || goal.of_motor) return down;
   const std::int64_t up = down + backlash();
-  if (goal.take_up != 0) return goal.take_up > 0 ? up : down;
   if (underWay() == nullptr) {
     const std::int64_t way = down - jointCount();
     return way > 0 ? up : way < 0 ? down : harvest().count;

@@ -24,7 +24,7 @@ struct Goal {
   double velocity = 0.0;   ///< [unit/s] as asked for, before any override; of a jog with its sign
   std::string stopped_by;  ///< what decelerates it; empty: it goes on
   bool held = false;       ///< decelerates, to go on later
-  int take_up = 0;         ///< the joint stays, the motor takes up the backlash: +1, -1, or 0: no
+  bool of_motor = false;   ///< the target is the motor's; else the joint's, backlash or not
   std::shared_ptr<Course> course;  ///< of kTogether, shared with the other axes
   std::size_t member = 0;          ///< which of its axes this is
 

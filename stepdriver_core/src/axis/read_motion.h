@@ -20,6 +20,7 @@ struct MotionContext {
 /// The unit of the keys tells the kind; in the configuration a unit is mm or a degree.
 ///
 /// @return the kind; none where it can't be told, which is an issue.
-std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context, AxisConfig& config);
+std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
+                               AxisConfig& config);
 
 }  // namespace stepdriver::axis

@@ -1,0 +1,215 @@
+#include "trajectory_action.h"
+
+#include <actionlib_msgs/GoalStatus.h>
+#include <ros/console.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "stepdriver_core/error.h"
+#include "text.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+using Result = action_msgs::FollowJointTrajectoryResult;
+using Feedback = action_msgs::FollowJointTrajectoryFeedback;
+
+const ros::WallDuration kLookPeriod(0.01);
+constexpr int kLooksPerFeedback = 5;
+
+ros::NodeHandle onQueue(ros::CallbackQueue& queue, ros::NodeHandle node) {
+  node.setCallbackQueue(&queue);
+  return node;
+}
+
+Result resultOf(int error_code, const std::string& error_string) {
+  Result result;
+  result.error_code = error_code;
+  result.error_string = error_string;
+  return result;
+}
+
+int errorCodeOf(BadTrajectory::Kind kind) {
+  switch (kind) {
+    case BadTrajectory::Kind::kJoints:
+      return Result::INVALID_JOINTS;
+    case BadTrajectory::Kind::kOldStamp:
+      return Result::OLD_HEADER_TIMESTAMP;
+    case BadTrajectory::Kind::kInvalid:
+      break;
+  }
+  return Result::INVALID_GOAL;
+}
+
+}  // namespace
+
+TrajectoryAction::TrajectoryAction(ros::NodeHandle node, machine::Machine& machine,
+                                   CallQueues& queues)
+    : machine_(machine),
+      axes_(axisOfJoint(machine)),
+      server_(
+          onQueue(queues.trajectories(), node), "follow_joint_trajectory",
+          [this](Server::GoalHandle handle) { take(std::move(handle)); },
+          [this](Server::GoalHandle handle) { cancel(std::move(handle)); }, false) {
+  node.setCallbackQueue(&queues.trajectories());
+  timer_ = node.createSteadyTimer(
+      kLookPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { look(); }, false);
+  server_.start();
+}
+
+// ---- goals and cancels ----
+
+void TrajectoryAction::take(Server::GoalHandle handle) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
+    handle.setCanceled(Result(), "it was cancelled before it began");
+    return;
+  }
+  try {
+    Following following = begin(handle);
+    handle.setAccepted();
+    takeOver(following);
+    under_way_.push_back(std::move(following));
+    concludeEnded();
+  } catch (const BadTrajectory& bad) {
+    handle.setRejected(resultOf(errorCodeOf(bad.kind()), bad.what()), bad.what());
+  } catch (const Error& error) {
+    handle.setRejected(resultOf(Result::INVALID_GOAL, error.what()), error.what());
+  }
+}
+
+TrajectoryAction::Following TrajectoryAction::begin(const Server::GoalHandle& handle) {
+  const auto goal = handle.getGoal();
+  Following following;
+  following.handle = handle;
+  following.joints = goal->trajectory.joint_names;
+  following.tolerances = readTolerances(*goal);
+  following.slipped_before = machine_.figures().slipped;
+  following.move = followMessage(machine_, goal->trajectory, axes_);
+  following.goal = goal->trajectory.points.back().positions;
+  following.began = ros::Time::now();
+  return following;
+}
+
+void TrajectoryAction::takeOver(const Following& newer) {
+  for (Following& older : under_way_) {
+    const bool shared =
+        std::any_of(older.joints.begin(), older.joints.end(), [&newer](const std::string& joint) {
+          return std::find(newer.joints.begin(), newer.joints.end(), joint) != newer.joints.end();
+        });
+    if (shared) older.preempted_by = "a newer goal took over";
+  }
+}
+
+void TrajectoryAction::cancel(Server::GoalHandle handle) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (Following& following : under_way_) {
+    if (following.handle != handle) continue;
+    following.preempted_by = "it was cancelled";
+    stop(following);
+  }
+}
+
+// The axes that move together with it stop with it.
+void TrajectoryAction::stop(const Following& following) {
+  try {
+    machine_.axis(following.move.members.front().axis).stop();
+  } catch (const Error& error) {
+    ROS_ERROR("follow_joint_trajectory: %s", error.what());
+  }
+}
+
+// ---- what becomes of them ----
+
+void TrajectoryAction::look() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  concludeEnded();
+  looks_ = (looks_ + 1) % kLooksPerFeedback;
+  for (Following& following : under_way_) {
+    const Places places = placesOf(following);
+    keepToPath(following, places);
+    if (looks_ == 0) publishFeedback(following, places);
+  }
+}
+
+void TrajectoryAction::tellEnded() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  concludeEnded();
+}
+
+void TrajectoryAction::concludeEnded() {
+  for (auto following = under_way_.begin(); following != under_way_.end();) {
+    const auto result = machine_.result(following->move);
+    if (result) conclude(*following, *result);
+    following = result ? under_way_.erase(following) : std::next(following);
+  }
+}
+
+void TrajectoryAction::conclude(Following& following, const machine::CoordinatedResult& result) {
+  const bool reached = result.end == axis::MoveEnd::kReached;
+  Server::GoalHandle& handle = following.handle;
+  if (!reached && !following.preempted_by.empty()) {
+    const std::string why = following.preempted_by + "; " + result.message;
+    handle.setCanceled(resultOf(Result::SUCCESSFUL, why), why);
+  } else if (!reached && !following.violated.empty()) {
+    handle.setAborted(resultOf(Result::PATH_TOLERANCE_VIOLATED, following.violated),
+                      following.violated);
+  } else if (const std::string why = shortOfGoal(following, result); !why.empty()) {
+    handle.setAborted(resultOf(Result::GOAL_TOLERANCE_VIOLATED, why), why);
+  } else {
+    handle.setSucceeded(resultOf(Result::SUCCESSFUL, result.message), result.message);
+  }
+}
+
+std::string TrajectoryAction::shortOfGoal(const Following& following,
+                                          const machine::CoordinatedResult& result) const {
+  if (result.end != axis::MoveEnd::kReached) return result.message;
+  // A motion's duration is its own time, which slips aren't in.
+  const double late = result.duration + machine_.figures().slipped - following.slipped_before -
+                      following.move.duration;
+  if (late > following.tolerances.goal_time) {
+    return "it ended " + numberText(late) + " s later than planned; goal_time_tolerance is " +
+           numberText(following.tolerances.goal_time) + " s";
+  }
+  return violation(following.joints, following.tolerances.goal, following.goal, result.positions);
+}
+
+TrajectoryAction::Places TrajectoryAction::placesOf(const Following& following) const {
+  Places places;
+  for (const auto& member : following.move.members) {
+    const axis::AxisState state = machine_.axis(member.axis).state();
+    places.planned.push_back(state.planned);
+    places.actual.push_back(state.position);
+    places.velocities.push_back(state.velocity);
+  }
+  return places;
+}
+
+void TrajectoryAction::keepToPath(Following& following, const Places& places) {
+  if (!following.violated.empty() || !following.preempted_by.empty()) return;
+  following.violated =
+      violation(following.joints, following.tolerances.path, places.planned, places.actual);
+  if (!following.violated.empty()) stop(following);
+}
+
+void TrajectoryAction::publishFeedback(Following& following, const Places& places) {
+  Feedback feedback;
+  feedback.header.stamp = ros::Time::now();
+  feedback.joint_names = following.joints;
+  const ros::Duration time = feedback.header.stamp - following.began;
+  for (auto* point : {&feedback.desired, &feedback.actual, &feedback.error}) {
+    point->time_from_start = time;
+  }
+  feedback.desired.positions = places.planned;
+  feedback.actual.positions = places.actual;
+  // An axis has no velocity but that of its plan.
+  feedback.desired.velocities = feedback.actual.velocities = places.velocities;
+  feedback.error.velocities.resize(places.velocities.size());
+  for (std::size_t i = 0; i < places.planned.size(); ++i) {
+    feedback.error.positions.push_back(places.planned[i] - places.actual[i]);
+  }
+  following.handle.publishFeedback(feedback);
+}
+
+}  // namespace stepdriver::ros_node

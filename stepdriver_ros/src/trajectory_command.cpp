@@ -1,0 +1,40 @@
+#include "trajectory_command.h"
+
+#include <ros/transport_hints.h>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+// A trajectory that comes after another replaces it: only those of several clients can queue up.
+constexpr std::uint32_t kQueued = 10;
+
+}  // namespace
+
+TrajectoryCommand::TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine,
+                                     CallQueues& queues)
+    : machine_(machine), axes_(axisOfJoint(machine)) {
+  node.setCallbackQueue(&queues.trajectories());
+  subscriber_ = node.subscribe("command", kQueued, &TrajectoryCommand::take, this,
+                               ros::TransportHints().tcpNoDelay());
+}
+
+void TrajectoryCommand::take(const trajectory_msgs::JointTrajectory::ConstPtr& message) {
+  try {
+    if (message->points.empty()) {
+      stop(message->joint_names);
+    } else {
+      followMessage(machine_, *message, axes_);
+    }
+  } catch (const Error& error) {
+    log_.warn(error.what());
+  }
+}
+
+void TrajectoryCommand::stop(const std::vector<std::string>& joints) {
+  if (joints.empty()) return machine_.stop();
+  for (const std::string& axis : axesOf(joints, axes_)) machine_.axis(axis).stop();
+}
+
+}  // namespace stepdriver::ros_node

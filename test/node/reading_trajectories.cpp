@@ -1,0 +1,199 @@
+#include <gtest/gtest.h>
+#include <ros/message_traits.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "follow_joint_trajectory.h"
+#include "support/says.h"
+#include "trajectory_message.h"
+#include "trajectory_tolerances.h"
+
+// What the node makes of a trajectory's messages, without a node.
+
+namespace stepdriver::node_test {
+namespace {
+
+using ros_node::AxisOfJoint;
+using ros_node::BadTrajectory;
+using ros_node::TimedTrajectory;
+using ros_node::timedTrajectory;
+using ros_node::withDelay;
+
+const AxisOfJoint kAxes{{"shoulder", "x"}, {"elbow", "y"}};
+const ros::Time kNow(1000.0);
+constexpr double kRounding = 1e-9;
+
+trajectory_msgs::JointTrajectory message(const std::vector<std::string>& joints,
+                                         const std::vector<double>& times) {
+  trajectory_msgs::JointTrajectory trajectory;
+  trajectory.joint_names = joints;
+  for (const double time : times) {
+    trajectory.points.emplace_back();
+    trajectory.points.back().positions.assign(joints.size(), 0.1 * time);
+    trajectory.points.back().time_from_start = ros::Duration(time);
+  }
+  return trajectory;
+}
+
+std::vector<double> timesOf(const machine::TrajectoryRequest& request) {
+  std::vector<double> times;
+  for (const auto& point : request.points) times.push_back(point.time);
+  return times;
+}
+
+void expectTimes(const machine::TrajectoryRequest& request, const std::vector<double>& times) {
+  ASSERT_EQ(request.points.size(), times.size());
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    EXPECT_NEAR(timesOf(request)[i], times[i], kRounding) << "point " << i;
+  }
+}
+
+template <typename Action>
+void expectBad(BadTrajectory::Kind kind, const std::string& words, const Action& action) {
+  try {
+    action();
+    FAIL() << "nothing is wrong, but this was expected: " << words;
+  } catch (const BadTrajectory& bad) {
+    EXPECT_EQ(static_cast<int>(bad.kind()), static_cast<int>(kind)) << bad.what();
+    expectSays(bad.what(), words);
+  }
+}
+
+void expectBadMessage(BadTrajectory::Kind kind, const std::string& words,
+                      const trajectory_msgs::JointTrajectory& trajectory) {
+  expectBad(kind, words, [&] { timedTrajectory(trajectory, kAxes, kNow); });
+}
+
+TEST(ReadingTrajectories, NamesTheAxesOfTheJointsInTheirOrder) {
+  const TimedTrajectory read = timedTrajectory(message({"elbow", "shoulder"}, {1.0}), kAxes, kNow);
+  EXPECT_EQ(read.request.names, (std::vector<std::string>{"y", "x"}));
+}
+
+TEST(ReadingTrajectories, TakesAllThatAPointHas) {
+  auto given = message({"shoulder"}, {0.5});
+  given.points[0].velocities = {0.25};
+  given.points[0].accelerations = {-2.0};
+  const TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
+  ASSERT_EQ(read.request.points.size(), 1U);
+  const machine::TrajectoryPoint& point = read.request.points[0];
+  EXPECT_EQ(point.time, 0.5);
+  EXPECT_EQ(point.positions, std::vector<double>{0.05});
+  EXPECT_EQ(point.velocities, std::vector<double>{0.25});
+  EXPECT_EQ(point.accelerations, std::vector<double>{-2.0});
+}
+
+TEST(ReadingTrajectories, RefusesJointsThatAreNotThereNoneAndOneTwice) {
+  using Kind = BadTrajectory::Kind;
+  expectBadMessage(Kind::kJoints, "no joint wrist; there are elbow, shoulder",
+                   message({"shoulder", "wrist"}, {1.0}));
+  expectBadMessage(Kind::kJoints, "names no joint", message({}, {1.0}));
+  expectBadMessage(Kind::kJoints, "elbow is named twice",
+                   message({"elbow", "shoulder", "elbow"}, {1.0}));
+  expectBadMessage(Kind::kInvalid, "no points", message({"elbow"}, {}));
+}
+
+TEST(ReadingTrajectories, StartsAtOnceWithoutAStampAndLaterWithOneAhead) {
+  auto given = message({"elbow"}, {0.5, 1.0});
+  TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
+  EXPECT_EQ(read.delay, 0.0);
+  expectTimes(read.request, {0.5, 1.0});
+  given.header.stamp = kNow + ros::Duration(0.25);
+  read = timedTrajectory(given, kAxes, kNow);
+  EXPECT_NEAR(read.delay, 0.25, kRounding);
+  expectTimes(read.request, {0.5, 1.0});
+}
+
+TEST(ReadingTrajectories, RestsUntilALaterStart) {
+  auto given = message({"elbow", "shoulder"}, {0.5, 1.0});
+  given.header.stamp = kNow + ros::Duration(0.25);
+  const auto request = withDelay(timedTrajectory(given, kAxes, kNow), {3.0, 4.0});
+  expectTimes(request, {0.25, 0.75, 1.25});
+  EXPECT_EQ(request.points[0].positions, (std::vector<double>{3.0, 4.0}));
+  EXPECT_EQ(request.points[0].velocities, (std::vector<double>{0.0, 0.0}));
+  EXPECT_EQ(request.points[0].accelerations, (std::vector<double>{0.0, 0.0}));
+}
+
+TEST(ReadingTrajectories, ChecksWhereADelayedTrajectoryBeginsAllTheSame) {
+  auto given = message({"elbow"}, {0.0, 1.0});
+  given.points[0].positions = {7.0};
+  given.header.stamp = kNow + ros::Duration(0.25);
+  const auto request = withDelay(timedTrajectory(given, kAxes, kNow), {3.0});
+  expectTimes(request, {0.0, 0.25, 1.25});
+  EXPECT_EQ(request.points[0].positions, std::vector<double>{7.0});
+  EXPECT_EQ(request.points[1].positions, std::vector<double>{3.0});
+}
+
+TEST(ReadingTrajectories, ComesSoonerByWhatOfItHasGoneBy) {
+  auto given = message({"elbow"}, {0.0, 0.5, 1.0});
+  given.header.stamp = kNow - ros::Duration(0.2);
+  const TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
+  EXPECT_EQ(read.delay, 0.0);
+  expectTimes(read.request, {0.0, 0.3, 0.8});
+}
+
+TEST(ReadingTrajectories, RefusesAPointInThePast) {
+  auto given = message({"elbow"}, {0.0, 0.5, 1.0});
+  given.header.stamp = kNow - ros::Duration(0.75);
+  expectBadMessage(BadTrajectory::Kind::kOldStamp,
+                   "point 1, 0.5 s after header.stamp, is in the past by 0.25 s", given);
+  auto only = message({"elbow"}, {0.0});
+  only.header.stamp = kNow - ros::Duration(0.001);
+  expectBadMessage(BadTrajectory::Kind::kOldStamp, "point 0", only);
+}
+
+TEST(ReadingTrajectories, HasNoLimitWhereNoToleranceIsGivenOrItIsLifted) {
+  ros_node::action_msgs::FollowJointTrajectoryGoal goal;
+  goal.trajectory = message({"elbow", "shoulder"}, {1.0});
+  goal.path_tolerance.resize(2);
+  goal.path_tolerance[0].name = "shoulder";
+  goal.path_tolerance[0].position = 0.01;
+  goal.path_tolerance[1].name = "elbow";
+  goal.path_tolerance[1].position = -1.0;
+  const auto read = ros_node::readTolerances(goal);
+  EXPECT_TRUE(std::isinf(read.path.at(0)));
+  EXPECT_EQ(read.path.at(1), 0.01);
+  EXPECT_TRUE(std::isinf(read.goal.at(0)) && std::isinf(read.goal.at(1)));
+  EXPECT_TRUE(std::isinf(read.goal_time));
+}
+
+TEST(ReadingTrajectories, RefusesTolerancesOfOtherJointsAndOfNoNumber) {
+  ros_node::action_msgs::FollowJointTrajectoryGoal goal;
+  goal.trajectory = message({"elbow"}, {1.0});
+  goal.goal_tolerance.resize(1);
+  goal.goal_tolerance[0].name = "shoulder";
+  expectBad(BadTrajectory::Kind::kInvalid, "goal_tolerance names the joint shoulder",
+            [&] { ros_node::readTolerances(goal); });
+  goal.goal_tolerance[0].name = "elbow";
+  goal.goal_tolerance[0].position = std::numeric_limits<double>::quiet_NaN();
+  expectBad(BadTrajectory::Kind::kInvalid, "goal_tolerance of the joint elbow isn't a number",
+            [&] { ros_node::readTolerances(goal); });
+}
+
+TEST(ReadingTrajectories, SaysWhichJointIsTooFarOff) {
+  const std::vector<std::string> joints{"elbow", "shoulder"};
+  EXPECT_EQ(ros_node::violation(joints, {0.1, 0.1}, {1.0, 2.0}, {1.1 - 1e-12, 1.9 + 1e-12}), "");
+  EXPECT_EQ(ros_node::violation(joints, {0.1, 0.1}, {1.0, 2.0}, {1.0, 2.25}),
+            "shoulder is at 2.25, 0.25 from 2; the tolerance is 0.1");
+}
+
+// The figures are those that clients of control_msgs 1.5 send (MoveIt, rosserial's libraries).
+TEST(FollowJointTrajectory, HasTheMd5sumsOfControlMsgs) {
+  using ros::message_traits::md5sum;
+  namespace msgs = ros_node::action_msgs;
+  EXPECT_STREQ(md5sum<msgs::JointTolerance>(), "f544fe9c16cf04547e135dd6063ff5be");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryGoal>(), "69636787b6ecbde4d61d711979bc7ecb");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryResult>(), "493383b18409bfb604b4e26c676401d2");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryFeedback>(), "10817c60c2486ef6b33e97dcd87f4474");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryActionGoal>(), "cff5c1d533bf2f82dd0138d57f4304bb");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryActionResult>(),
+               "c4fb3b000dc9da4fd99699380efcc5d9");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryActionFeedback>(),
+               "d8920dc4eae9fc107e00999cce4be641");
+  EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryAction>(), "bc4f9b743838566551c0390c65f1a248");
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
