@@ -54,10 +54,8 @@ axis::AxisConfig axisOf(const std::string& name, bool smooth) {
 
 class Batch {
  public:
-  Batch(std::uint64_t seed, bool smooth)
-      : random_(static_cast<unsigned>(seed)),
-        smooth_(smooth),
-        bench_({axisOf("x", smooth), axisOf("y", smooth)}) {}
+  Batch(unsigned seed, bool smooth)
+      : random_(seed), smooth_(smooth), bench_({axisOf("x", smooth), axisOf("y", smooth)}) {}
 
   void run(int sequences) {
     for (int i = 0; i < sequences && !testing::Test::HasFatalFailure(); ++i) {
@@ -261,7 +259,7 @@ TEST_P(RandomSequences, KeepEveryPromise) {
   int endstops = 0;
   std::size_t rows = 0;
   for (int batch = 0; batch < kBatches && !HasFatalFailure(); ++batch) {
-    const auto seed = static_cast<std::uint64_t>(GetParam() * kBatches + batch);
+    const auto seed = static_cast<unsigned>(GetParam() * kBatches + batch);
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const bool smooth = batch % 2 == 0;
     const auto run = std::make_unique<Batch>(seed, smooth);

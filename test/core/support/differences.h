@@ -41,6 +41,7 @@ inline Differences differencesOf(const std::vector<Crossing>& crossings, double 
       if (since >= apart) row.push_back(crossings[i]);
     }
     std::vector<double> order;
+    order.reserve(row.size());
     for (const Crossing& crossing : row) order.push_back(crossing.position);
     double factorial = 1.0;
     for (std::size_t n = 1; n < row.size(); ++n) {
