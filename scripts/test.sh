@@ -11,7 +11,8 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files
-  --core  stepdriver_core and its tests, built alone, as on a machine without ROS
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS; the pictures of
+          docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
@@ -100,7 +101,8 @@ check_tidy() {
   quietly tidy-configure configure_tidy
   own_files '*.cpp' | grep -E '^(stepdriver_core|test/core|test/kernel)/' | compiled_by "$build/core" |
     tidy "$build/core" || status=1
-  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check)/' | tidy "$build/catkin" || status=1
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/joystick)/' |
+    tidy "$build/catkin" || status=1
   return "$status"
 }
 compiled_by() {
@@ -128,6 +130,8 @@ build_core_quietly() {
 test_core() {
   (cd "$build/core" && ctest -j "$jobs" --timeout 300 --no-tests=error --output-on-failure)
 }
+
+check_pictures() { bash "$root/scripts/motion_pictures.sh" --check; }
 
 test_kernel() {
   local reason status=0
@@ -224,6 +228,8 @@ check_install() {
   done
   "$build/install/lib/stepdriver/stepdriver_node" --help >"$build/log/node-help.log" ||
     die "stepdriver_node --help doesn't work"
+  rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
+    die "stepdriver_joystick --help doesn't work"
   rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
     >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then
@@ -235,7 +241,8 @@ check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
 choose_build_folder
 rm -rf "$build/ros"
-install_packages core "${parts[@]}" "$(wants ros && echo trace)" "$(wants lint && echo ros)"
+install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
+  "$(wants core && echo pictures)" "$(wants lint && echo ros)"
 
 if wants lint; then
   stage shell check_shell
@@ -251,6 +258,7 @@ fi
 if wants core; then
   stage core-build build_core
   stage core-tests test_core core-build
+  stage pictures check_pictures core-build
 fi
 if wants kernel; then
   stage kernel test_kernel core-build

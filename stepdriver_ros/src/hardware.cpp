@@ -8,7 +8,7 @@ namespace {
 
 std::unique_ptr<Simulation> makeSimulation(const NodeConfig& config, const std::string& node_name) {
   try {
-    return std::make_unique<Simulation>(config.axes, config.simulation);
+    return std::make_unique<Simulation>(config.axes, config.emergency_stop, config.simulation);
   } catch (const Error& error) {
     throw ConfigError(
         {{node_name + "/simulation/trace", std::string("is wrong: ") + error.what()}});

@@ -1,6 +1,7 @@
 #include "machine_services.h"
 
 #include <ros/console.h>
+#include <std_srvs/SetBool.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/SpeedOverride.h>
 
@@ -109,6 +110,16 @@ void MachineServices::advertiseRig(Simulation& simulation) {
       };
   node_.setCallbackQueue(&queues_.control());
   servers_.push_back(node_.advertiseService("rig/report", handler));
+
+  using Press = std_srvs::SetBool;
+  const boost::function<bool(Press::Request&, Press::Response&)> press =
+      [&simulation](Press::Request& request, Press::Response& response) {
+        return answer(response, [&] {
+          simulation.pressEmergencyStop(request.data != 0);
+          response.message = request.data != 0 ? "the button is pressed" : "the button is released";
+        });
+      };
+  servers_.push_back(node_.advertiseService("rig/emergency_stop", press));
 }
 
 }  // namespace stepdriver::ros_node

@@ -22,7 +22,7 @@ class MachineServices {
   /// @param machine, queues outlive the services.
   MachineServices(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
 
-  /// Adds the report of the simulated rig. @param simulation outlives the services.
+  /// Adds the services of the simulated rig. @param simulation outlives the services.
   void advertiseRig(Simulation& simulation);
 
  private:

@@ -1,5 +1,7 @@
 #include "node_config.h"
 
+#include <utility>
+
 #include "stepdriver_core/axis/config_reader.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 
@@ -61,9 +63,16 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
 
   const std::size_t issues_before = issues.size();
   reader.allow("axes");
-  config.axes = axis::readAxes(valueOf(tree, "axes"), reader.fullName("axes"), issues);
+  axis::UsedLines used(issues);
+  config.axes = axis::readAxes(valueOf(tree, "axes"), reader.fullName("axes"), issues, used);
   const bool axes_are_right = issues.size() == issues_before;
-  config.simulation = readSimulation(reader.map("simulation"), config.axes, axes_are_right);
+  config.emergency_stop = axis::readInputSwitch(reader, "emergency_stop", used);
+  ConfigReader simulation = reader.map("simulation");
+  if (simulation.has("emergency_stop") && !reader.has("emergency_stop")) {
+    simulation.issue("emergency_stop", "is " + simulation.shown("emergency_stop") + ", but " +
+                                           reader.fullName("emergency_stop") + " is missing");
+  }
+  config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right);
   if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {
     issues.push_back({reader.fullName("simulation/trace"),
                       "is \"" + config.simulation.trace +

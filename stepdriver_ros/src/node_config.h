@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct NodeConfig {
   bool enforce_realtime = false;   ///< don't start where the machine is too slow for its axes
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
+  std::optional<axis::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
 };
 
 /// Reads the node's private parameters.
@@ -33,6 +35,8 @@ struct NodeConfig {
 ///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
 ///                                # not start
 ///   max_lateness_ms: 5.0
+/// emergency_stop:                # optional; see axis::readInputSwitch()
+///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode

@@ -48,11 +48,11 @@ lines.
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override
               ~move_line  ~hold  ~resume
-              ~rig/report (on the simulated rig)
+              ~rig/report  ~rig/emergency_stop (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~jog, ~command (subscribed)
   action      ~follow_joint_trajectory
-  parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~simulation
-              robot_description
+  parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
+              ~simulation  robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
 3 the machine is too slow for its axes and ~realtime is enforce.
@@ -95,8 +95,12 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   options.max_lateness = config.max_lateness;
   options.measure = true;
   options.enforce = config.enforce_realtime;
+  options.emergency_stop = config.emergency_stop;
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
+  if (machine.emergencyStopped()) {
+    ROS_WARN("The emergency stop input is active: no axis is enabled, none moves until recover");
+  }
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
   CallQueues queues(machine.axes().size());

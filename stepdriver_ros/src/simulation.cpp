@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/vcd_trace.h"
 #include "text.h"
 
@@ -118,8 +119,11 @@ void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig
   }
 }
 
-Simulation::Simulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config)
+Simulation::Simulation(const std::vector<AxisConfig>& axes,
+                       std::optional<axis::InputSwitch> emergency_stop,
+                       const SimulationConfig& config)
     : axes_(axes),
+      emergency_stop_(std::move(emergency_stop)),
       clock_(config.speed),
       rig_(rigOf(axes, config), traceTo(config.trace)),
       backend_(rig_, [this] { return clock_.now(); }) {
@@ -130,6 +134,12 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes, const SimulationConf
       rig_.failWrites(axis.pins.step.line, *simulated.fail_step_write_after, EIO);
     }
   }
+  if (emergency_stop_) pressEmergencyStop(config.emergency_stop);
+}
+
+void Simulation::pressEmergencyStop(bool pressed) {
+  if (!emergency_stop_) throw Refused("emergency_stop isn't configured: there is no button");
+  rig_.setInput(emergency_stop_->line, pressed == emergency_stop_->active_level, clock_.now());
 }
 
 RigReport::Response Simulation::report() {

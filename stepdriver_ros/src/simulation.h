@@ -3,6 +3,7 @@
 #include <stepdriver/RigReport.h>
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "simulation_config.h"
@@ -24,8 +25,10 @@ void checkSimulation(const std::vector<axis::AxisConfig>& axes, const Simulation
 /// All calls are safe from any thread.
 class Simulation {
  public:
+  /// @param emergency_stop the input of the machine, with a button at it.
   /// @throw Error where the trace can't be written.
-  Simulation(const std::vector<axis::AxisConfig>& axes, const SimulationConfig& config);
+  Simulation(const std::vector<axis::AxisConfig>& axes,
+             std::optional<axis::InputSwitch> emergency_stop, const SimulationConfig& config);
 
   gpio::Backend& backend() { return backend_; }
   pulse::Clock& clock() { return clock_; }
@@ -33,8 +36,13 @@ class Simulation {
   /// Also makes the trace readable up to now. @throw Error where the trace can't be written.
   RigReport::Response report();
 
+  /// Presses the button of the emergency-stop input, or releases it. @throw Refused where none is
+  /// configured.
+  void pressEmergencyStop(bool pressed);
+
  private:
   std::vector<axis::AxisConfig> axes_;
+  const std::optional<axis::InputSwitch> emergency_stop_;
   pulse::VirtualClock clock_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;

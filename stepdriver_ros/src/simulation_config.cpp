@@ -69,6 +69,7 @@ SimulationConfig readSimulation(ConfigReader reader, const std::vector<axis::Axi
   SimulationConfig config;
   config.speed = reader.number("speed", Range{0.0, kHighestSpeed}, config.speed);
   config.trace = reader.text("trace", config.trace);
+  config.emergency_stop = reader.boolean("emergency_stop", config.emergency_stop);
   ConfigReader rigs = reader.map("axes");
   for (const axis::AxisConfig& axis : axes) {
     std::string unit;

@@ -25,8 +25,9 @@ struct SimulatedAxis {
 };
 
 struct SimulationConfig {
-  double speed = 1.0;  ///< seconds of the rig per second; 0: as fast as it goes
-  std::string trace;   ///< path of the VCD file; empty: none
+  double speed = 1.0;           ///< seconds of the rig per second; 0: as fast as it goes
+  std::string trace;            ///< path of the VCD file; empty: none
+  bool emergency_stop = false;  ///< its button is pressed at the start
   std::map<std::string, SimulatedAxis> axes;
 };
 
@@ -36,7 +37,8 @@ struct SimulationConfig {
 /// simulation:
 ///   speed: 1.0                   # seconds of the rig per second; 0: as fast as it goes
 ///   trace: /tmp/axis.vcd         # where the pin trace goes; default: nowhere
-///   axes:
+///   emergency_stop: false        # true: the button of the emergency-stop input is pressed at
+///   first axes:
 ///     x:                         # `deg` in place of `mm` on a rotary axis
 ///       start_mm: 0.0            # where the carriage stands at first
 ///       min_switch_mm: -2.0      # default: 2 mm (2 degrees) outside the soft limit

@@ -24,8 +24,8 @@ Time nextTime(Time last, Duration period, Time now) {
 
 /// Whether anything but the progress of a motion differs.
 bool differ(const AxisStates& one, const AxisStates& other) {
-  return one.enabled != other.enabled || one.asleep != other.asleep || one.moving != other.moving ||
-         one.held != other.held || one.homed != other.homed ||
+  return one.enabled != other.enabled || one.asleep != other.asleep || one.idle != other.idle ||
+         one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
          one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
          one.target != other.target || one.fault != other.fault;
 }
@@ -38,6 +38,7 @@ AxisStates read(const machine::Machine& machine) {
     states.name.push_back(axis->config().name);
     states.enabled.push_back(state.enabled);
     states.asleep.push_back(state.asleep);
+    states.idle.push_back(state.idle);
     states.moving.push_back(state.moving);
     states.held.push_back(state.held);
     states.homed.push_back(state.homed);

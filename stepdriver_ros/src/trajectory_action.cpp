@@ -50,8 +50,8 @@ TrajectoryAction::TrajectoryAction(ros::NodeHandle node, machine::Machine& machi
       axes_(axisOfJoint(machine)),
       server_(
           onQueue(queues.trajectories(), node), "follow_joint_trajectory",
-          [this](Server::GoalHandle handle) { take(std::move(handle)); },
-          [this](Server::GoalHandle handle) { cancel(std::move(handle)); }, false) {
+          [this](const Server::GoalHandle& handle) { take(handle); },
+          [this](const Server::GoalHandle& handle) { cancel(handle); }, false) {
   node.setCallbackQueue(&queues.trajectories());
   timer_ = node.createSteadyTimer(
       kLookPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { look(); }, false);
@@ -60,8 +60,9 @@ TrajectoryAction::TrajectoryAction(ros::NodeHandle node, machine::Machine& machi
 
 // ---- goals and cancels ----
 
-void TrajectoryAction::take(Server::GoalHandle handle) {
+void TrajectoryAction::take(const Server::GoalHandle& goal) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  Server::GoalHandle handle = goal;
   if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
     handle.setCanceled(Result(), "it was cancelled before it began");
     return;
@@ -102,7 +103,7 @@ void TrajectoryAction::takeOver(const Following& newer) {
   }
 }
 
-void TrajectoryAction::cancel(Server::GoalHandle handle) {
+void TrajectoryAction::cancel(const Server::GoalHandle& handle) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (Following& following : under_way_) {
     if (following.handle != handle) continue;

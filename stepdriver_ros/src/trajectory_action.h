@@ -52,8 +52,8 @@ class TrajectoryAction {
     std::vector<double> velocities;
   };
 
-  void take(Server::GoalHandle handle);
-  void cancel(Server::GoalHandle handle);
+  void take(const Server::GoalHandle& goal);
+  void cancel(const Server::GoalHandle& handle);
   void look();
 
   Following begin(const Server::GoalHandle& handle);

@@ -93,6 +93,13 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   std::string pins;
   for (const NamedLine& line : linesOf({config})) pins += line.pin + "=" + line.line + " ";
   EXPECT_EQ(pins, "x/step=S x/m0=M x/endstops/min=E x/fault=F ");
+  axis::AxisConfig other = config;
+  other.name = "y";
+  config.pins.enable.line = other.pins.enable.line = "N";
+  const auto shared = linesOf({config, other});
+  EXPECT_EQ(shared[1].pin + "=" + shared[1].line, "x/enable, y/enable=N");
+  const auto with_stop = linesOf({config}, axis::InputSwitch{"T", true, gpio::Bias::kAsIs});
+  EXPECT_EQ(with_stop.back().pin + "=" + with_stop.back().line, "emergency_stop=T");
 }
 
 SystemFacts facts() {

@@ -184,10 +184,26 @@ TEST(ReadPins, UsesEachLineOnce) {
   ConfigValue a = linearAxis("a");
   ConfigValue b = linearAxis("b");
   put(a, "pins/enable", "EN");
+  put(b, "pins/dir", "EN");
+  EXPECT_EQ(
+      issuesOf(mapOf({{"a", a}, {"b", b}})),
+      Lines{"/axes/b/pins/dir: is \"EN\", which is used twice: it is /axes/a/pins/enable" + rest});
+}
+
+TEST(ReadPins, LetsAxesShareAnEnableLineOfOneLevel) {
+  ConfigValue a = linearAxis("a");
+  ConfigValue b = linearAxis("b");
+  put(a, "pins/enable", "EN");
   put(b, "pins/enable", "EN");
-  EXPECT_EQ(issuesOf(mapOf({{"a", a}, {"b", b}})),
-            Lines{"/axes/b/pins/enable: is \"EN\", which is used twice: it is /axes/a/pins/enable" +
-                  rest});
+  const auto both = [&] { return issuesOf(mapOf({{"a", a}, {"b", b}})); };
+  EXPECT_EQ(both(), Lines{});
+  put(b, "invert/enable", true);
+  EXPECT_EQ(both(),
+            Lines{"/axes/b/pins/enable: is \"EN\", which is /axes/a/pins/enable too, but its axis "
+                  "is enabled by high and the other by low; axes that share a line need the same "
+                  "level"});
+  put(a, "invert/enable", true);
+  EXPECT_EQ(both(), Lines{});
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "driver_axes.h"
 #include "support/config_map.h"
 
 namespace stepdriver::joystick {
@@ -136,6 +137,33 @@ TEST(JoystickConfig, RefusesNamesThatNoAxisHas) {
   EXPECT_EQ(issuesOf(tree),
             Lines{"/joystick/axes/x-axis: has the name \"x-axis\", but an axis's name must begin "
                   "with a letter and go on with letters, digits and _ only"});
+}
+
+TEST(DriverAxes, MustHaveWhatTheJoystickJogs) {
+  ConfigValue tree = leastConfig();
+  put(tree, "axes/r", mapOf({{"joystick_axis", 3}, {"max_speed_deg_s", 90}}));
+  const JoystickConfig config = read(tree);
+  const auto misfits = [&config](const ConfigValue& driver_axes) {
+    std::vector<ConfigIssue> issues;
+    checkDriverAxes(config, "/joystick", driver_axes, "/stepdriver", issues);
+    return linesOf(issues);
+  };
+  ConfigValue axes = mapOf({{"x", mapOf({{"max_speed_mm_s", 50}})},
+                            {"r", mapOf({{"max_speed_deg_s", 180.0}})},
+                            {"z", mapOf({{"max_speed_mm_s", 5.0}})}});
+  EXPECT_EQ(misfits(axes), Lines{});
+  EXPECT_EQ(misfits({}), Lines{}) << "not known yet";
+  put(axes, "x/max_speed_mm_s", 49.5);
+  EXPECT_EQ(misfits(axes), Lines{"/joystick/axes/x/max_speed_mm_s: is 50.0, but must be at most "
+                                 "/stepdriver/axes/x/max_speed_mm_s, which is 49.5"});
+  put(axes, "x/max_speed_mm_s", 100);
+  drop(axes, "r/max_speed_deg_s");
+  put(axes, "r/max_speed_mm_s", 100);
+  EXPECT_EQ(misfits(axes),
+            Lines{"/joystick/axes/r/max_speed_deg_s: must be max_speed_mm_s, as there is a "
+                  "/stepdriver/axes/r/max_speed_mm_s"});
+  drop(axes, "r");
+  EXPECT_EQ(misfits(axes), Lines{"/joystick/axes/r: is no axis of /stepdriver, which has x, z"});
 }
 
 }  // namespace

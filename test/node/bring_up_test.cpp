@@ -118,6 +118,28 @@ const std::vector<BadBringUp> kBadBringUps = {
      "joint_state_rte",
      {"did you mean joint_state_rate"}},
     {"RateOutOfRange", setting("joint_state_rate", 2000), "joint_state_rate", {"2000", "1000"}},
+    {"IdleWithoutThePin",
+     [](NodeUnderTest& node) {
+       node.set("axes/x/idle_timeout_s", 10.0);
+       node.erase("axes/x/pins/enable");
+     },
+     "axes/x/idle_timeout_s",
+     {"10.0", "axes/x/pins/enable, which isn't wired"}},
+    {"EmergencyStopWithoutALevel",
+     setting("emergency_stop/pin", "stop"),
+     "emergency_stop/active_level",
+     {"missing", "low or high"}},
+    {"EmergencyStopOnALineOfAnAxis",
+     [](NodeUnderTest& node) {
+       node.set("emergency_stop/pin", "x_endstop_min");
+       node.set("emergency_stop/active_level", "high");
+     },
+     "emergency_stop/pin",
+     {"\"x_endstop_min\"", "axes/x/endstops/min/pin already"}},
+    {"ButtonWithoutAnEmergencyStop",
+     setting("simulation/emergency_stop", true),
+     "simulation/emergency_stop",
+     {"true", "is missing"}},
     {"LatenessOfZero",
      setting("realtime/max_lateness_ms", 0.0),
      "realtime/max_lateness_ms",

@@ -115,6 +115,24 @@ TEST(ChipServices, SleepsAndWakes) {
   EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
 }
 
+TEST(ChipServices, AnIdleAxisIsShownAndWakesForTheNextMove) {
+  NodeUnderTest node;
+  node.set("axes/x/idle_timeout_s", 2.0);
+  node.set("axes/x/idle_action", "sleep");
+  node.set("axes/x/holds_position_unpowered", true);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(setPosition(node, 0.0).success);
+  EXPECT_TRUE(node.moveTo(0.0008, true).success);
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) {
+    return s.idle.at(0) && s.asleep.at(0) && s.enabled.at(0) && s.position_valid.at(0) &&
+           s.position.at(0) > 0.0;
+  }));
+  const auto answer = node.moveTo(0.01, true);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
 TEST(ChipServices, ResetTakesTheTrustInThePosition) {
   NodeUnderTest node;
   node.start();

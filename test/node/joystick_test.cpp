@@ -198,32 +198,43 @@ TEST_F(JoystickTest, DisablesInTheDeadBandAndEnablesBeforeItJogs) {
   EXPECT_EQ(node.process().output().find("jog:"), std::string::npos) << "no jog was refused";
 }
 
-TEST_F(JoystickTest, JogsOtherAxesWhileADisableWaits) {
-  set("axes/x/disable_in_dead_band", true);
-  set("axes/x/disable_after_s", 0.0);
+TEST_F(JoystickTest, JogsOtherAxesWhileAServiceWaits) {
+  // The test is the driver.
+  set("driver", "other");
   set("axes/slow/joystick_axis", 0);
   set("axes/slow/max_speed_mm_s", 10.0);
   set("axes/slow/disable_in_dead_band", true);
-  // An axis that takes its time: its service is the test's own.
   std::atomic<bool> asked{false};
   std::atomic<bool> free{false};
+  std::atomic<bool> answered{false};
   const auto slow =
       ros::NodeHandle().advertiseService<std_srvs::SetBoolRequest, std_srvs::SetBoolResponse>(
-          node.full("slow/enable"), [&](auto& /*request*/, auto& response) {
+          node.beside("other/slow/enable"), [&](auto& /*request*/, auto& response) {
             asked = true;
             waitUntil([&] { return free.load(); });
+            answered = true;
             response.success = true;
             return true;
           });
-  start();
+  const Recorder<Jog> sent(node.beside("other/jog"));
+  launch();
+  publisher = ros::NodeHandle().advertise<sensor_msgs::Joy>(node.beside("joy"), 1);
+  ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() == 1 && sent.connected(); }));
   sensor_msgs::Joy both;
   both.axes = {1.0F, 1.0F};
-  EXPECT_TRUE(waitUntil([&] {
-    publisher.publish(both);
-    return asked && moving();
-  })) << "one waits for its service, the other jogs";
-  EXPECT_TRUE(holdUntil(0.0, [&] { return !moving() && !enabled(); }));
+  const auto holdBothUntil = [&](const std::function<bool()>& happened) {
+    return waitUntil([&] {
+      publisher.publish(both);
+      return happened();
+    });
+  };
+  ASSERT_TRUE(holdBothUntil([&] { return asked.load(); }));
+  const std::size_t before = sent.count();
+  EXPECT_TRUE(holdBothUntil([&] { return sent.count() > before + 10; }));
+  EXPECT_FALSE(answered) << "they came while the service was waiting";
+  EXPECT_EQ(sent.messages().back().name, std::vector<std::string>{"x"});
   free = true;
+  EXPECT_TRUE(holdBothUntil([&] { return sent.messages().back().name.size() == 2; }));
 }
 
 TEST_F(JoystickTest, SaysWhatKeepsAnAxisFromBeingEnabled) {
@@ -253,6 +264,19 @@ TEST_F(JoystickTest, DoesNotStartWithParametersThatAreWrong) {
              node.beside("joystick/axes/x/dead_band") + " is 1.5, but must be from 0 to 0.99");
   expectSays(joystick->output(), "did you mean max_speed_mm_s?");
   expectSays(joystick->output(), "is \"my node\", but must be the name of a node");
+  joystick.reset();
+}
+
+TEST_F(JoystickTest, DoesNotStartForAxesThatTheDriverDoesNotHave) {
+  set("axes/x/max_speed_mm_s", 100.1);
+  set("axes/y/joystick_axis", 0);
+  set("axes/y/max_speed_mm_s", 5.0);
+  launch();
+  EXPECT_EQ(joystick->waitForExit(kBound).value_or(-1), 1);
+  expectSays(joystick->output(), node.beside("joystick/axes/x/max_speed_mm_s") +
+                                     " is 100.1, but must be at most " +
+                                     node.full("axes/x/max_speed_mm_s") + ", which is 100.0");
+  expectSays(joystick->output(), "is no axis of " + node.name() + ", which has x");
   joystick.reset();
 }
 

@@ -197,8 +197,10 @@ TEST_F(LinesTest, ALineThatWaitsHoldsUpNoLineOfOtherAxes) {
 
 TEST_F(LinesTest, AnswersEveryOneOfManyThatComeAtOnce) {
   node.start();
+  constexpr int kLines = 12;
   std::vector<std::future<MoveLine::Response>> lines;
-  for (int i = 0; i < 12; ++i) {
+  lines.reserve(kLines);
+  for (int i = 0; i < kLines; ++i) {
     lines.push_back(std::async(std::launch::async, [this, i] {
       return moveLine({0.01 * i, 0.1}, true);
     }));

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Endstops.h>
@@ -93,6 +94,68 @@ TEST(EmergencyStop, AtRestStopsWhatComesLater) {
   EXPECT_EQ(node.pulses(), 0);
   EXPECT_TRUE(trigger(node, "recover").success);
   EXPECT_TRUE(node.moveTo(0.01, true).success);
+}
+
+std_srvs::SetBool::Response press(NodeUnderTest& node, bool pressed) {
+  std_srvs::SetBool::Request request;
+  request.data = pressed;
+  return node.call<std_srvs::SetBool>("rig/emergency_stop", request);
+}
+
+void wireEmergencyStop(NodeUnderTest& node) {
+  node.set("emergency_stop/pin", "stop");
+  node.set("emergency_stop/active_level", "low");
+}
+
+TEST(EmergencyStopInput, StopsLikeTheServiceUntilItIsReleasedAndRecovered) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  wireEmergencyStop(node);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  auto waiting = longMove(node);
+  EXPECT_TRUE(press(node, true).success);
+  const auto answer = waiting.get();
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "emergency stop input");
+  const std::int64_t pulses = node.pulses();
+  EXPECT_EQ(std::llround(answer.position / kMetresPerStep), pulses);
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) {
+    return s.fault.at(0) == "emergency stop input" && s.enabled.at(0);
+  }));
+  const auto too_early = trigger(node, "recover");
+  EXPECT_FALSE(too_early.success);
+  expectSays(too_early.message, "stop is active");
+  EXPECT_FALSE(node.moveTo(0.0, true).success);
+  EXPECT_TRUE(press(node, false).success);
+  expectSays(node.moveTo(0.0, true).message, "recover");
+  EXPECT_TRUE(trigger(node, "recover").success);
+  EXPECT_EQ(node.pulses(), pulses) << "recover moves nothing";
+  EXPECT_TRUE(node.moveTo(0.0, true).success);
+}
+
+TEST(EmergencyStopInput, ThatIsActiveAtTheStartLetsTheNodeStartAtFault) {
+  NodeUnderTest node;
+  wireEmergencyStop(node);
+  node.set("simulation/emergency_stop", true);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) {
+    return s.fault.at(0) == "emergency stop input" && !s.enabled.at(0);
+  }));
+  EXPECT_FALSE(trigger(node, "recover").success);
+  EXPECT_TRUE(press(node, false).success);
+  EXPECT_TRUE(trigger(node, "recover").success);
+  expectSays(node.moveTo(0.01, true).message, "disabled");
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST(EmergencyStopInput, ThatIsntConfiguredHasNoButtonOnTheRig) {
+  NodeUnderTest node;
+  node.start();
+  const auto answer = press(node, true);
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "emergency_stop isn't configured");
 }
 
 TEST(Endstop, EndsAMoveByNameWithTheExactCountAndLetsItGoAway) {

@@ -281,7 +281,7 @@ TEST_F(TrajectoryActionTest, GoesOnAfterAHoldAndTellsWhereThatTookTooLong) {
   const Recorder<AxisStates> states(node.full("axis_states"));
   Goal goal = there(0.06, 1.5);
   goal.goal_time_tolerance = ros::Duration(0.0);
-  const auto holdOnTheWay = [&](std::int64_t pulses) {
+  const auto hold_on_the_way = [&](std::int64_t pulses) {
     ASSERT_TRUE(waitUntil([&] { return node.pulses() > pulses; }));
     EXPECT_TRUE(node.call<std_srvs::Trigger>("hold").success);
     ASSERT_TRUE(states.waitForLatest(
@@ -290,14 +290,14 @@ TEST_F(TrajectoryActionTest, GoesOnAfterAHoldAndTellsWhereThatTookTooLong) {
     EXPECT_TRUE(node.call<std_srvs::Trigger>("resume").success);
   };
   send(goal);
-  holdOnTheWay(1000);
+  hold_on_the_way(1000);
   EXPECT_EQ(await(), State::SUCCEEDED) << said();
   EXPECT_EQ(node.pulses(), 7200);
 
   goal = goalOf({{1.5, {0.0, 0.0}, {0.0, 0.0}}});
   goal.goal_time_tolerance = ros::Duration(0.001);
   send(goal);
-  holdOnTheWay(7200 + 1000);
+  hold_on_the_way(7200 + 1000);
   expectAborted(Result::GOAL_TOLERANCE_VIOLATED,
                 "later than planned; goal_time_tolerance is 0.001");
   EXPECT_EQ(node.pulses(), 14400) << "it went there all the same";

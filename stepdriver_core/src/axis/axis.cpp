@@ -83,8 +83,9 @@ void Axis::bringUp() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
   if (const auto sequence = axis.pins.bringUp(); sequence.size > 0) axis.writePins(sequence);
-  if (axis.config.enable_on_start && axis.pins.hasEnable()) {
-    axis.writePins(axis.pins.enable(true));
+  axis.harvest();
+  if (axis.config.enable_on_start && axis.pins.hasEnable() && axis.fault.empty()) {
+    axis.writeEnable(true);
     axis.enabled = true;
   }
 }
@@ -100,8 +101,9 @@ void Axis::enable(bool on) {
   if (on) {
     if (!axis.fault.empty()) axis.refuse("at fault: " + axis.fault + "; call recover first");
     if (axis.disabling) axis.refuse("busy: it is being disabled");
+    axis.wake();
     if (axis.enabled) return;
-    axis.writePins(axis.pins.enable(true));
+    axis.writeEnable(true);
     axis.enabled = true;
     return;
   }
@@ -116,12 +118,14 @@ void Axis::sleep(bool asleep) {
     axis.refuse(axis.chip.has_sleep ? "pins/sleep isn't configured"
                                     : "a " + axis.chip.title + " has no SLEEP pin");
   }
+  if (!asleep) axis.wake();
   if (axis.asleep == asleep) return;
   axis.writePins(axis.pins.sleep(asleep));
+  if (axis.enabled != axis.isEnabled()) axis.writeEnable(axis.enabled);
+  axis.idle = false;
   axis.asleep = asleep;
-  // Asleep nothing holds the motor, and the chip wakes at Home.
-  axis.position_valid = false;
-  axis.home_count = axis.harvest().count;
+  axis.noteUnpowered();
+  axis.noteHome();
 }
 
 void Axis::reset() {
@@ -133,8 +137,8 @@ void Axis::reset() {
                                     : "a " + axis.chip.title + " has no RESET pin");
   }
   axis.writePins(axis.pins.reset());
-  axis.position_valid = false;
-  axis.home_count = axis.harvest().count;
+  axis.noteUnpowered();
+  axis.noteHome();
 }
 
 void Axis::setMicrosteps(int microsteps) {
@@ -183,8 +187,9 @@ AxisState Axis::state() const {
   const pulse::ChannelState channel = axis.harvest();
   const pulse::Nanoseconds after = axis.driver.motionNow();
   AxisState state;
-  state.enabled = axis.enabled;
-  state.asleep = axis.asleep;
+  state.enabled = axis.isEnabled();
+  state.asleep = axis.isAsleep();
+  state.idle = axis.idle;
   state.moving = channel.following != 0;
   state.held = axis.held.has_value();
   state.homed = axis.homed;
@@ -225,6 +230,11 @@ EndstopState Axis::endstops() const {
 
 // ---- the machine's side ----
 
+pulse::Nanoseconds Axis::supervise() {
+  const Lock lock(impl_->mutex);
+  return impl_->superviseIdle();
+}
+
 void Axis::recover() {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;
@@ -232,6 +242,7 @@ void Axis::recover() {
   if (axis.fault.empty()) return;
   axis.restorePins();
   axis.resetFaultyChip();
+  if (axis.driver.engine().emergencyStopped()) axis.refuse("an emergency stop has come meanwhile");
   axis.fault.clear();
 }
 
@@ -240,7 +251,7 @@ void Axis::noteEmergencyStop() {
   Impl& axis = *impl_;
   axis.interruptHoming("emergency stop");
   axis.driver.waitFor([&axis] { return !axis.moving(); });
-  axis.fault = "emergency stop";
+  if (axis.fault != Impl::kEmergencyStopInput) axis.fault = Impl::kEmergencyStop;
   axis.dropHeld(MoveEnd::kEmergencyStop, axis.fault);
 }
 

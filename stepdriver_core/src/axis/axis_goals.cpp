@@ -205,14 +205,15 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
   try {
     awaitRest(lock, stopped_by);
     dropHeld(MoveEnd::kStopped, stopped_by);
-    if (enabled) writePins(pins.enable(false));
+    if (isEnabled()) writeEnable(false);
+    if (asleep != isAsleep()) writePins(pins.sleep(asleep));
   } catch (...) {
     disabling = false;
     throw;
   }
   disabling = false;
   enabled = false;
-  position_valid = false;  // nothing holds the motor
+  idle = false;
 }
 
 // ---- one goal after another ----
@@ -236,6 +237,7 @@ std::vector<Move> Axis::Impl::begin(Orders orders) {
     std::int64_t began = 0;
   };
   std::vector<Replaced> replaced;
+  for (const Order& order : orders) order.axis->wake();
   for (Order& order : orders) {
     order.goal.move = ++order.axis->moves_;
     const Motion* before = order.axis->underWay();

@@ -28,7 +28,9 @@ Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& ow
       channel(engine_channel),
       mutex(all_mutex),
       enabled(!pins.hasEnable()),
-      microsteps(config.microsteps) {}
+      microsteps(config.microsteps) {
+  if (pins.hasEnable()) on_enable_line_ = axis_lines.enable_line->join();
+}
 
 // ---- what the engine has done ----
 
@@ -42,25 +44,37 @@ pulse::ChannelState Axis::Impl::harvest() {
   }
   if (state.chip_faults != chip_faults_seen_) {
     chip_faults_seen_ = state.chip_faults;
-    if (!asleep) {
+    if (!isAsleep()) {
       fault = kChipFault;
       position_valid = false;
     }
   }
+  if (pins.hasEnable() && axis_lines.enable_line->releases() != releases_seen_) {
+    releases_seen_ = axis_lines.enable_line->releases();
+    noteUnpowered();
+  }
+  // Read after the state: what the input has ended is known to be its doing.
+  if (const std::uint64_t stops = driver.engine().inputStops(); stops != input_stops_seen_) {
+    input_stops_seen_ = stops;
+    fault = kEmergencyStopInput;
+  }
   if (state.ended != ended_seen_) {
     ended_seen_ = state.ended;
+    rest_since = std::min(driver.clock().now(), state.end_time + driver.engine().state().slipped);
     conclude(state);
   }
   if (!position_valid) homed = false;
   log.dropBefore(state.following != 0 ? state.following : state.ended);
-  if (held && !fault.empty()) dropHeld(MoveEnd::kFault, fault);
+  if (held && !fault.empty()) {
+    dropHeld(fault == kEmergencyStopInput ? MoveEnd::kEmergencyStop : MoveEnd::kFault, fault);
+  }
   return state;
 }
 
 void Axis::Impl::conclude(const pulse::ChannelState& state) {
   switch (state.end) {
     case pulse::EndReason::kEmergencyStop:
-      fault = "emergency stop";
+      if (fault != kEmergencyStopInput) fault = kEmergencyStop;
       break;
     case pulse::EndReason::kTooLate:
       fault = "a pulse was " + inMilliseconds(state.end_lateness) +
@@ -101,7 +115,7 @@ MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState&
       break;
     case pulse::EndReason::kEmergencyStop:
       result.end = MoveEnd::kEmergencyStop;
-      why = "emergency stop";
+      why = fault;
       break;
     case pulse::EndReason::kChipFault:
     case pulse::EndReason::kTooLate:

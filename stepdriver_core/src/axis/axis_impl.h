@@ -32,6 +32,9 @@ class Axis::Impl {
   Impl(AxisConfig axis_config, int channel, const AxisLines& axis_lines, gpio::Lines& lines,
        EdgeLog& edges, pulse::PulseDriver& driver, std::mutex& mutex);
 
+  static constexpr const char* kEmergencyStop = "emergency stop";
+  static constexpr const char* kEmergencyStopInput = "emergency stop input";
+
   // What the engine has done since it was last looked at, taken into this state.
   pulse::ChannelState harvest();
   bool moving() { return harvest().following != 0; }
@@ -85,6 +88,17 @@ class Axis::Impl {
   void restorePins();
   void resetFaultyChip();
 
+  // The motor's current.
+  bool isEnabled() const {
+    return enabled && !(idle && config.idle_action == IdleAction::kDisable);
+  }
+  bool isAsleep() const { return asleep || (idle && config.idle_action == IdleAction::kSleep); }
+  pulse::Nanoseconds superviseIdle();
+  void wake();
+  void writeEnable(bool on);
+  void noteUnpowered();
+  void noteHome();
+
   // Microstep modes.
   void refuseMicrosteps(int wanted);
   std::int64_t nearestCommon(int wanted);
@@ -123,15 +137,18 @@ class Axis::Impl {
   const int channel;
 
   std::mutex& mutex;
+  // As was commanded; while the axis is idle its pins are otherwise.
   bool enabled = false;
   bool asleep = false;
+  bool idle = false;
   bool disabling = false;
   bool homed = false;
   Homing* homing = nullptr;  // the one under way
   bool position_valid = false;
   int microsteps;
-  double origin = 0.0;          // [unit] the position at count 0
-  std::int64_t home_count = 0;  // a count at which the translator is at Home
+  double origin = 0.0;                // [unit] the position at count 0
+  std::int64_t home_count = 0;        // a count at which the translator is at Home
+  pulse::Nanoseconds rest_since = 0;  // clock time of the last thing that it did
   double speed_override = 1.0;
   std::string fault;
   std::string closed;
@@ -175,6 +192,9 @@ class Axis::Impl {
   std::uint64_t ended_seen_ = 0;
   std::uint64_t line_errors_seen_ = 0;
   std::uint64_t chip_faults_seen_ = 0;
+  std::uint64_t input_stops_seen_ = 0;
+  std::size_t on_enable_line_ = 0;  // its number there
+  std::uint64_t releases_seen_ = 0;
   bool pins_doubtful_ = false;  // a write failed: they may be as wanted or not
   int mode_failed_ = 0;         // the mode whose pins could not all be written; 0: none
 };

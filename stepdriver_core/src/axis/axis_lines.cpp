@@ -4,7 +4,22 @@
 
 namespace stepdriver::axis {
 
-AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest>& outputs,
+namespace {
+
+/// The axis that this ENABLE line was requested for; nullptr: none yet.
+const AxisLines* sharerOf(const Pin& enable, const std::vector<AxisLines>& others,
+                          const std::vector<gpio::OutputRequest>& outputs) {
+  for (const AxisLines& other : others) {
+    if (other.enable < 0 || !enable.wired()) continue;
+    if (outputs[static_cast<std::size_t>(other.enable)].line == enable.line) return &other;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+AxisLines requestLines(const AxisConfig& config, const std::vector<AxisLines>& others,
+                       std::vector<gpio::OutputRequest>& outputs,
                        std::vector<gpio::InputRequest>& inputs) {
   const chip::Chip& chip = chip::chipOf(config.driver);
   const auto output = [&outputs](const Pin& pin, bool chip_level, bool keep) {
@@ -21,7 +36,15 @@ AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest
   const bool keep = !config.disable_on_shutdown;
   const Pins& pins = config.pins;
   AxisLines lines;
-  lines.enable = output(pins.enable, !chip.enable_on, keep);
+  if (const AxisLines* sharer = sharerOf(pins.enable, others, outputs)) {
+    lines.enable = sharer->enable;
+    lines.enable_line = sharer->enable_line;
+    bool& kept = outputs[static_cast<std::size_t>(lines.enable)].keep_on_release;
+    kept = kept || keep;
+  } else {
+    lines.enable = output(pins.enable, !chip.enable_on, keep);
+    if (pins.enable.wired()) lines.enable_line = std::make_shared<EnableLine>();
+  }
   lines.sleep = output(pins.sleep, chip.sleep_asleep, keep);
   lines.reset = output(pins.reset, chip.reset_held, keep);
   const auto code = chip::codeOf(chip, config.microsteps);

@@ -17,6 +17,7 @@ void Axis::Impl::writePins(const pulse::PinSequence& sequence,
     return state.pins_done == command.serial || state.pins_failed == command.serial ||
            state.refused == command.serial;
   });
+  rest_since = driver.clock().now();
   harvest();
   if (state.pins_failed == command.serial) {
     throw GpioError(config.name + ": " + failureText(state.failure));
@@ -26,7 +27,9 @@ void Axis::Impl::writePins(const pulse::PinSequence& sequence,
 
 void Axis::Impl::restorePins() {
   if (!pins_doubtful_) return;
-  writePins(pins.restore(enabled, asleep));
+  const bool by_others =
+      pins.hasEnable() && axis_lines.enable_line->isWantedByOthers(on_enable_line_);
+  writePins(pins.restore(isEnabled() || by_others, isAsleep()));
   // Each pin on the way back that the failed change did not reach is where it should be already.
   if (mode_failed_ != 0) writePins(pins.mode(mode_failed_, microsteps));
   mode_failed_ = 0;
@@ -34,13 +37,13 @@ void Axis::Impl::restorePins() {
 }
 
 void Axis::Impl::resetFaultyChip() {
-  if (!config.fault || asleep) return;
+  if (!config.fault || isAsleep()) return;
   const auto faulty = [this] { return readInput(axis_lines.fault) == 0; };
   if (!faulty()) return;
   if (pins.hasReset()) {
     writePins(pins.reset());
-    position_valid = false;
-    home_count = harvest().count;
+    noteUnpowered();
+    noteHome();
     driver.waitFor(
         [this] { return driver.clock().now() >= driver.engine().channel(channel).ready; });
   }

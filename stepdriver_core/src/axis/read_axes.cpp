@@ -8,6 +8,7 @@
 #include "read_homing.h"
 #include "read_motion.h"
 #include "read_pins.h"
+#include "read_power.h"
 #include "stepdriver_core/axis/config_reader.h"
 
 namespace stepdriver::axis {
@@ -77,7 +78,8 @@ std::optional<int> readMicrosteps(ConfigReader& axis, const chip::Chip* chip) {
 
 class AxesReader {
  public:
-  explicit AxesReader(std::vector<ConfigIssue>& issues) : used_(issues) {}
+  AxesReader(const std::vector<ConfigIssue>& issues, UsedLines& used)
+      : issues_(issues), used_(used) {}
 
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
@@ -96,11 +98,11 @@ class AxesReader {
     config.microsteps = context.microsteps.value_or(1);
     config.timing = context.timing.value_or(chip::Timing{});
     config.joint = readJoint(name, axis);
+    const std::size_t issues_before = issues_.size();
     readPins(axis, chip, config, used_);
+    readPower(axis, issues_.size() == issues_before, config);
     readEndstops(axis, config, used_);
     readHoming(axis, readMotion(axis, context, config), config);
-    config.enable_on_start = axis.boolean("enable_on_start", config.enable_on_start);
-    config.disable_on_shutdown = axis.boolean("disable_on_shutdown", config.disable_on_shutdown);
     config.align_on_microstep_change =
         axis.boolean("align_on_microstep_change", config.align_on_microstep_change);
     axis.rejectUnknown();
@@ -126,7 +128,8 @@ class AxesReader {
     return joint;
   }
 
-  UsedLines used_;
+  const std::vector<ConfigIssue>& issues_;
+  UsedLines& used_;
   std::map<std::string, std::string> joints_;  ///< joint -> full name of its axis
 };
 
@@ -141,6 +144,12 @@ void checkAxisName(const std::string& name, ConfigReader& axis) {
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues) {
+  UsedLines used(issues);
+  return readAxes(axes, name, issues, used);
+}
+
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues, UsedLines& used) {
   if (axes.isNothing()) {
     issues.push_back({name, "is missing; it must be a map of at least one axis"});
     return {};
@@ -150,7 +159,7 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
   if (!reader.isMap()) return configs;
   const auto& map = *axes.as<ConfigValue::Map>();
   if (map.empty()) reader.issue("", "is empty, but must be a map of at least one axis");
-  AxesReader each(issues);
+  AxesReader each(issues, used);
   for (const auto& entry : map) configs.push_back(each.read(entry.first, reader.map(entry.first)));
   return configs;
 }

@@ -39,15 +39,21 @@ bool isLine(const std::string& line) {
          offset.find_first_not_of("0123456789") == std::string::npos;
 }
 
-std::optional<std::string> readLine(ConfigReader& reader, const std::string& key, Presence presence,
-                                    UsedLines& used) {
+std::optional<std::string> readLineName(ConfigReader& reader, const std::string& key,
+                                        Presence presence) {
   auto line = reader.findText(key, presence, kWantedLine);
   if (!line) return {};
   if (!isLine(*line)) {
     reader.issue(key, "is " + reader.shown(key) + ", but must be " + kWantedLine);
     return {};
   }
-  used.add(reader.fullName(key), *line);
+  return line;
+}
+
+std::optional<std::string> readLine(ConfigReader& reader, const std::string& key, Presence presence,
+                                    UsedLines& used) {
+  auto line = readLineName(reader, key, presence);
+  if (line) used.add(reader.fullName(key), *line);
   return line;
 }
 
@@ -83,6 +89,11 @@ class PinsReader {
     checkMicrostepPins();
     const bool common_anode = readCommonAnode();
     readInversions(common_anode);
+    if (pins_.enable.wired()) {
+      std::optional<bool> on;
+      if (chip_ != nullptr) on = chip_->enable_on != pins_.enable.inverted;
+      used_.addEnable(reader_.fullName("enable"), pins_.enable.line, on);
+    }
     config.pins = pins_;
     config.fault = fault_;
   }
@@ -111,6 +122,10 @@ class PinsReader {
     }
     if (alias && reader_.has(name.key)) {
       refuseSecondName(reader_, name);
+      return;
+    }
+    if (name.pin == &Pins::enable) {  // its level must be known before its line is
+      pins_.enable.line = readLineName(reader_, name.key, Presence::kOptional).value_or("");
       return;
     }
     const auto presence = isRequired(name) ? Presence::kRequired : Presence::kOptional;
@@ -223,25 +238,18 @@ class PinsReader {
   std::optional<FaultPin> fault_;
 };
 
-std::optional<Endstop> readEndstop(ConfigReader& endstops, const std::string& key,
-                                   UsedLines& used) {
-  ConfigReader reader = endstops.map(key);
-  if (!endstops.has(key)) return {};
-  Endstop endstop;
-  endstop.line = readLine(reader, "pin", Presence::kRequired, used).value_or("");
-  endstop.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
-  endstop.bias = readBias(reader, "bias");
-  reader.rejectUnknown();
-  return endstop;
-}
-
 }  // namespace
 
-void UsedLines::add(const std::string& key, const std::string& line) {
-  const auto [user, is_new] = users_.emplace(line, key);
-  if (is_new) return;
-  issues_.push_back({key, "is \"" + line + "\", which is used twice: it is " + user->second +
-                              " already, and each pin needs a line of its own"});
+std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
+                                           UsedLines& used) {
+  ConfigReader reader = parent.map(key);
+  if (!parent.has(key)) return {};
+  InputSwitch input;
+  input.line = readLine(reader, "pin", Presence::kRequired, used).value_or("");
+  input.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
+  input.bias = readBias(reader, "bias");
+  reader.rejectUnknown();
+  return input;
 }
 
 void readPins(ConfigReader& axis, const chip::Chip* chip, AxisConfig& config, UsedLines& used) {
@@ -250,8 +258,8 @@ void readPins(ConfigReader& axis, const chip::Chip* chip, AxisConfig& config, Us
 
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used) {
   ConfigReader endstops = axis.map("endstops");
-  config.endstop_min = readEndstop(endstops, "min", used);
-  config.endstop_max = readEndstop(endstops, "max", used);
+  config.endstop_min = readInputSwitch(endstops, "min", used);
+  config.endstop_max = readInputSwitch(endstops, "max", used);
   endstops.rejectUnknown();
 }
 

@@ -15,6 +15,7 @@
 #include "stepdriver_core/axis/coordination.h"
 #include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
@@ -29,21 +30,27 @@ constexpr double kMostOverride = 2.0;
 
 pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 
+bool anyGoesIdle(const std::vector<axis::AxisConfig>& axes) {
+  return std::any_of(axes.begin(), axes.end(),
+                     [](const axis::AxisConfig& axis) { return axis.idle_timeout > 0.0; });
+}
+
 }  // namespace
 
 class Machine::Impl {
  public:
   Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options) {
-    const Wiring wiring(configs);
+    const Wiring wiring(configs, options.emergency_stop);
+    emergency_stop_ = wiring.emergency_stop;
     lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
       capability_ = pulse::measureCapability(*lines_, clock, wiring.channels);
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
       if (!why.empty()) throw Refused(why);
     }
-    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
-                                                   nanoseconds(options.max_lateness));
+    engine_ = std::make_unique<pulse::PulseEngine>(
+        *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
     driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
     edges_ = std::make_unique<axis::EdgeLog>(*lines_, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
@@ -52,7 +59,7 @@ class Machine::Impl {
                                                    planning_));
     }
     for (const auto& axis : axes_) axis->bringUp();
-    if (options.threaded && !wiring.inputs.empty())
+    if (options.threaded && (!wiring.inputs.empty() || anyGoesIdle(configs)))
       watcher_ = std::thread([this] { watchInputs(); });
   }
 
@@ -156,7 +163,15 @@ class Machine::Impl {
       // Where waiting fails, reading will fail too, and say so.
       if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
       engine_->inputsChanged();
+      supervise();
     }
+  }
+
+  // What falls due by time alone. @return the clock time at which it wants to be called again.
+  pulse::Nanoseconds supervise() {
+    pulse::Nanoseconds due = pulse::kNever;
+    for (const auto& axis : axes_) due = std::min(due, axis->supervise());
+    return due;
   }
 
   void stopWatching() {
@@ -164,6 +179,15 @@ class Machine::Impl {
     watching_ended_ = true;
     lines_->interrupt();
     watcher_.join();
+  }
+
+  void refuseWhileEmergencyStopInput() const {
+    if (!emergency_stop_) return;
+    const int level = lines_->read(emergency_stop_->line);
+    const std::string input =
+        "the emergency stop input " + lines_->inputName(emergency_stop_->line);
+    if (level < 0) throw Refused(input + " can't be read: " + gpio::errorText(-level));
+    if ((level != 0) == emergency_stop_->active) throw Refused(input + " is active; release it");
   }
 
   // Does it for each axis, whatever happens to the others, and then tells all that went wrong.
@@ -181,6 +205,7 @@ class Machine::Impl {
 
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
+  std::optional<pulse::Signal> emergency_stop_;
   std::unique_ptr<axis::EdgeLog> edges_;
   std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
@@ -263,7 +288,9 @@ void Machine::emergencyStop() {
 bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped(); }
 
 void Machine::recover() {
+  impl_->refuseWhileEmergencyStopInput();
   impl_->engine_->clearEmergencyStop();
+  impl_->engine_->inputsChanged();
   impl_->forAll([](axis::Axis& axis) { axis.recover(); });
 }
 
@@ -280,6 +307,16 @@ EngineFigures Machine::figures() const {
   return figures;
 }
 
-void Machine::advance(double seconds) { impl_->driver_->advance(nanoseconds(seconds)); }
+void Machine::advance(double seconds) {
+  impl_->engine_->inputsChanged();  // nobody watches them
+  pulse::Clock& clock = impl_->driver_->clock();
+  const pulse::Nanoseconds end = clock.now() + nanoseconds(seconds);
+  for (;;) {
+    const pulse::Nanoseconds due = std::min(end, impl_->supervise());
+    impl_->driver_->advance(due - clock.now());
+    if (clock.now() >= end) break;
+  }
+  impl_->supervise();
+}
 
 }  // namespace stepdriver::machine

@@ -4,11 +4,15 @@
 
 namespace stepdriver::machine {
 
-Wiring::Wiring(const std::vector<axis::AxisConfig>& axes) {
+Wiring::Wiring(const std::vector<axis::AxisConfig>& axes,
+               const std::optional<axis::InputSwitch>& emergency) {
   for (const axis::AxisConfig& axis : axes) {
-    axis_lines.push_back(axis::requestLines(axis, outputs, inputs));
+    axis_lines.push_back(axis::requestLines(axis, axis_lines, outputs, inputs));
     channels.push_back(axis::channelConfig(axis, axis_lines.back()));
   }
+  if (!emergency) return;
+  emergency_stop = pulse::Signal{static_cast<int>(inputs.size()), emergency->active_level};
+  inputs.push_back({emergency->line, emergency->bias, true});
 }
 
 pulse::Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,

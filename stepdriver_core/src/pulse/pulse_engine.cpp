@@ -5,12 +5,18 @@
 namespace stepdriver::pulse {
 
 PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
-                         const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness)
-    : lines_(lines), clock_(clock), max_lateness_(max_lateness), channels_(channels.size()) {
+                         const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
+                         std::optional<Signal> emergency_stop)
+    : lines_(lines),
+      clock_(clock),
+      max_lateness_(max_lateness),
+      emergency_input_(emergency_stop),
+      channels_(channels.size()) {
   for (std::size_t i = 0; i < channels.size(); ++i) channels_[i].config = channels[i];
   writes_.reserve(channels.size());
   writers_.reserve(channels.size());
   errors_.resize(channels.size());
+  readEmergencyStop();
 }
 
 bool PulseEngine::post(const Command& command) {
@@ -23,13 +29,6 @@ void PulseEngine::inputsChanged() {
   inputs_changed_.store(true, std::memory_order_release);
   clock_.wake();
 }
-
-void PulseEngine::emergencyStop() {
-  emergency_.store(true, std::memory_order_release);
-  clock_.wake();
-}
-
-void PulseEngine::clearEmergencyStop() { emergency_.store(false, std::memory_order_release); }
 
 ChannelState PulseEngine::channel(int index) const {
   return channels_.at(static_cast<std::size_t>(index)).published.load();
@@ -193,6 +192,8 @@ void PulseEngine::stopAll(Nanoseconds now) {
 }
 
 void PulseEngine::readInputs(Nanoseconds now) {
+  readEmergencyStop();
+  if (emergencyStopped()) stopAll(now);
   for (Channel& channel : channels_) {
     if (channel.config.fault) readFault(channel, now);
     if (channel.next) mayStep(channel, now);

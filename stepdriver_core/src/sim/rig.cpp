@@ -47,7 +47,10 @@ class Rig::Impl {
   template <typename Active>
   bool levelOf(const std::string& line, const Active& active) const {
     const auto contacts = inputs.find(line);
-    if (contacts == inputs.end()) return false;
+    if (contacts == inputs.end()) {
+      const auto other = other_inputs.find(line);
+      return other != other_inputs.end() && other->second;
+    }
     const auto& all = contacts->second;
     const auto first = std::find_if(all.begin(), all.end(), active);
     return first != all.end() ? (*first)->spec().active_level : !all.front()->spec().active_level;
@@ -87,6 +90,7 @@ class Rig::Impl {
   TraceFeed feed;
   std::unordered_map<std::string, std::vector<PinOnLine>> outputs;
   std::unordered_map<std::string, std::vector<const SwitchModel*>> inputs;
+  std::unordered_map<std::string, bool> other_inputs;  // levels of those that no axis has
   std::unordered_map<std::string, WriteFault> write_faults;
   std::unordered_map<std::string, Watch> watches;
   std::int64_t latest_ns = kForEver;
@@ -142,6 +146,13 @@ void Rig::failWrites(const std::string& line, std::int64_t writes, int error) {
 void Rig::clearWriteFault(const std::string& line) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   impl_->write_faults.erase(line);
+}
+
+void Rig::setInput(const std::string& line, bool level, std::int64_t time_ns) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::int64_t now_ns = impl_->advance(time_ns);
+  impl_->other_inputs[line] = level;
+  impl_->switchesMoved(now_ns);
 }
 
 void Rig::placeCarriage(const std::string& axis, double position, std::int64_t time_ns) {

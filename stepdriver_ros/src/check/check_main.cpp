@@ -82,7 +82,7 @@ class Check {
       return;
     }
     const std::vector<gpio::ChipInfo> chips = gpio::gpioChips();
-    const LinesReport report = linesReport(chips, linesOf(config_.axes));
+    const LinesReport report = linesReport(chips, linesOf(config_.axes, config_.emergency_stop));
     section(title, chipsText(chips) + "\n" + report.text);
     if (report.missing == 0) return;
     note(kExitLines, std::to_string(report.missing) + (report.missing == 1 ? " line" : " lines") +
@@ -127,7 +127,8 @@ class Check {
     bool back = false;
     try {
       if (InterruptWatch::comesWithin(kWarning)) throw Error("interrupted");
-      const MoveOrder order{config_.axes, options_.axis, options_.distance, config_.max_lateness};
+      const MoveOrder order{config_.axes, options_.axis, options_.distance, config_.max_lateness,
+                            config_.emergency_stop};
       const auto backend = gpio::makeLibgpiodBackend();
       back = moveForthAndBack(order, *backend, clock_,
                               [](const std::string& line) { print(line + "\n"); });

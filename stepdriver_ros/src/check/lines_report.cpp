@@ -1,5 +1,6 @@
 #include "lines_report.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -54,8 +55,10 @@ std::string holderOf(const gpio::LineInfo& info) {
 
 }  // namespace
 
-std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes) {
+std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes,
+                               const std::optional<axis::InputSwitch>& emergency_stop) {
   std::vector<NamedLine> lines;
+  std::vector<std::size_t> enables;  // those of `lines` that axes may share
   for (const axis::AxisConfig& axis : axes) {
     const auto add = [&](const char* pin, const std::string& line) {
       if (!line.empty()) lines.push_back({axis.name + "/" + pin, line});
@@ -63,7 +66,15 @@ std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes) {
     const axis::Pins& pins = axis.pins;
     add("step", pins.step.line);
     add("dir", pins.dir.line);
-    add("enable", pins.enable.line);
+    const auto shared = std::find_if(enables.begin(), enables.end(), [&](std::size_t i) {
+      return lines[i].line == pins.enable.line;
+    });
+    if (shared != enables.end()) {
+      lines[*shared].pin += ", " + axis.name + "/enable";
+    } else if (pins.enable.wired()) {
+      enables.push_back(lines.size());
+      add("enable", pins.enable.line);
+    }
     const bool numbered_from_0 = axis.driver == chip::Model::kDrv8825;
     add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
     add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
@@ -74,6 +85,7 @@ std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes) {
     if (axis.endstop_max) add("endstops/max", axis.endstop_max->line);
     if (axis.fault) add("fault", axis.fault->line);
   }
+  if (emergency_stop) lines.push_back({"emergency_stop", emergency_stop->line});
   return lines;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,13 +9,14 @@
 
 namespace stepdriver::check {
 
-/// A line that an axis is wired to.
+/// A line that an axis or the emergency stop is wired to.
 struct NamedLine {
-  std::string pin;   ///< x/step
+  std::string pin;   ///< x/step, emergency_stop
   std::string line;  ///< as the file names it
 };
 
-std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes);
+std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes,
+                               const std::optional<axis::InputSwitch>& emergency_stop = {});
 
 /// What there is, and what of it the file asks for.
 struct LinesReport {

@@ -76,6 +76,7 @@ bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clo
   }
   machine::MachineOptions options;
   options.max_lateness = order.max_lateness;
+  options.emergency_stop = order.emergency_stop;
   machine::Machine machine(axes, backend, clock, options);
   InterruptWatch watch([&] {
     say("  interrupted: decelerating");

@@ -7,6 +7,7 @@ namespace {
 
 using axis::ConfigReader;
 using axis::ConfigValue;
+using axis::Kind;
 using axis::Presence;
 using axis::Range;
 
@@ -18,21 +19,21 @@ constexpr Range kDisableTimes{0.0, 3600.0};
 constexpr int kLastIndex = 255;
 constexpr double kPi = 3.14159265358979323846;
 
-const char* const kLinearSpeed = "max_speed_mm_s";
-const char* const kRotarySpeed = "max_speed_deg_s";
-
-/// @return [m/s|rad/s].
-double readMaxSpeed(ConfigReader& axis) {
-  const auto linear = axis.findNumber(kLinearSpeed, Range::positive(), Presence::kOptional);
-  const auto rotary = axis.findNumber(kRotarySpeed, Range::positive(), Presence::kOptional);
-  if (axis.has(kLinearSpeed) && axis.has(kRotarySpeed)) {
-    axis.issue(kRotarySpeed, "is " + axis.shown(kRotarySpeed) + ", but " + kLinearSpeed +
+void readMaxSpeed(ConfigReader& reader, JogAxis& axis) {
+  const std::string linear_key = speedKey(Kind::kLinear);
+  const std::string rotary_key = speedKey(Kind::kRotary);
+  const auto linear = reader.findNumber(linear_key, Range::positive(), Presence::kOptional);
+  const auto rotary = reader.findNumber(rotary_key, Range::positive(), Presence::kOptional);
+  if (reader.has(linear_key) && reader.has(rotary_key)) {
+    reader.issue(rotary_key, "is " + reader.shown(rotary_key) + ", but " + linear_key +
                                  " must not be given with it: an axis is linear or rotary");
-  } else if (axis.isMap() && !axis.has(kLinearSpeed) && !axis.has(kRotarySpeed)) {
-    axis.issue(kLinearSpeed, std::string("is missing; it, or ") + kRotarySpeed +
+  } else if (reader.isMap() && !reader.has(linear_key) && !reader.has(rotary_key)) {
+    reader.issue(linear_key, "is missing; it, or " + rotary_key +
                                  " of a rotary axis, must be a number above 0");
   }
-  return linear ? *linear / 1000.0 : rotary.value_or(0.0) * kPi / 180.0;
+  axis.kind = rotary ? Kind::kRotary : Kind::kLinear;
+  axis.max_speed = linear.value_or(rotary.value_or(0.0));
+  axis.stick.max_speed = axis.max_speed * (rotary ? kPi / 180.0 : 1.0 / 1000.0);
 }
 
 JogAxis readAxis(const std::string& name, ConfigReader reader) {
@@ -40,7 +41,7 @@ JogAxis readAxis(const std::string& name, ConfigReader reader) {
   JogAxis axis;
   axis.name = name;
   axis.joystick_axis = reader.integer("joystick_axis", 0, kLastIndex);
-  axis.stick.max_speed = readMaxSpeed(reader);
+  readMaxSpeed(reader, axis);
   axis.stick.inverted = reader.boolean("inverted", axis.stick.inverted);
   axis.stick.dead_band = reader.number("dead_band", kDeadBands, axis.stick.dead_band);
   axis.stick.exponent = reader.number("exponent", kExponents, axis.stick.exponent);
@@ -68,6 +69,10 @@ std::vector<JogAxis> readAxes(ConfigReader& reader, const ConfigValue& tree) {
 }
 
 }  // namespace
+
+const char* speedKey(Kind kind) {
+  return kind == Kind::kLinear ? "max_speed_mm_s" : "max_speed_deg_s";
+}
 
 JoystickConfig readJoystickConfig(const ConfigValue& tree, const std::string& name,
                                   std::vector<ConfigIssue>& issues) {

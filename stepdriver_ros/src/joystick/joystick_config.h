@@ -3,16 +3,22 @@
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/config_value.h"
 #include "stepdriver_core/error.h"
 #include "stick.h"
 
 namespace stepdriver::joystick {
 
+/// The key of the highest speed of an axis of this kind, here and in the driver's configuration.
+const char* speedKey(axis::Kind kind);
+
 /// One axis of the driver, and the stick that jogs it.
 struct JogAxis {
   std::string name;
   int joystick_axis = 0;  ///< index in sensor_msgs/Joy's axes
+  axis::Kind kind = axis::Kind::kLinear;
+  double max_speed = 0.0;  ///< [mm/s|deg/s] as it was given
   Stick stick;
   bool disable_in_dead_band = false;
   double disable_after = 1.0;  ///< [s] in the dead band
@@ -37,7 +43,7 @@ struct JoystickConfig {
 /// axes:
 ///   x:                        # name of an axis of the driver
 ///     joystick_axis: 0        # index of the stick, from 0
-///     max_speed_mm_s: 50.0    # or max_speed_deg_s of a rotary axis
+///     max_speed_mm_s: 50.0    # or max_speed_deg_s of a rotary axis; at most the driver's own
 ///     inverted: false
 ///     dead_band: 0.1          # from 0 to 0.99 of the full deflection
 ///     exponent: 1.0           # from 0.1 to 10

@@ -14,6 +14,8 @@
 
 #include "../end_requests.h"
 #include "../node_start.h"
+#include "../xmlrpc_value.h"
+#include "driver_axes.h"
 #include "joystick.h"
 #include "joystick_config.h"
 
@@ -44,7 +46,10 @@ Exit codes: 0 ended as asked, 1 wrong configuration.
 Start it with: roslaunch stepdriver joystick.launch
 )";
 
-JoystickConfig readParameters(const ros::NodeHandle& private_node) {
+/// @param driver is set to the driver's full name.
+/// @throw ConfigError
+JoystickConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                              std::string& driver) {
   std::vector<ConfigIssue> issues;
   const std::string& name = private_node.getNamespace();
   JoystickConfig config =
@@ -54,6 +59,12 @@ JoystickConfig readParameters(const ros::NodeHandle& private_node) {
     issues.push_back({name + "/driver", "is \"" + config.driver +
                                             "\", but must be the name of a node" +
                                             (why.empty() ? "" : ": " + why)});
+  }
+  if (!issues.empty()) throw ConfigError(issues);
+  driver = node.resolveName(config.driver);
+  XmlRpc::XmlRpcValue axes;
+  if (ros::param::get(driver + "/axes", axes)) {
+    checkDriverAxes(config, name, ros_node::configValue(axes), driver, issues);
   }
   if (!issues.empty()) throw ConfigError(issues);
   return config;
@@ -74,8 +85,8 @@ int run(EndRequests& end_requests) {
   const ros::NodeHandle private_node("~");
   end_requests.takeOverShutdownCall();
   try {
-    const JoystickConfig config = readParameters(private_node);
-    const std::string driver = node.resolveName(config.driver);
+    std::string driver;
+    const JoystickConfig config = readParameters(node, private_node, driver);
     warnOfTooLowRate(driver, config.rate);
     Joystick joystick(node, driver, config);
     ROS_INFO("Ready: %s jogs %zu %s of %s", node.resolveName("joy").c_str(), config.axes.size(),

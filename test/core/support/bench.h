@@ -84,12 +84,11 @@ class Bench {
       : Bench(axes, rigAxes(axes), threaded, speed) {}
 
   Bench(const std::vector<axis::AxisConfig>& axes, const std::vector<sim::RigAxisSpec>& rig_axes,
-        bool threaded = false, double speed = 0.0)
+        bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
         rig(rig_axes, trace),
         backend(rig, [this] { return clock.now(); }) {
-    machine::MachineOptions options;
     options.threaded = threaded;
     machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
   }

@@ -10,6 +10,7 @@
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/homing.h"
+#include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::gpio {
 class Lines;
@@ -111,12 +112,15 @@ class Axis {
   void checkHoming() const;
 
   /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
-  /// ends the trust in the position: nothing holds the motor.
+  /// ends the trust in the position, but with AxisConfig::holds_position_unpowered: nothing holds
+  /// the motor.
   ///
   /// @throw Refused where the axis is at fault (enabling only), or enable isn't wired.
   void enable(bool on);
 
-  /// Puts the chip to sleep, or wakes it. @throw Refused while moving, and where SLEEP isn't wired.
+  /// Puts the chip to sleep, or wakes it: at Home, so that the position is trusted only where that
+  /// was its phase and AxisConfig::holds_position_unpowered is set. @throw Refused while moving,
+  /// and where SLEEP isn't wired.
   void sleep(bool asleep);
 
   /// Pulses RESET: the translator goes to Home. @throw Refused while moving, and where RESET isn't
@@ -143,15 +147,22 @@ class Axis {
 
   // What follows is the machine's side.
 
-  /// Wakes the chip, ends its reset, and enables it where the configuration says so.
+  /// Wakes the chip, ends its reset, and enables it where the configuration says so and the
+  /// emergency-stop input isn't active.
   /// @throw GpioError
   void bringUp();
+
+  /// Takes the motor's current away where the axis has stood for its idle time-out. Where the pin
+  /// can't be written the axis has the fault that says so.
+  ///
+  /// @return the clock time at which it wants to be called again, at the latest.
+  pulse::Nanoseconds supervise();
 
   /// Ends a latched fault; the axis stands as it is. A chip with a fault line is reset for that,
   /// where RESET is wired.
   ///
   /// @throw GpioError where a line still fails. @throw Refused where the chip still reports a
-  /// fault.
+  /// fault, or an emergency stop has come since the engine was told that the last one is over.
   void recover();
 
   /// Latches the fault of an emergency stop that the engine has been told of.

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/axis/enable_line.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 
@@ -14,6 +16,7 @@ struct AxisLines {
   int step = -1;
   int dir = -1;
   int enable = -1;
+  std::shared_ptr<EnableLine> enable_line;  ///< of `enable`, shared with other axes or not
   std::array<int, 3> mode = {-1, -1, -1};
   int sleep = -1;
   int reset = -1;
@@ -24,7 +27,10 @@ struct AxisLines {
 
 /// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and
 /// the configured microstep mode. An axis that stays enabled over a shutdown keeps its chip awake.
-AxisLines requestLines(const AxisConfig& config, std::vector<gpio::OutputRequest>& outputs,
+///
+/// @param others the axes that the request has already: an ENABLE line of theirs is shared.
+AxisLines requestLines(const AxisConfig& config, const std::vector<AxisLines>& others,
+                       std::vector<gpio::OutputRequest>& outputs,
                        std::vector<gpio::InputRequest>& inputs);
 
 /// The axis as the pulse engine sees it.

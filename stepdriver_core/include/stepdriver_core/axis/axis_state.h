@@ -10,8 +10,9 @@ namespace stepdriver::axis {
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
 struct AxisState {
-  bool enabled = false;
+  bool enabled = false;  ///< wants its current; on a shared ENABLE line it may have it all the same
   bool asleep = false;
+  bool idle = false;  ///< disabled or asleep since it stood for long; the next motion ends that
   bool moving = false;
   bool held = false;  ///< by a feed hold: it will go on when it is told to
   bool homed = false;

@@ -26,17 +26,23 @@ struct Pins {
   Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
 };
 
-struct Endstop {
+/// A switch on an input line: an endstop, or the emergency stop of the whole machine.
+struct InputSwitch {
   std::string line;
   bool active_level = false;  ///< level of the line while the switch is pressed
   gpio::Bias bias = gpio::Bias::kAsIs;
 };
+
+using Endstop = InputSwitch;
 
 /// The chip's nFAULT: an open drain that is pulled low at over-current or over-temperature.
 struct FaultPin {
   std::string line;
   gpio::Bias bias = gpio::Bias::kAsIs;
 };
+
+/// How the motor's current is taken away at rest.
+enum class IdleAction { kDisable, kSleep };
 
 /// All that an axis needs to know, checked by readAxes(). A unit is m on a linear axis, rad on a
 /// rotary one; a step is a microstep of the configured mode.
@@ -75,6 +81,11 @@ struct AxisConfig {
   /// A microstep change where the new mode has no position moves to the nearest common one first;
   /// else it is refused.
   bool align_on_microstep_change = false;
+
+  double idle_timeout = 0.0;  ///< [s] at rest, then the idle action is taken; 0: never
+  IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired, where there is a timeout
+  /// The carriage stays where it is without current, as a self-locking screw has it.
+  bool holds_position_unpowered = false;
 };
 
 }  // namespace stepdriver::axis

@@ -8,6 +8,7 @@
 
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/axis/used_lines.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::axis {
@@ -108,7 +109,7 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///   x:                          # [a-zA-Z][a-zA-Z0-9_]*
 ///     driver: a4988             # a4988, drv8825 or tb6600
 ///     joint: x_joint            # default: the axis's name
-///     pins:                     # `chip:offset` or the name of a line; each line once only
+///     pins:                     # `chip:offset` or the name of a line; each once only, but enable
 ///       step: "gpiochip0:17"
 ///       dir: "gpiochip0:27"
 ///       enable: "gpiochip0:22"  # this and all below: optional
@@ -146,12 +147,24 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     enable_on_start: false
 ///     disable_on_shutdown: true
 ///     align_on_microstep_change: false
+///     idle_timeout_s: 0.0       # at rest, then idle; 0: never
+///     idle_action: disable      # or sleep
+///     holds_position_unpowered: false
 /// @endcode
 ///
 /// @param name full name of the map, as `/stepdriver/axes`.
 /// @param issues everything that is wrong is added here.
+/// @param used the lines of the axes are added here, for what else names lines.
 /// @return the axes in the order of their names; to be used only where no issue was added.
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues, UsedLines& used);
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues);
+
+/// Reads `{pin: "gpiochip0:25", active_level: high, bias: as_is}`; bias is optional.
+///
+/// @return none where the key is missing.
+std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
+                                           UsedLines& used);
 
 }  // namespace stepdriver::axis

@@ -26,6 +26,9 @@ struct MachineOptions {
   bool measure = false;
   /// And where that is less than the axes ask for, or real-time rights are refused, don't start.
   bool enforce = false;
+  /// An input that does what Machine::emergencyStop() does, where it becomes active or can't be
+  /// read.
+  std::optional<axis::InputSwitch> emergency_stop{};
 };
 
 /// What the pulse engine has done since the start.
@@ -107,11 +110,15 @@ class Machine {
   void setSpeedOverride(double factor);
 
   /// Lets the pulse that is out finish and sends no other. Every axis is at fault until recover();
-  /// motors stay energized.
+  /// motors stay energized. MachineOptions::emergency_stop does the same; where it is active at the
+  /// start no motor is energized.
   void emergencyStop();
   bool emergencyStopped() const;
 
   /// Ends the emergency stop and all faults. Nothing moves.
+  ///
+  /// @throw Refused while the emergency-stop input is active or can't be read; nothing is ended
+  ///   then.
   void recover();
 
   /// Refuses every command from now on, decelerates, and disables the axes that are configured so.

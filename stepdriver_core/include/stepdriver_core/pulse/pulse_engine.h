@@ -160,8 +160,10 @@ class PulseEngine {
  public:
   /// @param lines, clock outlive the engine. STEP lines are at their inactive level, DIR lines at
   ///   the inactive one too.
+  /// @param emergency_stop an input that, where it becomes active or can't be read, does what
+  ///   emergencyStop() does. It is read here for the first time.
   PulseEngine(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels,
-              Nanoseconds max_lateness);
+              Nanoseconds max_lateness, std::optional<Signal> emergency_stop = {});
 
   static constexpr double kClosest = 0.75;
 
@@ -178,6 +180,9 @@ class PulseEngine {
   void emergencyStop();
   void clearEmergencyStop();
   bool emergencyStopped() const { return emergency_.load(std::memory_order_acquire); }
+
+  /// Times that the emergency-stop input stopped all channels.
+  std::uint64_t inputStops() const { return input_stops_.load(std::memory_order_acquire); }
 
   ChannelState channel(int index) const;
   EngineState state() const { return figures_.load(); }
@@ -252,6 +257,7 @@ class PulseEngine {
 
   void stopAll(Nanoseconds now);
   void readInputs(Nanoseconds now);
+  void readEmergencyStop();
   void readFault(Channel& channel, Nanoseconds now);
   void meetLateness(Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
@@ -274,12 +280,15 @@ class PulseEngine {
   gpio::Lines& lines_;
   Clock& clock_;
   const Nanoseconds max_lateness_;
+  const std::optional<Signal> emergency_input_;
+  bool emergency_input_active_ = false;  // as it read last
   std::vector<Channel> channels_;
   std::vector<gpio::LineWrite> writes_;  // of one pass, with the channels that they are for
   std::vector<Channel*> writers_;
   std::vector<int> errors_;
   Mailbox<Command, 64> mail_;
   std::atomic<bool> emergency_{false};
+  std::atomic<std::uint64_t> input_stops_{0};
   std::atomic<bool> inputs_changed_{false};
   EngineState state_;
   Snapshot<EngineState> figures_;

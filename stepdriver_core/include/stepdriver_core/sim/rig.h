@@ -107,10 +107,10 @@ struct RigFaults {
 /// disabled, asleep, in RESET, all else inactive or low. The first request makes no edge: the line
 /// is taken to have had its level for ever, but a chip that it enables, wakes or lets out of RESET
 /// is so from that time on. A released line keeps its level; a later request is an edge where its
-/// level is another one. Lines that no axis knows are ignored, unknown inputs read low. A line may
-/// go to several pins and axes; switches that share a line read active where any of them does.
-/// Who watches a switch is told when the carriage or a fault changes its line, not of the bounces
-/// after that.
+/// level is another one. Lines that no axis knows are ignored, unknown inputs read low until
+/// setInput(). A line may go to several pins and axes; switches that share a line read active where
+/// any of them does. Who watches a switch is told when the carriage or a fault changes its line,
+/// not of the bounces after that.
 ///
 /// All calls are safe from any thread. Times that fall back are taken as the latest one so far.
 class Rig : public gpio::Board {
@@ -134,6 +134,9 @@ class Rig : public gpio::Board {
   /// another line may count.
   void failWrites(const std::string& line, std::int64_t writes, int error);
   void clearWriteFault(const std::string& line);
+
+  /// Gives an input that no axis has a level, as a switch beside the axes does: the emergency stop.
+  void setInput(const std::string& line, bool level, std::int64_t time_ns);
 
   /// Puts the carriage somewhere else, as a hand would: no step is counted, and the rotor turns
   /// with it. Against current it snaps to the nearest place with the translator's phase, up to two

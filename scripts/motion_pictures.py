@@ -1,0 +1,164 @@
+#!/usr/bin/python3
+"""Draws the pictures of docs/motion.md from recorded traces; motion_pictures.sh calls it.
+
+Position, speed and acceleration are taken from the times of the STEP edges alone. At each edge the
+motion is on a half-step line; the speed between two edges is the way from line to line over the
+time, and the acceleration the change from one speed to the next.
+"""
+
+import csv
+import pathlib
+import sys
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
+
+# The same trace makes the same file.
+matplotlib.rcParams.update({
+    "svg.hashsalt": "stepdriver",
+    "svg.fonttype": "none",
+    "font.size": 8,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#dddddd",
+    "lines.linewidth": 1.2,
+    "path.simplify_threshold": 0.3,
+})
+COLOURS = ["#1f6fb4", "#d9661f", "#2b8a3e"]
+REST = 0.1  # [s] without a step: it stands
+UNITS = {"position": "steps", "speed": "steps/s", "acceleration": "steps/s$^2$"}
+
+
+class Trace:
+    def __init__(self, folder, name):
+        self.marks = []
+        self.steps = {}  # of each axis: times [s] and counts
+        with open(folder / (name + ".csv"), newline="") as file:
+            for kind, axis, time_ns, what in csv.reader(file):
+                time = int(time_ns) * 1e-9
+                if kind == "mark":
+                    self.marks.append((time, what))
+                else:
+                    times, counts = self.steps.setdefault(axis, ([], []))
+                    times.append(time)
+                    counts.append(int(what))
+
+    def position(self, axis):
+        times, counts = self.steps[axis]
+        return times, [(before + count) / 2 for before, count in zip([0] + counts, counts)]
+
+    def speed(self, axis):
+        times, lines = self.position(axis)
+        at, speeds = [], []
+        for i in range(1, len(times)):
+            gap = times[i] - times[i - 1]
+            if gap > REST:
+                at += [times[i - 1] + REST / 4, times[i] - REST / 4]
+                speeds += [0.0, 0.0]
+            else:
+                at.append((times[i] + times[i - 1]) / 2)
+                speeds.append((lines[i] - lines[i - 1]) / gap)
+        return at, speeds
+
+    def acceleration(self, axis):
+        times, speeds = self.speed(axis)
+        at = [(a + b) / 2 for a, b in zip(times, times[1:])]
+        changes = zip(times, times[1:], speeds, speeds[1:])
+        return at, [(w - v) / (b - a) for a, b, v, w in changes]
+
+
+def draw(folder, picture, curves, what, width=6.4):
+    """curves: (trace, axis, label) of each; what: a panel for each of these quantities."""
+    figure, panels = plt.subplots(len(what), 1, sharex=True, squeeze=False,
+                                  figsize=(width, 0.5 + 1.35 * len(what)))
+    for quantity, panel in zip(what, panels[:, 0]):
+        for colour, (trace, axis, label) in zip(COLOURS, curves):
+            times, values = getattr(trace, quantity)(axis)
+            panel.plot(times, values, color=colour, label=label)
+        for time, words in curves[0][0].marks:
+            panel.axvline(time, color="#888888", linewidth=0.8, linestyle=":")
+            if panel is panels[0, 0]:
+                panel.annotate(words, (time, 1.0), xycoords=("data", "axes fraction"),
+                               xytext=(2, 1), textcoords="offset points", color="#555555")
+        if quantity == "speed" and min(panel.dataLim.intervaly) >= 0.0:
+            panel.set_ylim(bottom=0.0)
+        panel.set_ylabel(f"{quantity}\n[{UNITS[quantity]}]")
+    if len(curves) > 1:
+        panels[0, 0].legend(loc="best", frameon=False)
+    panels[-1, 0].set_xlabel("time [s]")
+    save(figure, folder, picture)
+
+
+def draw_half_steps(folder, trace):
+    """The edges, and the curve that they come from: 8 steps at 2000 steps/s^2."""
+    figure, panel = plt.subplots(figsize=(6.4, 2.4))
+    times, counts = trace.steps["x"]
+    begin = times[0] - (2 * 0.5 / 2000) ** 0.5
+    half = (8 / 2000) ** 0.5
+    ticks = [2 * half * i / 400 for i in range(401)]
+    curve = [1000 * t * t if t < half else 8 - 1000 * (2 * half - t) ** 2 for t in ticks]
+    for count in counts:
+        panel.axhline(count - 0.5, color="#bbbbbb", linewidth=0.6, linestyle=":")
+    panel.plot(ticks, curve, color=COLOURS[1], label="the curve")
+    at = [0.0] + [time - begin for time in times] + [2 * half]
+    panel.step(at, [0] + counts + [8], where="post", color=COLOURS[0], label="count of the edges")
+    panel.plot(at[1:-1], [count - 0.5 for count in counts], ".", color=COLOURS[0], markersize=4)
+    panel.grid(False)
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("position\n[steps]")
+    panel.legend(loc="upper left", frameon=False)
+    save(figure, folder, "half_steps")
+
+
+def draw_path(folder, trace):
+    """One axis over the other, and the two points that the trajectory goes through."""
+    events = sorted((time, axis, count) for axis in "xy" for time, count in zip(*trace.steps[axis]))
+    place = {"x": 0, "y": 0}
+    xs, ys = [0], [0]
+    for _, axis, count in events:
+        place[axis] = count
+        xs.append(place["x"])
+        ys.append(place["y"])
+    figure, panel = plt.subplots(figsize=(6.4, 2.2))
+    panel.plot(xs, ys, color=COLOURS[0])
+    panel.plot([400, 800], [300, 0], "o", color=COLOURS[1], markersize=4)
+    panel.set_xlabel("x [steps]")
+    panel.set_ylabel("y [steps]")
+    save(figure, folder, "trajectory_path")
+
+
+def save(figure, folder, picture):
+    figure.tight_layout()
+    figure.savefig(folder / (picture + ".svg"), metadata={"Date": None, "Creator": None})
+    plt.close(figure)
+
+
+def main(traces, pictures):
+    def trace(name):
+        return Trace(traces, name)
+
+    def one(name, axis="x", label=""):
+        return [(trace(name), axis, label)]
+
+    draw_half_steps(pictures, trace("half_steps"))
+    draw(pictures, "trapezoid", one("trapezoid", label="1000 steps") +
+         one("triangle", label="200 steps"), ["position", "speed"])
+    draw(pictures, "s_curve", one("s_curve"), ["position", "speed", "acceleration"])
+    draw(pictures, "speed_override", one("speed_override"), ["position", "speed"])
+    draw(pictures, "new_target", one("new_target"), ["position", "speed"])
+    draw(pictures, "stop", one("stop"), ["position", "speed"])
+    draw(pictures, "jog", one("jog"), ["position", "speed", "acceleration"])
+    line = trace("line")
+    draw(pictures, "line", [(line, "x", "x"), (line, "y", "y")], ["position", "speed"])
+    draw(pictures, "splines", one("cubics", label="cubics") + one("quintics", label="quintics"),
+         ["position", "speed", "acceleration"])
+    held = trace("trajectory_hold")
+    draw(pictures, "trajectory_hold", [(held, "x", "x"), (held, "y", "y")], ["position", "speed"])
+    draw_path(pictures, held)
+
+
+if __name__ == "__main__":
+    main(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]))

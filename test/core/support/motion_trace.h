@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/bench.h"
+
+namespace stepdriver::test {
+
+/// What the STEP and DIR lines of a bench did, as pictures of a motion are drawn from it.
+class MotionTrace {
+ public:
+  struct Step {
+    double time = 0.0;       ///< [s] of the edge, after the trace's making
+    std::int64_t count = 0;  ///< of the axis after it
+  };
+
+  /// @param bench outlives the trace; its axes stand at 0.
+  explicit MotionTrace(Bench& bench) : bench_(bench), begin_ns_(bench.clock.now()) {}
+
+  double now() const { return seconds(bench_.clock.now()); }
+
+  /// Words at this time, for the picture.
+  void mark(const std::string& words) { marks_.emplace_back(now(), words); }
+
+  std::vector<Step> steps(const std::string& axis) const {
+    const sim::MemoryTrace& trace = *bench_.trace;
+    const int step = trace.pin(axis, "step");
+    const int dir = trace.pin(axis, "dir");
+    bool forward = trace.levels()[static_cast<std::size_t>(dir)];
+    std::vector<Step> steps;
+    std::int64_t count = 0;
+    for (const sim::MemoryTrace::Edge& edge : trace.edges()) {
+      if (edge.pin == dir) forward = edge.level;
+      if (edge.pin != step || !edge.level) continue;
+      count += forward ? 1 : -1;
+      steps.push_back({seconds(edge.time_ns), count});
+    }
+    return steps;
+  }
+
+  /// [steps/s] Between the two steps around a time.
+  double speedAt(const std::string& axis, double time) const {
+    const std::vector<Step> all = steps(axis);
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      if (all[i].time < time) continue;
+      return static_cast<double>(all[i].count - all[i - 1].count) / (all[i].time - all[i - 1].time);
+    }
+    return 0.0;
+  }
+
+  /// Writes it to NAME.csv where the environment names a folder in STEPDRIVER_TRACES:
+  /// `step,AXIS,TIME_NS,COUNT` for each step and `mark,,TIME_NS,WORDS`.
+  void keep(const std::string& name) const {
+    const char* const folder = std::getenv("STEPDRIVER_TRACES");
+    if (folder == nullptr) return;
+    std::ofstream file(std::string(folder) + "/" + name + ".csv");
+    for (const auto& [time, words] : marks_) file << "mark,," << ns(time) << ',' << words << '\n';
+    for (const std::string& axis : bench_.rig.axes()) {
+      for (const Step& step : steps(axis)) {
+        file << "step," << axis << ',' << ns(step.time) << ',' << step.count << '\n';
+      }
+    }
+  }
+
+ private:
+  double seconds(std::int64_t clock_ns) const {
+    return static_cast<double>(clock_ns - begin_ns_) * 1e-9;
+  }
+  static std::int64_t ns(double seconds) { return std::llround(seconds * 1e9); }
+
+  Bench& bench_;
+  std::int64_t begin_ns_;
+  std::vector<std::pair<double, std::string>> marks_;
+};
+
+}  // namespace stepdriver::test
