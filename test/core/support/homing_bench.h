@@ -1,0 +1,61 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/axis.h"
+#include "support/bench.h"
+
+namespace stepdriver::test {
+
+inline constexpr double kStep = 1.0 / 80'000.0;  // [m]
+
+/// On the rig with its switches at -100 mm and 100 mm. Towards min at 50 mm/s, latched at 5 mm/s, 2
+/// mm off the trigger point, which is at -0.1 m.
+inline axis::AxisConfig homingAxis(const std::string& name = "x") {
+  axis::AxisConfig config = linearAxis(name);
+  axis::HomingConfig homing;
+  homing.seek_speed = 0.05;
+  homing.latch_speed = 0.005;
+  homing.pull_off = 0.002;
+  homing.offset = -0.1;
+  homing.max_travel = 0.3;
+  config.homing = homing;
+  return config;
+}
+
+class HomingTest : public testing::Test {
+ protected:
+  void build(const axis::AxisConfig& config,
+             const std::function<void(sim::RigAxisSpec&)>& change = {}) {
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
+    if (change) change(specs[0]);
+    bench = std::make_unique<Bench>(std::vector<axis::AxisConfig>{config}, specs);
+  }
+  void SetUp() override { build(homingAxis()); }
+
+  axis::Axis& x() { return bench->axis(); }
+  double carriage() { return bench->report().carriage / 1000.0; }
+
+  /// Homed, with the trigger point at the offset, whose place on the rig is `place` [m].
+  void expectHomed(const axis::HomingResult& result, double place = -0.1) {
+    EXPECT_EQ(result.end, axis::HomingEnd::kHomed) << result.message;
+    const axis::AxisState state = x().state();
+    EXPECT_TRUE(state.homed);
+    EXPECT_TRUE(state.position_valid);
+    EXPECT_FALSE(state.moving);
+    EXPECT_TRUE(state.enabled);
+    EXPECT_EQ(state.homing, axis::HomingPhase::kNone);
+    EXPECT_DOUBLE_EQ(result.position, state.position);
+    const double offset = x().config().homing->offset;
+    EXPECT_NEAR(state.position - offset, carriage() - place, kStep);
+  }
+
+  std::unique_ptr<Bench> bench;
+};
+
+}  // namespace stepdriver::test
