@@ -21,8 +21,8 @@ struct AxisState {
   int microsteps = 1;
   double position = 0.0;  ///< [unit] from the count of the edges that went out
   /// [unit] Where the plan of the motion under way has it; the position at rest. As the count and
-  /// the clock can't be read at one instant, it is the nearest to the position of what the plan went
-  /// through meanwhile.
+  /// the clock can't be read at one instant, it is the nearest to the position of what the plan
+  /// went through meanwhile.
   double planned = 0.0;
   double velocity = 0.0;  ///< [unit/s] of the plan
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
