@@ -23,6 +23,7 @@ struct NodeConfig {
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
   std::optional<axis::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
+  std::string state_file;                           ///< the same
 };
 
 /// Reads the node's private parameters.
@@ -37,6 +38,7 @@ struct NodeConfig {
 ///   max_lateness_ms: 5.0
 /// emergency_stop:                # optional; see axis::readInputSwitch()
 ///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
+/// state_file: ""                 # absolute path of a file that keeps the positions; empty: none
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode

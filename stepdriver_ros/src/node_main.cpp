@@ -85,6 +85,14 @@ void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
   }
 }
 
+void warnOfPositions(const machine::Machine& machine) {
+  for (const auto& axis : machine.axes()) {
+    const std::string note = axis->state().position_note;
+    if (note.empty()) continue;
+    ROS_WARN("%s: its position is unverified: %s", axis->config().name.c_str(), note.c_str());
+  }
+}
+
 /// The node's life, once there is a master.
 ///
 /// @return the exit code.
@@ -96,11 +104,13 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   options.measure = true;
   options.enforce = config.enforce_realtime;
   options.emergency_stop = config.emergency_stop;
+  options.state_file = config.state_file;
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   if (machine.emergencyStopped()) {
     ROS_WARN("The emergency stop input is active: no axis is enabled, none moves until recover");
   }
+  warnOfPositions(machine);
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
   CallQueues queues(machine.axes().size());
@@ -129,7 +139,12 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
            machine.figures().realtime.c_str());
 
   std::string who;
-  while (who.empty()) who = end_requests.waitFor(kPoll);
+  while (who.empty()) {
+    who = end_requests.waitFor(kPoll);
+    if (const std::string error = machine.stateFileError(); !error.empty()) {
+      ROS_ERROR_THROTTLE(60.0, "%s", error.c_str());
+    }
+  }
   ROS_INFO("Ending on %s", who.c_str());
   return shutDown(machine, queues, trajectory_action, publisher);
 }

@@ -27,7 +27,8 @@ bool differ(const AxisStates& one, const AxisStates& other) {
   return one.enabled != other.enabled || one.asleep != other.asleep || one.idle != other.idle ||
          one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
          one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
-         one.target != other.target || one.fault != other.fault;
+         one.target != other.target || one.fault != other.fault ||
+         one.position_note != other.position_note;
 }
 
 AxisStates read(const machine::Machine& machine) {
@@ -48,6 +49,7 @@ AxisStates read(const machine::Machine& machine) {
     states.velocity.push_back(state.velocity);
     states.target.push_back(state.target);
     states.fault.push_back(state.fault);
+    states.position_note.push_back(state.position_note);
   }
   return states;
 }

@@ -200,6 +200,7 @@ AxisState Axis::state() const {
   state.planned = state.position;
   state.target = state.position;
   state.fault = axis.fault;
+  if (!axis.position_valid) state.position_note = axis.position_note;
   if (axis.held && axis.held->goal.target) {
     state.target = axis.positionOf(static_cast<double>(*axis.held->goal.target));
   }

@@ -56,10 +56,13 @@ void Axis::Impl::noteUnpowered() {
 
 // The translator has gone Home: with another phase there the motor turns when it has current again.
 void Axis::Impl::noteHome() {
-  const std::int64_t count = harvest().count;
+  if (!isAtHome()) position_valid = false;
+  home_count = harvest().count;
+}
+
+bool Axis::Impl::isAtHome() {
   const std::int64_t cycle = static_cast<std::int64_t>(chip::kFullStepsPerCycle) * microsteps;
-  if ((count - home_count) % cycle != 0) position_valid = false;
-  home_count = count;
+  return (harvest().count - home_count) % cycle == 0;
 }
 
 }  // namespace stepdriver::axis

@@ -97,6 +97,10 @@ class Axis::Impl {
   void wake();
   void writeEnable(bool on);
   void noteUnpowered();
+  /// The translator is where it begins after a reset.
+  bool isAtHome();
+  /// Why a position that was kept can't be trusted; empty: it can.
+  std::string whyUnverified(const AxisMemory& kept, bool clean) const;
   void noteHome();
 
   // Microstep modes.
@@ -151,6 +155,7 @@ class Axis::Impl {
   pulse::Nanoseconds rest_since = 0;  // clock time of the last thing that it did
   double speed_override = 1.0;
   std::string fault;
+  std::string position_note;
   std::string closed;
   MoveLog log;
   std::optional<Held> held;

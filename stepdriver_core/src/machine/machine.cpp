@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "home_in_order.h"
+#include "state_keeper.h"
 #include "stepdriver_core/axis/coordination.h"
 #include "stepdriver_core/axis/edge_log.h"
 #include "stepdriver_core/error.h"
@@ -41,6 +42,7 @@ class Machine::Impl {
  public:
   Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options) {
+    if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options.emergency_stop);
     emergency_stop_ = wiring.emergency_stop;
     lines_ = backend.request(wiring.outputs, wiring.inputs);
@@ -59,6 +61,7 @@ class Machine::Impl {
                                                    planning_));
     }
     for (const auto& axis : axes_) axis->bringUp();
+    if (keeper_) keeper_->start(axes_, options.threaded);
     if (options.threaded && (!wiring.inputs.empty() || anyGoesIdle(configs)))
       watcher_ = std::thread([this] { watchInputs(); });
   }
@@ -152,7 +155,15 @@ class Machine::Impl {
   void shutdown() {
     if (shut_.exchange(true)) return;
     for (const auto& axis : axes_) axis->close("the machine was shut down");
+    // With its current a motor may lose the trust in its position. That is known of it, and what
+    // the next start makes of it is decided there.
+    driver_->waitFor([this] {
+      return std::none_of(axes_.begin(), axes_.end(),
+                          [](const auto& axis) { return axis->state().moving; });
+    });
+    if (keeper_) keeper_->close();
     forAll([](axis::Axis& axis) { axis.shutDown(); });
+    if (keeper_ && !keeper_->error().empty()) throw Error(keeper_->error());
   }
 
   // An edge is only a wake-up: the engine reads the levels. One that was lost, or a chip that was
@@ -212,6 +223,7 @@ class Machine::Impl {
   std::unique_ptr<pulse::PulseDriver> driver_;
   std::mutex planning_;  // of all axes
   std::vector<std::unique_ptr<axis::Axis>> axes_;
+  std::unique_ptr<StateKeeper> keeper_;
   std::atomic<bool> shut_{false};
   std::atomic<bool> watching_ended_{false};
   std::thread watcher_;
@@ -307,6 +319,10 @@ EngineFigures Machine::figures() const {
   return figures;
 }
 
+std::string Machine::stateFileError() const {
+  return impl_->keeper_ ? impl_->keeper_->error() : "";
+}
+
 void Machine::advance(double seconds) {
   impl_->engine_->inputsChanged();  // nobody watches them
   pulse::Clock& clock = impl_->driver_->clock();
@@ -317,6 +333,7 @@ void Machine::advance(double seconds) {
     if (clock.now() >= end) break;
   }
   impl_->supervise();
+  if (impl_->keeper_) impl_->keeper_->keep();
 }
 
 }  // namespace stepdriver::machine

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -146,6 +147,19 @@ class Axis {
   EndstopState endstops() const;
 
   // What follows is the machine's side.
+
+  /// What is to be kept over a restart; none while it moves.
+  std::optional<AxisMemory> memory();
+
+  /// Takes the position of an earlier run. It is trusted only where it was, where that run was shut
+  /// down at rest, where the mechanics hold it without current, and where a reset of the chip
+  /// leaves the motor where it is; else AxisState::position_note says why not.
+  ///
+  /// @param clean that run was shut down. @pre nothing has moved yet.
+  void restore(const AxisMemory& kept, bool clean);
+
+  /// Says why there is no position of an earlier run.
+  void notePosition(const std::string& why);
 
   /// Wakes the chip, ends its reset, and enables it where the configuration says so and the
   /// emergency-stop input isn't active.

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/homing.h"
 
 namespace stepdriver::axis {
@@ -28,6 +29,26 @@ struct AxisState {
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
   double target = 0.0;
   std::string fault;  ///< in words; empty: none
+  /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
+  /// none.
+  std::string position_note;
+};
+
+/// What of an axis outlasts the program; see machine::StateFile.
+struct AxisMemory {
+  Kind kind = Kind::kLinear;
+  double steps_per_unit = 0.0;  ///< [steps/unit] as configured
+  double position = 0.0;        ///< [unit] at rest
+  double slack = 0.0;           ///< [unit] what is taken up of the backlash
+  bool valid = false;           ///< the position could be trusted
+  bool homed = false;
+  bool at_home = false;  ///< the chip's translator was where it begins after a reset
+
+  bool operator==(const AxisMemory& other) const {
+    return kind == other.kind && steps_per_unit == other.steps_per_unit &&
+           position == other.position && slack == other.slack && valid == other.valid &&
+           homed == other.homed && at_home == other.at_home;
+  }
 };
 
 /// Levels of the switches as their lines read now, true where active. None where there is none.

@@ -29,6 +29,9 @@ struct MachineOptions {
   /// An input that does what Machine::emergencyStop() does, where it becomes active or can't be
   /// read.
   std::optional<axis::InputSwitch> emergency_stop{};
+  /// Absolute path of the file that keeps positions over a restart; empty: none. See
+  /// machine::StateFile.
+  std::string state_file{};
 };
 
 /// What the pulse engine has done since the start.
@@ -126,6 +129,9 @@ class Machine {
   void shutdown();
 
   EngineFigures figures() const;
+
+  /// Why the state file couldn't be written the last time; empty: it could, or there is none.
+  std::string stateFileError() const;
 
   /// As measured at the start; none where that wasn't asked for, or the clock is virtual.
   const std::optional<pulse::Capability>& capability() const;
