@@ -1,0 +1,97 @@
+#include <gtest/gtest.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/SetPosition.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/says.h"
+
+// Positions that outlast the node.
+
+namespace stepdriver::node_test {
+namespace {
+
+class StateFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    char name[] = "/tmp/stepdriver_node_state_XXXXXX";
+    ASSERT_NE(mkdtemp(name), nullptr);
+    directory_ = name;
+    node_.set("state_file", file());
+    node_.set("axes/x/holds_position_unpowered", true);
+  }
+  void TearDown() override {
+    for (const char* end : {"", ".lock"}) std::remove((file() + end).c_str());
+    rmdir(directory_.c_str());
+  }
+
+  std::string file() const { return directory_ + "/state"; }
+  void end(int signal) {
+    node_.process().signal(signal);
+    ASSERT_TRUE(node_.process().waitForExit(kBound));
+  }
+  void standAt(double position) {
+    SetPosition::Request here;
+    here.position = 0.0;
+    EXPECT_TRUE(node_.call<SetPosition>("x/set_position", here).success);
+    EXPECT_TRUE(node_.moveTo(position, true).success);
+  }
+  // At the start, before anything has moved.
+  AxisStates first() {
+    const Recorder<AxisStates> states(node_.full("axis_states"));
+    EXPECT_TRUE(states.waitFor([](const AxisStates&) { return true; }));
+    return states.messages().at(0);
+  }
+
+  NodeUnderTest node_;
+  std::string directory_;
+};
+
+TEST_F(StateFile, BringsThePositionBackAfterAShutdown) {
+  node_.start();
+  expectSays(first().position_note.at(0), "wasn't there yet");
+  standAt(0.008);
+  end(SIGTERM);
+  node_.start();
+  const AxisStates states = first();
+  EXPECT_DOUBLE_EQ(states.position.at(0), 0.008);
+  EXPECT_TRUE(states.position_valid.at(0));
+  EXPECT_EQ(states.position_note.at(0), "");
+  EXPECT_TRUE(node_.moveTo(0.0, true).success);
+  EXPECT_EQ(node_.pulses(), -640);
+}
+
+TEST_F(StateFile, SaysThatThePositionOfAKilledNodeIsUnverified) {
+  node_.start();
+  standAt(0.008);
+  const Recorder<AxisStates> states(node_.full("axis_states"));
+  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return !s.moving.at(0); }));
+  end(SIGKILL);
+  node_.start();
+  const AxisStates after = first();
+  EXPECT_FALSE(after.position_valid.at(0));
+  expectSays(after.position_note.at(0), "wasn't shut down");
+  end(SIGTERM);
+  expectSays(node_.process().output(), "x: its position is unverified: the node that kept");
+}
+
+TEST_F(StateFile, StopsTheStartWhereItCannotBe) {
+  node_.set("state_file", std::string("positions"));
+  NodeProcess& process = node_.launch();
+  EXPECT_EQ(process.waitForExit(kBound).value_or(-1), 1);
+  expectSays(process.output(),
+             "state_file: is \"positions\", but must be an absolute path, or empty for none");
+  node_.set("state_file", directory_ + "/nowhere/state");
+  NodeProcess& other = node_.launch();
+  EXPECT_EQ(other.waitForExit(kBound).value_or(-1), 1);
+  expectSays(other.output(), "can't be written: No such file or directory");
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
