@@ -173,6 +173,7 @@ TEST_F(StateFileTest, KeepsWhatIsTakenUpOfABacklash) {
 TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
   const std::string head = "stepdriver state 1\nclean\n";
   const std::string line = "x linear 80000 0.008 0 1 0 1\n";
+  const std::string twice = head + line + line;
   for (const auto& [content, where] : std::vector<std::pair<std::string, std::string>>{
            {"", "line 1"},
            {"stepdriver state 2\nclean\n", "line 1"},
@@ -182,13 +183,13 @@ TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
            {head + "x linear 80000 0.008 0 1 0 1 7\n", "line 3"},
            {head + "x linear -1 0.008 0 1 0 1\n", "line 3"},
            {head + "x crooked 80000 0.008 0 1 0 1\n", "line 3"},
-           {head + line + line, "line 4"}}) {
+           {twice, "line 4"}}) {
     SCOPED_TRACE(content);
     bench_.reset();
     std::ofstream(file_) << content;
     start();
-    EXPECT_NE(state().position_note.find("is broken in " + where), std::string::npos)
-        << state().position_note;
+    const std::string place = "is broken in " + where;
+    EXPECT_NE(state().position_note.find(place), std::string::npos) << state().position_note;
     EXPECT_FALSE(state().position_valid);
     EXPECT_EQ(state().position, 0.0);
   }
