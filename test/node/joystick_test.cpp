@@ -36,7 +36,7 @@ class JoystickTest : public testing::Test {
     set("axes/x/max_speed_mm_s", 50.0);
     set("axes/x/dead_band", 0.2);
   }
-  ~JoystickTest() override {
+  void TearDown() override {
     if (!joystick) return;
     joystick->signal(SIGTERM);
     EXPECT_EQ(joystick->waitForExit(kBound).value_or(-1), 0);
@@ -222,19 +222,19 @@ TEST_F(JoystickTest, JogsOtherAxesWhileAServiceWaits) {
   ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() == 1 && sent.connected(); }));
   sensor_msgs::Joy both;
   both.axes = {1.0F, 1.0F};
-  const auto holdBothUntil = [&](const std::function<bool()>& happened) {
+  const auto hold_both_until = [&](const std::function<bool()>& happened) {
     return waitUntil([&] {
       publisher.publish(both);
       return happened();
     });
   };
-  ASSERT_TRUE(holdBothUntil([&] { return asked.load(); }));
+  ASSERT_TRUE(hold_both_until([&] { return asked.load(); }));
   const std::size_t before = sent.count();
-  EXPECT_TRUE(holdBothUntil([&] { return sent.count() > before + 10; }));
+  EXPECT_TRUE(hold_both_until([&] { return sent.count() > before + 10; }));
   EXPECT_FALSE(answered) << "they came while the service was waiting";
   EXPECT_EQ(sent.messages().back().name, std::vector<std::string>{"x"});
   free = true;
-  EXPECT_TRUE(holdBothUntil([&] { return sent.messages().back().name.size() == 2; }));
+  EXPECT_TRUE(hold_both_until([&] { return sent.messages().back().name.size() == 2; }));
 }
 
 TEST_F(JoystickTest, SaysWhatKeepsAnAxisFromBeingEnabled) {
