@@ -10,7 +10,7 @@ HardwareNode::HardwareNode() {
   setAxis("x", "a4988", "board", kX);
   setAxis("y", "a4988", "board", kY);
   setAxis("z", "drv8825", "expander", kZ);
-  set("axes/y/max_speed_mm_s", 19.0);  // other than x: now and then both step at one instant
+  set("axes/y/max_speed_mm_s", 1.9);  // other than x: now and then both step at one instant
   set("axes/y/endstops/max/pin", "expander:" + std::to_string(kY.max));
   set("axes/z/pins/fault", "expander:" + std::to_string(kZFault));
   set("axes/z/fault_bias", "pull_up");
@@ -31,7 +31,7 @@ void HardwareNode::setAxis(const std::string& axis, const std::string& driver,
   set(key + "endstops/max/active_level", "high");
   set(key + "microsteps", 16);
   set(key + "steps_per_mm", 80.0);
-  set(key + "max_speed_mm_s", 20.0);
+  set(key + "max_speed_mm_s", 2.0);
   set(key + "acceleration_mm_s2", 500.0);
   set(key + "enable_on_start", true);
 }

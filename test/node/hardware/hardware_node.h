@@ -9,8 +9,9 @@
 namespace stepdriver::node_test {
 
 /// A NodeUnderTest on GPIO lines. Its axes x and y, A4988s, are on the chip "board", z, a DRV8825
-/// with its fault line, on the chip "expander", and so is the switch of y: 80 steps/mm, at most 20
-/// mm/s (y 19) and 500 mm/s^2, enabled on start.
+/// with its fault line, on the chip "expander", and so is the switch of y: 80 steps/mm, at most 2
+/// mm/s (y 1.9) and 500 mm/s^2, enabled on start: a virtual machine of one CPU holds that with time
+/// left for the node.
 class HardwareNode : public NodeUnderTest {
  public:
   HardwareNode();

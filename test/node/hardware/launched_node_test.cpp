@@ -32,6 +32,8 @@ namespace {
 
 const std::string kNode = "/pi/stepdriver";
 constexpr double kStepsPerMetre = 80000.0;
+// [m/s] A virtual machine of one CPU holds its 160 steps/s with time left for the node.
+constexpr double kVelocity = 0.002;
 
 // The lines that config/a4988.yaml names, by their offsets.
 constexpr unsigned kStep = 17;
@@ -66,7 +68,7 @@ class LaunchedNode : public NeedsGpioSim {
   static MoveTo::Response moveTo(double position) {
     MoveTo::Request request;
     request.position = position;
-    request.velocity = 0.02;
+    request.velocity = kVelocity;
     request.wait = true;
     return callWhenThere<MoveTo>(kNode + "/x/move_to", request);
   }
@@ -116,7 +118,7 @@ TEST_F(LaunchedNode, MovesByAsManyPulsesAsItSays) {
   expectPulses(0.01);
   MoveRounds::Request back;
   back.rounds = -0.1;
-  back.velocity = 0.02;
+  back.velocity = kVelocity;
   back.wait = true;
   const auto answer = callWhenThere<MoveRounds>(kNode + "/x/move_rounds", back);
   EXPECT_TRUE(answer.success) << answer.message;

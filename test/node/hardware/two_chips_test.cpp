@@ -63,7 +63,7 @@ class TwoChips : public NeedsGpioSim {
   /// Waits until this axis is well under way.
   static void awaitMotion(const Recorder<AxisStates>& states, std::size_t axis) {
     ASSERT_TRUE(states.waitForLatest([axis](const AxisStates& s) {
-      return s.moving.at(axis) != 0 && s.position.at(axis) > 0.004;
+      return s.moving.at(axis) != 0 && s.position.at(axis) > 0.001;
     })) << "it doesn't move";
   }
 
@@ -95,8 +95,8 @@ TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
   const Recorder<AxisStates> states(node->full("axis_states"));
   auto x = moving("x", 1.0);
   awaitMotion(states, kX);
-  auto y = moving("y", 0.019);
-  auto z = moving("z", -0.01);
+  auto y = moving("y", 0.0095);
+  auto z = moving("z", -0.005);
   EXPECT_TRUE(y.get().success);
   EXPECT_TRUE(z.get().success);
   const auto code = end();
@@ -109,8 +109,8 @@ TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
   const StepAndDir x_lines = stepAndDir(*board, HardwareNode::kX);
   const StepAndDir y_lines = stepAndDir(*board, HardwareNode::kY);
   EXPECT_EQ(pulsesIn(trace, x_lines), stepsOf(stopped.position));
-  EXPECT_EQ(pulsesIn(trace, y_lines), stepsOf(0.019));
-  EXPECT_EQ(pulsesIn(trace, stepAndDir(*expander, HardwareNode::kZ)), stepsOf(-0.01));
+  EXPECT_EQ(pulsesIn(trace, y_lines), stepsOf(0.0095));
+  EXPECT_EQ(pulsesIn(trace, stepAndDir(*expander, HardwareNode::kZ)), stepsOf(-0.005));
   expectSafe(trace, *board, HardwareNode::kX);
   expectSafe(trace, *board, HardwareNode::kY);
   expectSafe(trace, *expander, HardwareNode::kZ);
@@ -123,7 +123,7 @@ TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
 TEST_F(TwoChips, StopAnAxisWhoseDriverReportsAFaultAndResetItToRecover) {
   node->start();
   const Recorder<AxisStates> states(node->full("axis_states"));
-  auto x = moving("x", 0.05);
+  auto x = moving("x", 0.01);
   auto z = moving("z", 0.2);
   awaitMotion(states, kZ);
   expander->drive(HardwareNode::kZFault, false);
@@ -154,7 +154,7 @@ TEST_F(TwoChips, StopAnAxisWhoseDriverReportsAFaultAndResetItToRecover) {
   ended = true;
   chip.join();
   EXPECT_TRUE(recovered.success) << recovered.message;
-  const auto on = node->move("z", stopped.position + 0.005, true);
+  const auto on = node->move("z", stopped.position + 0.001, true);
   EXPECT_TRUE(on.success) << on.message;
 }
 
@@ -162,7 +162,7 @@ TEST_F(TwoChips, LoseOneInMidMoveAndGoOnWithTheOther) {
   node->start();
   const Recorder<AxisStates> states(node->full("axis_states"));
   const Recorder<Endstops> endstops(node->full("endstops"));
-  auto x = moving("x", 0.06);
+  auto x = moving("x", 0.02);
   auto y = moving("y", 0.2);
   auto z = moving("z", 0.2);
   awaitMotion(states, kZ);
@@ -184,9 +184,9 @@ TEST_F(TwoChips, LoseOneInMidMoveAndGoOnWithTheOther) {
   const auto reached = x.get();
   EXPECT_TRUE(reached.success) << reached.message;
 
-  const auto back = node->move("x", 0.05, true);
+  const auto back = node->move("x", 0.015, true);
   EXPECT_TRUE(back.success) << back.message;
-  EXPECT_EQ(pulsesIn(record->read(), stepAndDir(*board, HardwareNode::kX)), stepsOf(0.05));
+  EXPECT_EQ(pulsesIn(record->read(), stepAndDir(*board, HardwareNode::kX)), stepsOf(0.015));
   board->drive(HardwareNode::kX.max, true);
   EXPECT_TRUE(endstops.waitForLatest([](const Endstops& e) { return e.max.at(kX) != 0; }))
       << "the switches of the other chip are still published";
