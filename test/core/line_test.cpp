@@ -26,13 +26,8 @@ using test::refusal;
 using test::violationsOf;
 
 axis::AxisConfig axisOf(const std::string& name, double scale, double speed, double acceleration) {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = scale;
-  config.max_speed = speed;
-  config.acceleration = acceleration;
-  config.deceleration = acceleration;
+  axis::AxisConfig config = linearAxis(name, scale, speed, acceleration);
   config.endstop_min.reset();
-  config.endstop_max = axis::Endstop{name + ".max", false};
   return config;
 }
 

@@ -29,11 +29,7 @@ using test::refusal;
 using test::violationsOf;
 
 axis::AxisConfig axisOf(const std::string& name) {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = 1000.0;
-  config.max_speed = 2.0;
-  config.acceleration = 10.0;
-  config.deceleration = 10.0;
+  axis::AxisConfig config = linearAxis(name, 1000.0, 2.0, 10.0);
   config.endstop_min.reset();
   config.min_position = -5.0;
   return config;
