@@ -181,6 +181,37 @@ TEST_F(Line, IsHeldAndGoesOnWithoutLeavingIt) {
   expectClean();
 }
 
+TEST_F(Line, SaysOnceWhyItCannotGoOn) {
+  const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.6);
+  machine().hold();
+  awaitRest();
+  sim::RigFaults faults;
+  faults.max_stuck = true;
+  bench->rig.setFaults("y", faults);
+  try {
+    machine().resume();
+    ADD_FAILURE() << "it goes on into the switch";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "y: the max endstop is active; it moves only towards min");
+  }
+  bench->rig.setFaults("y", {});
+  machine().resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  expectClean();
+}
+
+TEST_F(Line, IsHeldAndResumedByAnyOfItsAxes) {
+  const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.6);
+  bench->axis("y").hold();
+  awaitRest();
+  EXPECT_TRUE(bench->axis("x").state().held);
+  bench->axis("y").resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  expectClean();
+}
+
 TEST_F(Line, ResumesWhileItStillSlowsDown) {
   const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
   advance(0.7);

@@ -5,6 +5,7 @@
 
 #include "axis_impl.h"
 #include "course.h"
+#include "homing.h"
 
 namespace stepdriver::axis {
 
@@ -131,7 +132,16 @@ void Axis::Impl::slowDown(const std::string& stopped_by) {
   dropHeld(MoveEnd::kStopped, stopped_by);  // it came to rest before the order came
 }
 
+bool Axis::Impl::leads() {
+  const Motion* current = underWay();
+  const Course* course = held                 ? held->goal.course.get()
+                         : current != nullptr ? current->goal.course.get()
+                                              : nullptr;
+  return course == nullptr || course->axes().front() == this;
+}
+
 void Axis::Impl::hold() {
+  if (homing != nullptr) homing->hold();
   const Motion* current = underWay();
   if (current == nullptr || current->goal.slowsDown()) return;
   if (current->goal.kind == Goal::Kind::kJog) {
@@ -152,7 +162,10 @@ void Axis::Impl::hold() {
 
 void Axis::Impl::resume() {
   harvest();
-  if (!held) return;
+  if (!held) {
+    if (homing != nullptr) homing->goOn();
+    return;
+  }
   const Orders orders = ordersOf(held->goal);
   for (const Order& order : orders) {
     order.axis->refuseUnlessReady();
@@ -160,6 +173,7 @@ void Axis::Impl::resume() {
   }
   carryOut(orders);
   for (const Order& order : orders) order.axis->held.reset();
+  if (homing != nullptr) homing->goOn();
 }
 
 void Axis::Impl::dropHeld(MoveEnd end, const std::string& why) {
@@ -185,8 +199,7 @@ void Axis::Impl::changeOverride(double factor) {
   speed_override = factor;
   const Motion* current = underWay();
   if (current == nullptr || current->goal.slowsDown()) return;
-  const auto& course = current->goal.course;
-  if (course == nullptr || course->axes().front() == this) carryOut(ordersOf(current->goal));
+  if (leads()) carryOut(ordersOf(current->goal));
 }
 
 void Axis::Impl::awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by) {

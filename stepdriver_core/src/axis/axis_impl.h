@@ -76,6 +76,9 @@ class Axis::Impl {
   /// the lock while it does so.
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
   void changeOverride(double factor);
+  /// Whether this is the axis to ask for what it follows or has kept: of a course that is the
+  /// first.
+  bool leads();
   void hold();
   void resume();
   /// Gives up what a hold has kept, of all axes of its course.

@@ -89,7 +89,7 @@ class Axis {
 
   /// Feed hold: decelerates to rest, along the path of axes that move together, and keeps the goal;
   /// who waits for the move goes on waiting. A jog just ends. Until resume() or stop() other
-  /// motions are refused.
+  /// motions are refused. A homing is held too, and its time-out waits meanwhile.
   void hold();
 
   /// Goes on with what is held. @throw Refused as moveTo().
