@@ -137,10 +137,5 @@ TEST_F(Backlash, KeepsThePositionOverAMicrostepChange) {
   expectClean();
 }
 
-TEST_F(Backlash, IsRefusedByATrajectory) {
-  EXPECT_REFUSED(bench->machine->followTrajectory({{"x"}, {{1.0, {0.0}, {0.0}, {}}}}),
-                 "x: it has a backlash, which a trajectory has no time to take up");
-}
-
 }  // namespace
 }  // namespace stepdriver

@@ -3,16 +3,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/motion/along.h"
-#include "stepdriver_core/motion/spline.h"
-#include "support/bench.h"
 #include "support/refusal.h"
+#include "support/trajectory_bench.h"
 
 // Trajectories of several axes. In steps: 1000 steps/m, 2 m/s, 10 m/s^2.
 
@@ -23,49 +20,10 @@ using axis::MoveEnd;
 using machine::CoordinatedMove;
 using machine::CoordinatedResult;
 using machine::TrajectoryRequest;
-using test::Bench;
-using test::linearAxis;
 using test::refusal;
-using test::violationsOf;
+using test::trajectoryAxis;
 
-axis::AxisConfig axisOf(const std::string& name) {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = 1000.0;
-  config.max_speed = 2.0;
-  config.acceleration = 10.0;
-  config.deceleration = 10.0;
-  config.endstop_min.reset();
-  config.min_position = -5.0;
-  return config;
-}
-
-class Trajectory : public testing::Test {
- protected:
-  void SetUp() override { build({axisOf("x"), axisOf("y")}); }
-  void build(const std::vector<axis::AxisConfig>& axes) {
-    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
-    for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
-    bench = std::make_unique<Bench>(axes, specs);
-  }
-
-  machine::Machine& machine() { return *bench->machine; }
-  CoordinatedMove follow(const TrajectoryRequest& request) {
-    return machine().followTrajectory(request);
-  }
-  axis::AxisState state(const std::string& name) { return bench->axis(name).state(); }
-  void advance(double seconds) { machine().advance(seconds); }
-  void awaitRest() {
-    while (state("x").moving || state("y").moving) advance(1e-4);
-  }
-  void expectClean() {
-    for (const std::string name : {"x", "y"}) {
-      EXPECT_EQ(violationsOf(bench->report(name)), "") << name;
-      EXPECT_NEAR(state(name).position, static_cast<double>(bench->pulses(name)) / 1000.0, 1e-12);
-    }
-  }
-
-  std::unique_ptr<Bench> bench;
-};
+class Trajectory : public test::TrajectoryBench {};
 
 // The cubic s^2 (3 - 2 s) over 2 s, with s = t/2; for y half of it backwards.
 TrajectoryRequest cubic() { return {{"x", "y"}, {{2.0, {1.0, -0.5}, {0.0, 0.0}, {}}}}; }
@@ -172,7 +130,7 @@ TEST_F(Trajectory, GoesThroughQuinticsCubicsAndLines) {
 }
 
 TEST_F(Trajectory, TakesLinesWithinTheStartSpeed) {
-  std::vector<axis::AxisConfig> axes{axisOf("x"), axisOf("y")};
+  std::vector<axis::AxisConfig> axes{trajectoryAxis("x"), trajectoryAxis("y")};
   for (axis::AxisConfig& axis : axes) axis.start_speed = 0.2;
   build(axes);
   const CoordinatedMove move = follow({{"x", "y"}, {{5.0, {0.5, -0.9}, {}, {}}}});
@@ -219,46 +177,6 @@ TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
   advance(1.0);
   EXPECT_EQ(bench->pulses("x"), 0);
   EXPECT_EQ(bench->pulses("y"), 0);
-}
-
-TEST(Along, IsTheCurveAtTheSameRateAndExactAtAnother) {
-  const motion::Profile curve = motion::planSpline(
-      0, {}, {{1'000'000'000, 300.0, 200.0, 0.0}, {2'500'000'000, 900.0, 0.0, {}}});
-  for (const double rate : {1.0, 0.25}) {
-    const motion::Profile path(5, {motion::Piece{2.5 / rate, 0.0, rate, 0.0, 0.0}});
-    const motion::Profile run = motion::along(curve, path);
-    EXPECT_NEAR(run.duration().value(), 2.5 / rate, 1e-12);
-    for (std::int64_t t = 0; t < 2'500'000'000; t += 10'000'019) {
-      const motion::MotionState wanted = curve.stateAt(t);
-      const motion::MotionState seen =
-          run.stateAt(5 + static_cast<std::int64_t>(static_cast<double>(t) / rate));
-      EXPECT_NEAR((seen.position - wanted.position).value(), 0.0, 1e-5) << t;
-      EXPECT_NEAR(seen.velocity, wanted.velocity * rate, 1e-5) << t;
-      EXPECT_NEAR(seen.acceleration, wanted.acceleration * rate * rate, 1e-3) << t;
-    }
-  }
-}
-
-TEST(Along, StaysWithinItsErrorWhereTheRateChanges) {
-  const motion::Profile curve = motion::planSpline(
-      0, {}, {{1'000'000'000, 30'000.0, 20'000.0, 0.0}, {2'500'000'000, 90'000.0, 0.0, {}}});
-  // From full rate to a fifth of it: 0.6 s in 1 s, up from 0.7 s.
-  const motion::Piece slowing{1.0, 0.7, 1.0, -0.8, 0.0};
-  const motion::Profile path(0, {slowing});
-  const motion::Profile run = motion::along(curve, path);
-  double worst = 0.0;
-  for (std::int64_t t = 0; t <= 1'000'000'000; t += 100'003) {
-    const double seconds = static_cast<double>(t) * 1e-9;
-    const motion::DoubleDouble s = slowing.positionAt(seconds);
-    const std::int64_t s_ns = motion::splitNanoseconds(s).whole;
-    const motion::MotionState there = curve.stateAt(s_ns);
-    const double rest = (s.value() - static_cast<double>(s_ns) * 1e-9) * there.velocity;
-    const double wanted = there.position.value() + rest;
-    worst = std::max(worst, std::abs(run.stateAt(t).position.value() - wanted));
-  }
-  EXPECT_LE(worst, motion::kAlongError * 1.001);
-  EXPECT_GT(worst, motion::kAlongError / 100.0);  // it is not cut finer than it must be
-  EXPECT_LT(run.pieces().size(), 300U);
 }
 
 }  // namespace

@@ -75,9 +75,6 @@ std::vector<Move> Coordination::follow(const std::vector<Axis*>& axes,
   for (Axis::Impl* axis : impls) {
     axis->refuseUnlessReadyToMove();
     axis->refuseUnlessHomed();
-    if (axis->backlash() == 0) continue;
-    axis->refuse(
-        "it has a backlash, which a trajectory has no time to take up: use moves or lines");
   }
   const auto course = std::make_shared<TrajectoryCourse>(impls, points);
   return Axis::Impl::begin(ordersFor(course, course->targets()));

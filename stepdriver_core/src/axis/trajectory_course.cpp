@@ -2,13 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "message_text.h"
 #include "stepdriver_core/motion/along.h"
+#include "stepdriver_core/motion/backlash.h"
+#include "stepdriver_core/motion/profile_parts.h"
 #include "stepdriver_core/motion/profile_peaks.h"
+#include "stepdriver_core/motion/rate.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -16,23 +21,24 @@ namespace {
 using motion::DoubleDouble;
 
 constexpr double kSteepest = 1000.0;  // 1/s: from full rate to none in a millisecond
+constexpr double kSteepestJerk = kSteepest * kSteepest;  // 1/s^2
 constexpr double kGentler = 0.8;
-constexpr int kTries = 60;  // down to a millionth of the steepest
+constexpr int kTries = 60;             // down to a millionth of the steepest
+constexpr double kFirstDelay = 0.010;  // s
 
 std::string at(double seconds) { return roughText(seconds) + " s after its start"; }
 
-// A rate that changes evenly to another, at the latest up to the end of the trajectory.
-motion::Piece ramp(DoubleDouble place, double from, double to, double slope, DoubleDouble end) {
-  const double change = std::copysign(slope, to - from);
-  motion::Piece piece{DoubleDouble(to - from) / DoubleDouble(change), place, from, change, 0.0};
-  const DoubleDouble left = end - place;
-  if (left < piece.positionAt(piece.duration) - place) {
-    // 2 x / (v + sqrt(v^2 + 2 a x)) cancels nothing.
-    const DoubleDouble root =
-        sqrt(abs(DoubleDouble(from) * DoubleDouble(from) + DoubleDouble(2.0 * change) * left));
-    piece.duration = DoubleDouble(2.0) * left / (DoubleDouble(from) + root);
-  }
-  return piece;
+double mostAcceleration(const motion::MotionLimits& limits) {
+  return std::max(limits.acceleration, limits.deceleration);
+}
+
+// When a path that planRate() has made comes to the rate, or to its end [s].
+double timeToRate(const motion::Profile& path, double rate) {
+  const double duration = path.duration().value();
+  if (path.pieces().empty()) return duration;
+  const motion::Piece& last = path.pieces().back();
+  const bool there = rate > 0.0 && last.v0 == rate && last.a == 0.0 && last.j == 0.0;
+  return there ? duration - last.duration.value() : duration;
 }
 
 }  // namespace
@@ -99,19 +105,47 @@ std::vector<std::int64_t> TrajectoryCourse::targets() const {
 
 void TrajectoryCourse::start(std::int64_t at_ns) {
   curves_.clear();
-  accelerations_.clear();
+  most_.clear();
   for (std::size_t member = 0; member < axes().size(); ++member) {
     Axis::Impl& axis = *axes()[member];
-    const bool moving = axis.moving();
-    if (!moving) requireStart(member);
-    const motion::MotionState from = axis.stateAt(at_ns);
+    if (!axis.moving()) requireStart(member);
+    const motion::MotionState motor = axis.stateAt(at_ns);
+    const double count = motor.position.value();
+    const double slack = count - axis.jointAt(count);
+    const motion::MotionState joint{motor.position - slack, motor.velocity, motor.acceleration};
     try {
-      curves_.push_back(motion::planSpline(0, from, waypoints_[member]));
+      const motion::Profile curve = motion::planSpline(0, joint, waypoints_[member]);
+      requirePositions(member, curve);
+      requireSmooth(member, motion::splineJerk(joint, waypoints_[member]));
+      curves_.push_back(motorOf(member, curve, slack));
     } catch (const std::invalid_argument& error) {
       axis.refuse(error.what());
     }
-    requireLimits(member, from.velocity);
+    requireLimits(member, motor.velocity);
   }
+  endTogether();
+}
+
+// What takes up a backlash at the end may last longer than the trajectory.
+void TrajectoryCourse::endTogether() {
+  DoubleDouble longest;
+  for (const motion::Profile& curve : curves_) longest = std::max(longest, curve.duration());
+  for (motion::Profile& curve : curves_) curve = motion::part(curve, 0.0, longest);
+}
+
+motion::Profile TrajectoryCourse::motorOf(std::size_t member, const motion::Profile& joint,
+                                          double slack) const {
+  const Axis::Impl& axis = *axes()[member];
+  if (axis.backlash() == 0) return joint;
+  motion::MotionLimits limits = axis.limits(axis.maxSpeed());
+  limits.acceleration = mostAcceleration(limits);
+  motion::MotorPlan plan = motion::planMotor(joint, slack, axis.backlash(), limits);
+  if (plan.no_room) {
+    axis.refuse("the trajectory turns " + at(*plan.no_room) +
+                ", and goes on so close to the axis's limits that its backlash of " +
+                axis.show(axis.config.backlash) + " can't be taken up meanwhile");
+  }
+  return std::move(plan.profile);
 }
 
 // At rest a first point at time 0 says where the trajectory believes the axis to be.
@@ -126,89 +160,128 @@ void TrajectoryCourse::requireStart(std::size_t member) const {
               "; they may differ by one full step");
 }
 
-void TrajectoryCourse::requireLimits(std::size_t member, double velocity_before) {
+void TrajectoryCourse::requirePositions(std::size_t member, const motion::Profile& joint) const {
   const Axis::Impl& axis = *axes()[member];
-  const motion::ProfilePeaks peaks = motion::profilePeaks(curves_[member], velocity_before);
-  const motion::MotionLimits limits = axis.limits(axis.maxSpeed());
-  const double scale = axis.stepsPerUnit();
+  const motion::ProfilePeaks peaks = motion::profilePeaks(joint);
   for (const motion::Peak& peak : {peaks.lowest, peaks.highest}) {
     axis.refuseBeyondLimits(axis.positionOf(peak.value),
                             "the trajectory's position " + at(peak.time_s) + ",");
   }
-  const auto require = [&](const motion::Peak& peak, double most, const char* what,
-                           const char* per) {
-    if (std::abs(peak.value) <= most * (1.0 + Coordination::kTolerance)) return;
-    axis.refuse("the trajectory's " + std::string(what) + " is " +
-                axis.show(peak.value / scale, per) + " " + at(peak.time_s) + ", but the axis has " +
-                axis.show(most / scale, per));
-  };
-  const double acceleration = std::max(limits.acceleration, limits.deceleration);
-  require(peaks.velocity, limits.max_speed, "velocity", "/s");
-  require(peaks.acceleration, acceleration, "acceleration", "/s^2");
+}
+
+void TrajectoryCourse::requireWithin(std::size_t member, const motion::Peak& peak, double most,
+                                     const char* what, const char* per) const {
+  if (std::abs(peak.value) <= most * (1.0 + Coordination::kTolerance)) return;
+  const Axis::Impl& axis = *axes()[member];
+  const double scale = axis.stepsPerUnit();
+  axis.refuse("the trajectory's " + std::string(what) + " is " +
+              axis.show(peak.value / scale, per) + " " + at(peak.time_s) + ", but the axis has " +
+              axis.show(most / scale, per));
+}
+
+void TrajectoryCourse::requireSmooth(std::size_t member, const motion::SplineJerk& jerk) const {
+  const Axis::Impl& axis = *axes()[member];
+  const motion::MotionLimits limits = axis.limits(axis.maxSpeed());
+  if (limits.jerk == 0.0) return;
+  const motion::Peak& jump = jerk.acceleration_jump;
+  if (std::abs(jump.value) > Coordination::kTolerance * mostAcceleration(limits)) {
+    axis.refuse("the trajectory's acceleration jumps by " +
+                axis.show(jump.value / axis.stepsPerUnit(), "/s^2") + " " + at(jump.time_s) +
+                ", but the axis has a jerk limit: all points must have velocities and "
+                "accelerations, 0 at the last");
+  }
+  requireWithin(member, jerk.jerk, limits.jerk, "jerk", "/s^3");
+}
+
+void TrajectoryCourse::requireLimits(std::size_t member, double velocity_before) {
+  const Axis::Impl& axis = *axes()[member];
+  const motion::ProfilePeaks peaks = motion::profilePeaks(curves_[member], velocity_before);
+  const motion::MotionLimits limits = axis.limits(axis.maxSpeed());
+  const double acceleration = mostAcceleration(limits);
+  requireWithin(member, peaks.velocity, limits.max_speed, "velocity", "/s");
+  requireWithin(member, peaks.acceleration, acceleration, "acceleration", "/s^2");
   // A jump of less than a microstep/s is rounding.
   motion::Peak jump = peaks.velocity_jump;
   if (std::abs(jump.value) < 1.0) jump.value = 0.0;
-  require(jump, limits.start_speed, "jump of the velocity", "/s");
-  accelerations_.push_back(std::max(acceleration, std::abs(peaks.acceleration.value)));
+  requireWithin(member, jump, limits.start_speed, "jump of the velocity", "/s");
+  // What it has itself it may have again.
+  constexpr double kMore = 1.0 + Coordination::kTolerance;
+  motion::AlongLimits most{std::max(acceleration * kMore, std::abs(peaks.acceleration.value)),
+                           limits.jerk * kMore};
+  for (const motion::Piece& piece : curves_[member].pieces()) {
+    if (limits.jerk > 0.0) most.jerk = std::max(most.jerk, std::abs(piece.j));
+  }
+  most_.push_back(most);
 }
 
 motion::MotionState TrajectoryCourse::begin() const { return {0.0, 1.0, 0.0}; }
 
 motion::Profile TrajectoryCourse::plan(std::int64_t at_ns, const motion::MotionState& from,
                                        double speed_override) const {
-  return changeRate(at_ns, from, std::min(speed_override, 1.0), accelerations_);
+  return changeRate(at_ns, from, std::min(speed_override, 1.0), most_);
 }
 
 motion::Profile TrajectoryCourse::planStop(std::int64_t at_ns,
                                            const motion::MotionState& from) const {
-  std::vector<double> most = accelerations_;
+  std::vector<motion::AlongLimits> most = most_;
   for (std::size_t member = 0; member < most.size(); ++member) {
-    most[member] = std::max(most[member], axes()[member]->stopDeceleration());
+    double& acceleration = most[member].acceleration;
+    acceleration = std::max(acceleration, axes()[member]->stopDeceleration());
   }
   return changeRate(at_ns, from, 0.0, most);
 }
 
-// As fast as no axis gets more acceleration than it may have. Where it has all of it already, the
-// trajectory goes on as it is: it ends at rest too.
+// As fast as no axis gets more acceleration and jerk than it may have: now, or where one of them
+// has all of it already, as soon as it leaves some. Where that is never, the trajectory goes on
+// nearly as it is: it ends at rest too.
 motion::Profile TrajectoryCourse::changeRate(std::int64_t at_ns, const motion::MotionState& from,
-                                             double rate, const std::vector<double>& most) const {
+                                             double rate,
+                                             const std::vector<motion::AlongLimits>& most) const {
   const DoubleDouble end = curves_.front().duration();
-  const double now = from.velocity;
-  double wanted = rate;
-  std::vector<motion::Piece> pieces;
-  double slope = steepest(from.position, most);
-  for (int i = 0; now != rate && i < kTries; ++i, slope *= kGentler) {
-    pieces = {ramp(from.position, now, rate, slope, end)};
-    if (keeps({at_ns, pieces}, most)) break;
-    if (i + 1 == kTries && now > 0.0) {
-      pieces.clear();
-      wanted = now;
+  if (from.velocity == rate && from.acceleration == 0.0) {
+    return motion::planRate(at_ns, from, rate, {1.0, 1.0}, 0.0, end);
+  }
+  const double left = (end - from.position).value();
+  std::optional<motion::Profile> best;
+  double soonest = std::numeric_limits<double>::infinity();
+  double delay = 0.0;
+  do {
+    motion::RateLimits limits = steepest(from, delay, most);
+    for (int i = 0; i < kTries; ++i, limits.slope *= kGentler, limits.jerk *= kGentler) {
+      motion::Profile path = motion::planRate(at_ns, from, rate, limits, delay, end);
+      const double time = timeToRate(path, rate);
+      if (time >= soonest) break;
+      const bool last_resort = delay == 0.0 && i + 1 == kTries;
+      if (!last_resort && !keeps(motion::part(path, 0.0, time), most)) continue;
+      best = std::move(path);
+      soonest = last_resort ? soonest : time;
+      break;
     }
-  }
-  const DoubleDouble place =
-      pieces.empty() ? from.position : pieces.back().positionAt(pieces.back().duration);
-  if (const DoubleDouble left = end - place; wanted > 0.0 && left.hi > 1e-12) {
-    pieces.push_back({left / DoubleDouble(wanted), place, wanted, 0.0, 0.0});
-  }
-  if (pieces.empty()) return {at_ns, place};
-  return {at_ns, std::move(pieces)};
+    delay = std::max(kFirstDelay, 2.0 * delay);
+  } while (delay < soonest && delay * from.velocity < left && from.velocity > 0.0);
+  return *std::move(best);
 }
 
-double TrajectoryCourse::steepest(DoubleDouble place, const std::vector<double>& most) const {
-  double slope = kSteepest;
+motion::RateLimits TrajectoryCourse::steepest(const motion::MotionState& from, double delay,
+                                              const std::vector<motion::AlongLimits>& most) const {
+  const DoubleDouble place = from.position + DoubleDouble(delay * from.velocity);
+  motion::RateLimits limits{kSteepest, 0.0};
   for (std::size_t member = 0; member < curves_.size(); ++member) {
-    const motion::MotionState state =
-        curves_[member].stateAt(motion::splitNanoseconds(place).whole);
-    if (state.velocity != 0.0)
-      slope = std::min(slope, 2.0 * most[member] / std::abs(state.velocity));
+    const auto state = curves_[member].stateAt(motion::splitNanoseconds(place).whole);
+    const double speed = std::abs(state.velocity);
+    if (most[member].jerk > 0.0) {
+      const double jerk = speed > 0.0 ? 2.0 * most[member].jerk / speed : kSteepestJerk;
+      limits.jerk = std::min(limits.jerk > 0.0 ? limits.jerk : kSteepestJerk, jerk);
+    }
+    if (speed > 0.0) limits.slope = std::min(limits.slope, 2.0 * most[member].acceleration / speed);
   }
-  return slope;
+  return limits;
 }
 
-bool TrajectoryCourse::keeps(const motion::Profile& path, const std::vector<double>& most) const {
+bool TrajectoryCourse::keeps(const motion::Profile& path,
+                             const std::vector<motion::AlongLimits>& most) const {
   for (std::size_t member = 0; member < curves_.size(); ++member) {
-    const motion::ProfilePeaks peaks = motion::profilePeaks(motion::along(curves_[member], path));
-    if (std::abs(peaks.acceleration.value) > most[member] * (1.0 + 1e-9)) return false;
+    if (!motion::staysWithin(curves_[member], path, most[member])) return false;
   }
   return true;
 }

@@ -5,6 +5,9 @@
 
 #include "course.h"
 #include "stepdriver_core/axis/coordination.h"
+#include "stepdriver_core/motion/along.h"
+#include "stepdriver_core/motion/limits.h"
+#include "stepdriver_core/motion/rate.h"
 #include "stepdriver_core/motion/spline.h"
 
 namespace stepdriver::axis {
@@ -30,15 +33,23 @@ class TrajectoryCourse : public Course {
  private:
   void takePoint(std::size_t member, std::size_t index, const CoursePoint& point);
   void requireStart(std::size_t member) const;
+  void requirePositions(std::size_t member, const motion::Profile& joint) const;
+  void requireSmooth(std::size_t member, const motion::SplineJerk& jerk) const;
   void requireLimits(std::size_t member, double velocity_before);
+  void requireWithin(std::size_t member, const motion::Peak& peak, double most, const char* what,
+                     const char* per) const;
+  motion::Profile motorOf(std::size_t member, const motion::Profile& joint, double slack) const;
+  void endTogether();
   motion::Profile changeRate(std::int64_t at, const motion::MotionState& from, double rate,
-                             const std::vector<double>& most) const;
-  bool keeps(const motion::Profile& ramp, const std::vector<double>& most) const;
-  double steepest(motion::DoubleDouble place, const std::vector<double>& most) const;
+                             const std::vector<motion::AlongLimits>& most) const;
+  motion::RateLimits steepest(const motion::MotionState& from, double delay,
+                              const std::vector<motion::AlongLimits>& most) const;
+  bool keeps(const motion::Profile& path, const std::vector<motion::AlongLimits>& most) const;
 
-  std::vector<std::vector<motion::Waypoint>> waypoints_;  // of each axis
-  std::vector<motion::Profile> curves_;                   // of each axis, from time 0 on
-  std::vector<double> accelerations_;                     // microsteps/s^2, that each may have
+  // Of each axis.
+  std::vector<std::vector<motion::Waypoint>> waypoints_;
+  std::vector<motion::Profile> curves_;    // of the motor, from time 0 on
+  std::vector<motion::AlongLimits> most_;  // that each may have
 };
 
 }  // namespace stepdriver::axis

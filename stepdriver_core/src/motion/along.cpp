@@ -7,24 +7,35 @@
 #include <vector>
 
 #include "hermite.h"
+#include "root.h"
 
 namespace stepdriver::motion {
 namespace {
 
 constexpr double kNoTime = 1e-15;  // s
+constexpr int kSlices = 8;         // of a part, to look at
 
 DoubleDouble velocityOf(const Piece& piece) { return {piece.v0, piece.v0_rest}; }
 DoubleDouble accelerationOf(const Piece& piece) { return {piece.a, piece.a_rest}; }
 
-// A part of a piece of a course, from `from` [s] in it on, and of this length.
+// A part of a piece of a course, and the part of a piece of the path that runs through it.
 struct Part {
   const Piece& course;
-  DoubleDouble from;
-  DoubleDouble length;
+  DoubleDouble from;  // s in the course's piece
+  const Piece& path;
+  DoubleDouble begin;  // t in the path's piece
+  DoubleDouble end;
+  DoubleDouble length;  // in s
+
+  bool atConstantRate() const { return path.a == 0.0 && path.j == 0.0; }
+  DoubleDouble placeAt(DoubleDouble t) const {
+    return from + (path.positionAt(t) - path.positionAt(begin));
+  }
 };
 
 // Run through at a constant rate.
-Piece atRate(const Part& part, DoubleDouble rate) {
+Piece atRate(const Part& part) {
+  const DoubleDouble rate = velocityOf(part.path);
   const DoubleDouble velocity = rate * part.course.velocityAt(part.from);
   const DoubleDouble acceleration = rate * rate * part.course.accelerationAt(part.from);
   const double jerk = (rate * rate * rate * DoubleDouble(part.course.j)).value();
@@ -37,25 +48,32 @@ Piece atRate(const Part& part, DoubleDouble rate) {
           acceleration.lo};
 }
 
-// Run through as a piece of the path does, between two times of that.
-void appendCubics(std::vector<Piece>& pieces, const Part& part, const Piece& path,
-                  DoubleDouble begin, DoubleDouble end) {
-  const double highest_rate =
-      std::max(path.velocityAt(begin).value(), path.velocityAt(end).value());
-  const double acceleration =
-      std::max(std::abs(part.course.accelerationAt(part.from).value()),
-               std::abs(part.course.accelerationAt(part.from + part.length).value()));
-  const double fourth = 3.0 * acceleration * path.a * path.a +
-                        6.0 * std::abs(part.course.j * path.a) * highest_rate * highest_rate;
-  const DoubleDouble duration = end - begin;
-  const double count = cubicsFor(duration.value(), fourth, kAlongError);
+// Of q(s(t)), and of its absolute value, from above.
+double largestFourthDerivative(const Part& part) {
+  const auto largest = [](double a, double b) { return std::max(std::abs(a), std::abs(b)); };
+  const Piece& path = part.path;
+  double rate = largest(path.velocityAt(part.begin).value(), path.velocityAt(part.end).value());
+  const double level = path.j != 0.0 ? -path.a / path.j : 0.0;
+  if (part.begin.value() < level && level < part.end.value()) {
+    rate = std::max(rate, std::abs(path.velocityAt(level).value()));
+  }
+  const double slope =
+      largest(path.accelerationAt(part.begin).value(), path.accelerationAt(part.end).value());
+  const double acceleration = largest(part.course.accelerationAt(part.from).value(),
+                                      part.course.accelerationAt(part.from + part.length).value());
+  return acceleration * (3.0 * slope * slope + 4.0 * rate * std::abs(path.j)) +
+         6.0 * std::abs(part.course.j) * slope * rate * rate;
+}
+
+void appendCubics(std::vector<Piece>& pieces, const Part& part) {
+  const DoubleDouble duration = part.end - part.begin;
+  const double count = cubicsFor(duration.value(), largestFourthDerivative(part), kAlongError);
   const DoubleDouble slice = duration / DoubleDouble(count);
-  const DoubleDouble origin = path.positionAt(begin) - part.from;
   const auto state = [&](double k) {
-    const DoubleDouble t = begin + DoubleDouble(k) * slice;
-    const DoubleDouble s = path.positionAt(t) - origin;
+    const DoubleDouble t = part.begin + DoubleDouble(k) * slice;
+    const DoubleDouble s = part.placeAt(t);
     return std::pair{part.course.positionAt(s),
-                     (part.course.velocityAt(s) * path.velocityAt(t)).value()};
+                     (part.course.velocityAt(s) * part.path.velocityAt(t)).value()};
   };
   auto from = state(0.0);
   for (double k = 1.0; k <= count; ++k) {
@@ -65,14 +83,56 @@ void appendCubics(std::vector<Piece>& pieces, const Part& part, const Piece& pat
   }
 }
 
-// The time in a piece of the path, from its beginning, at which it has gone so far. Of the two
-// roots the stable form gives the one that comes first.
+// The time in a piece of the path, from its beginning, at which it has gone so far.
 DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
+  if (path.j != 0.0) {
+    const auto left = [&](DoubleDouble t) { return way - (path.positionAt(t) - path.p0); };
+    return rootOf(left, path.duration.value());
+  }
   const DoubleDouble rate = velocityOf(path);
   if (path.a == 0.0) return way / rate;
+  // Of the two roots the stable form gives the one that comes first.
   const DoubleDouble under = rate * rate + DoubleDouble(2.0) * accelerationOf(path) * way;
   const DoubleDouble root = under.hi > 0.0 ? sqrt(under) : DoubleDouble();
   return DoubleDouble(2.0) * way / (rate + root);
+}
+
+// All parts, in the order in which the path runs through them, as long as they are wanted.
+template <typename Take>
+void forEachPart(const Profile& course, const Profile& path, const Take& take) {
+  std::size_t index = 0;  // of the course's piece
+  for (const Piece& stretch : path.pieces()) {
+    const DoubleDouble end = stretch.positionAt(stretch.duration);
+    DoubleDouble s = stretch.p0;
+    DoubleDouble t;
+    while ((stretch.duration - t).hi > kNoTime) {
+      while (index + 1 < course.pieces().size() &&
+             !((course.pieceStart(index + 1) - s).hi > kNoTime)) {
+        ++index;
+      }
+      const DoubleDouble knot = course.pieceStart(index + 1);
+      const bool ends_here = index + 1 == course.pieces().size() || !(knot < end);
+      const DoubleDouble next = ends_here ? end : knot;
+      const DoubleDouble until = ends_here ? stretch.duration : timeTo(stretch, next - stretch.p0);
+      const Part part{
+          course.pieces()[index], s - course.pieceStart(index), stretch, t, until, next - s};
+      if (!take(part)) return;
+      s = next;
+      t = until;
+    }
+  }
+}
+
+bool keeps(const Part& part, DoubleDouble t, const AlongLimits& limits) {
+  const DoubleDouble s = part.placeAt(t);
+  const double q1 = part.course.velocityAt(s).value();
+  const double q2 = part.course.accelerationAt(s).value();
+  const double s1 = part.path.velocityAt(t).value();
+  const double s2 = part.path.accelerationAt(t).value();
+  const double acceleration = q2 * s1 * s1 + q1 * s2;
+  const double jerk = part.course.j * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * part.path.j;
+  return std::abs(acceleration) <= limits.acceleration &&
+         (limits.jerk == 0.0 || std::abs(jerk) <= limits.jerk);
 }
 
 }  // namespace
@@ -92,35 +152,32 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale) {
 
 Profile along(const Profile& course, const Profile& path) {
   std::vector<Piece> pieces;
-  std::size_t index = 0;  // of the course's piece
-  for (const Piece& stretch : path.pieces()) {
-    const DoubleDouble end = stretch.p0 + (stretch.positionAt(stretch.duration) - stretch.p0);
-    DoubleDouble s = stretch.p0;
-    DoubleDouble t;
-    while ((stretch.duration - t).hi > kNoTime) {
-      while (index + 1 < course.pieces().size() &&
-             !((course.pieceStart(index + 1) - s).hi > kNoTime)) {
-        ++index;
-      }
-      const DoubleDouble knot = course.pieceStart(index + 1);
-      const bool ends_here = index + 1 == course.pieces().size() || !(knot < end);
-      const DoubleDouble next = ends_here ? end : knot;
-      const DoubleDouble until = ends_here ? stretch.duration : timeTo(stretch, next - stretch.p0);
-      const Part part{course.pieces()[index], s - course.pieceStart(index), next - s};
-      if (stretch.a == 0.0) {
-        pieces.push_back(atRate(part, velocityOf(stretch)));
-      } else {
-        appendCubics(pieces, part, stretch, t, until);
-      }
-      s = next;
-      t = until;
+  forEachPart(course, path, [&](const Part& part) {
+    if (part.atConstantRate()) {
+      pieces.push_back(atRate(part));
+    } else {
+      appendCubics(pieces, part);
     }
-  }
+    return true;
+  });
   if (pieces.empty()) {
     const std::int64_t s_ns = splitNanoseconds(path.endPosition()).whole;
     return {path.startNs(), course.stateAt(course.startNs() + s_ns).position};
   }
   return {path.startNs(), std::move(pieces)};
+}
+
+bool staysWithin(const Profile& course, const Profile& path, const AlongLimits& limits) {
+  bool within = true;
+  forEachPart(course, path, [&](const Part& part) {
+    if (part.atConstantRate()) return true;
+    const DoubleDouble slice = (part.end - part.begin) / DoubleDouble(kSlices);
+    for (int i = 0; i <= kSlices && within; ++i) {
+      within = keeps(part, part.begin + DoubleDouble(i) * slice, limits);
+    }
+    return within;
+  });
+  return within;
 }
 
 }  // namespace stepdriver::motion

@@ -14,10 +14,6 @@ constexpr double kFarthest = 1.15292e18;  // microsteps, 2^60: fits into a Split
 
 constexpr double kRounding = 1e-15;  // relative, of a state's doubles
 
-Piece pieceOf(const Phase& phase, DoubleDouble position) {
-  return {phase.duration, position, phase.v.hi, phase.a.hi, phase.j, phase.v.lo, phase.a.lo};
-}
-
 }  // namespace
 
 Course::Course(const MotionState& from, const MotionLimits& limits)

@@ -19,6 +19,10 @@ DoubleDouble wayOf(const Phase& phase, DoubleDouble t) {
   return t * slope;
 }
 
+Piece pieceOf(const Phase& phase, DoubleDouble position) {
+  return {phase.duration, position, phase.v.hi, phase.a.hi, phase.j, phase.v.lo, phase.a.lo};
+}
+
 void Path::run(double j, DoubleDouble duration) {
   if (!(duration.hi > kNoTime)) return;
   const Phase phase{duration, v_, a_, j};

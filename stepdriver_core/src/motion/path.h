@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "stepdriver_core/motion/double_double.h"
+#include "stepdriver_core/motion/profile.h"
 
 namespace stepdriver::motion {
 
@@ -55,5 +56,7 @@ constexpr double kExact = 1e-29;
 
 /// The way of a phase in the time `t` from its beginning.
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t);
+
+Piece pieceOf(const Phase& phase, DoubleDouble position);
 
 }  // namespace stepdriver::motion

@@ -7,54 +7,10 @@
 
 #include "hermite.h"
 #include "spline_refusals.h"
+#include "spline_segment.h"
 
 namespace stepdriver::motion {
 namespace {
-
-// One end of a segment.
-struct Knot {
-  std::int64_t time_ns;
-  DoubleDouble position;
-  std::optional<double> velocity;
-  std::optional<double> acceleration;
-};
-
-// A quintic over u from 0 to 1: p0 + c1 u + ... + c5 u^5 [microsteps].
-struct Quintic {
-  DoubleDouble p0, c1, c2, c3, c4, c5;
-
-  DoubleDouble positionAt(DoubleDouble u) const {
-    return p0 + u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))));
-  }
-  DoubleDouble slopeAt(DoubleDouble u) const {
-    return c1 + u * (DoubleDouble(2.0) * c2 +
-                     u * (DoubleDouble(3.0) * c3 +
-                          u * (DoubleDouble(4.0) * c4 + u * (DoubleDouble(5.0) * c5))));
-  }
-  // The fourth derivative is linear: it is largest at an end.
-  double largestFourthDerivative() const {
-    const double begin = 24.0 * c4.value();
-    return std::max(std::abs(begin), std::abs(begin + 120.0 * c5.value()));
-  }
-  double reach() const {
-    return std::abs(c1.hi) + std::abs(c2.hi) + std::abs(c3.hi) + std::abs(c4.hi) + std::abs(c5.hi);
-  }
-};
-
-Quintic quintic(DoubleDouble duration, const Knot& begin, const Knot& end) {
-  const DoubleDouble way = end.position - begin.position;
-  const DoubleDouble v0 = duration * *begin.velocity;
-  const DoubleDouble v1 = duration * *end.velocity;
-  const DoubleDouble a0 = duration * duration * DoubleDouble(*begin.acceleration / 2.0);
-  const DoubleDouble a1 = duration * duration * DoubleDouble(*end.acceleration / 2.0);
-  const auto times = [](double factor, DoubleDouble x) { return DoubleDouble(factor) * x; };
-  return {begin.position,
-          v0,
-          a0,
-          times(10.0, way) - times(6.0, v0) - times(4.0, v1) - times(3.0, a0) + a1,
-          times(-15.0, way) + times(8.0, v0) + times(7.0, v1) + times(3.0, a0) - times(2.0, a1),
-          times(6.0, way) - times(3.0, v0) - times(3.0, v1) - a0 + a1};
-}
 
 Piece line(DoubleDouble duration, DoubleDouble from, DoubleDouble to) {
   return {duration, from, ((to - from) / duration).value(), 0.0, 0.0};
@@ -66,14 +22,14 @@ double reach(const Piece& piece) {
          std::abs(piece.j) * t * t * t / 6.0;
 }
 
-void appendQuintic(std::vector<Piece>& pieces, DoubleDouble duration, const Knot& begin,
-                   const Knot& end, std::size_t index) {
-  const Quintic curve = quintic(duration, begin, end);
-  requireReach(curve.reach(), index);
+void appendQuintic(std::vector<Piece>& pieces, const Segment& segment) {
+  const Quintic curve = segment.quintic();
+  requireReach(curve.reach(), segment.index);
+  const DoubleDouble duration = segment.duration();
   const double count = cubicsFor(1.0, curve.largestFourthDerivative(), kQuinticError);
   const DoubleDouble part = duration / DoubleDouble(count);
-  DoubleDouble from = begin.position;
-  double v0 = *begin.velocity;
+  DoubleDouble from = segment.begin.position;
+  double v0 = *segment.begin.velocity;
   for (double k = 1.0; k < count; ++k) {
     const DoubleDouble u = DoubleDouble(k) / DoubleDouble(count);
     const DoubleDouble to = curve.positionAt(u);
@@ -82,19 +38,56 @@ void appendQuintic(std::vector<Piece>& pieces, DoubleDouble duration, const Knot
     from = to;
     v0 = v1;
   }
-  pieces.push_back(cubic(part, from, v0, end.position, *end.velocity));
+  pieces.push_back(cubic(part, from, v0, segment.end.position, *segment.end.velocity));
 }
 
-void append(std::vector<Piece>& pieces, const Knot& begin, const Knot& end, std::size_t index) {
-  const DoubleDouble duration = fromInteger(end.time_ns - begin.time_ns) / DoubleDouble(1e9);
-  if (!begin.velocity || !end.velocity) {
-    pieces.push_back(line(duration, begin.position, end.position));
-  } else if (!begin.acceleration || !end.acceleration) {
-    pieces.push_back(cubic(duration, begin.position, *begin.velocity, end.position, *end.velocity));
-    requireReach(reach(pieces.back()), index);
-  } else {
-    appendQuintic(pieces, duration, begin, end, index);
+void append(std::vector<Piece>& pieces, const Segment& segment) {
+  const Knot& begin = segment.begin;
+  const Knot& end = segment.end;
+  const DoubleDouble duration = segment.duration();
+  switch (segment.kind()) {
+    case SegmentKind::kLine:
+      pieces.push_back(line(duration, begin.position, end.position));
+      break;
+    case SegmentKind::kCubic:
+      pieces.push_back(
+          cubic(duration, begin.position, *begin.velocity, end.position, *end.velocity));
+      requireReach(reach(pieces.back()), segment.index);
+      break;
+    case SegmentKind::kQuintic:
+      appendQuintic(pieces, segment);
+      break;
   }
+}
+
+// The accelerations at a segment's ends [microsteps/s^2].
+struct Ends {
+  double begin = 0.0;
+  double end = 0.0;
+};
+
+Ends takeJerk(SplineJerk& worst, const Segment& segment) {
+  const double start = static_cast<double>(segment.begin.time_ns) * 1e-9;
+  const double duration = segment.duration().value();
+  const auto take = [&](double jerk, double time_s) {
+    if (std::abs(jerk) > std::abs(worst.jerk.value)) worst.jerk = {jerk, time_s};
+  };
+  if (segment.kind() == SegmentKind::kLine) return {};
+  if (segment.kind() == SegmentKind::kCubic) {
+    const Piece piece = cubic(segment.duration(), segment.begin.position, *segment.begin.velocity,
+                              segment.end.position, *segment.end.velocity);
+    take(piece.j, start);
+    return {piece.a, piece.accelerationAt(piece.duration).value()};
+  }
+  const Quintic curve = segment.quintic();
+  const auto consider = [&](double u) {
+    take(curve.thirdDerivativeAt(u) / (duration * duration * duration), start + u * duration);
+  };
+  consider(0.0);
+  consider(1.0);
+  const double level = -curve.c4.value() / (5.0 * curve.c5.value());
+  if (level > 0.0 && level < 1.0) consider(level);
+  return {*segment.begin.acceleration, *segment.end.acceleration};
 }
 
 }  // namespace
@@ -104,17 +97,28 @@ Profile planSpline(std::int64_t start_ns, const MotionState& from,
   requirePlannable(from, waypoints);
   std::vector<Piece> pieces;
   pieces.reserve(waypoints.size());
-  Knot begin{0, from.position, from.velocity, from.acceleration};
-  for (std::size_t index = waypoints.front().time_ns == 0 ? 1 : 0; index < waypoints.size();
-       ++index) {
-    const Waypoint& waypoint = waypoints[index];
-    const bool last = index + 1 == waypoints.size();
-    const double position = last ? std::nearbyint(waypoint.position) : waypoint.position;
-    const Knot end{waypoint.time_ns, position, waypoint.velocity, waypoint.acceleration};
-    append(pieces, begin, end, index);
-    begin = end;
-  }
+  for (const Segment& segment : segmentsOf(from, waypoints)) append(pieces, segment);
   return {start_ns, std::move(pieces)};
+}
+
+SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& waypoints) {
+  requirePlannable(from, waypoints);
+  SplineJerk worst;
+  const auto jump = [&](double change, double time_s) {
+    if (std::abs(change) > std::abs(worst.acceleration_jump.value)) {
+      worst.acceleration_jump = {change, time_s};
+    }
+  };
+  double before = from.acceleration;
+  double time_s = 0.0;
+  for (const Segment& segment : segmentsOf(from, waypoints)) {
+    const Ends ends = takeJerk(worst, segment);
+    jump(ends.begin - before, time_s);
+    before = ends.end;
+    time_s = static_cast<double>(segment.end.time_ns) * 1e-9;
+  }
+  jump(-before, time_s);
+  return worst;
 }
 
 }  // namespace stepdriver::motion

@@ -33,8 +33,10 @@ class Coordination {
   /// replace. The points' time is the trajectory's: a hold or a speed override below 1 runs through
   /// it more slowly, one above 1 does nothing. Refused where a position is beyond a soft limit, a
   /// velocity by more than kTolerance beyond the maximum, an acceleration beyond the larger of
-  /// acceleration and deceleration, or where a velocity jumps by more than the start speed. Its
-  /// jerk is the sender's: where the points give accelerations these don't jump, else they do.
+  /// acceleration and deceleration, or where a velocity jumps by more than the start speed; for an
+  /// axis with a jerk limit also where the jerk is beyond that or the acceleration jumps, by more
+  /// than kTolerance of its limit. A backlash is taken up beside the joint's own motion, see
+  /// motion::planMotor(), which may last longer than the points; refused where that has no room.
   static std::vector<Move> follow(const std::vector<Axis*>& axes,
                                   const std::vector<CoursePoint>& points);
 

@@ -14,17 +14,27 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale);
 
 /// What one axis does on a curve q(s) while s runs as `path` says: q(s(t)).
 ///
-/// Where s runs at a constant rate this is exact. Where the rate changes evenly, s(t) is a parabola
-/// and q(s(t)) has a degree of 6; it is cut into cubics of h that have its position and velocity at
-/// both ends, which leave it by at most h^4/384 max|d^4 q/dt^4| <= kAlongError, with
-/// d^4 q/dt^4 = 3 q'' s''^2 + 6 q''' s'^2 s''.
+/// Where s runs at a constant rate this is exact. Where the rate changes, s(t) is a parabola or a
+/// cubic, and q(s(t)) has a degree of up to 9; it is cut into cubics of h that have its position
+/// and velocity at both ends, which leave it by at most h^4/384 max|d^4 q/dt^4| <= kAlongError,
+/// with d^4 q/dt^4 = 6 q''' s'^2 s'' + q'' (3 s''^2 + 4 s' s''').
 ///
 /// @param course q(s), with s in seconds from its start.
-/// @param path s(t), in seconds: from 0 to the course's duration, never backwards, and without a
-///   jerk.
+/// @param path s(t), in seconds: from 0 to the course's duration, never backwards.
 Profile along(const Profile& course, const Profile& path);
 
 /// [microsteps]
 constexpr double kAlongError = 0.01;
+
+/// What a motor may be asked for.
+struct AlongLimits {
+  double acceleration = 0.0;  ///< [microsteps/s^2]
+  double jerk = 0.0;          ///< [microsteps/s^3] 0: no limit
+};
+
+/// Whether q(s(t)) keeps to limits wherever the rate changes; elsewhere it is the course itself,
+/// run through more slowly or as it is. Looked at nine times in each part that is one polynomial,
+/// with its ends; between these it may go beyond the limits by less than a hundredth.
+bool staysWithin(const Profile& course, const Profile& path, const AlongLimits& limits);
 
 }  // namespace stepdriver::motion

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "stepdriver_core/motion/profile.h"
+#include "stepdriver_core/motion/profile_peaks.h"
 
 namespace stepdriver::motion {
 
@@ -56,5 +57,18 @@ constexpr double kQuinticError = 0.01;
 /// @throw std::range_error where it takes Profile::kLongest or longer.
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
                    const std::vector<Waypoint>& waypoints);
+
+/// What a trajectory asks of a motor that has a jerk limit.
+struct SplineJerk {
+  Peak jerk;               ///< [microsteps/s^3] the one furthest from 0 in a segment, with its sign
+  Peak acceleration_jump;  ///< [microsteps/s^2] the largest change at once, with its sign, be it at
+                           ///< the start, at a waypoint or at the end
+};
+
+/// Of the curves that planSpline() follows, not of the cubics that it cuts a quintic into: their
+/// accelerations jump by as much as makes no difference to the steps.
+///
+/// @throw as planSpline().
+SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& waypoints);
 
 }  // namespace stepdriver::motion

@@ -1,0 +1,83 @@
+#include "stepdriver_core/motion/profile_parts.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr double kNoTime = 1e-15;  // s
+
+DoubleDouble startOf(const Profile& profile) {
+  return profile.pieces().empty() ? profile.endPosition() : profile.pieces().front().p0;
+}
+
+// Goes through a profile from its start on.
+class Walk {
+ public:
+  explicit Walk(const Profile& profile) : profile_(profile) {}
+
+  /// How long the polynomial of now goes on; none where the motion is over.
+  bool moves() const { return index_ < profile_.pieces().size(); }
+  DoubleDouble left() const { return profile_.pieceStart(index_ + 1) - time_; }
+
+  /// The next of it.
+  Piece take(DoubleDouble duration) {
+    if (!moves()) return {duration, profile_.endPosition()};
+    const Piece& piece = profile_.pieces()[index_];
+    const DoubleDouble t = time_ - profile_.pieceStart(index_);
+    const DoubleDouble v = piece.velocityAt(t);
+    const DoubleDouble a = piece.accelerationAt(t);
+    const Piece taken{duration, piece.positionAt(t), v.hi, a.hi, piece.j, v.lo, a.lo};
+    const bool whole = !((left() - duration).hi > kNoTime);
+    time_ = whole ? profile_.pieceStart(index_ + 1) : time_ + duration;
+    if (whole) ++index_;
+    return taken;
+  }
+
+ private:
+  const Profile& profile_;
+  std::size_t index_ = 0;
+  DoubleDouble time_;
+};
+
+Piece sumOf(const Piece& a, const Piece& b) {
+  const DoubleDouble v = DoubleDouble(a.v0, a.v0_rest) + DoubleDouble(b.v0, b.v0_rest);
+  const DoubleDouble acceleration = DoubleDouble(a.a, a.a_rest) + DoubleDouble(b.a, b.a_rest);
+  return {a.duration, a.p0 + b.p0, v.hi, acceleration.hi, a.j + b.j, v.lo, acceleration.lo};
+}
+
+}  // namespace
+
+Profile part(const Profile& profile, DoubleDouble from, DoubleDouble to) {
+  Walk walk(profile);
+  std::vector<Piece> pieces;
+  DoubleDouble time;
+  while ((to - time).hi > kNoTime) {
+    const DoubleDouble until = time < from ? from : to;
+    const DoubleDouble left = until - time;
+    const DoubleDouble duration = walk.moves() ? std::min(walk.left(), left) : left;
+    const Piece piece = walk.take(duration);
+    if (!(time < from)) pieces.push_back(piece);
+    time = time + duration;
+  }
+  if (pieces.empty()) return {profile.startNs(), startOf(profile)};
+  return {profile.startNs(), std::move(pieces)};
+}
+
+Profile sum(const Profile& a, const Profile& b) {
+  Walk of_a(a);
+  Walk of_b(b);
+  std::vector<Piece> pieces;
+  while (of_a.moves() || of_b.moves()) {
+    const DoubleDouble duration = !of_b.moves()   ? of_a.left()
+                                  : !of_a.moves() ? of_b.left()
+                                                  : std::min(of_a.left(), of_b.left());
+    pieces.push_back(sumOf(of_a.take(duration), of_b.take(duration)));
+  }
+  if (pieces.empty()) return {a.startNs(), a.endPosition() + b.endPosition()};
+  return {a.startNs(), std::move(pieces)};
+}
+
+}  // namespace stepdriver::motion

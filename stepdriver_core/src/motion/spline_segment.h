@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stepdriver_core/motion/spline.h"
+
+namespace stepdriver::motion {
+
+/// One end of a segment.
+struct Knot {
+  std::int64_t time_ns = 0;
+  DoubleDouble position;
+  std::optional<double> velocity;
+  std::optional<double> acceleration;
+};
+
+/// A quintic over u from 0 to 1: p0 + c1 u + ... + c5 u^5 [microsteps].
+struct Quintic {
+  DoubleDouble p0, c1, c2, c3, c4, c5;
+
+  DoubleDouble positionAt(DoubleDouble u) const;
+  DoubleDouble slopeAt(DoubleDouble u) const;
+  double thirdDerivativeAt(double u) const;
+  /// Of an absolute value, over all of it.
+  double largestFourthDerivative() const;
+  double reach() const;
+};
+
+/// What makes the curve of a segment, as planSpline() says.
+enum class SegmentKind { kLine, kCubic, kQuintic };
+
+struct Segment {
+  Knot begin;
+  Knot end;
+  std::size_t index = 0;  ///< of the waypoint that it leads to
+
+  SegmentKind kind() const;
+  DoubleDouble duration() const;  ///< [s]
+  /// @pre kind() is kQuintic
+  Quintic quintic() const;
+};
+
+/// The segments of a trajectory, one after the other.
+///
+/// @pre requirePlannable()
+std::vector<Segment> segmentsOf(const MotionState& from, const std::vector<Waypoint>& waypoints);
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/bench.h"
+#include "support/differences.h"
+#include "support/motion_trace.h"
+
+namespace stepdriver::test {
+
+/// 1000 steps/m, 2 m/s, 10 m/s^2, from -5 m on, without a min endstop.
+inline axis::AxisConfig trajectoryAxis(const std::string& name) {
+  axis::AxisConfig config = linearAxis(name);
+  config.steps_per_unit = 1000.0;
+  config.max_speed = 2.0;
+  config.acceleration = 10.0;
+  config.deceleration = 10.0;
+  config.endstop_min.reset();
+  config.min_position = -5.0;
+  return config;
+}
+
+/// Trajectories of two axes, x and y.
+class TrajectoryBench : public testing::Test {
+ protected:
+  void SetUp() override { build({trajectoryAxis("x"), trajectoryAxis("y")}); }
+  void build(const std::vector<axis::AxisConfig>& axes) {
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
+    for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
+    bench = std::make_unique<Bench>(axes, specs);
+  }
+
+  machine::Machine& machine() { return *bench->machine; }
+  machine::CoordinatedMove follow(const machine::TrajectoryRequest& request) {
+    return machine().followTrajectory(request);
+  }
+  axis::AxisState state(const std::string& name) { return bench->axis(name).state(); }
+  void advance(double seconds) { machine().advance(seconds); }
+  void awaitRest() {
+    while (state("x").moving || state("y").moving) advance(1e-4);
+  }
+  std::vector<Crossing> crossings(const std::string& name) {
+    std::vector<Crossing> found;
+    std::int64_t before = 0;
+    for (const MotionTrace::Step& step : MotionTrace(*bench).steps(name)) {
+      found.push_back(
+          {std::llround(step.time * 1e9), static_cast<double>(before + step.count) / 2.0});
+      before = step.count;
+    }
+    return found;
+  }
+  /// What the steps of an axis prove, of more than `apart` [s] of each other.
+  Differences differences(const std::string& name, double apart) {
+    return differencesOf(crossings(name), apart);
+  }
+  /// At rest: the chips saw nothing wrong, and the positions are the pulses, but for backlash.
+  void expectClean() {
+    for (const std::string name : {"x", "y"}) {
+      EXPECT_EQ(violationsOf(bench->report(name)), "") << name;
+      const double slack = bench->axis(name).memory().value().slack;
+      const double motor = static_cast<double>(bench->pulses(name)) / 1000.0;
+      EXPECT_NEAR(state(name).position, motor - slack, 1e-12);
+    }
+  }
+
+  std::unique_ptr<Bench> bench;
+};
+
+}  // namespace stepdriver::test
