@@ -3,7 +3,8 @@ import tempfile
 import unittest
 
 from support import vcd
-from stepdriver_plots.vcd import BadTrace, PinTrace
+from stepdriver_plots.errors import BadTrace
+from stepdriver_plots.vcd import PinTrace
 
 
 class PinTraceTest(unittest.TestCase):

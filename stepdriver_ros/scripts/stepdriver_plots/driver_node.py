@@ -5,11 +5,9 @@ import math
 import rosgraph
 import rospy
 
+from .errors import NodeError
+
 CONNECT = 10.0  # [s] how long a node may take until it has its services
-
-
-class NodeError(Exception):
-    """The node isn't there, or refuses; says which and why."""
 
 
 class DriverNode:
@@ -18,13 +16,16 @@ class DriverNode:
             raise NodeError(f"no ROS master answers at {rosgraph.get_master_uri()}: is roslaunch "
                             "running, and ROS_MASTER_URI right?")
         self.name = rospy.resolve_name(name)
+        self._proxies = {}
 
     def call(self, service, kind, **fields):
         """Calls a service below the node's name; raises NodeError where it isn't accepted."""
         full = f"{self.name}/{service}"
         try:
-            rospy.wait_for_service(full, CONNECT)
-            answer = rospy.ServiceProxy(full, kind)(**fields)
+            if full not in self._proxies:
+                rospy.wait_for_service(full, CONNECT)
+                self._proxies[full] = rospy.ServiceProxy(full, kind, persistent=True)
+            answer = self._proxies[full](**fields)
         except rospy.ROSException as error:
             raise NodeError(f"the service {full} isn't there: is the node called {self.name}, and "
                             f"has it such an axis? ({error})") from error

@@ -62,3 +62,25 @@ def draw_motion(curves, path, title=""):
         panels[0, 0].legend(loc="best", frameon=False)
     figure.suptitle(title)
     save(figure, path)
+
+
+def draw_drawing(lines, parts, limits, path, title):
+    """What was to be drawn, and over it what was: parts are (places, whether it is of the
+    drawing). Of the limits those that there are make a frame."""
+    figure, panel = plt.subplots(figsize=(6.4, 5.6))
+    (left, right), (low, high) = limits
+    if None not in (left, right, low, high):
+        panel.plot([left, right, right, left, left], [low, low, high, high, low],
+                   color="#bbbbbb", linewidth=0.8)
+    for begin, end in (line[:2] for line in lines if line[2]):
+        panel.plot(*zip(begin, end), color=COLOURS[1], linewidth=3.0, alpha=0.25,
+                   solid_capstyle="round")
+    for places, drawn in parts:
+        if len(places) > 1:
+            panel.plot(*zip(*places), color=COLOURS[0] if drawn else "#999999",
+                       linewidth=1.0 if drawn else 0.5)
+    panel.set_aspect("equal")
+    panel.set_xlabel("x [mm]")
+    panel.set_ylabel("y [mm]")
+    panel.set_title(title)
+    save(figure, path)

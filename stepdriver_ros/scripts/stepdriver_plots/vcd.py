@@ -1,8 +1,7 @@
 """Reads the pin trace that the simulated rig writes, and others of its kind."""
 
 
-class BadTrace(Exception):
-    """The file can't be read as a pin trace; says why, and in which line."""
+from .errors import BadTrace
 
 
 class PinTrace:
