@@ -222,7 +222,7 @@ check_install() {
   quietly install cmake --install "$build/catkin"
   use_ros "$build/install"
   [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
-  for launch_file in "$share"/launch/*.launch; do
+  for launch_file in "$share"/launch/*.launch "$share"/launch/examples/*.launch; do
     say "${launch_file##*/}:"
     roslaunch --files stepdriver "${launch_file##*/}" | indent
   done
