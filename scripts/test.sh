@@ -218,12 +218,12 @@ test_check_in_kernel() {
 
 # Nothing but the install space is on any path here.
 check_install() {
-  local share=$build/install/share/stepdriver launch_file
+  local share=$build/install/share/stepdriver launch_file program
   rm -rf "$build/install"
   quietly install cmake --install "$build/catkin"
   use_ros "$build/install"
   [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
-  for launch_file in "$share"/launch/*.launch; do
+  for launch_file in "$share"/launch/*.launch "$share"/launch/examples/*.launch; do
     say "${launch_file##*/}:"
     roslaunch --files stepdriver "${launch_file##*/}" | indent
   done
@@ -231,6 +231,10 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
+  for program in draw plot_motion; do
+    rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
+      die "$program --help doesn't work"
+  done
   rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
     >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then

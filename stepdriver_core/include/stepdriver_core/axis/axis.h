@@ -61,6 +61,11 @@ class Axis {
   ///   but has to be.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
+  /// What moveTo() would do now; nothing moves.
+  ///
+  /// @throw Refused as moveTo().
+  MovePlan plan(double position, bool relative = false, double velocity = 0.0);
+
   /// Turns the motor by a number of rounds, which need not be whole.
   ///
   /// @throw Refused as moveTo(), and where the steps of a round are not known.
