@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -42,9 +41,6 @@ class Coordination {
 
   /// Relative. A curve between points that keep to a limit goes a little beyond it.
   static constexpr double kTolerance = 0.01;
-
-  /// How a move ended; none where it hasn't.
-  static std::optional<MoveResult> result(const Axis& axis, const Move& move);
 
  private:
   static std::vector<Axis::Impl*> implsOf(const std::vector<Axis*>& axes);
