@@ -311,10 +311,13 @@ void Machine::shutdown() { impl_->shutdown(); }
 EngineFigures Machine::figures() const {
   const pulse::EngineState state = impl_->engine_->state();
   EngineFigures figures;
+  figures.edges = state.edges;
   figures.pulses = state.pulses;
   figures.slips = state.slips;
   figures.slipped = static_cast<double>(state.slipped) * 1e-9;
   figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
+  figures.lateness = impl_->engine_->lateness();
+  figures.lateness_last_second = impl_->engine_->latenessLastSecond();
   figures.realtime = impl_->driver_->rights().text();
   return figures;
 }
