@@ -238,6 +238,11 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
 
 const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr; }
 
+std::uint64_t Axis::Impl::currentMove() {
+  if (const Motion* motion = underWay()) return motion->goal.move;
+  return held ? held->goal.move : 0;
+}
+
 motion::MotionState Axis::Impl::stateAt(std::int64_t at) {
   if (const Motion* motion = underWay()) return motion->profile->stateAt(at);
   const pulse::ChannelState state = harvest();

@@ -76,6 +76,8 @@ class Axis::Impl {
   void slowDown(const std::string& stopped_by);
   /// The move that was accepted last; 0: none was.
   std::uint64_t lastMove() const { return moves_; }
+  /// The move under way, or that is held; 0: there is none.
+  std::uint64_t currentMove();
   /// Brings the motor to where the joint moves with its first step of a way. At rest; lets go of
   /// the lock while it does so.
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);

@@ -135,7 +135,7 @@ class Machine::Impl {
     CoordinatedResult result;
     int worst = -1;
     for (const CoordinatedMove::Member& member : move.members) {
-      const auto own = axis::Coordination::result(axis(member.axis), member.move);
+      const auto own = axis(member.axis).result(member.move);
       if (!own) return std::nullopt;
       result.positions.push_back(own->position);
       result.duration = std::max(result.duration, own->duration);
