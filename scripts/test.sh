@@ -15,8 +15,9 @@ Installs what is missing, builds, and runs the parts that are named; all of them
           docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
-  --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
-          read by sigrok-cli; with --kernel also the whole node on that kernel's GPIO chips
+  --ros   the catkin package, its rostests, its install space with all its commands and its service,
+          and the trace of a move from there, read by sigrok-cli; with --kernel also the whole node
+          on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -91,7 +92,7 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
@@ -237,6 +238,12 @@ check_install() {
   fi
 }
 
+# Every installed command, and the service, as far as that goes without a systemd that runs.
+check_operations() {
+  use_ros "$build/install"
+  bash "$src/test/operations/operations_test.sh" "$build/install"
+}
+
 check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
 choose_build_folder
@@ -275,6 +282,7 @@ if wants ros; then
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
   stage install check_install node-build
+  stage operations check_operations install
   stage trace check_trace install
 fi
 
