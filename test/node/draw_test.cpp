@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
+#include <ros/master.h>
 #include <stepdriver/AxisStates.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdint>
 #include <fstream>
@@ -87,6 +89,13 @@ TEST_F(Draw, StopsTheAxesWhereItIsInterrupted) {
   words.insert(words.end(), {"--speed", "5"});
   NodeProcess process(words, std::string(STEPDRIVER_PROGRAMS) + "/draw");
   ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.position.at(0) > 0.001; }));
+  EXPECT_TRUE(waitUntil([this] {
+    ros::master::V_TopicInfo topics;
+    ros::master::getTopics(topics);
+    return std::any_of(topics.begin(), topics.end(), [this](const ros::master::TopicInfo& topic) {
+      return topic.name == node.beside("drawing") && topic.datatype == "visualization_msgs/Marker";
+    });
+  })) << "the trail for rviz";
   process.signal(SIGINT);
   EXPECT_EQ(process.waitForExit(kBound), 130);
   expectSays(process.output(), "stopped");
