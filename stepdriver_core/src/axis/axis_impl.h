@@ -76,10 +76,15 @@ class Axis::Impl {
   void slowDown(const std::string& stopped_by);
   /// The move that was accepted last; 0: none was.
   std::uint64_t lastMove() const { return moves_; }
+  /// The move under way, or that is held; 0: there is none.
+  std::uint64_t currentMove();
   /// Brings the motor to where the joint moves with its first step of a way. At rest; lets go of
   /// the lock while it does so.
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
   void changeOverride(double factor);
+  /// Whether this is the axis to ask for what it follows or has kept: of a course that is the
+  /// first.
+  bool leads();
   void hold();
   void resume();
   /// Gives up what a hold has kept, of all axes of its course.

@@ -222,6 +222,7 @@ void PulseEngine::meetLateness(Nanoseconds now) {
     if (!isDue(channel, Action::kRise, now)) continue;
     const Nanoseconds late = now - channel.due;
     state_.worst_lateness = std::max(state_.worst_lateness, late);
+    lateness_.add(now, late);
     if (late > max_lateness_ && isFast(channel)) {
       channel.state.end_lateness = late;
       end(channel, EndReason::kTooLate, now);
@@ -292,6 +293,7 @@ void PulseEngine::written(Channel& channel, bool done) {
   const bool fall = channel.high;
   channel.high = !fall && done;
   (fall ? channel.fell : channel.rose) = clock_.now();
+  if (done) ++state_.edges;
   if (fall || !done) return;
   channel.state.count += channel.direction;
   channel.state.slack =

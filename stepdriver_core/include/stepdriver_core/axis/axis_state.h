@@ -29,6 +29,8 @@ struct AxisState {
   double velocity = 0.0;  ///< [unit/s] of the plan
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
   double target = 0.0;
+  /// [s] Until the motion under way ends, as planned; 0 at rest and in a jog without an end.
+  double time_left = 0.0;
   std::string fault;  ///< in words; empty: none
   /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
   /// none.

@@ -11,6 +11,7 @@
 #include "stepdriver_core/motion/profile.h"
 #include "stepdriver_core/motion/step_finder.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/lateness.h"
 #include "stepdriver_core/pulse/mailbox.h"
 #include "stepdriver_core/pulse/snapshot.h"
 
@@ -136,6 +137,7 @@ struct ChannelState {
 };
 
 struct EngineState {
+  std::uint64_t edges = 0;  ///< of STEP lines
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;         ///< times that the timeline was slid
   Nanoseconds slipped = 0;         ///< by how much altogether: motion time is clock time less this
@@ -186,6 +188,11 @@ class PulseEngine {
 
   ChannelState channel(int index) const;
   EngineState state() const { return figures_.load(); }
+
+  /// How late active STEP edges were against their planned times.
+  LatenessFigures lateness() const { return lateness_.sinceStart(); }
+  LatenessFigures latenessLastSecond() const { return lateness_.lastSecond(clock_.now()); }
+
   std::size_t channels() const { return channels_.size(); }
 
  private:
@@ -291,6 +298,7 @@ class PulseEngine {
   std::atomic<std::uint64_t> input_stops_{0};
   std::atomic<bool> inputs_changed_{false};
   EngineState state_;
+  LatenessRecord lateness_;
   Snapshot<EngineState> figures_;
 };
 
