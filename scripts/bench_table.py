@@ -21,7 +21,7 @@ def read_results(names):
             for run in json.load(file)["benchmarks"]:
                 if run.get("run_type") == "aggregate":
                     continue
-                key = run.get("run_name", run["name"])
+                key = re.sub("/iterations:[0-9]+", "", run.get("run_name", run["name"]))
                 if run.get("error_occurred"):
                     failed.append(f"{key}: {run['error_message']}")
                 if "items_per_second" in run:
