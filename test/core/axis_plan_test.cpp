@@ -105,17 +105,17 @@ TEST(AxisPlan, IsRefusedAsTheMoveIs) {
   axis::AxisConfig config = linearAxis("x");
   config.max_position = 0.08;
   Bench bench({config});
-  const auto expectSame = [&](double position, double velocity, const std::string& words) {
+  const auto expect_same = [&](double position, double velocity, const std::string& words) {
     const std::string said = refusal([&] { bench.axis().plan(position, false, velocity); });
     EXPECT_EQ(said, refusal([&] { bench.axis().moveTo(position, false, velocity); }));
     EXPECT_NE(said.find(words), std::string::npos) << said;
   };
-  expectSame(0.09, 0.0, "above the soft limit");
-  expectSame(std::numeric_limits<double>::quiet_NaN(), 0.0, "finite");
-  expectSame(0.05, 0.2, "above the maximum");
-  expectSame(-0.05, -0.1, "velocity");
+  expect_same(0.09, 0.0, "above the soft limit");
+  expect_same(std::numeric_limits<double>::quiet_NaN(), 0.0, "finite");
+  expect_same(0.05, 0.2, "above the maximum");
+  expect_same(-0.05, -0.1, "velocity");
   bench.axis().enable(false);
-  expectSame(0.05, 0.0, "disabled");
+  expect_same(0.05, 0.0, "disabled");
 }
 
 }  // namespace

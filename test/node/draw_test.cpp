@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
+#include <ros/master.h>
 #include <stepdriver/AxisStates.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdint>
 #include <fstream>
@@ -63,15 +65,15 @@ TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {
 
 TEST_F(Draw, RefusesBeforeAnythingMoves) {
   node.start();
-  const auto expectFails = [&](const std::string& text, const std::string& words) {
+  const auto expect_fails = [&](const std::string& text, const std::string& words) {
     write(text);
     const auto end = draw();
     EXPECT_EQ(end.code, 1);
     expectSays(end.output, words);
   };
-  expectFails("10 10\n10 300\n", "(10, 300) mm is beyond the soft limits of y");
-  expectFails("10 10\nten 30\n", "line 2: ten 30");
-  expectFails("", "there is no line");
+  expect_fails("10 10\n10 300\n", "(10, 300) mm is beyond the soft limits of y");
+  expect_fails("10 10\nten 30\n", "line 2: ten 30");
+  expect_fails("", "there is no line");
   EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 2);
   EXPECT_EQ(runProgram("draw", {"--help"}).code, 0);
   EXPECT_EQ(node.pulses(), 0);
@@ -87,6 +89,13 @@ TEST_F(Draw, StopsTheAxesWhereItIsInterrupted) {
   words.insert(words.end(), {"--speed", "5"});
   NodeProcess process(words, std::string(STEPDRIVER_PROGRAMS) + "/draw");
   ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.position.at(0) > 0.001; }));
+  EXPECT_TRUE(waitUntil([this] {
+    ros::master::V_TopicInfo topics;
+    ros::master::getTopics(topics);
+    return std::any_of(topics.begin(), topics.end(), [this](const ros::master::TopicInfo& topic) {
+      return topic.name == node.beside("drawing") && topic.datatype == "visualization_msgs/Marker";
+    });
+  })) << "the trail for rviz";
   process.signal(SIGINT);
   EXPECT_EQ(process.waitForExit(kBound), 130);
   expectSays(process.output(), "stopped");

@@ -29,18 +29,18 @@ TEST(PlotMotion, SaysWhyItDrawsNothing) {
   NodeUnderTest node;
   node.start();
   const TemporaryFile picture(".svg");
-  const auto expectFails = [&](const std::string& axis, const std::string& to, int code,
-                               const std::string& words) {
+  const auto expect_fails = [&](const std::string& axis, const std::string& to, int code,
+                                const std::string& words) {
     const auto end = runProgram("plot_motion", {"plan", "--node", node.name(), "--axis", axis,
                                                 "--to", to, "-o", picture.path()});
     EXPECT_EQ(end.code, code);
     expectSays(end.output, words);
     EXPECT_FALSE(picture.exists());
   };
-  expectFails("x", "0.3", 1, "above the soft limit");
-  expectFails("x", "0", 1, "nothing would move");
-  expectFails("z", "0.1", 1, "has no axis z: its axes are x");
-  expectFails("x", "nan", 2, "must be a finite number");
+  expect_fails("x", "0.3", 1, "above the soft limit");
+  expect_fails("x", "0", 1, "nothing would move");
+  expect_fails("z", "0.1", 1, "has no axis z: its axes are x");
+  expect_fails("x", "nan", 2, "must be a finite number");
 }
 
 TEST(PlotMotion, DrawsThePulsesOfATrace) {
