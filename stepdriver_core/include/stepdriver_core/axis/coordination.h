@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -33,16 +32,19 @@ class Coordination {
   /// replace. The points' time is the trajectory's: a hold or a speed override below 1 runs through
   /// it more slowly, one above 1 does nothing. Refused where a position is beyond a soft limit, a
   /// velocity by more than kTolerance beyond the maximum, an acceleration beyond the larger of
-  /// acceleration and deceleration, or where a velocity jumps by more than the start speed. Its
-  /// jerk is the sender's: where the points give accelerations these don't jump, else they do.
+  /// acceleration and deceleration, or where a velocity jumps by more than the start speed; for an
+  /// axis with a jerk limit also where the jerk is beyond that or the acceleration jumps, by more
+  /// than kTolerance of its limit. A backlash is taken up beside the joint's own motion, see
+  /// motion::planMotor(), which may last longer than the points; refused where that has no room.
   static std::vector<Move> follow(const std::vector<Axis*>& axes,
                                   const std::vector<CoursePoint>& points);
 
   /// Relative. A curve between points that keep to a limit goes a little beyond it.
   static constexpr double kTolerance = 0.01;
 
-  /// How a move ended; none where it hasn't.
-  static std::optional<MoveResult> result(const Axis& axis, const Move& move);
+  /// Whether a hold or a resume is to be asked of this axis: of those that move together it is of
+  /// one, and goes for all of them.
+  static bool leads(const Axis& axis);
 
  private:
   static std::vector<Axis::Impl*> implsOf(const std::vector<Axis*>& axes);
