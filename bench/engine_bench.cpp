@@ -70,17 +70,15 @@ void run(benchmark::State& state, Steps steps) {
     (void)unused;
     load.serve();
   }
-  const auto edges = static_cast<double>(load.lines.edges - before);
-  state.counters["per_edge"] =
-      benchmark::Counter(edges, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.SetItemsProcessed(static_cast<std::int64_t>(load.lines.edges - before));
   if (load.slips() != 0) state.SkipWithError("the timeline slid: this isn't the engine's own cost");
 }
 
 void edgesApart(benchmark::State& state) { run(state, Steps::kApart); }
 void edgesTogether(benchmark::State& state) { run(state, Steps::kTogether); }
 
-BENCHMARK(edgesApart)->RangeMultiplier(2)->Range(1, 32);
-BENCHMARK(edgesTogether)->RangeMultiplier(2)->Range(2, 32);
+BENCHMARK(edgesApart)->Name("Engine/edges_apart")->RangeMultiplier(2)->Range(1, 32);
+BENCHMARK(edgesTogether)->Name("Engine/edges_together")->RangeMultiplier(2)->Range(2, 32);
 
 }  // namespace
 }  // namespace stepdriver::bench

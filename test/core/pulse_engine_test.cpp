@@ -103,7 +103,7 @@ TEST_F(PulseEngineTest, AbsorbsASmallLatenessAndBunchesNothing) {
   for (std::size_t k = 1; k < rises.size(); ++k) ASSERT_GE(rises[k] - rises[k - 1], 1'000'000);
   EXPECT_EQ(engine->state().slips, 0U);
   EXPECT_EQ(engine->state().worst_lateness, 100'000);
-  EXPECT_EQ(engine->state().edges, 200U);
+  EXPECT_EQ(engine->state().pulses, 100U);
   EXPECT_EQ(engine->lateness().count, 100U);
   EXPECT_EQ(engine->lateness().p50, 100'000);
   clock.waitUntil(1'500'000'000);

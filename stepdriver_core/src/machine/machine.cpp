@@ -318,7 +318,7 @@ void Machine::shutdown() { impl_->shutdown(); }
 EngineFigures Machine::figures() const {
   const pulse::EngineState state = impl_->engine_->state();
   EngineFigures figures;
-  figures.edges = state.edges;
+  figures.edges = 2 * state.pulses;
   figures.pulses = state.pulses;
   figures.slips = state.slips;
   figures.slipped = static_cast<double>(state.slipped) * 1e-9;

@@ -61,6 +61,7 @@ struct EngineChannel {
   void countStep();
   void endMotion(EndReason reason, Nanoseconds motion_now);
 
+  std::size_t index = 0;
   bool high = false;     // the pulse is out
   bool running = false;  // the motion under way has made a step
   bool changed = false;  // it is to be scheduled

@@ -55,6 +55,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
   if (emergencyStopped()) stopAll(now);
   dropEnded();
   if (writes_.empty()) return;
+  const std::uint64_t pulses = state_.pulses;
   const int error = lines_.write(writes_.data(), writes_.size());
   if (error != 0) {
     writeOneByOne(error, now);
@@ -62,7 +63,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     const Nanoseconds done = clock_.now();
     for (Channel* channel : writers_) written(*channel, done);
   }
-  figures_.store(state_);
+  if (state_.pulses != pulses) figures_.store(state_);
 }
 
 void PulseEngine::dropEnded() {
@@ -97,7 +98,6 @@ void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
 }
 
 void PulseEngine::written(Channel& channel, Nanoseconds now) {
-  ++state_.edges;
   changed(channel);
   channel.high = !channel.high;
   if (!channel.high) {

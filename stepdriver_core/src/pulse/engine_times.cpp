@@ -7,10 +7,6 @@ namespace stepdriver::pulse {
 
 using Action = EngineChannel::Action;
 
-std::size_t PulseEngine::indexOf(const Channel& channel) const {
-  return static_cast<std::size_t>(&channel - channels_.data());
-}
-
 void PulseEngine::changed(Channel& channel) {
   if (channel.changed) return;
   channel.changed = true;
@@ -66,7 +62,7 @@ bool PulseEngine::schedule(Channel& channel) {
       due = channel.profile->endNs() + state_.slipped;
       break;
   }
-  dues_.set(indexOf(channel), due);
+  dues_.set(channel.index, due);
   return slid;
 }
 
@@ -83,7 +79,7 @@ bool PulseEngine::scheduleRise(Channel& channel) {
     earliest = std::max({earliest, channel.fell + config.step_low, closestRise(channel)});
   }
   const Nanoseconds planned = channel.next->time_ns + state_.slipped;
-  dues_.set(indexOf(channel), std::max(planned, earliest));
+  dues_.set(channel.index, std::max(planned, earliest));
   return slideUpTo(earliest, planned);
 }
 

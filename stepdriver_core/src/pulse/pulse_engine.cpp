@@ -13,7 +13,10 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
       emergency_input_(emergency_stop),
       channels_(channels.size()),
       dues_(channels.size()) {
-  for (std::size_t i = 0; i < channels.size(); ++i) channels_[i].config = channels[i];
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    channels_[i].index = i;
+    channels_[i].config = channels[i];
+  }
   due_.reserve(channels.size());
   changed_.reserve(channels.size());
   writes_.reserve(channels.size());

@@ -18,7 +18,6 @@
 namespace stepdriver::pulse {
 
 struct EngineState {
-  std::uint64_t edges = 0;  ///< of STEP lines
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;  ///< times that the timeline was slid, for one instant's edges once
   Nanoseconds slipped = 0;  ///< by how much altogether: motion time is clock time less this
@@ -120,7 +119,6 @@ class PulseEngine {
   static Nanoseconds closestRise(const Channel& channel);
   bool slideUpTo(Nanoseconds earliest, Nanoseconds planned);
   void slide(Nanoseconds by);
-  std::size_t indexOf(const Channel& channel) const;
 
   gpio::Lines& lines_;
   Clock& clock_;
