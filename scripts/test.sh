@@ -15,8 +15,9 @@ Installs what is missing, builds, and runs the parts that are named; all of them
           benchmarks is exact; the pictures of docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
-  --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
-          read by sigrok-cli; with --kernel also the whole node on that kernel's GPIO chips
+  --ros   the catkin package, its rostests, its install space with all its commands and its service,
+          and the trace of a move from there, read by sigrok-cli; with --kernel also the whole node
+          on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -91,7 +92,7 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
@@ -206,7 +207,7 @@ test_node_in_kernel() {
     --chip "header:$header:58:${lines#,}" --trace "$trace" -- \
     rostest "$src/test/node/hardware/hardware.test"
   "$build/core/test/kernel/check_waveform" "$trace" --axis x --driver a4988 --step "$header:17" \
-    --dir "$header:27" --enable "$header:22" --shortest-interval $((1000000000 * 3 / 4 / 1600))
+    --dir "$header:27" --enable "$header:22" --shortest-interval $((1000000000 * 3 / 4 / 160))
 }
 
 # stepdriver_check there, with and without lines that it can have.
@@ -217,12 +218,12 @@ test_check_in_kernel() {
 
 # Nothing but the install space is on any path here.
 check_install() {
-  local share=$build/install/share/stepdriver launch_file
+  local share=$build/install/share/stepdriver launch_file program
   rm -rf "$build/install"
   quietly install cmake --install "$build/catkin"
   use_ros "$build/install"
   [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
-  for launch_file in "$share"/launch/*.launch; do
+  for launch_file in "$share"/launch/*.launch "$share"/launch/examples/*.launch; do
     say "${launch_file##*/}:"
     roslaunch --files stepdriver "${launch_file##*/}" | indent
   done
@@ -230,11 +231,21 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
+  for program in draw plot_motion; do
+    rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
+      die "$program --help doesn't work"
+  done
   rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
     >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then
     die "these installed files refer to the build folder"
   fi
+}
+
+# Every installed command, and the service, as far as that goes without a systemd that runs.
+check_operations() {
+  use_ros "$build/install"
+  bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
 check_trace() { bash "$root/scripts/demo.sh" --installed; }
@@ -275,6 +286,7 @@ if wants ros; then
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
   stage install check_install node-build
+  stage operations check_operations install
   stage trace check_trace install
 fi
 

@@ -2,7 +2,6 @@
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
-#include <cstdio>
 #include <deque>
 #include <exception>
 #include <string>
@@ -17,6 +16,7 @@
 #include "jog_subscriber.h"
 #include "machine_homing.h"
 #include "machine_services.h"
+#include "move_actions.h"
 #include "node_start.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
@@ -28,11 +28,8 @@
 namespace stepdriver::ros_node {
 namespace {
 
-constexpr int kExitOk = 0;
-constexpr int kExitConfig = 1;
 constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
-constexpr int kExitUsage = 64;
 
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
@@ -50,20 +47,20 @@ lines.
               ~move_line  ~hold  ~resume
               ~rig/report  ~rig/emergency_stop (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~jog, ~command (subscribed)
-  action      ~follow_joint_trajectory
+  actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
               ~simulation  robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
-3 the machine is too slow for its axes and ~realtime is enforce.
+3 the machine is too slow for its axes and ~realtime is enforce, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
 /// Refuses new commands, decelerates, disables, and lets every client have its answer.
 ///
 /// @return the exit code.
-int shutDown(machine::Machine& machine, CallQueues& queues, TrajectoryAction& trajectory_action,
-             StatePublisher& publisher) {
+int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
+             TrajectoryAction& trajectory_action, StatePublisher& publisher) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -71,6 +68,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, TrajectoryAction& tr
     ROS_ERROR("Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
   }
+  move_actions.tellEnded();
   trajectory_action.tellEnded();
   queues.finish(kLastAnswers);
   publisher.stop();
@@ -126,6 +124,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
+  MoveActions move_actions(private_node, machine, queues);
   const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
@@ -146,7 +145,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
     }
   }
   ROS_INFO("Ending on %s", who.c_str());
-  return shutDown(machine, queues, trajectory_action, publisher);
+  return shutDown(machine, queues, move_actions, trajectory_action, publisher);
 }
 
 int runOrExplain(EndRequests& end_requests) {
@@ -178,15 +177,7 @@ int runOrExplain(EndRequests& end_requests) {
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
   node::EndRequests end_requests;
-  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
-  std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  std::vector<std::string> arguments;
-  ros::removeROSArgs(argc, argv, arguments);
-  if (arguments.size() > 1) {
-    const bool help = arguments[1] == "--help" || arguments[1] == "-h";
-    std::fputs(node::kUsage, help ? stdout : stderr);
-    return help ? node::kExitOk : node::kExitUsage;
-  }
+  if (const auto code = node::answerArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
   if (!node::waitForMaster(end_requests)) return node::kExitOk;
   const int exit_code = node::runOrExplain(end_requests);

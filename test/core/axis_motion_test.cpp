@@ -22,14 +22,7 @@ using test::linearAxis;
 using test::violationsOf;
 
 /// 1000 steps/s, 2000 steps/s^2, no soft limits, switches at -100 m and 100 m.
-axis::AxisConfig config() {
-  axis::AxisConfig config = linearAxis("x");
-  config.steps_per_unit = 1000.0;
-  config.max_speed = 1.0;
-  config.acceleration = 2.0;
-  config.deceleration = 2.0;
-  return config;
-}
+axis::AxisConfig config() { return linearAxis("x", 1000.0, 1.0, 2.0); }
 
 class AxisMotion : public testing::Test {
  protected:
@@ -257,6 +250,42 @@ TEST_F(AxisMotion, StopsAtTheDecelerationOfAStop) {
   const axis::MoveResult result = x().wait(move);
   EXPECT_EQ(result.end, MoveEnd::kStopped);
   expectCleanAt(801);
+}
+
+TEST_F(AxisMotion, StopsAMoveOnlyWhileItIsTheOneUnderWayOrHeld) {
+  const axis::Move first = x().moveTo(4.0);
+  advance(1.0);
+  const axis::Move second = x().moveTo(3.0);
+  x().stop(first);
+  EXPECT_EQ(x().wait(second).end, MoveEnd::kReached) << "it has replaced the first";
+  const axis::Move third = x().moveTo(1.0);
+  advance(1.0);
+  x().stop(third);
+  EXPECT_EQ(x().wait(third).end, MoveEnd::kStopped);
+  const axis::Move fourth = x().moveTo(0.0);
+  advance(0.5);
+  x().hold();
+  advance(2.0);
+  EXPECT_FALSE(x().result(fourth).has_value());
+  x().stop(third);
+  EXPECT_FALSE(x().result(fourth).has_value()) << "that one is long over";
+  x().stop(fourth);
+  ASSERT_TRUE(x().result(fourth).has_value());
+  EXPECT_EQ(x().result(fourth)->end, MoveEnd::kStopped);
+}
+
+TEST_F(AxisMotion, SaysHowLongItsMotionStillTakes) {
+  EXPECT_EQ(x().state().time_left, 0.0);
+  const axis::Move move = x().moveTo(2.0);  // 2.5 s
+  advance(1.0);
+  EXPECT_NEAR(x().state().time_left, 1.501, 1e-4) << "it began a millisecond later";
+  x().stop();
+  EXPECT_NEAR(x().state().time_left, 0.5, 0.002);
+  x().wait(move);
+  EXPECT_EQ(x().state().time_left, 0.0);
+  x().jog(0.5);
+  advance(1.0);
+  EXPECT_EQ(x().state().time_left, 0.0) << "no end";
 }
 
 TEST_F(AxisMotion, GoesOnFromAStopThatIsUnderWayOnlyByANewCommand) {

@@ -26,13 +26,8 @@ using test::refusal;
 using test::violationsOf;
 
 axis::AxisConfig axisOf(const std::string& name, double scale, double speed, double acceleration) {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = scale;
-  config.max_speed = speed;
-  config.acceleration = acceleration;
-  config.deceleration = acceleration;
+  axis::AxisConfig config = linearAxis(name, scale, speed, acceleration);
   config.endstop_min.reset();
-  config.endstop_max = axis::Endstop{name + ".max", false};
   return config;
 }
 
@@ -186,6 +181,37 @@ TEST_F(Line, IsHeldAndGoesOnWithoutLeavingIt) {
   expectClean();
 }
 
+TEST_F(Line, SaysOnceWhyItCannotGoOn) {
+  const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.6);
+  machine().hold();
+  awaitRest();
+  sim::RigFaults faults;
+  faults.max_stuck = true;
+  bench->rig.setFaults("y", faults);
+  try {
+    machine().resume();
+    ADD_FAILURE() << "it goes on into the switch";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "y: the max endstop is active; it moves only towards min");
+  }
+  bench->rig.setFaults("y", {});
+  machine().resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  expectClean();
+}
+
+TEST_F(Line, IsHeldAndResumedByAnyOfItsAxes) {
+  const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.6);
+  bench->axis("y").hold();
+  awaitRest();
+  EXPECT_TRUE(bench->axis("x").state().held);
+  bench->axis("y").resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  expectClean();
+}
+
 TEST_F(Line, ResumesWhileItStillSlowsDown) {
   const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
   advance(0.7);
@@ -231,7 +257,7 @@ TEST_F(Line, EndsAtOnceForAllWhereOneMeetsItsEndstop) {
   EXPECT_NE(result.message.find("y stands at 0.3"), std::string::npos) << result.message;
   EXPECT_FALSE(bench->axis("x").state().moving);
   expectOnTheLine(1.0, 0.7);
-  const auto x = axis::Coordination::result(bench->axis("x"), move.members[0].move);
+  const auto x = bench->axis("x").result(move.members[0].move);
   EXPECT_EQ(x->end, MoveEnd::kCompanion);
   EXPECT_NE(x->message.find("it moved together with y, which was stopped"), std::string::npos)
       << x->message;
@@ -255,7 +281,7 @@ TEST_F(Line, LetsTheOthersStopWhereOneIsGivenAnotherGoal) {
   advance(0.7);
   const axis::Move other = bench->axis("x").moveTo(0.2);
   EXPECT_EQ(bench->axis("x").wait(other).end, MoveEnd::kReached);
-  const auto y = axis::Coordination::result(bench->axis("y"), move.members[1].move);
+  const auto y = bench->axis("y").result(move.members[1].move);
   ASSERT_TRUE(y.has_value());
   EXPECT_EQ(y->end, MoveEnd::kStopped);
   EXPECT_NE(y->message.find("x, which it moved together with, was given another goal"),

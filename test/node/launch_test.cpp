@@ -4,6 +4,7 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
+#include <stepdriver/MoveLine.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/RigReport.h>
 
@@ -83,6 +84,21 @@ TEST(Launch, BringsUpTwoAxesThatMoveAtTheSameTime) {
   EXPECT_TRUE(states.waitForLatest([](const JointState& s) {
     return std::abs(s.position.at(0) - 1.0) < 1e-3 && std::abs(s.position.at(1) - 0.05) < 1e-4;
   }));
+}
+
+TEST(Launch, BringsUpAPlotterThatDrawsALine) {
+  MoveLine::Request request;
+  request.name = {"x", "y"};
+  request.position = {0.08, 0.06};
+  request.wait = true;
+  const auto answer = callWhenThere<MoveLine>("/plotter/stepdriver/move_line", request);
+  EXPECT_TRUE(answer.success) << answer.message;
+  const auto report = callWhenThere<RigReport>("/plotter/stepdriver/rig/report");
+  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{6400, 4800}));
+  EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
+  const Recorder<JointState> states(std::string("/plotter/joint_states"));
+  ASSERT_TRUE(states.waitForLatest([](const JointState&) { return true; }));
+  EXPECT_EQ(states.messages().back().name, (std::vector<std::string>{"x_joint", "y_joint"}));
 }
 
 TEST(Launch, JogsTwoAxesByAJoystick) {

@@ -80,10 +80,9 @@ std::vector<Move> Coordination::follow(const std::vector<Axis*>& axes,
   return Axis::Impl::begin(ordersFor(course, course->targets()));
 }
 
-std::optional<MoveResult> Coordination::result(const Axis& axis, const Move& move) {
+bool Coordination::leads(const Axis& axis) {
   const std::lock_guard<std::mutex> lock(axis.impl_->mutex);
-  axis.impl_->harvest();
-  return axis.impl_->log.result(move.id);
+  return axis.impl_->leads();
 }
 
 }  // namespace stepdriver::axis

@@ -135,7 +135,7 @@ class Machine::Impl {
     CoordinatedResult result;
     int worst = -1;
     for (const CoordinatedMove::Member& member : move.members) {
-      const auto own = axis::Coordination::result(axis(member.axis), member.move);
+      const auto own = axis(member.axis).result(member.move);
       if (!own) return std::nullopt;
       result.positions.push_back(own->position);
       result.duration = std::max(result.duration, own->duration);
@@ -214,6 +214,13 @@ class Machine::Impl {
     if (!errors.empty()) throw Error(errors);
   }
 
+  // What is wrong with a motion of several axes is said once.
+  void forEachMotion(const std::function<void(axis::Axis&)>& action) {
+    forAll([&action](axis::Axis& axis) {
+      if (axis::Coordination::leads(axis)) action(axis);
+    });
+  }
+
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
   std::optional<pulse::Signal> emergency_stop_;
@@ -246,11 +253,11 @@ void Machine::stop() {
 }
 
 void Machine::hold() {
-  impl_->forAll([](axis::Axis& axis) { axis.hold(); });
+  impl_->forEachMotion([](axis::Axis& axis) { axis.hold(); });
 }
 
 void Machine::resume() {
-  impl_->forAll([](axis::Axis& axis) { axis.resume(); });
+  impl_->forEachMotion([](axis::Axis& axis) { axis.resume(); });
 }
 
 std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
@@ -311,10 +318,13 @@ void Machine::shutdown() { impl_->shutdown(); }
 EngineFigures Machine::figures() const {
   const pulse::EngineState state = impl_->engine_->state();
   EngineFigures figures;
+  figures.edges = state.edges;
   figures.pulses = state.pulses;
   figures.slips = state.slips;
   figures.slipped = static_cast<double>(state.slipped) * 1e-9;
   figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
+  figures.lateness = impl_->engine_->lateness();
+  figures.lateness_last_second = impl_->engine_->latenessLastSecond();
   figures.realtime = impl_->driver_->rights().text();
   return figures;
 }
