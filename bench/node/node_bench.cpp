@@ -96,21 +96,21 @@ double median(std::vector<double> samples) {
   return samples[samples.size() / 2];
 }
 
-/// Calls take turns, so that noise meets both. With a target that is new each time, so that each
-/// call plans a motion, from the midst of the last one.
 struct CallTimes {
   double node = 0.0;
   double empty = 0.0;
 };
 
-CallTimes measureCalls(ros::NodeHandle& handle, bool persistent) {
-  constexpr int kCalls = 1500;
+/// Calls take turns, so that noise meets both. The target is a new one each time, so that each call
+/// plans a motion, from the midst of the last one.
+CallTimes measureCalls(ros::NodeHandle& handle, bool persistent, double way) {
+  constexpr int kCalls = 800;
   auto node = handle.serviceClient<stepdriver::MoveTo>("/stepdriver/a0/move_to", persistent);
   auto empty = handle.serviceClient<stepdriver::MoveTo>("/empty/move_to", persistent);
   std::vector<double> node_times;
   std::vector<double> empty_times;
   for (int i = 0; i < kCalls; ++i) {
-    const double position = 0.05 + 0.04 * (i % 2 == 0 ? 1 : -1) - 1e-6 * i;
+    const double position = i % 2 == 0 ? way : 0.0;
     node_times.push_back(callTime(node, position));
     empty_times.push_back(callTime(empty, position));
   }
@@ -148,7 +148,7 @@ int measure(const std::string& self, const std::string& program, int axes, const
   const double start = secondsSince(begin);
 
   constexpr double kIdle = 10.0;
-  ros::WallDuration(1.0).sleep();
+  ros::WallDuration(3.0).sleep();
   const int states_before = states;
   const double used_before = processorTime(node.id());
   const auto idle_begin = SteadyTime::now();
@@ -161,8 +161,13 @@ int measure(const std::string& self, const std::string& program, int axes, const
   if (!ros::service::waitForService("/empty/move_to", 20000)) {
     throw std::runtime_error("the empty service doesn't come up");
   }
-  const CallTimes calls = measureCalls(handle, false);
-  const CallTimes kept = measureCalls(handle, true);
+  // A step there and back leaves the processor to the calls; a long way, with 8000 steps/s on the
+  // simulated rig, doesn't.
+  constexpr double kStep = 12.5e-6;
+  constexpr double kLong = 0.1;
+  const CallTimes calls = measureCalls(handle, false, kStep);
+  const CallTimes kept = measureCalls(handle, true, kStep);
+  const CallTimes moving = measureCalls(handle, false, kLong);
 
   std::ofstream(out) << "{\"benchmarks\": [{\"name\": \"Node/axes/" << axes << "\""
                      << ", \"start_s\": " << start << ", \"idle_percent\": " << 100.0 * used / idle
@@ -170,7 +175,9 @@ int measure(const std::string& self, const std::string& program, int axes, const
                      << ", \"memory_mb\": " << residentMemory(node.id())
                      << ", \"call_us\": " << calls.node << ", \"empty_call_us\": " << calls.empty
                      << ", \"kept_call_us\": " << kept.node
-                     << ", \"empty_kept_call_us\": " << kept.empty << "}]}\n";
+                     << ", \"empty_kept_call_us\": " << kept.empty
+                     << ", \"moving_call_us\": " << moving.node
+                     << ", \"empty_moving_call_us\": " << moving.empty << "}]}\n";
   return 0;
 }
 
