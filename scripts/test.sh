@@ -11,8 +11,8 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files
-  --core  stepdriver_core and its tests, built alone, as on a machine without ROS; the pictures of
-          docs/motion.md from what that build does
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS; what of its
+          benchmarks is exact; the pictures of docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space with all its commands and its service,
@@ -92,7 +92,7 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
@@ -100,7 +100,7 @@ check_shell() {
 check_tidy() {
   local status=0
   quietly tidy-configure configure_tidy
-  own_files '*.cpp' | grep -E '^(stepdriver_core|test/core|test/kernel)/' | compiled_by "$build/core" |
+  own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | compiled_by "$build/core" |
     tidy "$build/core" || status=1
   own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/joystick)/' |
     tidy "$build/catkin" || status=1
@@ -113,19 +113,19 @@ compiled_by() {
   done
 }
 configure_tidy() {
-  configure_core && configure_catkin &&
+  configure_core -DSTEPDRIVER_BENCH=ON && configure_catkin &&
     cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
 }
 tidy() {
   sed "s|^|$src/|" | xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$1" \
-    --header-filter="^$src/(stepdriver_core|stepdriver_ros|test)/" 2>>"$build/log/tidy.log"
+    --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
 
 build_core() {
   quietly core-build build_core_quietly
 }
 build_core_quietly() {
-  configure_core -DCMAKE_COMPILE_WARNING_AS_ERROR=ON &&
+  configure_core -DCMAKE_COMPILE_WARNING_AS_ERROR=ON -DSTEPDRIVER_BENCH=ON &&
     cmake --build "$build/core" -j "$jobs"
 }
 test_core() {
@@ -220,12 +220,12 @@ test_check_in_kernel() {
 
 # Nothing but the install space is on any path here.
 check_install() {
-  local share=$build/install/share/stepdriver launch_file
+  local share=$build/install/share/stepdriver launch_file program
   rm -rf "$build/install"
   quietly install cmake --install "$build/catkin"
   use_ros "$build/install"
   [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
-  for launch_file in "$share"/launch/*.launch; do
+  for launch_file in "$share"/launch/*.launch "$share"/launch/examples/*.launch; do
     say "${launch_file##*/}:"
     roslaunch --files stepdriver "${launch_file##*/}" | indent
   done
@@ -233,6 +233,10 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
+  for program in draw plot_motion; do
+    rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
+      die "$program --help doesn't work"
+  done
   rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
     >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then
@@ -251,7 +255,7 @@ check_trace() { bash "$root/scripts/demo.sh" --installed; }
 choose_build_folder
 rm -rf "$build/ros"
 install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
-  "$(wants core && echo pictures)" "$(wants lint && echo ros)"
+  "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)"
 
 if wants lint; then
   stage shell check_shell

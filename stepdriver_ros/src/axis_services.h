@@ -7,6 +7,7 @@
 #include <stepdriver/Microstep.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/Plan.h>
 #include <stepdriver/SetPosition.h>
 
 #include <string>
@@ -37,6 +38,7 @@ class AxisServices {
 
   bool moveTo(MoveTo::Request& request, MoveTo::Response& response);
   bool moveRounds(MoveRounds::Request& request, MoveRounds::Response& response);
+  bool plan(Plan::Request& request, Plan::Response& response);
   bool microstep(Microstep::Request& request, Microstep::Response& response);
   bool setPosition(SetPosition::Request& request, SetPosition::Response& response);
   bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
@@ -46,6 +48,9 @@ class AxisServices {
 
   template <typename Response>
   void answerMove(const axis::Move& move, bool wait, Response& response);
+
+  /// "to 0.1 m in 1.2 s"
+  std::string wayText(const axis::Move& move) const;
 
   axis::Axis& axis_;
   ros::NodeHandle node_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ros/callback_queue.h>
+#include <ros/node_handle.h>
 #include <ros/spinner.h>
 
 #include <chrono>
@@ -54,5 +55,11 @@ class CallQueues {
   ros::CallbackQueue emergency_;
   std::vector<ros::AsyncSpinner> spinners_;
 };
+
+/// A handle for what is to be served by a queue.
+inline ros::NodeHandle onQueue(ros::CallbackQueue& queue, ros::NodeHandle node) {
+  node.setCallbackQueue(&queue);
+  return node;
+}
 
 }  // namespace stepdriver::ros_node

@@ -12,11 +12,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kFeedbackPeriod{100};
 
-ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue& queue) {
-  node.setCallbackQueue(&queue);
-  return node;
-}
-
 }  // namespace
 
 // A homing takes a thread of the axis's queue while its call waits, as a move does. What begins and
@@ -24,10 +19,10 @@ ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue& queue) {
 HomingServer::HomingServer(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
                            CallQueues& queues)
     : axis_(axis),
-      node_(onQueue(ros::NodeHandle(node, axis.config().name), queues.ofAxis(index))),
+      node_(onQueue(queues.ofAxis(index), ros::NodeHandle(node, axis.config().name))),
       service_(node_.advertiseService("home", &HomingServer::home, this)),
       action_(
-          onQueue(node_, queues.control()), "homing",
+          onQueue(queues.control(), node_), "homing",
           [this](const HomeGoalConstPtr& goal) { execute(goal); }, false) {
   action_.start();
 }

@@ -16,6 +16,7 @@
 #include "jog_subscriber.h"
 #include "machine_homing.h"
 #include "machine_services.h"
+#include "move_actions.h"
 #include "node_start.h"
 #include "state_publisher.h"
 #include "stepdriver_core/error.h"
@@ -46,7 +47,7 @@ lines.
               ~move_line  ~hold  ~resume
               ~rig/report  ~rig/emergency_stop (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~jog, ~command (subscribed)
-  action      ~follow_joint_trajectory
+  actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
               ~simulation  robot_description
 
@@ -58,8 +59,8 @@ Start it with: roslaunch stepdriver axis.launch
 /// Refuses new commands, decelerates, disables, and lets every client have its answer.
 ///
 /// @return the exit code.
-int shutDown(machine::Machine& machine, CallQueues& queues, TrajectoryAction& trajectory_action,
-             StatePublisher& publisher) {
+int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
+             TrajectoryAction& trajectory_action, StatePublisher& publisher) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -67,6 +68,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, TrajectoryAction& tr
     ROS_ERROR("Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
   }
+  move_actions.tellEnded();
   trajectory_action.tellEnded();
   queues.finish(kLastAnswers);
   publisher.stop();
@@ -122,6 +124,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
+  MoveActions move_actions(private_node, machine, queues);
   const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
@@ -142,7 +145,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
     }
   }
   ROS_INFO("Ending on %s", who.c_str());
-  return shutDown(machine, queues, trajectory_action, publisher);
+  return shutDown(machine, queues, move_actions, trajectory_action, publisher);
 }
 
 int runOrExplain(EndRequests& end_requests) {

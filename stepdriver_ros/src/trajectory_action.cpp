@@ -1,6 +1,5 @@
 #include "trajectory_action.h"
 
-#include <actionlib_msgs/GoalStatus.h>
 #include <ros/console.h>
 
 #include <algorithm>
@@ -14,14 +13,6 @@ namespace {
 
 using Result = action_msgs::FollowJointTrajectoryResult;
 using Feedback = action_msgs::FollowJointTrajectoryFeedback;
-
-const ros::WallDuration kLookPeriod(0.01);
-constexpr int kLooksPerFeedback = 5;
-
-ros::NodeHandle onQueue(ros::CallbackQueue& queue, ros::NodeHandle node) {
-  node.setCallbackQueue(&queue);
-  return node;
-}
 
 Result resultOf(int error_code, const std::string& error_string) {
   Result result;
@@ -46,41 +37,18 @@ int errorCodeOf(BadTrajectory::Kind kind) {
 
 TrajectoryAction::TrajectoryAction(ros::NodeHandle node, machine::Machine& machine,
                                    CallQueues& queues)
-    : machine_(machine),
-      axes_(axisOfJoint(machine)),
-      server_(
-          onQueue(queues.trajectories(), node), "follow_joint_trajectory",
-          [this](const Server::GoalHandle& handle) { take(handle); },
-          [this](const Server::GoalHandle& handle) { cancel(handle); }, false) {
+    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory"),
+      machine_(machine),
+      axes_(axisOfJoint(machine)) {
   node.setCallbackQueue(&queues.trajectories());
   timer_ = node.createSteadyTimer(
       kLookPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { look(); }, false);
-  server_.start();
+  start();
 }
 
 // ---- goals and cancels ----
 
-void TrajectoryAction::take(const Server::GoalHandle& goal) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  Server::GoalHandle handle = goal;
-  if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
-    handle.setCanceled(Result(), "it was cancelled before it began");
-    return;
-  }
-  try {
-    Following following = begin(handle);
-    handle.setAccepted();
-    takeOver(following);
-    under_way_.push_back(std::move(following));
-    concludeEnded();
-  } catch (const BadTrajectory& bad) {
-    handle.setRejected(resultOf(errorCodeOf(bad.kind()), bad.what()), bad.what());
-  } catch (const Error& error) {
-    handle.setRejected(resultOf(Result::INVALID_GOAL, error.what()), error.what());
-  }
-}
-
-TrajectoryAction::Following TrajectoryAction::begin(const Server::GoalHandle& handle) {
+FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
   const auto goal = handle.getGoal();
   Following following;
   following.handle = handle;
@@ -93,29 +61,25 @@ TrajectoryAction::Following TrajectoryAction::begin(const Server::GoalHandle& ha
   return following;
 }
 
-void TrajectoryAction::takeOver(const Following& newer) {
-  for (Following& older : under_way_) {
-    const bool shared =
-        std::any_of(older.joints.begin(), older.joints.end(), [&newer](const std::string& joint) {
-          return std::find(newer.joints.begin(), newer.joints.end(), joint) != newer.joints.end();
-        });
-    if (shared) older.preempted_by = "a newer goal took over";
-  }
+void TrajectoryAction::reject(GoalHandle& handle, const Error& error) {
+  const auto* bad = dynamic_cast<const BadTrajectory*>(&error);
+  const int code = bad != nullptr ? errorCodeOf(bad->kind()) : Result::INVALID_GOAL;
+  handle.setRejected(resultOf(code, error.what()), error.what());
 }
 
-void TrajectoryAction::cancel(const Server::GoalHandle& handle) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (Following& following : under_way_) {
-    if (following.handle != handle) continue;
-    following.preempted_by = "it was cancelled";
-    stop(following);
-  }
+void TrajectoryAction::takeOver(const Following& newer, Following& older) {
+  const bool shared =
+      std::any_of(older.joints.begin(), older.joints.end(), [&newer](const std::string& joint) {
+        return std::find(newer.joints.begin(), newer.joints.end(), joint) != newer.joints.end();
+      });
+  if (shared) older.preempted_by = "a newer goal took over";
 }
 
 // The axes that move together with it stop with it.
 void TrajectoryAction::stop(const Following& following) {
   try {
-    machine_.axis(following.move.members.front().axis).stop();
+    const auto& first = following.move.members.front();
+    machine_.axis(first.axis).stop(first.move);
   } catch (const Error& error) {
     ROS_ERROR("follow_joint_trajectory: %s", error.what());
   }
@@ -123,44 +87,29 @@ void TrajectoryAction::stop(const Following& following) {
 
 // ---- what becomes of them ----
 
-void TrajectoryAction::look() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  concludeEnded();
-  looks_ = (looks_ + 1) % kLooksPerFeedback;
-  for (Following& following : under_way_) {
-    const Places places = placesOf(following);
-    keepToPath(following, places);
-    if (looks_ == 0) publishFeedback(following, places);
-  }
+void TrajectoryAction::watch(Following& following, bool tell) {
+  const Places places = placesOf(following);
+  keepToPath(following, places);
+  if (tell) publishFeedback(following, places);
 }
 
-void TrajectoryAction::tellEnded() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  concludeEnded();
-}
-
-void TrajectoryAction::concludeEnded() {
-  for (auto following = under_way_.begin(); following != under_way_.end();) {
-    const auto result = machine_.result(following->move);
-    if (result) conclude(*following, *result);
-    following = result ? under_way_.erase(following) : std::next(following);
-  }
-}
-
-void TrajectoryAction::conclude(Following& following, const machine::CoordinatedResult& result) {
-  const bool reached = result.end == axis::MoveEnd::kReached;
-  Server::GoalHandle& handle = following.handle;
+bool TrajectoryAction::conclude(Following& following) {
+  const auto result = machine_.result(following.move);
+  if (!result) return false;
+  const bool reached = result->end == axis::MoveEnd::kReached;
+  GoalHandle& handle = following.handle;
   if (!reached && !following.preempted_by.empty()) {
-    const std::string why = following.preempted_by + "; " + result.message;
+    const std::string why = following.preempted_by + "; " + result->message;
     handle.setCanceled(resultOf(Result::SUCCESSFUL, why), why);
   } else if (!reached && !following.violated.empty()) {
     handle.setAborted(resultOf(Result::PATH_TOLERANCE_VIOLATED, following.violated),
                       following.violated);
-  } else if (const std::string why = shortOfGoal(following, result); !why.empty()) {
+  } else if (const std::string why = shortOfGoal(following, *result); !why.empty()) {
     handle.setAborted(resultOf(Result::GOAL_TOLERANCE_VIOLATED, why), why);
   } else {
-    handle.setSucceeded(resultOf(Result::SUCCESSFUL, result.message), result.message);
+    handle.setSucceeded(resultOf(Result::SUCCESSFUL, result->message), result->message);
   }
+  return true;
 }
 
 std::string TrajectoryAction::shortOfGoal(const Following& following,

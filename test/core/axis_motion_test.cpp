@@ -252,6 +252,42 @@ TEST_F(AxisMotion, StopsAtTheDecelerationOfAStop) {
   expectCleanAt(801);
 }
 
+TEST_F(AxisMotion, StopsAMoveOnlyWhileItIsTheOneUnderWayOrHeld) {
+  const axis::Move first = x().moveTo(4.0);
+  advance(1.0);
+  const axis::Move second = x().moveTo(3.0);
+  x().stop(first);
+  EXPECT_EQ(x().wait(second).end, MoveEnd::kReached) << "it has replaced the first";
+  const axis::Move third = x().moveTo(1.0);
+  advance(1.0);
+  x().stop(third);
+  EXPECT_EQ(x().wait(third).end, MoveEnd::kStopped);
+  const axis::Move fourth = x().moveTo(0.0);
+  advance(0.5);
+  x().hold();
+  advance(2.0);
+  EXPECT_FALSE(x().result(fourth).has_value());
+  x().stop(third);
+  EXPECT_FALSE(x().result(fourth).has_value()) << "that one is long over";
+  x().stop(fourth);
+  ASSERT_TRUE(x().result(fourth).has_value());
+  EXPECT_EQ(x().result(fourth)->end, MoveEnd::kStopped);
+}
+
+TEST_F(AxisMotion, SaysHowLongItsMotionStillTakes) {
+  EXPECT_EQ(x().state().time_left, 0.0);
+  const axis::Move move = x().moveTo(2.0);  // 2.5 s
+  advance(1.0);
+  EXPECT_NEAR(x().state().time_left, 1.501, 1e-4) << "it began a millisecond later";
+  x().stop();
+  EXPECT_NEAR(x().state().time_left, 0.5, 0.002);
+  x().wait(move);
+  EXPECT_EQ(x().state().time_left, 0.0);
+  x().jog(0.5);
+  advance(1.0);
+  EXPECT_EQ(x().state().time_left, 0.0) << "no end";
+}
+
 TEST_F(AxisMotion, GoesOnFromAStopThatIsUnderWayOnlyByANewCommand) {
   const axis::Move first = x().moveTo(5.0);
   advance(1.0);

@@ -257,7 +257,7 @@ TEST_F(Line, EndsAtOnceForAllWhereOneMeetsItsEndstop) {
   EXPECT_NE(result.message.find("y stands at 0.3"), std::string::npos) << result.message;
   EXPECT_FALSE(bench->axis("x").state().moving);
   expectOnTheLine(1.0, 0.7);
-  const auto x = axis::Coordination::result(bench->axis("x"), move.members[0].move);
+  const auto x = bench->axis("x").result(move.members[0].move);
   EXPECT_EQ(x->end, MoveEnd::kCompanion);
   EXPECT_NE(x->message.find("it moved together with y, which was stopped"), std::string::npos)
       << x->message;
@@ -281,7 +281,7 @@ TEST_F(Line, LetsTheOthersStopWhereOneIsGivenAnotherGoal) {
   advance(0.7);
   const axis::Move other = bench->axis("x").moveTo(0.2);
   EXPECT_EQ(bench->axis("x").wait(other).end, MoveEnd::kReached);
-  const auto y = axis::Coordination::result(bench->axis("y"), move.members[1].move);
+  const auto y = bench->axis("y").result(move.members[1].move);
   ASSERT_TRUE(y.has_value());
   EXPECT_EQ(y->end, MoveEnd::kStopped);
   EXPECT_NE(y->message.find("x, which it moved together with, was given another goal"),

@@ -42,6 +42,7 @@ if [[ $owner != "root:$gpio 660" ]]; then
 fi
 # opens_it GROUPS: whether somebody with these can open it to write.
 opens_it() {
+  # shellcheck disable=SC2016
   setpriv --reuid 65534 --regid 65534 "$@" bash -c 'exec 3<>"$1"' opens_it "$chip" 2>/dev/null
 }
 opens_it --groups "$gpio" || die "the group gpio can't open it"

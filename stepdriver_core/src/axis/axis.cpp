@@ -41,15 +41,19 @@ Move Axis::moveRounds(double rounds, double velocity) {
                             true, velocity);
 }
 
+std::optional<MoveResult> Axis::result(const Move& move) const {
+  const Lock lock(impl_->mutex);
+  impl_->harvest();
+  return impl_->log.result(move.id);
+}
+
 MoveResult Axis::wait(const Move& move) {
-  std::optional<MoveResult> result;
+  std::optional<MoveResult> ended;
   impl_->driver.waitFor([&] {
-    const Lock lock(impl_->mutex);
-    impl_->harvest();
-    result = impl_->log.result(move.id);
-    return result.has_value();
+    ended = result(move);
+    return ended.has_value();
   });
-  return *result;
+  return *ended;
 }
 
 void Axis::jog(double velocity) {
@@ -65,6 +69,11 @@ void Axis::setSpeedOverride(double factor) {
 void Axis::stop() {
   const Lock lock(impl_->mutex);
   impl_->decelerate("it was stopped");
+}
+
+void Axis::stop(const Move& move) {
+  const Lock lock(impl_->mutex);
+  if (impl_->currentMove() == move.id) impl_->decelerate("it was stopped");
 }
 
 void Axis::hold() {
@@ -218,6 +227,10 @@ AxisState Axis::state() const {
       state.target = axis.positionOf(axis.jointAt(motion->profile->endPosition().value()));
     } else if (goal.target) {
       state.target = axis.positionOf(static_cast<double>(*goal.target));
+    }
+    if (goal.target || goal.stops()) {
+      const pulse::Nanoseconds left = motion->profile->endNs() - after;
+      state.time_left = static_cast<double>(std::max<pulse::Nanoseconds>(left, 0)) * 1e-9;
     }
   }
   return state;

@@ -28,11 +28,16 @@ std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
   return std::llround(countOf(goal));
 }
 
+Goal Axis::Impl::checkedGoal(double position, bool relative, double velocity) {
+  Goal goal;
+  goal.target = checkedTarget(position, relative);
+  goal.velocity = checkedVelocity(velocity);
+  if (!moving()) refuseIntoEndstop(*goal.target - jointCount());
+  return goal;
+}
+
 Move Axis::Impl::checkedMove(double position, bool relative, double velocity) {
-  const std::int64_t target = checkedTarget(position, relative);
-  const double speed = checkedVelocity(velocity);
-  if (!moving()) refuseIntoEndstop(target - jointCount());
-  return startMove(target, speed);
+  return begin({{this, checkedGoal(position, relative, velocity)}}).front();
 }
 
 double Axis::Impl::relativeOrigin() {
@@ -233,6 +238,11 @@ void Axis::Impl::restAndDisable(std::unique_lock<std::mutex>& lock, const std::s
 
 const Motion* Axis::Impl::underWay() { return moving() ? log.latest() : nullptr; }
 
+std::uint64_t Axis::Impl::currentMove() {
+  if (const Motion* motion = underWay()) return motion->goal.move;
+  return held ? held->goal.move : 0;
+}
+
 motion::MotionState Axis::Impl::stateAt(std::int64_t at) {
   if (const Motion* motion = underWay()) return motion->profile->stateAt(at);
   const pulse::ChannelState state = harvest();
@@ -266,10 +276,8 @@ std::vector<Move> Axis::Impl::begin(Orders orders) {
     if (before.move != 0 && !axis.log.result(before.move)) {
       axis.log.conclude(before.move, axis.replacedBy(motion, replaced[i].began));
     }
-    const motion::Profile& profile = *motion.profile;
-    moves.push_back({motion.goal.move, axis.positionOf(axis.jointAt(profile.endPosition().value())),
-                     static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9,
-                     motion.overshoot / axis.stepsPerUnit()});
+    moves.push_back(axis.moveOf(*motion.profile, motion.overshoot));
+    moves.back().id = motion.goal.move;
   }
   for (std::size_t i = 0; i < orders.size(); ++i) {
     orders[i].axis->leaveCourse(replaced[i].goal, orders[i].axis->config.name);

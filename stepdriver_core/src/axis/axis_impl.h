@@ -65,13 +65,19 @@ class Axis::Impl {
   Move moveMotor(std::int64_t target);
   /// [microsteps] @throw Refused where it isn't one to move to.
   std::int64_t checkedTarget(double position, bool relative);
+  /// @throw Refused as Axis::moveTo().
+  Goal checkedGoal(double position, bool relative, double velocity);
   Move checkedMove(double position, bool relative, double velocity);
+  /// What a goal would be now; nothing moves.
+  MovePlan planOf(const Goal& goal);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
   /// The same, of a motion alone: a homing goes on.
   void slowDown(const std::string& stopped_by);
   /// The move that was accepted last; 0: none was.
   std::uint64_t lastMove() const { return moves_; }
+  /// The move under way, or that is held; 0: there is none.
+  std::uint64_t currentMove();
   /// Brings the motor to where the joint moves with its first step of a way. At rest; lets go of
   /// the lock while it does so.
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
@@ -184,6 +190,8 @@ class Axis::Impl {
   void leaveCourse(const Goal& goal, const std::string& left_by);
   std::int64_t stepsTo(const Goal& goal);
   motion::Plan plan(const Goal& goal, std::int64_t at);
+  /// @param overshoot [microsteps] @return without an id.
+  Move moveOf(const motion::Profile& profile, double overshoot);
   std::int64_t motorTarget(const Goal& goal, const motion::MotionState& from,
                            const motion::MotionLimits& within);
   motion::Profile planStopOf(const Motion& before, std::int64_t at,

@@ -85,10 +85,4 @@ bool Coordination::leads(const Axis& axis) {
   return axis.impl_->leads();
 }
 
-std::optional<MoveResult> Coordination::result(const Axis& axis, const Move& move) {
-  const std::lock_guard<std::mutex> lock(axis.impl_->mutex);
-  axis.impl_->harvest();
-  return axis.impl_->log.result(move.id);
-}
-
 }  // namespace stepdriver::axis

@@ -135,7 +135,7 @@ class Machine::Impl {
     CoordinatedResult result;
     int worst = -1;
     for (const CoordinatedMove::Member& member : move.members) {
-      const auto own = axis::Coordination::result(axis(member.axis), member.move);
+      const auto own = axis(member.axis).result(member.move);
       if (!own) return std::nullopt;
       result.positions.push_back(own->position);
       result.duration = std::max(result.duration, own->duration);
@@ -318,10 +318,13 @@ void Machine::shutdown() { impl_->shutdown(); }
 EngineFigures Machine::figures() const {
   const pulse::EngineState state = impl_->engine_->state();
   EngineFigures figures;
+  figures.edges = state.edges;
   figures.pulses = state.pulses;
   figures.slips = state.slips;
   figures.slipped = static_cast<double>(state.slipped) * 1e-9;
   figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
+  figures.lateness = impl_->engine_->lateness();
+  figures.lateness_last_second = impl_->engine_->latenessLastSecond();
   figures.realtime = impl_->driver_->rights().text();
   return figures;
 }

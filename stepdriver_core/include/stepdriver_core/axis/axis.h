@@ -61,10 +61,18 @@ class Axis {
   ///   but has to be.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
+  /// What moveTo() would do now; nothing moves.
+  ///
+  /// @throw Refused as moveTo().
+  MovePlan plan(double position, bool relative = false, double velocity = 0.0);
+
   /// Turns the motor by a number of rounds, which need not be whole.
   ///
   /// @throw Refused as moveTo(), and where the steps of a round are not known.
   Move moveRounds(double rounds, double velocity = 0.0);
+
+  /// How a move ended; none where it hasn't.
+  std::optional<MoveResult> result(const Move& move) const;
 
   /// Returns when the move has ended.
   MoveResult wait(const Move& move);
@@ -86,6 +94,9 @@ class Axis {
   /// The axes that move together with this one stop with it, along their path. What is held is
   /// given up. Without effect else at rest.
   void stop();
+
+  /// The same where the axis still makes this move, or holds it: what has replaced it goes on.
+  void stop(const Move& move);
 
   /// Feed hold: decelerates to rest, along the path of axes that move together, and keeps the goal;
   /// who waits for the move goes on waiting. A jog just ends. Until resume() or stop() other

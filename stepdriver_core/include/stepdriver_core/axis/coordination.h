@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -46,9 +45,6 @@ class Coordination {
   /// Whether a hold or a resume is to be asked of this axis: of those that move together it is of
   /// one, and goes for all of them.
   static bool leads(const Axis& axis);
-
-  /// How a move ended; none where it hasn't.
-  static std::optional<MoveResult> result(const Axis& axis, const Move& move);
 
  private:
   static std::vector<Axis::Impl*> implsOf(const std::vector<Axis*>& axes);

@@ -13,6 +13,7 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/lateness.h"
 
 namespace stepdriver::machine {
 
@@ -36,11 +37,15 @@ struct MachineOptions {
 
 /// What the pulse engine has done since the start.
 struct EngineFigures {
+  std::uint64_t edges = 0;  ///< of all STEP lines, both ends of each pulse
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;      ///< times that the timeline was slid because a pulse was late
   double slipped = 0.0;         ///< [s] by how much altogether
   double worst_lateness = 0.0;  ///< [s] of one pulse
-  std::string realtime;         ///< how the pulse thread runs, in words
+  /// Of the pulses since the start, and of those in the last whole second of the clock [ns].
+  pulse::LatenessFigures lateness;
+  pulse::LatenessFigures lateness_last_second;
+  std::string realtime;  ///< how the pulse thread runs, in words
 };
 
 /// All axes, one pulse engine, one set of lines. All calls are safe from any thread.

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <actionlib/server/action_server.h>
+#include <actionlib_msgs/GoalStatus.h>
+#include <ros/duration.h>
+#include <ros/node_handle.h>
+
+#include <iterator>
+#include <list>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+
+/// How often an action asks how its goals are.
+inline const ros::WallDuration kLookPeriod(0.01);
+
+/// An action whose goals are motions. It asks each kLookPeriod how these are: no thread waits for a
+/// motion, and what other commands make of it is seen like anything else that ends it.
+///
+/// @tparam Action the type of the action.
+/// @tparam Following a goal under way; has `GoalHandle handle` and `std::string preempted_by`, a
+///   cancel or a newer goal in words.
+template <typename Action, typename Following>
+class MotionAction {
+ public:
+  MotionAction(const MotionAction&) = delete;
+  MotionAction& operator=(const MotionAction&) = delete;
+  virtual ~MotionAction() = default;
+
+  /// Tells the clients what has become of their goals; to be called each kLookPeriod.
+  void look() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    concludeEnded();
+    looks_ = (looks_ + 1) % kLooksPerFeedback;
+    for (Following& following : under_way_) watch(following, looks_ == 0);
+  }
+
+  /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
+  void tellEnded() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    concludeEnded();
+  }
+
+ protected:
+  using Server = actionlib::ActionServer<Action>;
+  using GoalHandle = typename Server::GoalHandle;
+
+  /// @param node with the queue of the goals and cancels.
+  MotionAction(const ros::NodeHandle& node, const std::string& name)
+      : server_(
+            node, name, [this](const GoalHandle& handle) { take(handle); },
+            [this](const GoalHandle& handle) { cancel(handle); }, false) {}
+
+  /// To be called when the action is whole.
+  void start() { server_.start(); }
+
+ private:
+  static constexpr int kLooksPerFeedback = 5;
+
+  /// Begins its motion. @throw Error where that is refused.
+  virtual Following begin(const GoalHandle& handle) = 0;
+  virtual void reject(GoalHandle& handle, const Error& error) = 0;
+  /// A newer goal has begun.
+  virtual void takeOver(const Following& newer, Following& older) = 0;
+  /// Decelerates what is still of this goal.
+  virtual void stop(const Following& following) = 0;
+  /// Tells the client where the motion has ended. @return whether it has.
+  virtual bool conclude(Following& following) = 0;
+  /// Looks at a motion under way, and tells how it is.
+  virtual void watch(Following& following, bool tell) = 0;
+
+  void take(GoalHandle handle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
+      handle.setCanceled({}, "it was cancelled before it began");
+      return;
+    }
+    try {
+      Following following = begin(handle);
+      handle.setAccepted();
+      for (Following& older : under_way_) takeOver(following, older);
+      under_way_.push_back(std::move(following));
+      concludeEnded();
+    } catch (const Error& error) {
+      reject(handle, error);
+    }
+  }
+
+  void cancel(const GoalHandle& handle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (Following& following : under_way_) {
+      if (following.handle != handle) continue;
+      following.preempted_by = "it was cancelled";
+      stop(following);
+    }
+  }
+
+  void concludeEnded() {
+    for (auto following = under_way_.begin(); following != under_way_.end();) {
+      following = conclude(*following) ? under_way_.erase(following) : std::next(following);
+    }
+  }
+
+  std::mutex mutex_;
+  Server server_;
+  std::list<Following> under_way_;
+  int looks_ = 0;
+};
+
+}  // namespace stepdriver::ros_node

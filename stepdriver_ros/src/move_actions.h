@@ -1,0 +1,46 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/steady_timer.h>
+
+#include <deque>
+
+#include "call_queues.h"
+#include "move_action.h"
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+
+/// The actions `move` of all axes. Their goals are taken by the axes' queues.
+class MoveActions {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues outlive the actions.
+  MoveActions(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues) {
+    for (std::size_t i = 0; i < machine.axes().size(); ++i) {
+      axis::Axis& axis = *machine.axes()[i];
+      actions_.emplace_back(onQueue(queues.ofAxis(i), ros::NodeHandle(node, axis.config().name)),
+                            axis);
+    }
+    node.setCallbackQueue(&queues.control());
+    timer_ = node.createSteadyTimer(
+        kLookPeriod,
+        [this](const ros::SteadyTimerEvent& /*event*/) {
+          for (AxisMoveAction& action : actions_) action.look();
+        },
+        false);
+  }
+  MoveActions(const MoveActions&) = delete;
+  MoveActions& operator=(const MoveActions&) = delete;
+
+  /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
+  void tellEnded() {
+    for (AxisMoveAction& action : actions_) action.tellEnded();
+  }
+
+ private:
+  std::deque<AxisMoveAction> actions_;
+  ros::SteadyTimer timer_;
+};
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,280 @@
+#include <actionlib/client/simple_action_client.h>
+#include <gtest/gtest.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/MoveAction.h>
+
+#include <cmath>
+#include <future>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/says.h"
+#include "support/two_axes.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+using MoveClient = actionlib::SimpleActionClient<MoveAction>;
+using State = actionlib::SimpleClientGoalState;
+
+constexpr double kStep = 1.0 / 80000.0;  // [m]
+
+MoveGoal goalTo(double position, double velocity = 0.0, bool relative = false) {
+  MoveGoal goal;
+  goal.position = position;
+  goal.velocity = velocity;
+  goal.relative = relative;
+  return goal;
+}
+
+class MoveActionTest : public testing::Test {
+ protected:
+  void start(double speed = 20.0) {
+    node.set("simulation/speed", speed);
+    node.start();
+    client = makeClient();
+  }
+  std::unique_ptr<MoveClient> makeClient(const std::string& axis = "x") {
+    auto made = std::make_unique<MoveClient>(node.full(axis + "/move"), false);
+    EXPECT_TRUE(made->waitForServer(ros::Duration(kBound.count())));
+    return made;
+  }
+  State await(MoveClient& of) {
+    EXPECT_TRUE(of.waitForResult(ros::Duration(kBound.count()))) << "no result comes";
+    return of.getState();
+  }
+  State run(const MoveGoal& goal) {
+    client->sendGoal(goal);
+    return await(*client);
+  }
+  /// Sends a goal and returns on its way there.
+  void setOut(const MoveGoal& goal, std::int64_t pulses = 2000) {
+    client->sendGoal(goal);
+    ASSERT_TRUE(waitUntil([&] { return node.pulses() > pulses; }));
+  }
+  void expectEnd(int end, const std::string& words) {
+    const auto result = client->getResult();
+    EXPECT_EQ(result->end, end) << result->message;
+    expectSays(result->message, words);
+    EXPECT_EQ(client->getState().getText(), result->message);
+  }
+  void expectNoViolation() {
+    const auto report = node.rig();
+    EXPECT_EQ(report.violations.at(0), 0) << report.violation_kinds.at(0);
+  }
+
+  NodeUnderTest node;
+  std::unique_ptr<MoveClient> client;
+};
+
+TEST_F(MoveActionTest, ReachesItsTargetAndTellsHowFarItIs) {
+  start(1.0);
+  EXPECT_EQ(run(goalTo(0.01)), State::SUCCEEDED);
+  const Recorder<MoveActionFeedback> feedback(node.full("x/move/feedback"));
+  ASSERT_TRUE(waitUntil([&] { return feedback.connected(); }));
+  // 90 mm at 100 mm/s, with ramps of 0.2 s: 1.1 s.
+  EXPECT_EQ(run(goalTo(0.1)), State::SUCCEEDED);
+  expectEnd(MoveResult::REACHED, "x reached 0.1 m");
+  const auto result = client->getResult();
+  EXPECT_NEAR(result->position, 0.1, 1e-12);
+  EXPECT_NEAR(result->duration, 1.1, 1e-3);
+  EXPECT_EQ(node.pulses(), 8000);
+
+  const auto told = feedback.messages();
+  ASSERT_GT(told.size(), 3U) << "20 a second, on a machine that stalls";
+  double progress = 0.0;
+  double time_left = 1.2;
+  bool fast = false;
+  for (const auto& message : told) {
+    const MoveFeedback& now = message.feedback;
+    EXPECT_NEAR(now.progress, (now.position - 0.01) / 0.09, 1e-9);
+    EXPECT_GE(now.progress, progress);
+    EXPECT_LE(now.time_left, time_left);
+    EXPECT_GE(now.time_left, 0.0);
+    // What is left of the way takes at least as long as at full speed, and one ramp more at most.
+    const double left = (0.1 - now.position) / 0.1;
+    EXPECT_GE(now.time_left, left - 0.001);
+    EXPECT_LE(now.time_left, left + 0.201);
+    progress = now.progress;
+    time_left = now.time_left;
+    fast = fast || now.velocity > 0.09;
+  }
+  EXPECT_TRUE(fast);
+  EXPECT_GT(progress, 0.0);
+  expectNoViolation();
+}
+
+TEST_F(MoveActionTest, MovesRelativeAndAtAVelocity) {
+  start();
+  EXPECT_EQ(run(goalTo(0.02)), State::SUCCEEDED);
+  EXPECT_EQ(run(goalTo(0.01, 0.01, true)), State::SUCCEEDED);
+  EXPECT_NEAR(client->getResult()->position, 0.03, 1e-12);
+  EXPECT_GT(client->getResult()->duration, 1.0) << "10 mm at 10 mm/s";
+}
+
+TEST_F(MoveActionTest, RejectsWhatMoveToRefusesAndSaysWhy) {
+  start();
+  struct Bad {
+    MoveGoal goal;
+    const char* words;
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Bad& bad : {Bad{goalTo(nan), "the position must be a finite number"},
+                         Bad{goalTo(0.3), "above the soft limit max_position 0.2 m"},
+                         Bad{goalTo(0.1, -1.0), "the velocity must be a finite number"},
+                         Bad{goalTo(0.1, 0.5), "above the maximum 0.1 m/s"}}) {
+    EXPECT_EQ(run(bad.goal), State::REJECTED) << bad.words;
+    expectEnd(MoveResult::REFUSED, bad.words);
+    MoveTo::Request request;
+    request.position = bad.goal.position;
+    request.velocity = bad.goal.velocity;
+    EXPECT_EQ(node.call<MoveTo>("x/move_to", request).message, client->getResult()->message);
+  }
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST_F(MoveActionTest, DeceleratesWhenCancelled) {
+  start(1.0);
+  setOut(goalTo(0.15));
+  client->cancelGoal();
+  EXPECT_EQ(await(*client), State::PREEMPTED);
+  expectEnd(MoveResult::STOPPED, "not at 0.15 m: it was stopped");
+  const std::int64_t pulses = node.pulses();
+  EXPECT_LT(pulses, 12000) << "not the whole way";
+  EXPECT_EQ(node.pulses(), pulses) << "it rests";
+  EXPECT_NEAR(client->getResult()->position, static_cast<double>(pulses) * kStep, 1e-9);
+  expectNoViolation();
+}
+
+TEST_F(MoveActionTest, ANewerGoalTakesOverWithoutAStop) {
+  start(1.0);
+  const auto other = makeClient();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  setOut(goalTo(0.19), 3000);
+  other->sendGoal(goalTo(0.18));
+  EXPECT_EQ(await(*client), State::PREEMPTED);
+  expectEnd(MoveResult::REPLACED, "a move to 0.18 m took over");
+  client->cancelGoal();  // of a goal that is over
+  EXPECT_EQ(await(*other), State::SUCCEEDED);
+  EXPECT_EQ(node.pulses(), 14400);
+  for (const AxisStates& s : states.messages()) {
+    if (s.position.at(0) > 0.05 && s.position.at(0) < 0.15) {
+      EXPECT_NEAR(s.velocity.at(0), 0.1, 1e-6);
+    }
+  }
+  expectNoViolation();
+}
+
+TEST_F(MoveActionTest, EveryOtherCommandThatTakesOverPreemptsIt) {
+  start(1.0);
+  setOut(goalTo(0.15));
+  const auto moved = node.moveTo(0.01, true);
+  EXPECT_TRUE(moved.success) << moved.message;
+  EXPECT_EQ(await(*client), State::PREEMPTED);
+  expectEnd(MoveResult::REPLACED, "a move to 0.01 m took over");
+}
+
+TEST_F(MoveActionTest, PreemptsWhoeverWaitsForAMoveTo) {
+  start(1.0);
+  auto first = std::async(std::launch::async, [this] { return node.moveTo(0.15, true); });
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 2000; }));
+  EXPECT_EQ(run(goalTo(0.01)), State::SUCCEEDED);
+  const auto replaced = first.get();
+  EXPECT_FALSE(replaced.success);
+  expectSays(replaced.message, "a move to 0.01 m took over");
+  expectNoViolation();
+}
+
+TEST_F(MoveActionTest, ACancelLeavesWhatHasTakenOverAlone) {
+  start(1.0);
+  setOut(goalTo(0.15));
+  EXPECT_TRUE(node.moveTo(0.1, false).success);
+  client->cancelGoal();
+  EXPECT_EQ(await(*client), State::PREEMPTED);
+  EXPECT_TRUE(waitUntil([this] { return node.pulses() == 8000; })) << "it goes on to 0.1";
+}
+
+TEST_F(MoveActionTest, EveryClientSeesTheSameState) {
+  start(1.0);
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  setOut(goalTo(0.1));
+  EXPECT_TRUE(states.waitFor(
+      [](const AxisStates& s) { return s.moving.at(0) != 0 && s.target.at(0) == 0.1; }));
+  EXPECT_EQ(await(*client), State::SUCCEEDED);
+  EXPECT_TRUE(states.waitForLatest(
+      [](const AxisStates& s) { return s.moving.at(0) == 0 && s.position.at(0) == 0.1; }));
+}
+
+TEST_F(MoveActionTest, EndsAbortedByAStopAnEndstopOrAnEmergencyStop) {
+  node.set("simulation/axes/x/max_switch_mm", 100.0);
+  start(1.0);
+  setOut(goalTo(0.19));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
+  EXPECT_EQ(await(*client), State::ABORTED);
+  expectEnd(MoveResult::STOPPED, "it was stopped");
+
+  EXPECT_EQ(run(goalTo(0.19)), State::ABORTED);
+  expectEnd(MoveResult::ENDSTOP_MAX, "the max endstop was met");
+  EXPECT_NEAR(client->getResult()->position, 0.1, 2.0 * kStep);
+
+  const std::int64_t pulses = node.pulses();
+  setOut(goalTo(0.0), pulses + 500);
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("emergency_stop").success);
+  EXPECT_EQ(await(*client), State::ABORTED);
+  expectEnd(MoveResult::EMERGENCY_STOP, "emergency stop");
+  EXPECT_EQ(run(goalTo(0.0)), State::REJECTED);
+  expectSays(client->getResult()->message, "call recover first");
+}
+
+TEST_F(MoveActionTest, WaitsOverAHoldAndCanBeCancelledInIt) {
+  start(1.0);
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  const auto hold = [&] {
+    EXPECT_TRUE(node.call<std_srvs::Trigger>("hold").success);
+    EXPECT_TRUE(states.waitForLatest(
+        [](const AxisStates& s) { return s.held.at(0) != 0 && s.moving.at(0) == 0; }));
+    EXPECT_FALSE(client->getState().isDone());
+  };
+  setOut(goalTo(0.1));
+  hold();
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("resume").success);
+  EXPECT_EQ(await(*client), State::SUCCEEDED);
+  EXPECT_EQ(node.pulses(), 8000);
+
+  setOut(goalTo(0.0), 8000 + 2000);
+  hold();
+  client->cancelGoal();
+  EXPECT_EQ(await(*client), State::PREEMPTED);
+  expectEnd(MoveResult::STOPPED, "it was stopped");
+  EXPECT_EQ(run(goalTo(0.1)), State::SUCCEEDED) << "what was held is given up";
+}
+
+TEST_F(MoveActionTest, AxesHaveActionsOfTheirOwn) {
+  addSecondAxis(node);
+  start(1.0);
+  const auto of_y = makeClient("y");
+  client->sendGoal(goalTo(0.05));
+  of_y->sendGoal(goalTo(0.02));
+  EXPECT_EQ(await(*of_y), State::SUCCEEDED);
+  EXPECT_EQ(await(*client), State::SUCCEEDED);
+  EXPECT_EQ(node.rig().pulses_forward, (std::vector<std::int64_t>{4000, 1600}));
+}
+
+TEST_F(MoveActionTest, TellsItsClientWhenTheNodeEnds) {
+  start(1.0);
+  setOut(goalTo(0.15));
+  node.process().signal(SIGTERM);
+  EXPECT_EQ(await(*client), State::ABORTED);
+  expectEnd(MoveResult::STOPPED, "the machine was shut down");
+  EXPECT_EQ(node.process().waitForExit(kBound), 0);
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
