@@ -7,6 +7,7 @@
 #include <stepdriver/Microstep.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
 
 #include <string>
@@ -38,6 +39,7 @@ class AxisServices {
   bool moveTo(MoveTo::Request& request, MoveTo::Response& response);
   bool moveRounds(MoveRounds::Request& request, MoveRounds::Response& response);
   bool microstep(Microstep::Request& request, Microstep::Response& response);
+  bool setLimits(SetLimits::Request& request, SetLimits::Response& response);
   bool setPosition(SetPosition::Request& request, SetPosition::Response& response);
   bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool sleep(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
