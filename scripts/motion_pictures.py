@@ -1,34 +1,15 @@
 #!/usr/bin/python3
-"""Draws the pictures of docs/motion.md from recorded traces; motion_pictures.sh calls it.
-
-Position, speed and acceleration are taken from the times of the STEP edges alone. At each edge the
-motion is on a half-step line; the speed between two edges is the way from line to line over the
-time, and the acceleration the change from one speed to the next.
-"""
+"""Draws the pictures of docs/motion.md from recorded traces; motion_pictures.sh calls it."""
 
 import csv
 import pathlib
 import sys
 
-import matplotlib
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "stepdriver_ros/scripts"))
+from stepdriver_plots import figure as look  # noqa: E402: the path comes first
+from stepdriver_plots.figure import COLOURS, plt  # noqa: E402
+from stepdriver_plots.step_curve import StepCurve  # noqa: E402
 
-matplotlib.use("svg")
-import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
-
-# The same trace makes the same file.
-matplotlib.rcParams.update({
-    "svg.hashsalt": "stepdriver",
-    "svg.fonttype": "none",
-    "font.size": 8,
-    "axes.grid": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#dddddd",
-    "lines.linewidth": 1.2,
-    "path.simplify_threshold": 0.3,
-})
-COLOURS = ["#1f6fb4", "#d9661f", "#2b8a3e"]
-REST = 0.1  # [s] without a step: it stands
 UNITS = {"position": "steps", "speed": "steps/s", "acceleration": "steps/s$^2$"}
 
 
@@ -46,28 +27,8 @@ class Trace:
                     times.append(time)
                     counts.append(int(what))
 
-    def position(self, axis):
-        times, counts = self.steps[axis]
-        return times, [(before + count) / 2 for before, count in zip([0] + counts, counts)]
-
-    def speed(self, axis):
-        times, lines = self.position(axis)
-        at, speeds = [], []
-        for i in range(1, len(times)):
-            gap = times[i] - times[i - 1]
-            if gap > REST:
-                at += [times[i - 1] + REST / 4, times[i] - REST / 4]
-                speeds += [0.0, 0.0]
-            else:
-                at.append((times[i] + times[i - 1]) / 2)
-                speeds.append((lines[i] - lines[i - 1]) / gap)
-        return at, speeds
-
-    def acceleration(self, axis):
-        times, speeds = self.speed(axis)
-        at = [(a + b) / 2 for a, b in zip(times, times[1:])]
-        changes = zip(times, times[1:], speeds, speeds[1:])
-        return at, [(w - v) / (b - a) for a, b, v, w in changes]
+    def curve(self, axis):
+        return StepCurve.of_counts(*self.steps[axis])
 
 
 def draw(folder, picture, curves, what, width=6.4):
@@ -76,7 +37,7 @@ def draw(folder, picture, curves, what, width=6.4):
                                   figsize=(width, 0.5 + 1.35 * len(what)))
     for quantity, panel in zip(what, panels[:, 0]):
         for colour, (trace, axis, label) in zip(COLOURS, curves):
-            times, values = getattr(trace, quantity)(axis)
+            times, values = getattr(trace.curve(axis), quantity)()
             panel.plot(times, values, color=colour, label=label)
         for time, words in curves[0][0].marks:
             panel.axvline(time, color="#888888", linewidth=0.8, linestyle=":")
@@ -131,9 +92,7 @@ def draw_path(folder, trace):
 
 
 def save(figure, folder, picture):
-    figure.tight_layout()
-    figure.savefig(folder / (picture + ".svg"), metadata={"Date": None, "Creator": None})
-    plt.close(figure)
+    look.save(figure, folder / (picture + ".svg"))
 
 
 def main(traces, pictures):

@@ -11,12 +11,13 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files
-  --core  stepdriver_core and its tests, built alone, as on a machine without ROS; the pictures of
-          docs/motion.md from what that build does
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS; what of its
+          benchmarks is exact; the pictures of docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
-  --ros   the catkin package, its rostests, its install space, and the trace of a move from there,
-          read by sigrok-cli; with --kernel also the whole node on that kernel's GPIO chips
+  --ros   the catkin package, its rostests, its install space with all its commands and its service,
+          and the trace of a move from there, read by sigrok-cli; with --kernel also the whole node
+          on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -91,7 +92,7 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
@@ -99,7 +100,7 @@ check_shell() {
 check_tidy() {
   local status=0
   quietly tidy-configure configure_tidy
-  own_files '*.cpp' | grep -E '^(stepdriver_core|test/core|test/kernel)/' | compiled_by "$build/core" |
+  own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | compiled_by "$build/core" |
     tidy "$build/core" || status=1
   own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/joystick)/' |
     tidy "$build/catkin" || status=1
@@ -112,19 +113,19 @@ compiled_by() {
   done
 }
 configure_tidy() {
-  configure_core && configure_catkin &&
+  configure_core -DSTEPDRIVER_BENCH=ON && configure_catkin &&
     cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
 }
 tidy() {
   sed "s|^|$src/|" | xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$1" \
-    --header-filter="^$src/(stepdriver_core|stepdriver_ros|test)/" 2>>"$build/log/tidy.log"
+    --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
 
 build_core() {
   quietly core-build build_core_quietly
 }
 build_core_quietly() {
-  configure_core -DCMAKE_COMPILE_WARNING_AS_ERROR=ON &&
+  configure_core -DCMAKE_COMPILE_WARNING_AS_ERROR=ON -DSTEPDRIVER_BENCH=ON &&
     cmake --build "$build/core" -j "$jobs"
 }
 test_core() {
@@ -217,12 +218,12 @@ test_check_in_kernel() {
 
 # Nothing but the install space is on any path here.
 check_install() {
-  local share=$build/install/share/stepdriver launch_file
+  local share=$build/install/share/stepdriver launch_file program
   rm -rf "$build/install"
   quietly install cmake --install "$build/catkin"
   use_ros "$build/install"
   [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
-  for launch_file in "$share"/launch/*.launch; do
+  for launch_file in "$share"/launch/*.launch "$share"/launch/examples/*.launch; do
     say "${launch_file##*/}:"
     roslaunch --files stepdriver "${launch_file##*/}" | indent
   done
@@ -230,6 +231,10 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
+  for program in draw plot_motion; do
+    rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
+      die "$program --help doesn't work"
+  done
   rosrun stepdriver stepdriver_check --config "$share/config/a4988.yaml" --backend simulated \
     >"$build/log/check-installed.log" || die "stepdriver_check doesn't work"
   if grep -rIl -e "$build/catkin" "$build/install"; then
@@ -237,12 +242,18 @@ check_install() {
   fi
 }
 
+# Every installed command, and the service, as far as that goes without a systemd that runs.
+check_operations() {
+  use_ros "$build/install"
+  bash "$src/test/operations/operations_test.sh" "$build/install"
+}
+
 check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
 choose_build_folder
 rm -rf "$build/ros"
 install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
-  "$(wants core && echo pictures)" "$(wants lint && echo ros)"
+  "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)"
 
 if wants lint; then
   stage shell check_shell
@@ -275,6 +286,7 @@ if wants ros; then
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
   stage install check_install node-build
+  stage operations check_operations install
   stage trace check_trace install
 fi
 

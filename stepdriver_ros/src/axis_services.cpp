@@ -40,6 +40,7 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
   ros::CallbackQueue& own = queues.ofAxis(index);
   advertise<MoveTo>("move_to", &AxisServices::moveTo, own);
   advertise<MoveRounds>("move_rounds", &AxisServices::moveRounds, own);
+  advertise<Plan>("plan", &AxisServices::plan, own);
   advertise<Microstep>("microstep", &AxisServices::microstep, own);
   advertise<SetLimits>("set_limits", &AxisServices::setLimits, own);
   advertise<SetPosition>("set_position", &AxisServices::setPosition, own);
@@ -65,18 +66,45 @@ bool AxisServices::moveRounds(MoveRounds::Request& request, MoveRounds::Response
   });
 }
 
+bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
+  response.position = axis_.state().position;
+  return answer(response, [&] {
+    const axis::MovePlan planned =
+        axis_.plan(request.position, request.relative != 0, request.velocity);
+    response.position = planned.move.target;
+    response.duration = planned.move.duration;
+    response.overshoot = planned.move.overshoot;
+    response.steps_per_unit = planned.steps_per_unit;
+    response.message = axis_.config().name + ": would move " + wayText(planned.move);
+    for (const axis::MovePiece& piece : planned.pieces) {
+      response.pieces.emplace_back();
+      Piece& shown = response.pieces.back();
+      shown.duration = piece.duration;
+      shown.position = piece.position;
+      shown.velocity = piece.velocity;
+      shown.acceleration = piece.acceleration;
+      shown.jerk = piece.jerk;
+    }
+  });
+}
+
+std::string AxisServices::wayText(const axis::Move& move) const {
+  const std::string unit = std::string(" ") + unitOf(axis_.config().kind);
+  std::string text =
+      "to " + numberText(move.target) + unit + " in " + numberText(move.duration) + " s";
+  if (move.overshoot > 0.0) {
+    text += "; it can't stop before that, goes " + numberText(move.overshoot) + unit +
+            " beyond, and comes back";
+  }
+  return text;
+}
+
 template <typename Response>
 void AxisServices::answerMove(const axis::Move& move, bool wait, Response& response) {
   if (!wait) {
     response.position = move.target;
     response.duration = move.duration;
-    const std::string unit = std::string(" ") + unitOf(axis_.config().kind);
-    response.message = axis_.config().name + ": moves to " + numberText(move.target) + unit +
-                       " in " + numberText(move.duration) + " s";
-    if (move.overshoot > 0.0) {
-      response.message += "; it can't stop before that, goes " + numberText(move.overshoot) + unit +
-                          " beyond, and comes back";
-    }
+    response.message = axis_.config().name + ": moves " + wayText(move);
     return;
   }
   const axis::MoveResult result = axis_.wait(move);

@@ -7,6 +7,7 @@
 #include <stepdriver/Microstep.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/Plan.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
 
@@ -38,6 +39,7 @@ class AxisServices {
 
   bool moveTo(MoveTo::Request& request, MoveTo::Response& response);
   bool moveRounds(MoveRounds::Request& request, MoveRounds::Response& response);
+  bool plan(Plan::Request& request, Plan::Response& response);
   bool microstep(Microstep::Request& request, Microstep::Response& response);
   bool setLimits(SetLimits::Request& request, SetLimits::Response& response);
   bool setPosition(SetPosition::Request& request, SetPosition::Response& response);
@@ -48,6 +50,9 @@ class AxisServices {
 
   template <typename Response>
   void answerMove(const axis::Move& move, bool wait, Response& response);
+
+  /// "to 0.1 m in 1.2 s"
+  std::string wayText(const axis::Move& move) const;
 
   axis::Axis& axis_;
   ros::NodeHandle node_;

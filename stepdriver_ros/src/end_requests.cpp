@@ -5,8 +5,9 @@
 #include <ros/xmlrpc_manager.h>
 
 #include <algorithm>
-#include <array>
 #include <ctime>
+
+#include "end_signals.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -14,27 +15,9 @@ namespace {
 // How long a shutdown call, which ends no wait, goes unnoticed at most.
 constexpr std::chrono::milliseconds kPoll{20};
 
-struct EndSignal {
-  int number;
-  const char* name;
-};
-
-constexpr std::array<EndSignal, 4> kEndSignals{
-    {{SIGINT, "SIGINT"}, {SIGTERM, "SIGTERM"}, {SIGQUIT, "SIGQUIT"}, {SIGHUP, "SIGHUP"}}};
-
-bool isIgnored(int signal) {
-  struct sigaction action {};
-  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
-}
-
 }  // namespace
 
-EndRequests::EndRequests() {
-  sigemptyset(&signals_);
-  for (const EndSignal& signal : kEndSignals) {
-    if (signal.number == SIGHUP && isIgnored(SIGHUP)) continue;
-    sigaddset(&signals_, signal.number);
-  }
+EndRequests::EndRequests() : signals_(endSignals()) {
   pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
 }
 

@@ -7,10 +7,9 @@
 
 namespace stepdriver::ros_node {
 
-/// What asks the node to end: SIGINT, SIGTERM, SIGQUIT, SIGHUP, as of a terminal that is closed,
-/// where nobody has it ignored (nohup), and the shutdown call of `rosnode kill` and of the
-/// master. One object, made first thing in main(), that outlives ros::shutdown(); waitFor() is
-/// called by main's thread.
+/// What asks the node to end: the signals of endSignals(), and the shutdown call of `rosnode kill`
+/// and of the master. One object, made first thing in main(), that outlives ros::shutdown();
+/// waitFor() is called by main's thread.
 class EndRequests {
  public:
   /// Blocks the signals in this thread and in all that it starts from now on.
@@ -28,7 +27,7 @@ class EndRequests {
   std::string waitFor(std::chrono::milliseconds time);
 
  private:
-  sigset_t signals_{};
+  const sigset_t signals_;
   std::atomic<bool> shutdown_called_{false};
 };
 

@@ -2,7 +2,6 @@
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
-#include <cstdio>
 #include <deque>
 #include <exception>
 #include <string>
@@ -30,11 +29,8 @@
 namespace stepdriver::ros_node {
 namespace {
 
-constexpr int kExitOk = 0;
-constexpr int kExitConfig = 1;
 constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
-constexpr int kExitUsage = 64;
 
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
@@ -58,7 +54,7 @@ lines.
               ~state_file  ~hardware_id  ~simulation  robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
-3 the machine is too slow for its axes and ~realtime is enforce.
+3 the machine is too slow for its axes and ~realtime is enforce, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -188,15 +184,7 @@ int runOrExplain(EndRequests& end_requests) {
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
   node::EndRequests end_requests;
-  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
-  std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  std::vector<std::string> arguments;
-  ros::removeROSArgs(argc, argv, arguments);
-  if (arguments.size() > 1) {
-    const bool help = arguments[1] == "--help" || arguments[1] == "-h";
-    std::fputs(node::kUsage, help ? stdout : stderr);
-    return help ? node::kExitOk : node::kExitUsage;
-  }
+  if (const auto code = node::answerArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
   if (!node::waitForMaster(end_requests)) return node::kExitOk;
   const int exit_code = node::runOrExplain(end_requests);

@@ -1,10 +1,13 @@
 #include "node_start.h"
 
 #include <ros/console.h>
+#include <ros/init.h>
 #include <ros/master.h>
 #include <ros/param.h>
 
 #include <chrono>
+#include <cstdio>
+#include <vector>
 
 #include "xmlrpc_value.h"
 
@@ -14,6 +17,17 @@ namespace {
 constexpr std::chrono::milliseconds kMasterPoll{200};
 
 }  // namespace
+
+std::optional<int> answerArguments(int argc, char** argv, const char* usage) {
+  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  if (arguments.size() < 2) return {};
+  const bool help = arguments[1] == "--help" || arguments[1] == "-h";
+  std::fputs(usage, help ? stdout : stderr);
+  return help ? kExitOk : kExitUsage;
+}
 
 bool waitForMaster(EndRequests& end_requests) {
   while (!ros::master::check()) {

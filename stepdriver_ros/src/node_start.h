@@ -2,6 +2,7 @@
 
 #include <ros/node_handle.h>
 
+#include <optional>
 #include <string>
 
 #include "end_requests.h"
@@ -9,6 +10,17 @@
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::ros_node {
+
+// Exit codes that the nodes share.
+constexpr int kExitOk = 0;
+constexpr int kExitConfig = 1;
+constexpr int kExitUsage = 64;
+
+/// What a node's main() begins with, before ros::init(): each line of its output can be read when
+/// it is written, and what isn't for ROS among its arguments is answered with the usage.
+///
+/// @return the exit code where the program ends with that.
+std::optional<int> answerArguments(int argc, char** argv, const char* usage);
 
 /// @return false: the node was asked to end before there was a master.
 bool waitForMaster(EndRequests& end_requests);

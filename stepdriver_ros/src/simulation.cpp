@@ -15,15 +15,11 @@ namespace {
 using axis::AxisConfig;
 using axis::Kind;
 
-constexpr double kPi = 3.14159265358979323846;
 // A switch that no parameter places stands this far outside of the soft limit,
 constexpr double kSwitchMargin = 2.0;  // [mm|deg]
 // or, where there is none, this far from the origin or from the other soft limit.
 constexpr double kFarLinear = 100.0;  // [mm]
 constexpr double kFarRotary = 360.0;  // [deg]
-
-/// The rig's unit, mm or degrees, in one of the axis's.
-double rigUnitsPerUnit(Kind kind) { return kind == Kind::kLinear ? 1000.0 : 180.0 / kPi; }
 
 struct SwitchPlaces {
   double min = 0.0;  ///< [mm|deg]
@@ -31,7 +27,7 @@ struct SwitchPlaces {
 };
 
 SwitchPlaces switchPlaces(const AxisConfig& axis, const SimulatedAxis& simulated) {
-  const double scale = rigUnitsPerUnit(axis.kind);
+  const double scale = axis::configUnitsPerUnit(axis.kind);
   const double far = axis.kind == Kind::kLinear ? kFarLinear : kFarRotary;
   SwitchPlaces places{-far, far};
   if (axis.min_position) places.min = *axis.min_position * scale - kSwitchMargin;
@@ -72,7 +68,8 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& axis, const SimulatedAxis& simulate
   spec.sleep = wireOf(axis.pins.sleep);
   spec.reset = wireOf(axis.pins.reset);
   spec.microsteps = axis.microsteps;
-  spec.full_step_travel = axis.microsteps / axis.steps_per_unit * rigUnitsPerUnit(axis.kind);
+  spec.full_step_travel =
+      axis.microsteps / axis.steps_per_unit * axis::configUnitsPerUnit(axis.kind);
   spec.start = simulated.start;
   if (axis.fault) spec.fault_line = axis.fault->line;
   const SwitchPlaces places = switchPlaces(axis, simulated);
@@ -150,7 +147,7 @@ RigReport::Response Simulation::report() {
     response.name.push_back(axis.name);
     response.pulses_forward.push_back(report.pulses_forward);
     response.pulses_backward.push_back(report.pulses_backward);
-    response.carriage.push_back(report.carriage / rigUnitsPerUnit(axis.kind));
+    response.carriage.push_back(report.carriage / axis::configUnitsPerUnit(axis.kind));
     response.microsteps.push_back(report.microsteps);
     response.violations.push_back(report.totalViolations());
     response.violation_kinds.push_back(kindsText(report));

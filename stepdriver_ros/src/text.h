@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdio>
 #include <string>
 
@@ -7,10 +8,12 @@
 
 namespace stepdriver::ros_node {
 
-/// A number as messages show it: six digits, no trailing zeros.
+/// A number as messages show it: six digits, no trailing zeros; from 100000 on as a whole number,
+/// as nobody reads 1.23457e+06, up to what a double counts exactly.
 inline std::string numberText(double number) {
+  const double size = std::abs(number);
   char text[32];
-  std::snprintf(text, sizeof text, "%.6g", number);
+  std::snprintf(text, sizeof text, size < 1e5 || size > 9e15 ? "%.6g" : "%.0f", number);
   return text;
 }
 

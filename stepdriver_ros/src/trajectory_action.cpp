@@ -114,6 +114,8 @@ bool TrajectoryAction::conclude(Following& following) {
 
 std::string TrajectoryAction::shortOfGoal(const Following& following,
                                           const machine::CoordinatedResult& result) const {
+  // What a stop, a switch or a fault ended stayed on its path, was no bad goal, and isn't
+  // SUCCESSFUL: of the codes that there are, 0 to -5, the goal that it missed says most.
   if (result.end != axis::MoveEnd::kReached) return result.message;
   // A motion's duration is its own time, which slips aren't in.
   const double late = result.duration + machine_.figures().slipped - following.slipped_before -

@@ -11,6 +11,7 @@
 #include "stepdriver_core/error.h"
 #include "system_report.h"
 #include "table.h"
+#include "text.h"
 
 namespace stepdriver::check {
 namespace {
@@ -21,8 +22,16 @@ bool has(const std::string& text, const std::string& part) {
 
 TEST(Table, HasColumnsAsWideAsTheirWidestWord) {
   EXPECT_EQ(table({{"a", "bb"}, {"long", "", "c"}, {"x"}}), "  a     bb\n  long      c\n  x\n");
-  EXPECT_EQ(numberText(1000000.0), "1000000");
+}
+
+TEST(NumberText, HasSixDigitsAndAnExponentOnlyWhereNobodyWouldReadTheZeros) {
+  using ros_node::numberText;
   EXPECT_EQ(numberText(0.5), "0.5");
+  EXPECT_EQ(numberText(-1.0 / 3.0), "-0.333333");
+  EXPECT_EQ(numberText(99999.96), "100000");
+  EXPECT_EQ(numberText(1234567.8), "1234568");
+  EXPECT_EQ(numberText(-9e15), "-9000000000000000");
+  EXPECT_EQ(numberText(1e300), "1e+300");
 }
 
 std::vector<gpio::ChipInfo> twoChips() {

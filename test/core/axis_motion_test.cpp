@@ -22,14 +22,7 @@ using test::linearAxis;
 using test::violationsOf;
 
 /// 1000 steps/s, 2000 steps/s^2, no soft limits, switches at -100 m and 100 m.
-axis::AxisConfig config() {
-  axis::AxisConfig config = linearAxis("x");
-  config.steps_per_unit = 1000.0;
-  config.max_speed = 1.0;
-  config.acceleration = 2.0;
-  config.deceleration = 2.0;
-  return config;
-}
+axis::AxisConfig config() { return linearAxis("x", 1000.0, 1.0, 2.0); }
 
 class AxisMotion : public testing::Test {
  protected:

@@ -205,6 +205,32 @@ TEST_F(HomingFailure, TakesTheFirstContactOfASwitchThatBounces) {
   EXPECT_NEAR(x().state().position - -0.1, carriage() + 0.1 - 0.5 * kStep, 1e-9);
 }
 
+// It opens again for less than the debounce time after the latch has ended, and the contact after
+// that comes too late to count.
+TEST_F(HomingFailure, TakesNoContactForTheFirstThatComesAfterTheLatch) {
+  std::int64_t ended = 0;
+  int changes = 0;
+  const HomingResult result = x().home([&] {
+    const std::int64_t now = bench->clock.now();
+    const axis::AxisState state = x().state();
+    if (ended == 0 && state.homing == HomingPhase::kLatching && *x().endstops().min &&
+        state.velocity == 0.0) {
+      ended = now;
+    }
+    if (ended != 0 && changes == 0 && now - ended > 2'000'000) {
+      ++changes;
+      stick(false);
+    } else if (changes == 1 && now - ended > 5'000'000) {
+      ++changes;
+      stick({});
+    }
+    return false;
+  });
+  EXPECT_EQ(changes, 2);
+  expectHomed(result);
+  EXPECT_NEAR(x().state().position - -0.1, carriage() + 0.1 - 0.5 * kStep, 1e-9);
+}
+
 TEST_F(HomingFailure, GoesOnAfterAGlitchThatIsShorterThanTheDebounce) {
   for (const HomingPhase phase : {HomingPhase::kSeeking, HomingPhase::kLatching}) {
     build(homingAxis());

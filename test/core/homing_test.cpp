@@ -203,6 +203,88 @@ TEST_F(HomingTest, TakesSoftLimitsForNothingWhileItHomes) {
   EXPECT_REFUSED(x().moveTo(-0.05), "min_position");
 }
 
+TEST_F(HomingTest, IsHeldWhereItStandsBetweenTwoStrokes) {
+  bool held = false;
+  expectHomed(x().home([&] {
+    if (held || !*x().endstops().min || x().state().moving) return false;
+    held = true;
+    const std::int64_t at_rest = bench->pulses();
+    bench->machine->hold();
+    bench->machine->advance(1.0);
+    EXPECT_EQ(bench->pulses(), at_rest);
+    EXPECT_TRUE(x().state().held);
+    bench->machine->resume();
+    return false;
+  }));
+  EXPECT_TRUE(held);
+}
+
+TEST_F(HomingTest, IsHeldAtAnyMomentForLongerThanItsTimeOutAndGoesOn) {
+  for (std::int64_t moment = 0; moment < 32; ++moment) {
+    SCOPED_TRACE(moment);
+    axis::AxisConfig config = homingAxis();
+    config.homing->timeout = 4.0;
+    build(config);
+    const std::int64_t begin = bench->clock.now() + moment * 70'000'000;
+    bool held = false;
+    const HomingResult result = x().home([&] {
+      if (held || bench->clock.now() < begin) return false;
+      held = true;
+      bench->machine->hold();
+      EXPECT_TRUE(x().state().held);
+      bench->machine->advance(1.0);
+      const std::int64_t at_rest = bench->pulses();
+      bench->machine->advance(60.0);
+      EXPECT_EQ(bench->pulses(), at_rest);
+      bench->machine->resume();
+      EXPECT_FALSE(x().state().held);
+      return false;
+    });
+    EXPECT_TRUE(held);
+    expectHomed(result);
+    EXPECT_NEAR(carriage(), -0.098, 2.0 * kStep);
+    EXPECT_EQ(violationsOf(bench->report()), "");
+  }
+}
+
+TEST_F(HomingTest, CountsTheTimeBeforeAndAfterAHold) {
+  axis::AxisConfig config = homingAxis();
+  config.homing->timeout = 1.5;
+  build(config);
+  bool held = false;
+  const HomingResult result = x().home([&] {
+    if (held || bench->clock.now() < 1'000'000'000) return false;
+    held = true;
+    bench->machine->hold();
+    bench->machine->advance(10.0);
+    bench->machine->resume();
+    return false;
+  });
+  EXPECT_EQ(result.end, HomingEnd::kFailed);
+  EXPECT_NE(result.message.find("didn't close within timeout_s, 1.5 s"), std::string::npos)
+      << result.message;
+  EXPECT_NEAR(carriage(), -0.075, 0.005);
+}
+
+TEST_F(HomingTest, IsEndedByAStopOrACancelWhileItIsHeld) {
+  for (const bool cancel : {false, true}) {
+    build(homingAxis());
+    bool held = false;
+    const HomingResult result = x().home([&] {
+      if (!held && bench->pulses() < -1000) {
+        held = true;
+        bench->machine->hold();
+      }
+      if (!held || x().state().moving) return false;
+      if (!cancel) bench->machine->stop();
+      return cancel;
+    });
+    EXPECT_EQ(result.end, cancel ? HomingEnd::kCancelled : HomingEnd::kFailed) << result.message;
+    EXPECT_FALSE(x().state().held);
+    EXPECT_EQ(bench->move(-0.01).end, axis::MoveEnd::kReached);
+  }
+}
+
 TEST_F(HomingTest, RefusesWhatCannotBeDoneMeanwhile) {
   std::string position;
   std::string again;

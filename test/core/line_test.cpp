@@ -26,13 +26,8 @@ using test::refusal;
 using test::violationsOf;
 
 axis::AxisConfig axisOf(const std::string& name, double scale, double speed, double acceleration) {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = scale;
-  config.max_speed = speed;
-  config.acceleration = acceleration;
-  config.deceleration = acceleration;
+  axis::AxisConfig config = linearAxis(name, scale, speed, acceleration);
   config.endstop_min.reset();
-  config.endstop_max = axis::Endstop{name + ".max", false};
   return config;
 }
 
@@ -183,6 +178,37 @@ TEST_F(Line, IsHeldAndGoesOnWithoutLeavingIt) {
   EXPECT_EQ(bench->pulses("x"), 1000);
   EXPECT_EQ(bench->pulses("y"), 350);
   EXPECT_FALSE(bench->axis("x").state().held);
+  expectClean();
+}
+
+TEST_F(Line, SaysOnceWhyItCannotGoOn) {
+  const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.6);
+  machine().hold();
+  awaitRest();
+  sim::RigFaults faults;
+  faults.max_stuck = true;
+  bench->rig.setFaults("y", faults);
+  try {
+    machine().resume();
+    ADD_FAILURE() << "it goes on into the switch";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "y: the max endstop is active; it moves only towards min");
+  }
+  bench->rig.setFaults("y", {});
+  machine().resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  expectClean();
+}
+
+TEST_F(Line, IsHeldAndResumedByAnyOfItsAxes) {
+  const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.6);
+  bench->axis("y").hold();
+  awaitRest();
+  EXPECT_TRUE(bench->axis("x").state().held);
+  bench->axis("y").resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
   expectClean();
 }
 

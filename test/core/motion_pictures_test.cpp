@@ -24,10 +24,7 @@ using test::MotionTrace;
 
 /// 1000 steps/s, 2000 steps/s^2, no limits of position.
 axis::AxisConfig config(const std::string& name = "x") {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = 1000.0;
-  config.max_speed = 1.0;
-  config.acceleration = config.deceleration = 2.0;
+  axis::AxisConfig config = linearAxis(name, 1000.0, 1.0, 2.0);
   config.endstop_min.reset();
   config.endstop_max.reset();
   return config;
@@ -47,6 +44,15 @@ class MotionPictures : public testing::Test {
     for (const auto& axis : bench->machine->axes()) {
       while (axis->state().moving) advance(1e-4);
     }
+  }
+  void holdDuring(double begin, double end) {
+    advanceTo(begin);
+    trace->mark("hold");
+    bench->machine->hold();
+    awaitRest();
+    advanceTo(end);
+    trace->mark("resume");
+    bench->machine->resume();
   }
   double takes(double position) {
     const axis::Move move = x().moveTo(position);
@@ -186,13 +192,7 @@ TEST_F(MotionPictures, Jog) {
 TEST_F(MotionPictures, LineWithHold) {
   build({config("x"), config("y")});
   const auto line = bench->machine->moveLine({{"x", "y"}, {1.0, 0.4}});
-  advanceTo(0.7);
-  trace->mark("hold");
-  bench->machine->hold();
-  awaitRest();
-  advanceTo(1.6);
-  trace->mark("resume");
-  bench->machine->resume();
+  holdDuring(0.7, 1.6);
   EXPECT_EQ(bench->machine->wait(line).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("x"), 1000);
   EXPECT_EQ(bench->pulses("y"), 400);
@@ -238,13 +238,7 @@ TEST_F(MotionPictures, TrajectoryWithHold) {
   build(axes);
   const auto move = bench->machine->followTrajectory(
       {{"x", "y"}, {{1.0, {0.4, 0.3}, {0.6, 0.0}, {}}, {2.0, {0.8, 0.0}, {0.0, 0.0}, {}}}});
-  advanceTo(0.8);
-  trace->mark("hold");
-  bench->machine->hold();
-  awaitRest();
-  advanceTo(1.5);
-  trace->mark("resume");
-  bench->machine->resume();
+  holdDuring(0.8, 1.5);
   EXPECT_EQ(bench->machine->wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("x"), 800);
   EXPECT_EQ(bench->pulses("y"), 0);

@@ -1,113 +1,14 @@
-#include "stepdriver_core/pulse/pulse_engine.h"
-
 #include <gtest/gtest.h>
 
 #include <cerrno>
 #include <cstdint>
-#include <deque>
-#include <memory>
-#include <optional>
-#include <vector>
+#include <map>
 
-#include "support/plan_from_rest.h"
-#include "support/recording_lines.h"
+#include "stepdriver_core/motion/step_finder.h"
+#include "support/pulse_engine_bench.h"
 
 namespace stepdriver::pulse {
 namespace {
-
-constexpr int kLinesPerChannel = 2;  // STEP and DIR
-
-using test::Edge;
-using test::RecordingLines;
-
-class PulseEngineTest : public testing::Test {
- protected:
-  static ChannelConfig config(int channel) {
-    ChannelConfig config;
-    config.step.line = channel * kLinesPerChannel;
-    config.dir.line = channel * kLinesPerChannel + 1;
-    config.step_high = 1'900;
-    config.step_low = 2'100;
-    config.dir_setup = 650;
-    config.dir_hold = 700;
-    config.mode_hold = 800;
-    return config;
-  }
-
-  void make(const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness = 5'000'000) {
-    engine = std::make_unique<PulseEngine>(lines, clock, channels, max_lateness);
-  }
-
-  /// @param continues serial of the profile that this one goes on from.
-  std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
-    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
-    follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval});
-    postFollows(1);
-    return serial;
-  }
-
-  // The last so many of `follows` in one order.
-  void postFollows(std::size_t count) {
-    Command command;
-    command.follows = &follows[follows.size() - count];
-    command.follow_count = count;
-    EXPECT_TRUE(engine->post(command));
-  }
-
-  // Serves until nothing is left to do, each time `late` after it is due.
-  void runOut(Nanoseconds late = 0) {
-    for (Nanoseconds due = engine->serve(); due != kNever; due = engine->serve()) {
-      while (clock.now() < due + late) clock.waitUntil(due + late);
-    }
-  }
-
-  void runUntil(Nanoseconds time) {
-    for (Nanoseconds due = engine->serve(); due <= time; due = engine->serve()) {
-      while (clock.now() < due) clock.waitUntil(due);
-    }
-    while (clock.now() < time) clock.waitUntil(time);
-  }
-
-  // Holds the edges of the first channel against what the chip wants.
-  void expectTimes(const ChannelConfig& channel) {
-    std::optional<Nanoseconds> rose;
-    std::optional<Nanoseconds> turned;
-    std::optional<Nanoseconds> fell;
-    std::size_t last_write = 0;
-    for (const Edge& edge : lines.edges) {
-      const auto since = [&edge](const std::optional<Nanoseconds>& time) {
-        return time ? edge.time - *time : kNever;
-      };
-      SCOPED_TRACE(testing::Message() << "line " << edge.line << " at " << edge.time);
-      EXPECT_NE(edge.write, last_write) << "STEP and DIR in one write";
-      last_write = edge.write;
-      if (edge.line == 1) {
-        EXPECT_GE(since(rose), channel.dir_hold);
-        turned = edge.time;
-      } else if (edge.level) {
-        EXPECT_GE(since(fell), channel.step_low);
-        EXPECT_GE(since(turned), channel.dir_setup);
-        rose = edge.time;
-      } else {
-        EXPECT_GE(since(rose), channel.step_high);
-        fell = edge.time;
-      }
-    }
-  }
-
-  static motion::Profile cruise(Nanoseconds start, std::int64_t from, std::int64_t to,
-                                double speed) {
-    return motion::planFromRest(start, from, to, {speed, speed, 1.0, 1.0});
-  }
-
-  VirtualClock clock;
-  RecordingLines lines{clock};
-  std::unique_ptr<PulseEngine> engine;
-  std::vector<std::unique_ptr<motion::Profile>> profiles;
-  std::deque<Follow> follows;
-  std::uint64_t serial = 0;
-  Nanoseconds restart_interval = 0;
-};
 
 TEST_F(PulseEngineTest, PutsEachStepOutAtItsNanosecond) {
   make({config(0)});
@@ -420,71 +321,6 @@ TEST_F(PulseEngineTest, RefusesMoreSuccessorsThanItHasRoomForAndKeepsThose) {
   runOut();
   EXPECT_EQ(engine->channel(0).count, 1000);
   EXPECT_EQ(engine->channel(0).ended, last);
-}
-
-class PulseEngineGroup : public PulseEngineTest {
- protected:
-  void order(motion::Profile profile, int channel, std::uint64_t continues = 0) {
-    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
-    follows.push_back({channel, ++serial, profiles.back().get(), continues, 2'000'000, 7});
-  }
-};
-
-TEST_F(PulseEngineGroup, TakesAllProfilesOfAnOrderOrNone) {
-  make({config(0), config(1)});
-  order(cruise(1'000'000, 0, 100, 1000.0), 0);
-  order(cruise(1'000'000, 0, 100, 1000.0), 1, 99);  // goes on from a profile that isn't there
-  std::swap(follows[0], follows[1]);
-  postFollows(2);
-  runOut();
-  for (const int channel : {0, 1}) {
-    EXPECT_EQ(engine->channel(channel).following, 0U);
-    EXPECT_EQ(engine->channel(channel).refused, engine->channel(channel).taken);
-    EXPECT_NE(engine->channel(channel).refused, 0U);
-  }
-  EXPECT_TRUE(lines.edges.empty());
-}
-
-TEST_F(PulseEngineGroup, EndsAllWhereOneLineFailsWithTheStepsOfThatInstantCounted) {
-  make({config(0), config(1), config(2)});
-  for (const int channel : {0, 1, 2}) order(cruise(1'000'000, 0, 100, 1000.0), channel);
-  follows[2].group = 8;
-  postFollows(3);
-  runUntil(50'300'000);
-  lines.broken = 0;
-  runOut();
-  EXPECT_EQ(engine->channel(0).end, EndReason::kLineError);
-  EXPECT_EQ(engine->channel(1).end, EndReason::kCompanion);
-  EXPECT_TRUE(engine->channel(1).end_abrupt);
-  EXPECT_EQ(engine->channel(2).end, EndReason::kDone);
-  EXPECT_EQ(engine->channel(2).count, 100);
-  for (const int channel : {0, 1}) {
-    const auto sent = lines.rises(channel * kLinesPerChannel).size();
-    EXPECT_EQ(engine->channel(channel).count, static_cast<std::int64_t>(sent)) << channel;
-    EXPECT_LT(sent, 60U) << channel;
-  }
-}
-
-TEST_F(PulseEngineGroup, SendsNoStepOfTheInstantAtWhichAnotherMeetsItsEndstop) {
-  // Both orders: the one that meets it is looked at before the other one, or after it.
-  for (const int meets : {0, 1}) {
-    SCOPED_TRACE(meets);
-    lines.inputs[0] = 0;
-    std::vector<ChannelConfig> both{config(0), config(1)};
-    both[static_cast<std::size_t>(meets)].endstop_max = Signal{0, true};
-    make(both);
-    const Nanoseconds start = clock.now() + 1'000'000;
-    for (const int channel : {0, 1}) order(cruise(start, 0, 100, 1000.0), channel);
-    postFollows(2);
-    runUntil(start + 50'300'000);
-    const std::int64_t before = engine->channel(0).count;
-    lines.inputs[0] = 1;
-    runOut();
-    EXPECT_EQ(engine->channel(meets).end, EndReason::kEndstopMax);
-    EXPECT_EQ(engine->channel(1 - meets).end, EndReason::kCompanion);
-    EXPECT_EQ(engine->channel(0).count, before);
-    EXPECT_EQ(engine->channel(1).count, before);
-  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -53,6 +54,16 @@ struct Textbook {
   }
   bool quintic() const { return c[4] != 0.0L || c[5] != 0.0L; }
 };
+
+/// The first time after `low` at which the textbook is on a half-step line [s].
+long double crossing(const Textbook& textbook, long double line, long double low,
+                     long double high) {
+  for (int i = 0; i < 100; ++i) {
+    const long double middle = (low + high) / 2.0L;
+    (textbook.at(middle) < line ? low : high) = middle;
+  }
+  return low;
+}
 
 MotionState restAt(double position) { return {position, 0.0, 0.0}; }
 
@@ -126,15 +137,78 @@ TEST(Spline, StepsOfACubicComeWithinANanosecond) {
   Step step;
   for (int k = 0; k < 10000; ++k) {
     ASSERT_TRUE(finder.next(step));
-    long double low = 0.0L;
-    long double high = 2.0L;
-    for (int i = 0; i < 100; ++i) {
-      const long double middle = (low + high) / 2.0L;
-      (textbook.at(middle) < k + 0.5L ? low : high) = middle;
-    }
-    ASSERT_LE(std::abs(step.time_ns - low * 1e9L), 1.0L) << "step " << k;
+    const long double time = crossing(textbook, k + 0.5L, 0.0L, 2.0L);
+    ASSERT_LE(std::abs(step.time_ns - time * 1e9L), 1.0L) << "step " << k;
   }
   EXPECT_FALSE(finder.next(step));
+}
+
+// In place rather than in time: at its ends the axis hardly moves.
+TEST(Spline, StepsOfAQuinticComeWhereThePolynomialIsWithinAHundredthOfAStep) {
+  const std::vector<Waypoint> waypoints{{2 * kSecond, 10000.0, 0.0, 0.0}};
+  const Textbook textbook({0, 0.0, 0.0, 0.0}, waypoints[0]);
+  ASSERT_TRUE(textbook.quintic());
+  const Profile profile = planSpline(0, restAt(0.0), waypoints);
+  StepFinder finder(profile, 0);
+  Step step;
+  for (int k = 0; k < 10000; ++k) {
+    ASSERT_TRUE(finder.next(step));
+    const long double off = textbook.at(step.time_ns / 1e9L) - (k + 0.5L);
+    // A nanosecond is 1e-5 steps at the peak of 9375 steps/s.
+    ASSERT_LE(std::abs(off), kQuinticError + 1e-5L) << "step " << k;
+    if (k < 100 || k >= 9900) continue;
+    const long double time = crossing(textbook, k + 0.5L, 0.0L, 2.0L);
+    const long double speed = 1.0L / (crossing(textbook, k + 1.5L, 0.0L, 2.0L) - time);
+    ASSERT_LE(std::abs(step.time_ns / 1e9L - time), 1.1L * kQuinticError / speed) << "step " << k;
+  }
+  EXPECT_FALSE(finder.next(step));
+}
+
+// Where both segments at a waypoint have a velocity for it, they join without a jump; so do the
+// cubics that a quintic is made of.
+TEST(Spline, JoinsWithoutAJumpOfVelocity) {
+  std::mt19937_64 random(20261122);
+  for (int round = 0; round < 1000; ++round) {
+    SCOPED_TRACE(round);
+    std::vector<Waypoint> waypoints = randomWaypoints(random, 4);
+    for (Waypoint& waypoint : waypoints) waypoint.velocity = waypoint.velocity.value_or(0.0);
+    const Profile profile = planSpline(0, {3.0, -20.0, 50.0}, waypoints);
+    double fastest = 20.0;
+    for (const Piece& piece : profile.pieces()) fastest = std::max(fastest, std::abs(piece.v0));
+    DoubleDouble before(-20.0);
+    for (const Piece& piece : profile.pieces()) {
+      ASSERT_NEAR(piece.v0, before.value(), 1e-9 * fastest);
+      before = piece.velocityAt(piece.duration);
+    }
+    ASSERT_NEAR(before.value(), *waypoints.back().velocity, 1e-9 * fastest);
+    ASSERT_LE(std::abs(profilePeaks(profile, -20.0).velocity_jump.value) -
+                  std::abs(*waypoints.back().velocity),
+              1e-9 * fastest);
+  }
+}
+
+// From rest to rest the textbook has them in closed form: 1.5 L/T at T/2 and 6 L/T^2 at both ends
+// for the cubic, 15/8 L/T at T/2 and 10/sqrt(3) L/T^2 at T/2 -+ T/sqrt(12) for the quintic.
+TEST(Spline, OfASegmentFromRestToRestHasThePeaksOfTheTextbook) {
+  const double length = 10000.0;
+  const double time = 2.0;
+  const auto peaks = [&](std::optional<double> acceleration) {
+    return profilePeaks(planSpline(0, restAt(0.0), {{2 * kSecond, length, 0.0, acceleration}}));
+  };
+  const ProfilePeaks cubic = peaks({});
+  EXPECT_NEAR(cubic.velocity.value, 1.5 * length / time, 1e-6);
+  EXPECT_NEAR(cubic.velocity.time_s, time / 2.0, 1e-6);
+  EXPECT_NEAR(std::abs(cubic.acceleration.value), 6.0 * length / (time * time), 1e-6);
+  const ProfilePeaks quintic = peaks(0.0);
+  EXPECT_NEAR(quintic.velocity.value, 15.0 / 8.0 * length / time, 1e-3 * length);
+  EXPECT_NEAR(quintic.velocity.time_s, time / 2.0, 0.01 * time);
+  EXPECT_NEAR(std::abs(quintic.acceleration.value), 10.0 / std::sqrt(3.0) * length / (time * time),
+              0.02 * 10.0 * length);
+  for (const ProfilePeaks& each : {cubic, quintic}) {
+    EXPECT_NEAR(each.lowest.value, 0.0, 1e-9);
+    EXPECT_NEAR(each.highest.value, length, 1e-9);
+    EXPECT_NEAR(each.velocity_jump.value, 0.0, 1e-6);
+  }
 }
 
 TEST(Spline, StaysOnItsWaypointsOver10000) {

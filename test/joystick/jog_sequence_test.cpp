@@ -16,6 +16,14 @@ void expectOrders(const JogOrders& orders, std::optional<double> velocity,
   EXPECT_EQ(orders.enable, enable);
 }
 
+/// One that jogs at 0.1, and was enabled for that at 0.1 s.
+JogSequence jogging(double disable_after) {
+  JogSequence sequence = JogSequence::disabling(disable_after);
+  sequence.orders(0.1, 0.0);
+  sequence.answered(true, 0.1);
+  return sequence;
+}
+
 TEST(JogSequence, RepeatsTheVelocityAndGivesNothingOnceWhenItIsOver) {
   JogSequence sequence;
   expectOrders(sequence.orders(0.0, 0.0), kNoVelocity, kNoCall);
@@ -52,17 +60,13 @@ TEST(JogSequence, EnablesBeforeItJogsAndDisablesInTheDeadBand) {
 }
 
 TEST(JogSequence, DisablesAtOnceWhereItIsToldTo) {
-  JogSequence sequence = JogSequence::disabling(0.0);
-  sequence.orders(0.1, 0.0);
-  sequence.answered(true, 0.1);
+  JogSequence sequence = jogging(0.0);
   sequence.orders(0.1, 0.2);
   expectOrders(sequence.orders(0.0, 0.3), 0.0, false);
 }
 
 TEST(JogSequence, WaitsForTheDisableBeforeItEnablesAgain) {
-  JogSequence sequence = JogSequence::disabling(0.0);
-  sequence.orders(0.1, 0.0);
-  sequence.answered(true, 0.1);
+  JogSequence sequence = jogging(0.0);
   sequence.orders(0.0, 0.2);  // the order to disable
   expectOrders(sequence.orders(0.1, 0.3), kNoVelocity, kNoCall);
   sequence.answered(true, 0.4);

@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
-#include <exception>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "kernel_trace.h"
 #include "stepdriver_core/error.h"
+#include "trace_program.h"
 #include "waveform.h"
 
 namespace {
@@ -132,26 +132,14 @@ bool isRight(const Asked& asked, const kernel::KernelTrace& trace) {
   return there && seen.violations.empty();
 }
 
+bool areRight(const std::vector<std::string>& arguments, const kernel::KernelTrace& trace) {
+  bool right = true;
+  for (const Asked& axis : askedFor(arguments)) right = isRight(axis, trace) && right;
+  return right;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() == 1 && (arguments[0] == "--help" || arguments[0] == "-h")) {
-    std::fputs(kUsage, stdout);
-    return 0;
-  }
-  if (arguments.size() < 3) {
-    std::fputs(kUsage, stderr);
-    return 2;
-  }
-  try {
-    const std::vector<Asked> axes = askedFor(arguments);
-    const auto trace = kernel::KernelTrace::fromFile(arguments[0]);
-    bool right = true;
-    for (const Asked& axis : axes) right = isRight(axis, trace) && right;
-    return right ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "check_waveform: %s\n", error.what());
-    return 2;
-  }
+  return kernel::runTraceProgram({"check_waveform", kUsage, areRight}, argc, argv);
 }

@@ -1,11 +1,10 @@
-#include <cstdio>
-#include <exception>
 #include <string>
 #include <vector>
 
 #include "kernel_trace.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/vcd_trace.h"
+#include "trace_program.h"
 
 namespace {
 
@@ -19,7 +18,9 @@ constexpr const char kUsage[] =
     "LINE      chip:offset, with the chip's label, or the number that the kernel has for the line\n"
     "\n"
     "Time 0 is the first event of any of these lines. Times are those at which the kernel called\n"
-    "the chip's driver, in nanoseconds.\n";
+    "the chip's driver, in nanoseconds.\n"
+    "\n"
+    "Exit status: 0; 2 where it couldn't be done.\n";
 
 stepdriver::kernel::TracedPin tracedPin(const std::string& text,
                                         const stepdriver::kernel::KernelTrace& trace) {
@@ -32,28 +33,17 @@ stepdriver::kernel::TracedPin tracedPin(const std::string& text,
           trace.line(text.substr(equals + 1))};
 }
 
+bool convert(const std::vector<std::string>& arguments,
+             const stepdriver::kernel::KernelTrace& trace) {
+  std::vector<stepdriver::kernel::TracedPin> pins;
+  for (std::size_t i = 2; i < arguments.size(); ++i) pins.push_back(tracedPin(arguments[i], trace));
+  stepdriver::sim::VcdTrace vcd(arguments[1]);
+  copyTo(vcd, trace, pins);
+  return true;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() == 1 && (arguments[0] == "--help" || arguments[0] == "-h")) {
-    std::fputs(kUsage, stdout);
-    return 0;
-  }
-  if (arguments.size() < 3) {
-    std::fputs(kUsage, stderr);
-    return 2;
-  }
-  try {
-    const auto trace = stepdriver::kernel::KernelTrace::fromFile(arguments[0]);
-    std::vector<stepdriver::kernel::TracedPin> pins;
-    for (std::size_t i = 2; i < arguments.size(); ++i)
-      pins.push_back(tracedPin(arguments[i], trace));
-    stepdriver::sim::VcdTrace vcd(arguments[1]);
-    copyTo(vcd, trace, pins);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "trace_to_vcd: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  return stepdriver::kernel::runTraceProgram({"trace_to_vcd", kUsage, convert}, argc, argv);
 }

@@ -210,7 +210,7 @@ AxisState Axis::state() const {
   state.asleep = axis.isAsleep();
   state.idle = axis.idle;
   state.moving = channel.following != 0;
-  state.held = axis.held.has_value();
+  state.held = axis.held.has_value() || (axis.homing != nullptr && axis.homing->isHeld());
   state.homed = axis.homed;
   if (axis.homing != nullptr) state.homing = axis.homing->phase();
   state.position_valid = axis.position_valid;

@@ -5,6 +5,7 @@
 
 #include "axis_impl.h"
 #include "course.h"
+#include "homing.h"
 
 namespace stepdriver::axis {
 
@@ -27,11 +28,16 @@ std::int64_t Axis::Impl::checkedTarget(double position, bool relative) {
   return std::llround(countOf(goal));
 }
 
+Goal Axis::Impl::checkedGoal(double position, bool relative, double velocity) {
+  Goal goal;
+  goal.target = checkedTarget(position, relative);
+  goal.velocity = checkedVelocity(velocity);
+  if (!moving()) refuseIntoEndstop(*goal.target - jointCount());
+  return goal;
+}
+
 Move Axis::Impl::checkedMove(double position, bool relative, double velocity) {
-  const std::int64_t target = checkedTarget(position, relative);
-  const double speed = checkedVelocity(velocity);
-  if (!moving()) refuseIntoEndstop(target - jointCount());
-  return startMove(target, speed);
+  return begin({{this, checkedGoal(position, relative, velocity)}}).front();
 }
 
 double Axis::Impl::relativeOrigin() {
@@ -131,7 +137,16 @@ void Axis::Impl::slowDown(const std::string& stopped_by) {
   dropHeld(MoveEnd::kStopped, stopped_by);  // it came to rest before the order came
 }
 
+bool Axis::Impl::leads() {
+  const Motion* current = underWay();
+  const Course* course = held                 ? held->goal.course.get()
+                         : current != nullptr ? current->goal.course.get()
+                                              : nullptr;
+  return course == nullptr || course->axes().front() == this;
+}
+
 void Axis::Impl::hold() {
+  if (homing != nullptr) homing->hold();
   const Motion* current = underWay();
   if (current == nullptr || current->goal.slowsDown()) return;
   if (current->goal.kind == Goal::Kind::kJog) {
@@ -152,7 +167,10 @@ void Axis::Impl::hold() {
 
 void Axis::Impl::resume() {
   harvest();
-  if (!held) return;
+  if (!held) {
+    if (homing != nullptr) homing->goOn();
+    return;
+  }
   const Orders orders = ordersOf(held->goal);
   for (const Order& order : orders) {
     order.axis->refuseUnlessReady();
@@ -160,6 +178,7 @@ void Axis::Impl::resume() {
   }
   carryOut(orders);
   for (const Order& order : orders) order.axis->held.reset();
+  if (homing != nullptr) homing->goOn();
 }
 
 void Axis::Impl::dropHeld(MoveEnd end, const std::string& why) {
@@ -185,8 +204,7 @@ void Axis::Impl::changeOverride(double factor) {
   speed_override = factor;
   const Motion* current = underWay();
   if (current == nullptr || current->goal.slowsDown()) return;
-  const auto& course = current->goal.course;
-  if (course == nullptr || course->axes().front() == this) carryOut(ordersOf(current->goal));
+  if (leads()) carryOut(ordersOf(current->goal));
 }
 
 void Axis::Impl::awaitRest(std::unique_lock<std::mutex>& lock, const std::string& stopped_by) {
@@ -258,10 +276,8 @@ std::vector<Move> Axis::Impl::begin(Orders orders) {
     if (before.move != 0 && !axis.log.result(before.move)) {
       axis.log.conclude(before.move, axis.replacedBy(motion, replaced[i].began));
     }
-    const motion::Profile& profile = *motion.profile;
-    moves.push_back({motion.goal.move, axis.positionOf(axis.jointAt(profile.endPosition().value())),
-                     static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9,
-                     motion.overshoot / axis.stepsPerUnit()});
+    moves.push_back(axis.moveOf(*motion.profile, motion.overshoot));
+    moves.back().id = motion.goal.move;
   }
   for (std::size_t i = 0; i < orders.size(); ++i) {
     orders[i].axis->leaveCourse(replaced[i].goal, orders[i].axis->config.name);

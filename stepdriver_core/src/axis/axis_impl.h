@@ -65,7 +65,11 @@ class Axis::Impl {
   Move moveMotor(std::int64_t target);
   /// [microsteps] @throw Refused where it isn't one to move to.
   std::int64_t checkedTarget(double position, bool relative);
+  /// @throw Refused as Axis::moveTo().
+  Goal checkedGoal(double position, bool relative, double velocity);
   Move checkedMove(double position, bool relative, double velocity);
+  /// What a goal would be now; nothing moves.
+  MovePlan planOf(const Goal& goal);
   void checkedJog(double velocity);
   void decelerate(const std::string& stopped_by);
   /// The same, of a motion alone: a homing goes on.
@@ -79,6 +83,9 @@ class Axis::Impl {
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
   void changeOverride(double factor);
   void changeLimits(const AxisLimits& wanted);
+  /// Whether this is the axis to ask for what it follows or has kept: of a course that is the
+  /// first.
+  bool leads();
   void hold();
   void resume();
   /// Gives up what a hold has kept, of all axes of its course.
@@ -190,6 +197,8 @@ class Axis::Impl {
   void leaveCourse(const Goal& goal, const std::string& left_by);
   std::int64_t stepsTo(const Goal& goal);
   motion::Plan plan(const Goal& goal, std::int64_t at);
+  /// @param overshoot [microsteps] @return without an id.
+  Move moveOf(const motion::Profile& profile, double overshoot);
   std::int64_t motorTarget(const Goal& goal, const motion::MotionState& from,
                            const motion::MotionLimits& within);
   motion::Profile planStopOf(const Motion& before, std::int64_t at,

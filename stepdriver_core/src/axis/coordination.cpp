@@ -80,4 +80,9 @@ std::vector<Move> Coordination::follow(const std::vector<Axis*>& axes,
   return Axis::Impl::begin(ordersFor(course, course->targets()));
 }
 
+bool Coordination::leads(const Axis& axis) {
+  const std::lock_guard<std::mutex> lock(axis.impl_->mutex);
+  return axis.impl_->leads();
+}
+
 }  // namespace stepdriver::axis

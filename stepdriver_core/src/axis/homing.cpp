@@ -94,8 +94,10 @@ bool Homing::isDue() {
   if (over_) return false;
   const pulse::ChannelState channel = axis_.harvest();
   if (phase_ == HomingPhase::kStopping) return channel.following == 0 || isReplaced();
+  if (cancelled_ || !interrupted_.empty() || !axis_.fault.empty()) return true;
+  if (isHeld()) return false;
   if (stroke_ == 0 || axis_.log.result(stroke_) || isReplaced()) return true;
-  if (cancelled_ || !interrupted_.empty() || now() >= deadline_) return true;
+  if (now() >= deadline_) return true;
   // A line that can't be read is something to do too.
   return leaves() && !slowing_ && (axis_.lines.read(line_) != 0) != endstop_->active_level;
 }
@@ -107,6 +109,16 @@ void Homing::cancel() {
 
 void Homing::interrupt(const std::string& why) {
   if (interrupted_.empty()) interrupted_ = why;
+}
+
+void Homing::hold() {
+  if (!isHeld()) held_since_ = now();
+}
+
+void Homing::goOn() {
+  if (!isHeld()) return;
+  deadline_ += now() - *held_since_;
+  held_since_.reset();
 }
 
 void Homing::advance() {
@@ -132,6 +144,7 @@ void Homing::step() {
   if (!interrupted_.empty()) return fail(interrupted_);
   if (!axis_.fault.empty()) return fail(axis_.fault);
   if (cancelled_) return fail("it was cancelled", HomingEnd::kCancelled);
+  if (isHeld()) return;
   if (stroke_ == 0) {
     axis_.homed = false;
     deadline_ = now() + nanoseconds(config_.timeout);

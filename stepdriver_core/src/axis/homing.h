@@ -44,6 +44,10 @@ class Homing {
   HomingPhase phase() const { return phase_; }
   /// Someone stops or disables the axis.
   void interrupt(const std::string& why);
+  /// Feed hold: no stroke begins until it goes on, and the time doesn't count.
+  void hold();
+  void goOn();
+  bool isHeld() const { return held_since_.has_value(); }
 
  private:
   void step();
@@ -88,6 +92,7 @@ class Homing {
   std::string interrupted_;
   bool cancelled_ = false;
   pulse::Nanoseconds deadline_ = 0;
+  std::optional<pulse::Nanoseconds> held_since_;
 
   std::uint64_t stroke_ = 0;  // the move that is under way or was the last; 0: none yet
   std::int64_t bound_ =

@@ -1,20 +1,18 @@
 #include "read_motion.h"
 
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "message_text.h"
 #include "motion_keys.h"
+#include "read_scale.h"
 
 namespace stepdriver::axis {
 namespace {
 
 // Far beyond any machine, and well inside what the motion can count and time in 64 bits.
-constexpr double kLowestScale = 1e-9;  // [steps/unit]
-constexpr double kHighestScale = 1e9;
 constexpr double kLowestRate = 1e-3;          // [steps/s]
 constexpr double kLowestAcceleration = 1e-3;  // [steps/s^2]
 constexpr double kHighestAcceleration = 1e12;
@@ -22,13 +20,8 @@ constexpr double kMostBacklash = 1e6;  // steps
 constexpr double kLowestJerk = 1e-3;   // [steps/s^3]
 constexpr double kHighestJerk = 1e15;
 constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: each step is a double of its own
-constexpr int kMostFullSteps = 1'000'000;
 // What is beyond a limit only by the rounding of units, or of the bound in a message, isn't.
 constexpr double kSlack = 1.0 + 1e-9;
-
-const char* const kFullSteps = "full_steps_per_round";
-const char* const kGear = "gear_ratio";
-const char* const kStepsPerRound = "steps_per_round";
 
 /// The first key of this unit that is given; empty: none.
 std::string firstGiven(const ConfigReader& axis, const MotionKeys& keys) {
@@ -66,11 +59,11 @@ class MotionReader {
   MotionReader(ConfigReader& axis, const MotionContext& context, Kind kind, Presence presence)
       : axis_(axis), context_(context), keys_(motionKeys(kind)), presence_(presence) {}
 
-  void read(std::optional<int> full_steps, std::optional<double> gear, AxisConfig& config) {
+  void read(const Rounds& rounds, AxisConfig& config) {
     config.kind = keys_.kind;
-    const auto scale = readScale(full_steps, gear);
+    const auto scale = readScale(axis_, keys_, rounds, presence_);
     // Where the unit isn't certain, nothing is computed from it.
-    if (scale && presence_ == Presence::kRequired && checkScale(*scale)) {
+    if (scale && presence_ == Presence::kRequired) {
       config.steps_per_unit = static_cast<double>(*scale * keys_.units_per_si_unit);
       steps_per_unit_ = static_cast<double>(*scale);
     }
@@ -86,92 +79,6 @@ class MotionReader {
 
   std::string is(const std::string& key) const {
     return "is " + axis_.shown(key) + ", but must be ";
-  }
-
-  bool scaleIsGivenBy(const std::string& key) const { return !key.empty() && axis_.has(key); }
-
-  /// Those of the keys of a scale by rounds that are given.
-  std::vector<std::string> givenOfRounds() const {
-    std::vector<std::string> given;
-    for (const std::string& key :
-         {std::string(kFullSteps), keys_.per_round, keys_.wheel_diameter, std::string(kGear)}) {
-      if (scaleIsGivenBy(key)) given.push_back(key);
-    }
-    return given;
-  }
-
-  /// @return [microsteps/unit]; none where something that it needs is missing or wrong.
-  std::optional<long double> readScale(std::optional<int> full_steps, std::optional<double> gear) {
-    const std::vector<std::string> by_rounds = givenOfRounds();
-    if (axis_.has(keys_.steps_per_unit) || by_rounds.empty()) return readDirectScale(by_rounds);
-    const std::optional<long double> per_round = readTravel(presence_);
-    if (presence_ == Presence::kRequired && !axis_.has(kFullSteps)) {
-      axis_.issue(kFullSteps,
-                  "is missing; it must be an integer of 1 or more, as the axis is scaled by " +
-                      by_rounds.front());
-    }
-    if (!full_steps || !gear || !per_round || !context_.microsteps) return {};
-    return static_cast<long double>(*full_steps) * *context_.microsteps * *gear / *per_round;
-  }
-
-  /// @return [unit] what one round behind the gear travels; none where that is missing or wrong.
-  std::optional<long double> readTravel(Presence presence) {
-    if (keys_.per_round.empty()) return keys_.units_per_round;
-    const bool by_wheel = axis_.has(keys_.wheel_diameter);
-    const bool by_travel = axis_.has(keys_.per_round);
-    if (!by_wheel && !by_travel && presence == Presence::kRequired) {
-      axis_.issue(keys_.per_round, "is missing; it must be a number above 0, or else " +
-                                       keys_.wheel_diameter + " must be given");
-    }
-    const auto travel = axis_.findNumber(keys_.per_round, Range::positive(), Presence::kOptional);
-    const auto diameter =
-        axis_.findNumber(keys_.wheel_diameter, Range::positive(), Presence::kOptional);
-    if (by_wheel && by_travel) {
-      axis_.issue(keys_.wheel_diameter,
-                  "is " + axis_.shown(keys_.wheel_diameter) + ", but " + keys_.per_round +
-                      " must not be given with it: a round travels either that or pi times the "
-                      "diameter");
-      return {};
-    }
-    if (diameter) return kPi * static_cast<long double>(*diameter);
-    return travel;
-  }
-
-  /// @param by_rounds the keys of the other way that are given; they are not to be.
-  std::optional<long double> readDirectScale(const std::vector<std::string>& by_rounds) {
-    const std::string& key = keys_.steps_per_unit;
-    if (!axis_.has(key)) {
-      if (presence_ == Presence::kRequired) {
-        const std::string travel = keys_.per_round.empty()
-                                       ? ""
-                                       : " and " + keys_.per_round + " or " + keys_.wheel_diameter;
-        axis_.issue(key, "is missing; it must be a number above 0, or else " +
-                             std::string(kFullSteps) + travel + " must be given");
-      }
-      return {};
-    }
-    const auto scale = axis_.findNumber(key, Range::positive(), presence_);
-    if (by_rounds.empty()) return scale;
-    readTravel(Presence::kOptional);
-    axis_.issue(key, "is " + axis_.shown(key) + ", but " + listText(by_rounds, "and") +
-                         " must not be given with it: the axis is scaled by either (the motor's "
-                         "own steps can be given as " +
-                         kStepsPerRound + ")");
-    return {};
-  }
-
-  bool checkScale(long double scale) {
-    if (scale >= kLowestScale && scale <= kHighestScale) return true;
-    std::string key = kFullSteps;
-    for (const std::string& other :
-         {std::string(kGear), keys_.per_round, keys_.wheel_diameter, keys_.steps_per_unit}) {
-      if (scaleIsGivenBy(other)) key = other;
-    }
-    axis_.issue(key, "is " + axis_.shown(key) + ", which makes " +
-                         roughText(static_cast<double>(scale)) + " steps per " + keys_.unit +
-                         ", but must make from " + numberText(kLowestScale) + " to " +
-                         numberText(kHighestScale));
-    return false;
   }
 
   void readSpeeds(AxisConfig& config) {
@@ -289,25 +196,6 @@ class MotionReader {
   std::optional<double> steps_per_unit_;
 };
 
-double readStepsPerRound(ConfigReader& axis, std::optional<int> full_steps,
-                         std::optional<int> microsteps) {
-  const auto steps =
-      axis.findInteger(kStepsPerRound, 1, std::numeric_limits<int>::max(), Presence::kOptional);
-  const std::string is = "is " + axis.shown(kStepsPerRound) + ", but must be ";
-  const bool by_full_steps = full_steps && microsteps;
-  const int product = by_full_steps ? *full_steps * *microsteps : 0;
-  if (steps && by_full_steps && *steps != product) {
-    axis.issue(kStepsPerRound, is + std::to_string(product) + ": " + kFullSteps + " (" +
-                                   std::to_string(*full_steps) + ") times microsteps (" +
-                                   std::to_string(*microsteps) + ")");
-  } else if (steps && microsteps && *steps % *microsteps != 0) {
-    axis.issue(kStepsPerRound, is + "a multiple of microsteps, which is " +
-                                   std::to_string(*microsteps) +
-                                   ": it counts the microsteps of whole full steps");
-  }
-  return steps.value_or(product);
-}
-
 }  // namespace
 
 std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
@@ -315,19 +203,17 @@ std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
   for (const Kind kind : {Kind::kLinear, Kind::kRotary}) {
     for (const std::string& key : motionKeys(kind).all()) axis.allow(key);
   }
-  const auto full_steps = axis.findInteger(kFullSteps, 1, kMostFullSteps, Presence::kOptional);
-  auto gear = axis.findNumber(kGear, Range::positive(), Presence::kOptional);
-  if (!axis.has(kGear)) gear = 1.0;
-  config.steps_per_round = readStepsPerRound(axis, full_steps, context.microsteps);
+  const Rounds rounds = readRounds(axis, context.microsteps);
+  config.steps_per_round = rounds.steps;
 
   const auto kind = readKind(axis);
   if (kind) {
-    MotionReader(axis, context, *kind, Presence::kRequired).read(full_steps, gear, config);
+    MotionReader(axis, context, *kind, Presence::kRequired).read(rounds, config);
     return kind;
   }
   // Each value that is there can be right or wrong by itself.
   for (const Kind each : {Kind::kLinear, Kind::kRotary}) {
-    MotionReader(axis, context, each, Presence::kOptional).read(full_steps, gear, config);
+    MotionReader(axis, context, each, Presence::kOptional).read(rounds, config);
   }
   return {};
 }

@@ -214,6 +214,13 @@ class Machine::Impl {
     if (!errors.empty()) throw Error(errors);
   }
 
+  // What is wrong with a motion of several axes is said once.
+  void forEachMotion(const std::function<void(axis::Axis&)>& action) {
+    forAll([&action](axis::Axis& axis) {
+      if (axis::Coordination::leads(axis)) action(axis);
+    });
+  }
+
   // In the order in which they must go: axes, driver, engine, lines.
   std::unique_ptr<gpio::Lines> lines_;
   std::optional<pulse::Signal> emergency_stop_;
@@ -246,11 +253,11 @@ void Machine::stop() {
 }
 
 void Machine::hold() {
-  impl_->forAll([](axis::Axis& axis) { axis.hold(); });
+  impl_->forEachMotion([](axis::Axis& axis) { axis.hold(); });
 }
 
 void Machine::resume() {
-  impl_->forAll([](axis::Axis& axis) { axis.resume(); });
+  impl_->forEachMotion([](axis::Axis& axis) { axis.resume(); });
 }
 
 std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "../text.h"
 #include "stepdriver_core/chip/chip.h"
 #include "stepdriver_core/error.h"
 #include "table.h"
@@ -11,8 +12,7 @@ namespace stepdriver::check {
 namespace {
 
 using axis::ConfigValue;
-
-constexpr double kPi = 3.14159265358979323846;
+using ros_node::numberText;
 
 ConfigValue* childOf(ConfigValue& tree, const std::string& key) {
   auto* map = tree.as<ConfigValue::Map>();
@@ -40,8 +40,8 @@ void choose(ConfigValue& tree, BackendChoice choice) {
 }
 
 std::string speedText(const axis::AxisConfig& axis) {
-  if (axis.kind == axis::Kind::kLinear) return numberText(axis.max_speed * 1e3) + " mm/s";
-  return numberText(axis.max_speed * 180.0 / kPi) + " deg/s";
+  return numberText(axis.max_speed * axis::configUnitsPerUnit(axis.kind)) +
+         (axis.kind == axis::Kind::kLinear ? " mm/s" : " deg/s");
 }
 
 std::string endstopsText(const axis::AxisConfig& axis) {

@@ -7,35 +7,23 @@
 #include <ctime>
 #include <utility>
 
+#include "../end_signals.h"
+
 namespace stepdriver::check {
 namespace {
 
 constexpr std::chrono::milliseconds kPoll{50};
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-bool isIgnored(int signal) {
-  struct sigaction action {};
-  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
-}
-
-sigset_t interrupts() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int signal : {SIGINT, SIGTERM, SIGQUIT}) sigaddset(&signals, signal);
-  // Under nohup a terminal that closes changes nothing.
-  if (!isIgnored(SIGHUP)) sigaddset(&signals, SIGHUP);
-  return signals;
-}
-
 }  // namespace
 
 void InterruptWatch::block() {
-  const sigset_t signals = interrupts();
+  const sigset_t signals = ros_node::endSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 }
 
 bool InterruptWatch::comesWithin(std::chrono::nanoseconds time) {
-  const sigset_t signals = interrupts();
+  const sigset_t signals = ros_node::endSignals();
   const timespec wait{static_cast<std::time_t>(time.count() / kSecond),
                       static_cast<long>(time.count() % kSecond)};
   return sigtimedwait(&signals, nullptr, &wait) > 0;

@@ -7,8 +7,8 @@
 
 namespace stepdriver::check {
 
-/// Waits in a thread for what asks a program to end, for as long as it lives: SIGINT, SIGTERM,
-/// SIGQUIT, and SIGHUP where that isn't ignored.
+/// Waits in a thread for what asks a program to end, for as long as it lives: the signals of
+/// ros_node::endSignals().
 class InterruptWatch {
  public:
   /// Blocks these signals in this thread and in those that it starts from now on.

@@ -2,33 +2,28 @@
 
 #include <algorithm>
 
+#include "../text.h"
 #include "interrupt_watch.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
-#include "table.h"
 
 namespace stepdriver::check {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kShortStroke = 1.0;  // [mm]
 constexpr double kShortTurn = 10.0;   // [deg]
 
+using ros_node::numberText;
 using Say = std::function<void(const std::string&)>;
 
-/// Millimetres or degrees in a unit of the axis.
-double perUnit(const axis::AxisConfig& axis) {
-  return axis.kind == axis::Kind::kLinear ? 1e3 : 180.0 / kPi;
-}
-
 std::string lengthText(const axis::AxisConfig& axis, double length) {
-  return numberText(length * perUnit(axis)) +
+  return numberText(length * axis::configUnitsPerUnit(axis.kind)) +
          (axis.kind == axis::Kind::kLinear ? " mm" : " degrees");
 }
 
 double strokeOf(const axis::AxisConfig& axis, const std::optional<double>& distance) {
   const double usual = axis.kind == axis::Kind::kLinear ? kShortStroke : kShortTurn;
-  return distance.value_or(usual) / perUnit(axis);
+  return distance.value_or(usual) / axis::configUnitsPerUnit(axis.kind);
 }
 
 /// Moves one axis. @return whether it is back where it was.

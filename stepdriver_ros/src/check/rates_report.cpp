@@ -3,10 +3,13 @@
 #include <cmath>
 #include <cstdio>
 
+#include "../text.h"
 #include "table.h"
 
 namespace stepdriver::check {
 namespace {
+
+using ros_node::numberText;
 
 std::string inMicroseconds(pulse::Nanoseconds time) {
   char text[32];

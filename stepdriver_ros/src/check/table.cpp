@@ -1,8 +1,6 @@
 #include "table.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 
 namespace stepdriver::check {
 
@@ -21,12 +19,6 @@ std::string table(const std::vector<std::vector<std::string>>& rows) {
     }
     text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
   }
-  return text;
-}
-
-std::string numberText(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, std::abs(number) < 1e5 ? "%.6g" : "%.0f", number);
   return text;
 }
 

@@ -8,7 +8,4 @@ namespace stepdriver::check {
 /// Rows of words, in columns that are as wide as their widest word; each row indented by two.
 std::string table(const std::vector<std::vector<std::string>>& rows);
 
-/// A number without digits that nobody needs: `8000`, `12.5`.
-std::string numberText(double number);
-
 }  // namespace stepdriver::check

@@ -17,7 +17,6 @@ constexpr Range kDeadBands{0.0, 0.99};
 constexpr Range kExponents{0.1, 10.0};
 constexpr Range kDisableTimes{0.0, 3600.0};
 constexpr int kLastIndex = 255;
-constexpr double kPi = 3.14159265358979323846;
 
 void readMaxSpeed(ConfigReader& reader, JogAxis& axis) {
   const std::string linear_key = speedKey(Kind::kLinear);
@@ -33,7 +32,7 @@ void readMaxSpeed(ConfigReader& reader, JogAxis& axis) {
   }
   axis.kind = rotary ? Kind::kRotary : Kind::kLinear;
   axis.max_speed = linear.value_or(rotary.value_or(0.0));
-  axis.stick.max_speed = axis.max_speed * (rotary ? kPi / 180.0 : 1.0 / 1000.0);
+  axis.stick.max_speed = axis.max_speed / axis::configUnitsPerUnit(axis.kind);
 }
 
 JogAxis readAxis(const std::string& name, ConfigReader reader) {

@@ -6,7 +6,6 @@
 #include <ros/param.h>
 
 #include <chrono>
-#include <cstdio>
 #include <exception>
 #include <string>
 #include <thread>
@@ -24,10 +23,6 @@ namespace {
 
 using ros_node::EndRequests;
 
-constexpr int kExitOk = 0;
-constexpr int kExitConfig = 1;
-constexpr int kExitUsage = 64;
-
 constexpr double kPoll = 0.02;  // [s]
 // For the last message, which roscpp sends in a thread of its own.
 constexpr std::chrono::milliseconds kLastWords{50};
@@ -42,7 +37,7 @@ Jogs the axes of a stepdriver_node by the sticks of a joystick.
   services    DRIVER/AXIS/enable (called, where disable_in_dead_band is configured)
   parameters  ~driver  ~rate  ~joy_timeout  ~deadman_button  ~axes
 
-Exit codes: 0 ended as asked, 1 wrong configuration.
+Exit codes: 0 ended as asked, 1 wrong configuration, 64 wrong usage.
 Start it with: roslaunch stepdriver joystick.launch
 )";
 
@@ -100,13 +95,13 @@ int run(EndRequests& end_requests) {
     joystick.rest();
     std::this_thread::sleep_for(kLastWords);
     ros::shutdown();  // also ends the calls that nobody answers
-    return kExitOk;
+    return ros_node::kExitOk;
   } catch (const ConfigError& error) {
     ros_node::explain(error, "Not started");
   } catch (const std::exception& error) {
     ROS_FATAL("Not started: %s", error.what());
   }
-  return kExitConfig;
+  return ros_node::kExitConfig;
 }
 
 }  // namespace
@@ -114,17 +109,10 @@ int run(EndRequests& end_requests) {
 
 int main(int argc, char** argv) {
   namespace joystick = stepdriver::joystick;
-  stepdriver::ros_node::EndRequests end_requests;
-  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
-  std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  std::vector<std::string> arguments;
-  ros::removeROSArgs(argc, argv, arguments);
-  if (arguments.size() > 1) {
-    const bool help = arguments[1] == "--help" || arguments[1] == "-h";
-    std::fputs(joystick::kUsage, help ? stdout : stderr);
-    return help ? joystick::kExitOk : joystick::kExitUsage;
-  }
+  namespace ros_node = stepdriver::ros_node;
+  ros_node::EndRequests end_requests;
+  if (const auto code = ros_node::answerArguments(argc, argv, joystick::kUsage)) return *code;
   ros::init(argc, argv, "joystick", ros::init_options::NoSigintHandler);
-  if (!stepdriver::ros_node::waitForMaster(end_requests)) return joystick::kExitOk;
+  if (!ros_node::waitForMaster(end_requests)) return ros_node::kExitOk;
   return joystick::run(end_requests);
 }

@@ -43,6 +43,16 @@ inline axis::AxisConfig linearAxis(const std::string& name,
   return config;
 }
 
+/// The same at another scale [steps/unit], speed and acceleration.
+inline axis::AxisConfig linearAxis(const std::string& name, double scale, double speed,
+                                   double acceleration) {
+  axis::AxisConfig config = linearAxis(name);
+  config.steps_per_unit = scale;
+  config.max_speed = speed;
+  config.acceleration = config.deceleration = acceleration;
+  return config;
+}
+
 /// The rig's side of an axis: switches at -100 mm and 100 mm, the carriage at 0.
 inline sim::RigAxisSpec rigAxis(const axis::AxisConfig& config) {
   const auto wire = [](const axis::Pin& pin) { return sim::Wire{pin.line, pin.inverted}; };

@@ -17,11 +17,7 @@ namespace stepdriver::test {
 
 /// 1000 steps/m, 2 m/s, 10 m/s^2, from -5 m on, without a min endstop.
 inline axis::AxisConfig trajectoryAxis(const std::string& name) {
-  axis::AxisConfig config = linearAxis(name);
-  config.steps_per_unit = 1000.0;
-  config.max_speed = 2.0;
-  config.acceleration = 10.0;
-  config.deceleration = 10.0;
+  axis::AxisConfig config = linearAxis(name, 1000.0, 2.0, 10.0);
   config.endstop_min.reset();
   config.min_position = -5.0;
   return config;

@@ -1,6 +1,13 @@
 #include "hardware/hardware_node.h"
 
+#include <cmath>
+
 namespace stepdriver::node_test {
+namespace {
+
+constexpr double kStepsPerMm = 80.0;
+
+}  // namespace
 
 HardwareNode::HardwareNode() {
   erase("simulation");
@@ -30,10 +37,14 @@ void HardwareNode::setAxis(const std::string& axis, const std::string& driver,
   set(key + "endstops/max/pin", line(lines.max));
   set(key + "endstops/max/active_level", "high");
   set(key + "microsteps", 16);
-  set(key + "steps_per_mm", 80.0);
+  set(key + "steps_per_mm", kStepsPerMm);
   set(key + "max_speed_mm_s", 2.0);
   set(key + "acceleration_mm_s2", 500.0);
   set(key + "enable_on_start", true);
+}
+
+std::int64_t HardwareNode::stepsOf(double position) {
+  return std::llround(position * 1000.0 * kStepsPerMm);
 }
 
 MoveTo::Response HardwareNode::move(const std::string& axis, double position, bool wait) {

@@ -2,6 +2,7 @@
 
 #include <stepdriver/AxisStates.h>
 
+#include <cstdint>
 #include <string>
 
 #include "support/node_under_test.h"
@@ -25,6 +26,9 @@ class HardwareNode : public NodeUnderTest {
   static constexpr Axis kZ{0, 1, 2, 3, 4, 5};
   static constexpr unsigned kZFault = 6;
   static constexpr unsigned kLinesOfChip = 16;
+
+  /// [microsteps] of any axis in a position [m].
+  static std::int64_t stepsOf(double position);
 
   MoveTo::Response move(const std::string& axis, double position, bool wait);
 

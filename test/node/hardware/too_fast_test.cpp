@@ -1,13 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
-#include <memory>
-#include <string>
 
-#include "core/support/gpio_sim.h"
-#include "hardware/hardware_node.h"
-#include "hardware/line_record.h"
-#include "hardware/needs_gpio_sim.h"
+#include "hardware/board_and_expander.h"
 #include "support/says.h"
 #include "support/wait.h"
 
@@ -15,28 +10,17 @@ namespace stepdriver::node_test {
 namespace {
 
 /// A node whose axis x asks for a million steps/s, which no machine holds.
-class TooFast : public NeedsGpioSim {
+class TooFast : public BoardAndExpander {
  protected:
   void SetUp() override {
-    NeedsGpioSim::SetUp();
+    BoardAndExpander::SetUp();
     if (IsSkipped()) return;
-    const unsigned lines = HardwareNode::kLinesOfChip;
-    board = std::make_unique<test::GpioSimChip>("board", "board", lines);
-    expander = std::make_unique<test::GpioSimChip>("expander", "expander", lines);
-    record = std::make_unique<LineRecord>();
-    node = std::make_unique<HardwareNode>();
     node->set("axes/x/max_speed_mm_s", 12500.0);
     node->set("axes/x/timing/step_high_us", 0.1);
     node->set("axes/x/timing/step_low_us", 0.1);
   }
-  void TearDown() override { node.reset(); }
 
   unsigned number(unsigned offset) const { return numberOf(board->lines(), offset); }
-
-  std::unique_ptr<test::GpioSimChip> board;
-  std::unique_ptr<test::GpioSimChip> expander;
-  std::unique_ptr<LineRecord> record;
-  std::unique_ptr<HardwareNode> node;
 };
 
 TEST_F(TooFast, DoesNotStartWhereThatIsEnforcedAndLeavesEveryLineSafe) {

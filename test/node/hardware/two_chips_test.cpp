@@ -5,19 +5,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <csignal>
 #include <future>
-#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
 
-#include "core/support/gpio_sim.h"
 #include "core/support/other_program.h"
-#include "hardware/hardware_node.h"
-#include "hardware/line_record.h"
-#include "hardware/needs_gpio_sim.h"
+#include "hardware/board_and_expander.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 #include "support/recorder.h"
 #include "support/says.h"
@@ -26,27 +21,12 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kStepsPerMetre = 80000.0;
-
 // As arrays of the messages have them.
 constexpr std::size_t kX = 0;
 constexpr std::size_t kZ = 2;
 
-std::int64_t stepsOf(double position) { return std::llround(position * kStepsPerMetre); }
-
-class TwoChips : public NeedsGpioSim {
+class TwoChips : public BoardAndExpander {
  protected:
-  void SetUp() override {
-    NeedsGpioSim::SetUp();
-    if (IsSkipped()) return;
-    const unsigned lines = HardwareNode::kLinesOfChip;
-    board = std::make_unique<test::GpioSimChip>("board", "board", lines);
-    expander = std::make_unique<test::GpioSimChip>("expander", "expander", lines);
-    record = std::make_unique<LineRecord>();
-    node = std::make_unique<HardwareNode>();
-  }
-  void TearDown() override { node.reset(); }
-
   static StepAndDir stepAndDir(const test::GpioSimChip& chip, const HardwareNode::Axis& axis) {
     return {numberOf(chip.lines(), axis.step), numberOf(chip.lines(), axis.dir)};
   }
@@ -83,11 +63,6 @@ class TwoChips : public NeedsGpioSim {
     EXPECT_FALSE(last(axis.sleep)) << "low: asleep";
     EXPECT_FALSE(last(axis.reset)) << "low: held";
   }
-
-  std::unique_ptr<test::GpioSimChip> board;
-  std::unique_ptr<test::GpioSimChip> expander;
-  std::unique_ptr<LineRecord> record;
-  std::unique_ptr<HardwareNode> node;
 };
 
 TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
@@ -108,9 +83,10 @@ TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
   const auto trace = record->read();
   const StepAndDir x_lines = stepAndDir(*board, HardwareNode::kX);
   const StepAndDir y_lines = stepAndDir(*board, HardwareNode::kY);
-  EXPECT_EQ(pulsesIn(trace, x_lines), stepsOf(stopped.position));
-  EXPECT_EQ(pulsesIn(trace, y_lines), stepsOf(0.0095));
-  EXPECT_EQ(pulsesIn(trace, stepAndDir(*expander, HardwareNode::kZ)), stepsOf(-0.005));
+  EXPECT_EQ(pulsesIn(trace, x_lines), HardwareNode::stepsOf(stopped.position));
+  EXPECT_EQ(pulsesIn(trace, y_lines), HardwareNode::stepsOf(0.0095));
+  EXPECT_EQ(pulsesIn(trace, stepAndDir(*expander, HardwareNode::kZ)),
+            HardwareNode::stepsOf(-0.005));
   expectSafe(trace, *board, HardwareNode::kX);
   expectSafe(trace, *board, HardwareNode::kY);
   expectSafe(trace, *expander, HardwareNode::kZ);
@@ -136,7 +112,7 @@ TEST_F(TwoChips, StopAnAxisWhoseDriverReportsAFaultAndResetItToRecover) {
   EXPECT_TRUE(x.get().success) << "the others go on";
   expectSays(node->move("z", 0.0, true).message, "recover");
   EXPECT_EQ(pulsesIn(record->read(), stepAndDir(*expander, HardwareNode::kZ)),
-            stepsOf(stopped.position));
+            HardwareNode::stepsOf(stopped.position));
 
   const auto still = trigger("recover");
   EXPECT_FALSE(still.success);
@@ -186,7 +162,8 @@ TEST_F(TwoChips, LoseOneInMidMoveAndGoOnWithTheOther) {
 
   const auto back = node->move("x", 0.015, true);
   EXPECT_TRUE(back.success) << back.message;
-  EXPECT_EQ(pulsesIn(record->read(), stepAndDir(*board, HardwareNode::kX)), stepsOf(0.015));
+  EXPECT_EQ(pulsesIn(record->read(), stepAndDir(*board, HardwareNode::kX)),
+            HardwareNode::stepsOf(0.015));
   board->drive(HardwareNode::kX.max, true);
   EXPECT_TRUE(endstops.waitForLatest([](const Endstops& e) { return e.max.at(kX) != 0; }))
       << "the switches of the other chip are still published";
@@ -197,7 +174,7 @@ TEST_F(TwoChips, LoseOneInMidMoveAndGoOnWithTheOther) {
 
   EXPECT_FALSE(node->move("y", 0.2, true).success) << "not a step without its switch";
   EXPECT_EQ(pulsesIn(record->read(), stepAndDir(*board, HardwareNode::kY)),
-            stepsOf(blind.position));
+            HardwareNode::stepsOf(blind.position));
 
   const auto code = end();
   EXPECT_EQ(code.value_or(-1), 2) << node->process().output();

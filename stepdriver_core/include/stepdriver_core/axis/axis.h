@@ -62,6 +62,11 @@ class Axis {
   ///   but has to be.
   Move moveTo(double position, bool relative = false, double velocity = 0.0);
 
+  /// What moveTo() would do now; nothing moves.
+  ///
+  /// @throw Refused as moveTo().
+  MovePlan plan(double position, bool relative = false, double velocity = 0.0);
+
   /// Turns the motor by a number of rounds, which need not be whole.
   ///
   /// @throw Refused as moveTo(), and where the steps of a round are not known.
@@ -109,7 +114,7 @@ class Axis {
 
   /// Feed hold: decelerates to rest, along the path of axes that move together, and keeps the goal;
   /// who waits for the move goes on waiting. A jog just ends. Until resume() or stop() other
-  /// motions are refused.
+  /// motions are refused. A homing is held too, and its time-out waits meanwhile.
   void hold();
 
   /// Goes on with what is held. @throw Refused as moveTo().

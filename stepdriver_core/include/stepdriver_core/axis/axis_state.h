@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/homing.h"
@@ -67,6 +68,23 @@ struct Move {
   double duration = 0.0;  ///< [s] as planned
   double overshoot =
       0.0;  ///< [unit] how far it passes its target first, as it can't stop before it
+};
+
+/// A cubic piece of position over time: position + velocity t + acceleration t^2/2 + jerk t^3/6.
+struct MovePiece {
+  double duration = 0.0;      ///< [s]
+  double position = 0.0;      ///< [unit] where it begins, as the three below
+  double velocity = 0.0;      ///< [unit/s]
+  double acceleration = 0.0;  ///< [unit/s^2]
+  double jerk = 0.0;          ///< [unit/s^3] all through it
+};
+
+/// What a move would be, piece after piece. Positions are those of the motor: with a backlash they
+/// are off the joint's by what of it is taken up.
+struct MovePlan {
+  Move move;                      ///< its id is 0
+  double steps_per_unit = 0.0;    ///< [microsteps/unit] in the microstep mode of now
+  std::vector<MovePiece> pieces;  ///< none where nothing would move
 };
 
 /// How a move ended.

@@ -14,6 +14,11 @@ enum class Kind {
   kRotary,  ///< degrees in configurations, rad outside
 };
 
+/// A unit of configurations, mm or degree, in one of the axis's, m or rad.
+constexpr double configUnitsPerUnit(Kind kind) {
+  return kind == Kind::kLinear ? 1000.0 : 180.0 / 3.14159265358979323846;
+}
+
 /// A line of the driver chip. An empty name: the pin isn't wired.
 struct Pin {
   std::string line;       ///< `chip:offset`, `label:offset` or the kernel's name

@@ -42,6 +42,10 @@ class Coordination {
   /// Relative. A curve between points that keep to a limit goes a little beyond it.
   static constexpr double kTolerance = 0.01;
 
+  /// Whether a hold or a resume is to be asked of this axis: of those that move together it is of
+  /// one, and goes for all of them.
+  static bool leads(const Axis& axis);
+
  private:
   static std::vector<Axis::Impl*> implsOf(const std::vector<Axis*>& axes);
 };

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -8,141 +7,25 @@
 #include <vector>
 
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "stepdriver_core/pulse/channel.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/command.h"
+#include "stepdriver_core/pulse/due_tree.h"
 #include "stepdriver_core/pulse/lateness.h"
 #include "stepdriver_core/pulse/mailbox.h"
 #include "stepdriver_core/pulse/snapshot.h"
 
 namespace stepdriver::pulse {
 
-/// A line by its index in the gpio::Lines, and the level at which it does what it is named for.
-struct Signal {
-  int line = -1;
-  bool active = true;
-};
-
-/// What the engine needs to know of an axis.
-struct ChannelConfig {
-  Signal step;
-  Signal dir;  ///< active: forward, the count rises
-  std::optional<Signal> endstop_min;
-  std::optional<Signal> endstop_max;
-  std::optional<Signal> fault;  ///< an input of the chip's, active: it has switched its outputs off
-  Nanoseconds step_high = 0;
-  Nanoseconds step_low = 0;
-  Nanoseconds dir_setup = 0;
-  Nanoseconds dir_hold = 0;
-  Nanoseconds mode_hold = 0;
-  std::int64_t backlash =
-      0;  ///< microsteps that the motor makes at a reversal before the joint moves
-};
-
-/// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
-/// before what comes next: the next write, or the first step.
-struct PinSequence {
-  struct Write {
-    int line;
-    bool level;
-    Nanoseconds then_wait;
-  };
-
-  static constexpr std::size_t kCapacity = 8;
-  std::array<Write, kCapacity> writes{};
-  std::size_t size = 0;
-
-  void add(int line, bool level, Nanoseconds then_wait) {
-    writes.at(size++) = {line, level, then_wait};
-  }
-};
-
-/// A profile that a channel is to follow from its start time on, instead of the one before it.
-struct Follow {
-  int channel = 0;
-  std::uint64_t serial = 0;
-  const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
-  /// Serial of the profile that this one was planned to go on from, the last one that was ordered;
-  /// 0: from rest. Where the channel has ended that, it can't be taken.
-  std::uint64_t continues = 0;
-  /// Steps planned closer than this are at a speed that the motor can't start from or stop at
-  /// without a ramp.
-  Nanoseconds restart_interval = 0;
-  /// Channels of one group that isn't 0 end together: what ends one of them before its time ends
-  /// all others at once.
-  std::uint64_t group = 0;
-};
-
-/// An order to the pulse thread. Serials rise by one on each channel.
-struct Command {
-  enum class Kind {
-    kFollow,  ///< follow the profiles, all of them, or where one can't be taken none
-    kPins,    ///< write the pins, at rest; then, where a scale is given, take that
-  };
-
-  Kind kind = Kind::kFollow;
-  const Follow* follows = nullptr;  ///< of kFollow; live until the channels have taken the order
-  std::size_t follow_count = 0;
-  int channel = 0;  ///< of kPins, as all below
-  std::uint64_t serial = 0;
-  PinSequence pins;
-  /// Where the motor stands then, in the microsteps of a new mode.
-  struct Scale {
-    std::int64_t count = 0;
-    std::int64_t slack = 0;
-    std::int64_t backlash = 0;
-  };
-  std::optional<Scale> scale;
-};
-
-enum class EndReason {
-  kDone,
-  kEndstopMin,
-  kEndstopMax,
-  kEmergencyStop,
-  kChipFault,  ///< the chip's fault line became active
-  kTooLate,    ///< a pulse came too late to go on at this speed
-  kLineError,  ///< a line could not be written or read
-  kCompanion,  ///< another channel of the group was ended
-};
-
-/// A write or a read that failed.
-struct LineFailure {
-  int error = 0;       ///< errno; 0: none did
-  int line = -1;       ///< by its index in the gpio::Lines
-  bool input = false;  ///< it was read; else it was written
-};
-
-/// What a channel does and has done.
-struct ChannelState {
-  std::int64_t count = 0;  ///< microsteps: active STEP edges forward less those backward
-  /// Of the backlash, what is taken up towards max: from 0 to all of it. The joint stands at count
-  /// less this.
-  std::int64_t slack = 0;
-  std::uint64_t pulses = 0;     ///< active STEP edges
-  std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
-  std::uint64_t refused = 0;    ///< serial of the last command that came too late or found it busy
-  std::uint64_t following = 0;  ///< serial of the profile under way; 0: at rest
-  std::uint64_t ended = 0;      ///< serial of the last profile that ended
-  EndReason end = EndReason::kDone;
-  LineFailure failure;            ///< the last one
-  Nanoseconds end_time = 0;       ///< motion time at which it ended
-  bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
-  Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
-  std::uint64_t pins_done = 0;    ///< serial of the last kPins that was carried out
-  std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `failure`
-  std::uint64_t chip_faults = 0;  ///< times that the fault line became active
-  std::uint64_t line_errors = 0;  ///< failed writes and reads
-  Nanoseconds ready = 0;          ///< clock time before which no step goes out
-};
-
 struct EngineState {
   std::uint64_t edges = 0;  ///< of STEP lines
   std::uint64_t pulses = 0;
-  std::uint64_t slips = 0;         ///< times that the timeline was slid
-  Nanoseconds slipped = 0;         ///< by how much altogether: motion time is clock time less this
+  std::uint64_t slips = 0;  ///< times that the timeline was slid, for one instant's edges once
+  Nanoseconds slipped = 0;  ///< by how much altogether: motion time is clock time less this
   Nanoseconds worst_lateness = 0;  ///< of an active STEP edge against its planned time
 };
+
+struct EngineChannel;
 
 /// Turns profiles into edges on lines, for all axes.
 ///
@@ -166,10 +49,14 @@ class PulseEngine {
   ///   emergencyStop() does. It is read here for the first time.
   PulseEngine(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels,
               Nanoseconds max_lateness, std::optional<Signal> emergency_stop = {});
+  ~PulseEngine();
+  PulseEngine(const PulseEngine&) = delete;
+  PulseEngine& operator=(const PulseEngine&) = delete;
 
   static constexpr double kClosest = 0.75;
 
-  /// Does all that is due. @return the clock time at which it wants to be called again.
+  /// Does what is due. @return the clock time at which it wants to be called again, which may be
+  ///   past.
   Nanoseconds serve();
 
   /// @return false where the mailbox is full.
@@ -193,96 +80,47 @@ class PulseEngine {
   LatenessFigures lateness() const { return lateness_.sinceStart(); }
   LatenessFigures latenessLastSecond() const { return lateness_.lastSecond(clock_.now()); }
 
-  std::size_t channels() const { return channels_.size(); }
+  std::size_t channels() const;
 
  private:
-  /// Profiles that take over, one after the other, each at its start time. One that was planned
-  /// before another has taken over goes on from that other: none may be left out.
-  struct Successors {
-    struct Entry {
-      const motion::Profile* profile = nullptr;
-      std::uint64_t serial = 0;
-    };
-    static constexpr std::size_t kCapacity = 16;
-    std::array<Entry, kCapacity> entries{};
-    std::size_t size = 0;
+  using Channel = EngineChannel;
 
-    bool empty() const { return size == 0; }
-    /// Room for one that begins then: those that would begin no earlier have no time left.
-    bool hasRoom(Nanoseconds start) const {
-      return size < kCapacity || entries[size - 1].profile->startNs() >= start;
-    }
-    void add(const motion::Profile& profile, std::uint64_t serial);
-    Entry takeFirst();
-  };
-
-  struct Channel {
-    ChannelConfig config;
-    ChannelState state;
-    Snapshot<ChannelState> published;
-
-    const motion::Profile* profile = nullptr;  // the one that is followed
-    Successors successors;
-    std::uint64_t group = 0;  // of the order that came last; 0: alone
-    Nanoseconds restart_interval = 0;
-    motion::StepFinder finder;
-    std::optional<motion::Step> next;
-    Nanoseconds last_planned = 0;  // motion time of the step before, or of the profile's start
-
-    PinSequence pins;
-    std::size_t pin = 0;
-    std::uint64_t pins_serial = 0;  // of the sequence under way; 0: none
-    std::optional<Command::Scale> pins_scale;
-    Nanoseconds pin_due = 0;
-
-    // Clock times by which the last edges had happened.
-    Nanoseconds rose = 0;
-    Nanoseconds fell = 0;
-    Nanoseconds turned = 0;
-    bool faulty = false;   // as the fault line read last
-    bool running = false;  // the motion under way has made a step
-    bool high = false;     // the pulse is out
-    int direction = -1;    // as the DIR line has it
-    Nanoseconds due = kNever;
-  };
-
-  /// What a channel does when it is due.
-  enum class Action { kNothing, kFall, kPin, kTurn, kRise, kFinish };
-
-  static Action actionOf(const Channel& channel);
-  static bool isDue(const Channel& channel, Action action, Nanoseconds now);
-  static Nanoseconds interval(const Channel& channel);
-  static bool isFast(const Channel& channel);
-
+  // Orders.
   void takeMail(Nanoseconds now);
   void followAll(const Command& command, Nanoseconds now);
   bool mayFollow(const Follow& order, Nanoseconds now) const;
-  void follow(Channel& channel, const Follow& order);
-  void startPins(Channel& channel, const Command& command, Nanoseconds now);
-  void adopt(Channel& channel, const motion::Profile& profile, std::uint64_t serial);
-  static void pullNext(Channel& channel);
 
+  // Inputs.
   void stopAll(Nanoseconds now);
   void readInputs(Nanoseconds now);
   void readEmergencyStop();
   void readFault(Channel& channel, Nanoseconds now);
-  void meetLateness(Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
+
+  // Edges.
+  void collectDue(Nanoseconds now);
+  bool meetLateness(Nanoseconds now);
   void writeSteps(Nanoseconds now);
   void dropEnded();
-  void written(Channel& channel, bool done);
+  void writeOneByOne(int error, Nanoseconds now);
+  void written(Channel& channel, Nanoseconds now);
   void writeOthers(Nanoseconds now);
   void turn(Channel& channel, Nanoseconds now);
   void writePin(Channel& channel, Nanoseconds now);
-  static std::uint64_t latest(const Channel& channel);
-  void pinsDone(Channel& channel, Nanoseconds then_wait, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
   void endOne(Channel& channel, EndReason reason, Nanoseconds now);
 
+  // Times.
+  void changed(Channel& channel);
+  void scheduleChanged();
   void scheduleAll();
   bool schedule(Channel& channel);
+  bool scheduleRise(Channel& channel);
+  static Nanoseconds closestRise(const Channel& channel);
+  bool slideUpTo(Nanoseconds earliest, Nanoseconds planned);
   void slide(Nanoseconds by);
+  std::size_t indexOf(const Channel& channel) const;
 
   gpio::Lines& lines_;
   Clock& clock_;
@@ -290,9 +128,14 @@ class PulseEngine {
   const std::optional<Signal> emergency_input_;
   bool emergency_input_active_ = false;  // as it read last
   std::vector<Channel> channels_;
-  std::vector<gpio::LineWrite> writes_;  // of one pass, with the channels that they are for
+  DueTree dues_;
+  // Of one pass: who is due, who is to be scheduled, and the writes with who they are for.
+  std::vector<std::size_t> due_;
+  std::vector<Channel*> changed_;
+  std::vector<gpio::LineWrite> writes_;
   std::vector<Channel*> writers_;
   std::vector<int> errors_;
+  bool slid_ = false;
   Mailbox<Command, 64> mail_;
   std::atomic<bool> emergency_{false};
   std::atomic<std::uint64_t> input_stops_{0};

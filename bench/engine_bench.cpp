@@ -1,0 +1,86 @@
+#include <benchmark/benchmark.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "free_hardware.h"
+#include "stepdriver_core/motion/planner.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+namespace stepdriver::bench {
+namespace {
+
+constexpr double kStepsPerSecond = 16'000.0;
+constexpr std::int64_t kSteps = 40'000'000'000;  // more than any run makes
+constexpr pulse::Nanoseconds kStart = 1'000'000;
+
+/// How the steps of several axes lie to each other.
+enum class Steps { kApart, kTogether };
+
+pulse::ChannelConfig channelConfig(int channel) {
+  pulse::ChannelConfig config;
+  config.step.line = 2 * channel;
+  config.dir.line = 2 * channel + 1;
+  config.step_high = 1'900;
+  config.step_low = 1'900;
+  config.dir_setup = config.dir_hold = 650;
+  return config;
+}
+
+/// The engine with lines and a clock that cost nothing, all axes in motion.
+class EngineUnderLoad {
+ public:
+  EngineUnderLoad(int axes, Steps steps) {
+    std::vector<pulse::ChannelConfig> channels;
+    for (int i = 0; i < axes; ++i) channels.push_back(channelConfig(i));
+    engine_ = std::make_unique<pulse::PulseEngine>(lines, clock_, channels, 1'000'000'000);
+    for (int i = 0; i < axes; ++i) {
+      // Speeds that have no common measure: the edges of two axes hardly ever fall together.
+      const double speed = kStepsPerSecond * (steps == Steps::kTogether ? 1.0 : 1.0 - 0.00731 * i);
+      profiles_.push_back(std::make_unique<motion::Profile>(
+          motion::planMove(kStart, {motion::fromInteger(0), 0.0, 0.0}, kSteps,
+                           {100.0, speed, 100'000.0, 100'000.0})
+              .profile));
+      follows_.push_back({i, 1, profiles_.back().get()});
+    }
+    pulse::Command command;
+    command.follows = follows_.data();
+    command.follow_count = follows_.size();
+    engine_->post(command);
+    while (clock_.now() < 1'000'000'000) serve();  // past the ramps
+  }
+
+  void serve() { clock_.waitUntil(engine_->serve()); }
+  std::uint64_t slips() const { return engine_->state().slips; }
+
+  FreeLines lines;
+
+ private:
+  FreeClock clock_;
+  std::unique_ptr<pulse::PulseEngine> engine_;
+  std::vector<std::unique_ptr<motion::Profile>> profiles_;
+  std::vector<pulse::Follow> follows_;
+};
+
+void run(benchmark::State& state, Steps steps) {
+  EngineUnderLoad load(static_cast<int>(state.range(0)), steps);
+  const std::uint64_t before = load.lines.edges;
+  for (auto unused : state) {
+    (void)unused;
+    load.serve();
+  }
+  const auto edges = static_cast<double>(load.lines.edges - before);
+  state.counters["per_edge"] =
+      benchmark::Counter(edges, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  if (load.slips() != 0) state.SkipWithError("the timeline slid: this isn't the engine's own cost");
+}
+
+void edgesApart(benchmark::State& state) { run(state, Steps::kApart); }
+void edgesTogether(benchmark::State& state) { run(state, Steps::kTogether); }
+
+BENCHMARK(edgesApart)->RangeMultiplier(2)->Range(1, 32);
+BENCHMARK(edgesTogether)->RangeMultiplier(2)->Range(2, 32);
+
+}  // namespace
+}  // namespace stepdriver::bench

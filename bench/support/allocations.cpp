@@ -1,0 +1,28 @@
+#include "support/allocations.h"
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+namespace {
+
+std::atomic<std::int64_t> taken{0};
+std::atomic<std::int64_t> taken_bytes{0};
+
+}  // namespace
+
+// The array forms call these.
+void* operator new(std::size_t size) {
+  taken.fetch_add(1, std::memory_order_relaxed);
+  taken_bytes.fetch_add(static_cast<std::int64_t>(size), std::memory_order_relaxed);
+  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
+
+namespace stepdriver::bench {
+
+Allocations allocations() { return {taken.load(), taken_bytes.load()}; }
+
+}  // namespace stepdriver::bench

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+namespace stepdriver::bench {
+
+/// What this program has taken from the heap so far. A program that asks counts every operator new.
+struct Allocations {
+  std::int64_t count = 0;
+  std::int64_t bytes = 0;
+};
+
+Allocations allocations();
+
+inline Allocations operator-(const Allocations& a, const Allocations& b) {
+  return {a.count - b.count, a.bytes - b.bytes};
+}
+inline bool operator==(const Allocations& a, const Allocations& b) {
+  return a.count == b.count && a.bytes == b.bytes;
+}
+
+}  // namespace stepdriver::bench

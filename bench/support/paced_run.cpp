@@ -1,0 +1,244 @@
+#include "support/paced_run.h"
+
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/motion/profile.h"
+#include "stepdriver_core/motion/step_finder.h"
+#include "stepdriver_core/pulse/pulse_driver.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+#include "stepdriver_core/pulse/realtime.h"
+
+namespace stepdriver::bench {
+namespace {
+
+using pulse::Nanoseconds;
+
+constexpr Nanoseconds kStepTime = 1000;               // an A4988's, high and low
+constexpr Nanoseconds kBegin = 20'000'000;            // from now
+constexpr Nanoseconds kMaxLateness = 60'000'000'000;  // a late edge is a figure here, not a fault
+
+// A write of a STEP line: when, and what the timeline was slid by then.
+struct Edge {
+  Nanoseconds time;
+  Nanoseconds slipped;
+  bool level;
+};
+
+/// Lines that cost nothing but the reading of the clock. STEP of axis i is output 2 i, DIR the one
+/// after it.
+class FreeLines : public gpio::Lines {
+ public:
+  FreeLines(int axes, std::size_t edges_of_each) : edges_(static_cast<std::size_t>(axes)) {
+    for (auto& edges : edges_) edges.reserve(edges_of_each);
+  }
+
+  int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
+    const Nanoseconds now = clock_.now();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (writes[i].output % 2 != 0) continue;
+      auto& edges = edges_[static_cast<std::size_t>(writes[i].output / 2)];
+      // Never more than was reserved: the pulse thread doesn't allocate.
+      if (edges.size() < edges.capacity()) {
+        edges.push_back({now, engine_->state().slipped, writes[i].level});
+      }
+    }
+    return 0;
+  }
+  int read(int /*input*/) noexcept override { return 0; }
+  int waitForEdges(std::int64_t /*timeout_ns*/, gpio::EdgeEvent* /*events*/,
+                   std::size_t /*capacity*/) noexcept override {
+    return 0;
+  }
+  void interrupt() noexcept override {}
+  const std::string& outputName(int /*output*/) const override { return name_; }
+  const std::string& inputName(int /*input*/) const override { return name_; }
+
+  void serve(const pulse::PulseEngine& engine) { engine_ = &engine; }
+  const std::vector<Edge>& edges(std::size_t axis) const { return edges_[axis]; }
+
+ private:
+  pulse::SteadyClock clock_;
+  const pulse::PulseEngine* engine_ = nullptr;
+  std::vector<std::vector<Edge>> edges_;
+  std::string name_ = "free";
+};
+
+std::vector<pulse::ChannelConfig> channelsOf(int axes) {
+  std::vector<pulse::ChannelConfig> channels(static_cast<std::size_t>(axes));
+  for (int i = 0; i < axes; ++i) {
+    pulse::ChannelConfig& channel = channels[static_cast<std::size_t>(i)];
+    channel.step = {2 * i, true};
+    channel.dir = {2 * i + 1, true};
+    channel.step_high = kStepTime;
+    channel.step_low = kStepTime;
+  }
+  return channels;
+}
+
+double processSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) * 1e-9;
+}
+
+struct Plan {
+  Nanoseconds begin = 0;
+  std::vector<std::unique_ptr<const motion::Profile>> profiles;
+};
+
+Plan planned(Nanoseconds begin, int axes, double rate, double seconds) {
+  Plan plan{begin, {}};
+  for (int i = 0; i < axes; ++i) {
+    const double own = rate * (1.0 - 0.01 * i);
+    const double steps = std::floor(own * seconds);
+    plan.profiles.push_back(std::make_unique<motion::Profile>(
+        begin, std::vector<motion::Piece>{{steps / own, 0.0, own, 0.0, 0.0}}));
+  }
+  return plan;
+}
+
+// Where the machine stalls for so long that the engine has the order too late, it is made again.
+Plan start(pulse::PulseDriver& driver, int axes, double rate, double seconds) {
+  Nanoseconds ahead = kBegin;
+  for (std::uint64_t serial = 1;; ++serial, ahead *= 2) {
+    Plan plan = planned(driver.motionNow() + ahead, axes, rate, seconds);
+    std::vector<pulse::Follow> follows(plan.profiles.size());
+    for (std::size_t i = 0; i < follows.size(); ++i) {
+      follows[i].channel = static_cast<int>(i);
+      follows[i].serial = serial;
+      follows[i].profile = plan.profiles[i].get();
+    }
+    pulse::Command command;
+    command.follows = follows.data();
+    command.follow_count = follows.size();
+    driver.post(command);
+    // Of the channels of an order the first one is told last.
+    driver.waitFor([&] { return driver.engine().channel(0).taken == serial; });
+    if (driver.engine().channel(0).refused != serial) return plan;
+  }
+}
+
+// Of one axis: each edge against the plan and against the edge before it.
+void take(PacedFigures& figures, const std::vector<Edge>& edges, const motion::Profile& profile) {
+  motion::StepFinder finder(profile, 0);
+  motion::Step step;
+  const Edge* rose = nullptr;
+  const Edge* fell = nullptr;
+  std::int64_t planned_before = 0;
+  for (const Edge& edge : edges) {
+    const Edge* const before = edge.level ? fell : rose;
+    if (before != nullptr && edge.time - before->time < kStepTime) ++figures.too_short;
+    if (!edge.level) {
+      fell = &edge;
+      continue;
+    }
+    if (!finder.next(step)) throw std::logic_error("more steps went out than were planned");
+    ++figures.edges;
+    figures.lateness.push_back(edge.time - (step.time_ns + edge.slipped));
+    const auto closest = static_cast<Nanoseconds>(
+        pulse::PulseEngine::kClosest * static_cast<double>(step.time_ns - planned_before));
+    if (rose != nullptr && edge.time - rose->time < closest) ++figures.too_close;
+    rose = &edge;
+    planned_before = step.time_ns;
+  }
+  if (finder.next(step)) throw std::logic_error("fewer steps went out than were planned");
+}
+
+}  // namespace
+
+Nanoseconds PacedFigures::percentile(double part) const {
+  if (lateness.empty()) return 0;
+  const auto last = static_cast<double>(lateness.size() - 1);
+  return lateness[static_cast<std::size_t>(std::lround(part * last))];
+}
+
+PacedFigures runPaced(int axes, double rate, double seconds) {
+  pulse::SteadyClock clock;
+  const auto steps = static_cast<std::size_t>(std::ceil(rate * seconds));
+  FreeLines lines(axes, 2 * steps + 2);
+  pulse::PulseEngine engine(lines, clock, channelsOf(axes), kMaxLateness);
+  lines.serve(engine);
+  pulse::PulseDriver driver(engine, clock, true);
+
+  const Plan plan = start(driver, axes, rate, seconds);
+  const double used = processSeconds();
+  for (int i = 0; i < axes; ++i) {
+    while (engine.channel(i).following != 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+  const double elapsed = static_cast<double>(driver.clock().now() - plan.begin) * 1e-9;
+
+  PacedFigures figures;
+  figures.cpu = (processSeconds() - used) / elapsed;
+  figures.scheduler_error = driver.rights().scheduler_error;
+  driver.stop();
+  for (int i = 0; i < axes; ++i) {
+    take(figures, lines.edges(static_cast<std::size_t>(i)),
+         *plan.profiles[static_cast<std::size_t>(i)]);
+  }
+  figures.slips = engine.state().slips;
+  figures.slipped = engine.state().slipped;
+  std::sort(figures.lateness.begin(), figures.lateness.end());
+  return figures;
+}
+
+PacedFigures runNanosleep(double rate, double seconds) {
+  PacedFigures figures;
+  const auto count = static_cast<std::size_t>(rate * seconds);
+  figures.lateness.reserve(count);
+  pulse::SteadyClock clock;
+  const double used = processSeconds();
+  std::thread([&] {
+    figures.scheduler_error = pulse::askForScheduler();
+    const Nanoseconds begin = clock.now() + kBegin;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Nanoseconds due = begin + std::llround(static_cast<double>(i) * 1e9 / rate);
+      timespec deadline{};
+      deadline.tv_sec = static_cast<time_t>(due / 1'000'000'000);
+      deadline.tv_nsec = static_cast<decltype(deadline.tv_nsec)>(due % 1'000'000'000);
+      while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) != 0) {
+      }
+      figures.lateness.push_back(clock.now() - due);
+    }
+  }).join();
+  figures.cpu = (processSeconds() - used) / seconds;
+  figures.edges = count;
+  std::sort(figures.lateness.begin(), figures.lateness.end());
+  return figures;
+}
+
+Load::Load() {
+  for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
+    const pid_t process = fork();
+    if (process < 0) throw std::runtime_error("no process could be made to load the machine with");
+    if (process == 0) {
+      prctl(PR_SET_PDEATHSIG, SIGKILL);
+      for (volatile std::uint64_t busy = 0;; busy = busy + 1) {
+      }
+    }
+    processes_.push_back(process);
+  }
+}
+
+Load::~Load() {
+  for (const int process : processes_) {
+    kill(process, SIGKILL);
+    waitpid(process, nullptr, 0);
+  }
+}
+
+}  // namespace stepdriver::bench

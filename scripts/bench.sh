@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# Measures how fast it is, and prints each figure against its target.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/bench.sh [--quick]
+
+Installs what is missing, builds the benchmarks (bench/) for speed, runs them, and prints the table
+of bench/figures.txt: what was measured, its target, and whether that is held. The figures of each
+program, and the table, go to build/bench/*.json. Then paced runs: how late the engine's edges come
+on this machine against the steady clock, idle and busy, beside a plain clock_nanosleep() and, where
+linuxcnc-uspace is installed, its base thread; to build/bench/paced.json. Exit code 0: every target is
+held, and no pulse was shorter, no step closer than allowed.
+
+  --quick  fewer repetitions: only to see that all of it runs
+END
+}
+
+repetitions=15 seconds=0.05 paced=(--seconds 1)
+case ${1:-} in
+  '') ;;
+  --quick) repetitions=1 seconds=0.01 paced=(--quick --seconds 0.1) ;;
+  -h | --help) usage && exit ;;
+  *) usage >&2 && exit 2 ;;
+esac
+
+choose_build_folder
+install_packages core bench
+bench=$build/bench
+mkdir -p "$bench"
+rm -f "$bench"/*.json
+
+build_bench() {
+  configure "$src/stepdriver_core" "$bench/core" -DCMAKE_BUILD_TYPE=Release \
+    -DSTEPDRIVER_BENCH=ON -DSTEPDRIVER_TESTS=OFF &&
+    cmake --build "$bench/core" -j "$jobs"
+}
+# The repetitions of all benchmarks of a program take turns, so that noise meets all of them.
+run_bench() {
+  "$1" --benchmark_repetitions="$repetitions" --benchmark_min_time="$seconds" \
+    --benchmark_enable_random_interleaving=true --benchmark_out_format=json \
+    --benchmark_out="$bench/${1##*/}.json"
+}
+
+say "Building (Release)"
+quietly bench-build build_bench
+for program in "$bench"/core/bench/*_bench; do
+  say "Running ${program##*/}"
+  quietly "${program##*/}" run_bench "$program"
+done
+
+say "" "Medians of $repetitions repetitions, on $(nproc) cores, load $(cut -d' ' -f1 /proc/loadavg)" ""
+held=0
+/usr/bin/python3 "$root/scripts/bench_table.py" "$root/bench/figures.txt" "$bench/table.json" \
+  "$bench"/*_bench.json || held=$?
+
+say "" "Paced runs, lateness in us" ""
+"$bench/core/bench/paced" "${paced[@]}" --json "$bench/paced.json" || held=$?
+"$root/bench/linuxcnc_base_thread.sh" || say "LinuxCNC's base thread couldn't be measured"
+((held == 0))

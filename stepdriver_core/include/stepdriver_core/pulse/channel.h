@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::pulse {
+
+/// A line by its index in the gpio::Lines, and the level at which it does what it is named for.
+struct Signal {
+  int line = -1;
+  bool active = true;
+};
+
+/// What the engine needs to know of an axis.
+struct ChannelConfig {
+  Signal step;
+  Signal dir;  ///< active: forward, the count rises
+  std::optional<Signal> endstop_min;
+  std::optional<Signal> endstop_max;
+  std::optional<Signal> fault;  ///< an input of the chip's, active: it has switched its outputs off
+  Nanoseconds step_high = 0;
+  Nanoseconds step_low = 0;
+  Nanoseconds dir_setup = 0;
+  Nanoseconds dir_hold = 0;
+  Nanoseconds mode_hold = 0;
+  std::int64_t backlash =
+      0;  ///< microsteps that the motor makes at a reversal before the joint moves
+};
+
+enum class EndReason {
+  kDone,
+  kEndstopMin,
+  kEndstopMax,
+  kEmergencyStop,
+  kChipFault,  ///< the chip's fault line became active
+  kTooLate,    ///< a pulse came too late to go on at this speed
+  kLineError,  ///< a line could not be written or read
+  kCompanion,  ///< another channel of the group was ended
+};
+
+/// A write or a read that failed.
+struct LineFailure {
+  int error = 0;       ///< errno; 0: none did
+  int line = -1;       ///< by its index in the gpio::Lines
+  bool input = false;  ///< it was read; else it was written
+};
+
+/// What a channel does and has done.
+struct ChannelState {
+  std::int64_t count = 0;  ///< microsteps: active STEP edges forward less those backward
+  /// Of the backlash, what is taken up towards max: from 0 to all of it. The joint stands at count
+  /// less this.
+  std::int64_t slack = 0;
+  std::uint64_t pulses = 0;     ///< active STEP edges
+  std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
+  std::uint64_t refused = 0;    ///< serial of the last command that came too late or found it busy
+  std::uint64_t following = 0;  ///< serial of the profile under way; 0: at rest
+  std::uint64_t ended = 0;      ///< serial of the last profile that ended
+  EndReason end = EndReason::kDone;
+  LineFailure failure;            ///< the last one
+  Nanoseconds end_time = 0;       ///< motion time at which it ended
+  bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
+  Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
+  std::uint64_t pins_done = 0;    ///< serial of the last kPins that was carried out
+  std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `failure`
+  std::uint64_t chip_faults = 0;  ///< times that the fault line became active
+  std::uint64_t line_errors = 0;  ///< failed writes and reads
+  Nanoseconds ready = 0;          ///< clock time before which no step goes out
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::pulse {
+
+/// The times at which channels are due, with the earliest of them at hand: a binary tree in which
+/// each node is the earlier one of the two below it. A change costs log2 of the number of channels
+/// at most, and who is due is found without a look at those that aren't.
+class DueTree {
+ public:
+  /// @param count of the channels; all are due never.
+  explicit DueTree(std::size_t count) {
+    while (leaves_ < count) leaves_ *= 2;
+    nodes_.assign(2 * leaves_, kNever);
+  }
+
+  Nanoseconds earliest() const { return nodes_[1]; }
+  Nanoseconds operator[](std::size_t channel) const { return nodes_[leaves_ + channel]; }
+
+  void set(std::size_t channel, Nanoseconds due) {
+    std::size_t node = leaves_ + channel;
+    nodes_[node] = due;
+    for (; node > 1; node /= 2) {
+      const Nanoseconds earlier = std::min(nodes_[node], nodes_[node ^ 1]);
+      if (nodes_[node / 2] == earlier) return;
+      nodes_[node / 2] = earlier;
+    }
+  }
+
+  /// Adds those that are due at `now` to `channels`, in their order.
+  void collect(Nanoseconds now, std::vector<std::size_t>& channels) const {
+    collectBelow(1, now, channels);
+  }
+
+ private:
+  void collectBelow(std::size_t node, Nanoseconds now, std::vector<std::size_t>& channels) const {
+    if (nodes_[node] > now) return;
+    if (node >= leaves_) {
+      channels.push_back(node - leaves_);
+      return;
+    }
+    collectBelow(2 * node, now, channels);
+    collectBelow(2 * node + 1, now, channels);
+  }
+
+  std::size_t leaves_ = 1;
+  std::vector<Nanoseconds> nodes_;  // the root is the first one, and below n are 2 n and 2 n + 1
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,20 @@
+#include "successors.h"
+
+#include <algorithm>
+
+namespace stepdriver::pulse {
+
+void Successors::add(const motion::Profile& profile, std::uint64_t serial) {
+  while (size_ > 0 && last().profile->startNs() >= profile.startNs()) --size_;
+  entries_[size_++] = {&profile, serial};
+}
+
+Successors::Entry Successors::takeFirst() {
+  const Entry first = entries_[0];
+  std::copy(entries_.begin() + 1, entries_.begin() + static_cast<std::ptrdiff_t>(size_),
+            entries_.begin());
+  --size_;
+  return first;
+}
+
+}  // namespace stepdriver::pulse

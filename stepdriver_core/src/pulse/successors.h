@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "stepdriver_core/motion/profile.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::pulse {
+
+/// Profiles that take over, one after the other, each at its start time. One that was planned
+/// before another has taken over goes on from that other: none may be left out.
+class Successors {
+ public:
+  struct Entry {
+    const motion::Profile* profile = nullptr;
+    std::uint64_t serial = 0;
+  };
+
+  bool empty() const { return size_ == 0; }
+  const Entry& first() const { return entries_[0]; }
+  const Entry& last() const { return entries_[size_ - 1]; }
+
+  /// Room for one that begins then: those that would begin no earlier have no time left.
+  bool hasRoom(Nanoseconds start) const {
+    return size_ < kCapacity || last().profile->startNs() >= start;
+  }
+
+  /// @pre hasRoom() for it.
+  void add(const motion::Profile& profile, std::uint64_t serial);
+  Entry takeFirst();
+  void clear() { size_ = 0; }
+
+ private:
+  static constexpr std::size_t kCapacity = 16;
+  std::array<Entry, kCapacity> entries_{};
+  std::size_t size_ = 0;
+};
+
+}  // namespace stepdriver::pulse

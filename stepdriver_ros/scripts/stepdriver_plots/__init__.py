@@ -1,0 +1,1 @@
+"""What the programs that draw motions share; none of it needs ROS."""

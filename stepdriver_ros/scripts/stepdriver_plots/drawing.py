@@ -1,0 +1,100 @@
+"""What is to be drawn: strokes in millimetres on two axes."""
+
+import math
+
+from .errors import BadDrawing
+from .svg_path import read_svg
+
+MARGIN = 0.05  # of the smaller side, where a drawing is fitted into the axes' limits
+
+
+def read_drawing(path):
+    """Strokes of a file, and whether they are places in mm; those of an SVG have to be placed."""
+    if path.suffix.lower() == ".svg":
+        strokes, in_place = read_svg(path), False
+        # Its y goes down, the axes' goes up.
+        strokes = [[(x, -y) for x, y in stroke] for stroke in strokes]
+    else:
+        strokes, in_place = read_points(path), True
+    strokes = [without_repeats(stroke) for stroke in strokes]
+    strokes = [stroke for stroke in strokes if len(stroke) > 1]
+    if not strokes:
+        raise BadDrawing(f"{path}: there is no line in it")
+    return strokes, in_place
+
+
+def read_points(path):
+    """Lines of `x y` or `x, y` in mm; an empty one begins another stroke, # a comment."""
+    strokes = [[]]
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadDrawing(f"{path}: {error}") from error
+    for number, line in enumerate(lines, 1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if words:
+            strokes[-1].append(point(words, f"{path}, line {number}: {line.strip()}"))
+        elif "#" not in line and strokes[-1]:
+            strokes.append([])
+    return strokes
+
+
+def point(words, where):
+    try:
+        x, y = (float(word) for word in words)
+    except ValueError:
+        raise BadDrawing(f"{where}: isn't a point: two numbers in mm, x and y") from None
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise BadDrawing(f"{where}: must be finite numbers")
+    return x, y
+
+
+def without_repeats(stroke):
+    return stroke[:1] + [there for here, there in zip(stroke, stroke[1:]) if there != here]
+
+
+def bounds(strokes):
+    """(least x, greatest x), (least y, greatest y)"""
+    points = [point for stroke in strokes for point in stroke]
+    return tuple((min(values), max(values)) for values in zip(*points))
+
+
+def placed(strokes, limits, scale=None, corner=None):
+    """Scaled by mm per unit, the lower left corner at a place in mm; where these aren't given, as
+    large as the limits allow, and in their middle."""
+    box = bounds(strokes)
+    sizes = [high - low for low, high in box]
+    if scale is None or corner is None:
+        if any(value is None for limit in limits for value in limit):
+            raise BadDrawing("the axes have no soft limits to fit the drawing into: give its scale "
+                             "and its corner")
+    if scale is None:
+        rooms = [high - low for low, high in limits]
+        free = [room - 2 * MARGIN * min(rooms) for room in rooms]
+        scale = min(room / size for room, size in zip(free, sizes) if size > 0.0)
+    if corner is None:
+        corner = [(low + high - scale * size) / 2 for (low, high), size in zip(limits, sizes)]
+    return [[tuple(at + scale * (value - low)
+                   for at, value, (low, _) in zip(corner, point, box)) for point in stroke]
+            for stroke in strokes]
+
+
+def refuse_beyond(strokes, axes, limits):
+    """Before anything moves: half of a drawing is none."""
+    for stroke in strokes:
+        for place in stroke:
+            for axis, value, (low, high) in zip(axes, place, limits):
+                if (low is not None and value < low - 1e-9) or \
+                        (high is not None and value > high + 1e-9):
+                    raise BadDrawing(f"the point ({place[0]:.6g}, {place[1]:.6g}) mm is beyond the "
+                                     f"soft limits of {axis}, which are {low} and {high} mm")
+
+
+def segments(start, strokes):
+    """(from, to, whether it is part of the drawing) of each line, ways between strokes too."""
+    here = start
+    for stroke in strokes:
+        for i, there in enumerate(stroke):
+            if there != here:
+                yield here, there, i > 0
+            here = there

@@ -1,0 +1,86 @@
+"""How the pictures look, and the graphs of a motion."""
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
+
+# The same motion makes the same file.
+matplotlib.rcParams.update({
+    "svg.hashsalt": "stepdriver",
+    "svg.fonttype": "none",
+    "font.size": 8,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#dddddd",
+    "lines.linewidth": 1.2,
+    "path.simplify_threshold": 0.3,
+})
+COLOURS = ["#1f6fb4", "#d9661f", "#2b8a3e", "#8a3ea8", "#7a6a20", "#555555"]
+FORMATS = ("svg", "png")
+# Differences of differences of edges at whole nanoseconds: this many of them are above the noise.
+SAMPLES = 250
+
+
+def save(figure, path):
+    figure.tight_layout()
+    metadata = {"Date": None, "Creator": None} if path.suffix == ".svg" else {"Software": None}
+    figure.savefig(path, metadata=metadata, dpi=150)
+    plt.close(figure)
+
+
+def draw_motion(curves, path, title=""):
+    """The graphs of one or more axes of one unit: speed and step period over position; position,
+    speed, acceleration and jerk over time."""
+    unit = curves[0].unit
+    figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2))
+    for curve, colour in zip(curves, COLOURS * len(curves)):
+        coarse = curve.coarse(SAMPLES)
+        for panel, (xs, ys) in (
+                (panels[0, 0], curve.speed_over_position()),
+                (panels[1, 0], curve.period_over_position() if curve.step else ([], [])),
+                (panels[2, 0], curve.position()),
+                (panels[0, 1], curve.speed()),
+                (panels[1, 1], coarse.acceleration()),
+                (panels[2, 1], coarse.jerk())):
+            panel.plot(xs, ys, color=colour, label=curve.label)
+    if not any(curve.step for curve in curves):
+        panels[1, 0].text(0.5, 0.5, "needs the steps per unit", ha="center", va="center",
+                          transform=panels[1, 0].transAxes, color="#777777")
+    place, time = f"position [{unit}]", "time [s]"
+    for panel, x, y in ((panels[0, 0], place, f"speed [{unit}/s]"),
+                        (panels[1, 0], place, "step period [us]"),
+                        (panels[2, 0], time, place),
+                        (panels[0, 1], time, f"speed [{unit}/s]"),
+                        (panels[1, 1], time, f"acceleration [{unit}/s$^2$]"),
+                        (panels[2, 1], time, f"jerk [{unit}/s$^3$]")):
+        panel.set_xlabel(x)
+        panel.set_ylabel(y)
+    panels[1, 0].set_ylim(bottom=0.0)
+    if len(curves) > 1:
+        panels[0, 0].legend(loc="best", frameon=False)
+    figure.suptitle(title)
+    save(figure, path)
+
+
+def draw_drawing(lines, parts, limits, path, title):
+    """What was to be drawn, and over it what was: parts are (places, whether it is of the
+    drawing). Of the limits those that there are make a frame."""
+    figure, panel = plt.subplots(figsize=(6.4, 5.6))
+    (left, right), (low, high) = limits
+    if None not in (left, right, low, high):
+        panel.plot([left, right, right, left, left], [low, low, high, high, low],
+                   color="#bbbbbb", linewidth=0.8)
+    for begin, end in (line[:2] for line in lines if line[2]):
+        panel.plot(*zip(begin, end), color=COLOURS[1], linewidth=3.0, alpha=0.25,
+                   solid_capstyle="round")
+    for places, drawn in parts:
+        if len(places) > 1:
+            panel.plot(*zip(*places), color=COLOURS[0] if drawn else "#999999",
+                       linewidth=1.0 if drawn else 0.5)
+    panel.set_aspect("equal")
+    panel.set_xlabel("x [mm]")
+    panel.set_ylabel("y [mm]")
+    panel.set_title(title)
+    save(figure, path)

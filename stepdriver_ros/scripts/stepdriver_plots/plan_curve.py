@@ -1,0 +1,76 @@
+"""Position, speed, acceleration and jerk of a planned move, from its cubic pieces."""
+
+from collections import namedtuple
+
+Piece = namedtuple("Piece", "duration position velocity acceleration jerk")
+SAMPLES = 200  # of each piece
+
+
+class PlanCurve:
+    """The pieces as the service plan answers them: duration, position, velocity, acceleration and
+    jerk of each."""
+
+    def __init__(self, pieces, label="", unit="m", step=None):
+        """step: the unit's way of one microstep."""
+        self.label = label
+        self.unit = unit
+        self.step = step
+        self.pieces = [piece for piece in pieces if piece.duration > 0.0]
+        self.starts = [0.0]
+        for piece in self.pieces:
+            self.starts.append(self.starts[-1] + piece.duration)
+
+    def scaled(self, factor, unit):
+        """The same in another unit, of which each of this one's has so many."""
+        pieces = [Piece(piece.duration, piece.position * factor, piece.velocity * factor,
+                        piece.acceleration * factor, piece.jerk * factor) for piece in self.pieces]
+        step = None if self.step is None else self.step * factor
+        return PlanCurve(pieces, self.label, unit, step)
+
+    def coarse(self, _samples):
+        return self
+
+    def _over_time(self, value, samples=SAMPLES):
+        at, values = [], []
+        for start, piece in zip(self.starts, self.pieces):
+            for i in range(samples + 1):
+                t = piece.duration * i / samples
+                at.append(start + t)
+                values.append(value(piece, t))
+        return at, values
+
+    def position(self):
+        return self._over_time(place)
+
+    def speed(self):
+        return self._over_time(speed)
+
+    def acceleration(self):
+        return self._over_time(lambda piece, t: piece.acceleration + piece.jerk * t, 1)
+
+    def jerk(self):
+        return self._over_time(lambda piece, _: piece.jerk, 1)
+
+    def speed_over_position(self):
+        return self.position()[1], self.speed()[1]
+
+    def period_over_position(self):
+        """[us] from step to step; not within the first and the last step of a way, whose speed
+        begins or ends at rest."""
+        places, speeds = self.speed_over_position()
+        peak = max((abs(s) for s in speeds), default=0.0)
+        rests = [p for p, s in zip(places, speeds) if abs(s) <= 1e-9 * peak]
+        at, periods = [], []
+        for p, s in zip(places, speeds):
+            if all(abs(p - rest) >= self.step for rest in rests):
+                at.append(p)
+                periods.append(self.step / abs(s) * 1e6)
+        return at, periods
+
+
+def place(piece, t):
+    return piece.position + t * (piece.velocity + t * (piece.acceleration / 2 + t * piece.jerk / 6))
+
+
+def speed(piece, t):
+    return piece.velocity + t * (piece.acceleration + t * piece.jerk / 2)

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <csignal>
+
+namespace stepdriver::ros_node {
+
+struct EndSignal {
+  int number;
+  const char* name;
+};
+
+constexpr std::array<EndSignal, 4> kEndSignals{
+    {{SIGINT, "SIGINT"}, {SIGTERM, "SIGTERM"}, {SIGQUIT, "SIGQUIT"}, {SIGHUP, "SIGHUP"}}};
+
+/// The signals that ask a program to end: these, but SIGHUP, as of a terminal that is closed, only
+/// where nobody has it ignored (nohup).
+inline sigset_t endSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  struct sigaction hangup {};
+  const bool ignored = sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler == SIG_IGN;
+  for (const EndSignal& signal : kEndSignals) {
+    if (signal.number != SIGHUP || !ignored) sigaddset(&signals, signal.number);
+  }
+  return signals;
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "plan_from_rest.h"
+#include "recording_lines.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+namespace stepdriver::pulse {
+
+constexpr int kLinesPerChannel = 2;  // STEP and DIR
+
+using test::Edge;
+using test::RecordingLines;
+
+/// An engine on a virtual clock, with lines that remember.
+class PulseEngineTest : public testing::Test {
+ protected:
+  static ChannelConfig config(int channel) {
+    ChannelConfig config;
+    config.step.line = channel * kLinesPerChannel;
+    config.dir.line = channel * kLinesPerChannel + 1;
+    config.step_high = 1'900;
+    config.step_low = 2'100;
+    config.dir_setup = 650;
+    config.dir_hold = 700;
+    config.mode_hold = 800;
+    return config;
+  }
+
+  void make(const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness = 5'000'000) {
+    engine = std::make_unique<PulseEngine>(lines, clock, channels, max_lateness);
+  }
+
+  /// @param continues serial of the profile that this one goes on from.
+  std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
+    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
+    follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval});
+    postFollows(1);
+    return serial;
+  }
+
+  // The last so many of `follows` in one order.
+  void postFollows(std::size_t count) {
+    Command command;
+    command.follows = &follows[follows.size() - count];
+    command.follow_count = count;
+    EXPECT_TRUE(engine->post(command));
+  }
+
+  // Serves until nothing is left to do, each time `late` after it is due.
+  void runOut(Nanoseconds late = 0) {
+    for (Nanoseconds due = engine->serve(); due != kNever; due = engine->serve()) {
+      while (clock.now() < due + late) clock.waitUntil(due + late);
+    }
+  }
+
+  void runUntil(Nanoseconds time) {
+    for (Nanoseconds due = engine->serve(); due <= time; due = engine->serve()) {
+      while (clock.now() < due) clock.waitUntil(due);
+    }
+    while (clock.now() < time) clock.waitUntil(time);
+  }
+
+  // Holds the edges of the first channel against what the chip wants.
+  void expectTimes(const ChannelConfig& channel) {
+    std::optional<Nanoseconds> rose;
+    std::optional<Nanoseconds> turned;
+    std::optional<Nanoseconds> fell;
+    std::size_t last_write = 0;
+    for (const Edge& edge : lines.edges) {
+      const auto since = [&edge](const std::optional<Nanoseconds>& time) {
+        return time ? edge.time - *time : kNever;
+      };
+      SCOPED_TRACE(testing::Message() << "line " << edge.line << " at " << edge.time);
+      EXPECT_NE(edge.write, last_write) << "STEP and DIR in one write";
+      last_write = edge.write;
+      if (edge.line == 1) {
+        EXPECT_GE(since(rose), channel.dir_hold);
+        turned = edge.time;
+      } else if (edge.level) {
+        EXPECT_GE(since(fell), channel.step_low);
+        EXPECT_GE(since(turned), channel.dir_setup);
+        rose = edge.time;
+      } else {
+        EXPECT_GE(since(rose), channel.step_high);
+        fell = edge.time;
+      }
+    }
+  }
+
+  static motion::Profile cruise(Nanoseconds start, std::int64_t from, std::int64_t to,
+                                double speed) {
+    return motion::planFromRest(start, from, to, {speed, speed, 1.0, 1.0});
+  }
+
+  VirtualClock clock;
+  RecordingLines lines{clock};
+  std::unique_ptr<PulseEngine> engine;
+  std::vector<std::unique_ptr<motion::Profile>> profiles;
+  std::deque<Follow> follows;
+  std::uint64_t serial = 0;
+  Nanoseconds restart_interval = 0;
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+#include <ros/master.h>
+#include <stepdriver/AxisStates.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "support/node_under_test.h"
+#include "support/program.h"
+#include "support/recorder.h"
+#include "support/says.h"
+#include "support/two_axes.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+class Draw : public testing::Test {
+ protected:
+  Draw() : points(".txt"), picture(".svg") { addSecondAxis(node); }
+
+  void write(const std::string& text) const { std::ofstream(points.path()) << text; }
+
+  std::vector<std::string> arguments() const {
+    return {points.path(), "--node", node.name(), "-o", picture.path()};
+  }
+  ProgramEnd draw() const { return runProgram("draw", arguments()); }
+
+  NodeUnderTest node;
+  const TemporaryFile points;
+  const TemporaryFile picture;
+};
+
+TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
+  node.traced();
+  node.start();
+  ASSERT_TRUE(node.moveTo(0.005, true).success) << "pulses before the drawing aren't of it";
+  write("10 10\n30 10\n30 25\n10 10\n");
+  const auto end = draw();
+  EXPECT_EQ(end.code, 0);
+  // From (5, 0): 400 and 800, 1600, 1200, then back.
+  expectSays(end.output, "6800 pulses, at most ");
+  expectSays(end.output, "line 4 of 4, 71 of 71 mm, 100 %");
+  const double off = std::stod(end.output.substr(end.output.find("at most ") + 8));
+  EXPECT_LE(off, 12.5) << "[um] no place is a microstep off the lines";
+  EXPECT_GT(off, 1.0) << "[um] a slope can't be drawn more exactly than its half steps";
+  expectSays(picture.text(), "x [mm]");
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{2400, 2000}));
+  EXPECT_EQ(report.pulses_backward, (std::vector<std::int64_t>{1600, 1200}));
+  EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
+}
+
+TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {
+  node.start();
+  write("10 10\n30 10\n");
+  const auto end = draw();
+  EXPECT_EQ(end.code, 0);
+  expectSays(end.output, "joint_states, at most ");
+  EXPECT_TRUE(picture.exists());
+}
+
+TEST_F(Draw, RefusesBeforeAnythingMoves) {
+  node.start();
+  const auto expect_fails = [&](const std::string& text, const std::string& words) {
+    write(text);
+    const auto end = draw();
+    EXPECT_EQ(end.code, 1);
+    expectSays(end.output, words);
+  };
+  expect_fails("10 10\n10 300\n", "(10, 300) mm is beyond the soft limits of y");
+  expect_fails("10 10\nten 30\n", "line 2: ten 30");
+  expect_fails("", "there is no line");
+  EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 2);
+  EXPECT_EQ(runProgram("draw", {"--help"}).code, 0);
+  EXPECT_EQ(node.pulses(), 0);
+  EXPECT_FALSE(picture.exists());
+}
+
+TEST_F(Draw, StopsTheAxesWhereItIsInterrupted) {
+  node.set("simulation/speed", 1.0);
+  node.start();
+  write("199 0\n199 10\n");
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  std::vector<std::string> words = arguments();
+  words.insert(words.end(), {"--speed", "5"});
+  NodeProcess process(words, std::string(STEPDRIVER_PROGRAMS) + "/draw");
+  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.position.at(0) > 0.001; }));
+  EXPECT_TRUE(waitUntil([this] {
+    ros::master::V_TopicInfo topics;
+    ros::master::getTopics(topics);
+    return std::any_of(topics.begin(), topics.end(), [this](const ros::master::TopicInfo& topic) {
+      return topic.name == node.beside("drawing") && topic.datatype == "visualization_msgs/Marker";
+    });
+  })) << "the trail for rviz";
+  process.signal(SIGINT);
+  EXPECT_EQ(process.waitForExit(kBound), 130);
+  expectSays(process.output(), "stopped");
+  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
+  EXPECT_LT(states.messages().back().position.at(0), 0.19);
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

@@ -1,0 +1,71 @@
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/program.h"
+#include "support/says.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+TEST(PlotMotion, DrawsWhatARunningNodeWouldDoAndMovesNothing) {
+  NodeUnderTest node;
+  node.start();
+  const TemporaryFile picture(".svg");
+  const auto end = runProgram("plot_motion", {"plan", "--node", node.name(), "--axis", "x", "--to",
+                                              "0.1", "-o", picture.path()});
+  EXPECT_EQ(end.code, 0);
+  expectSays(end.output, "x: would move to 0.1 m in 1.2 s");
+  expectSays(end.output, picture.path());
+  for (const char* words : {"speed [mm/s]", "step period [us]", "position [mm]", "jerk [mm/s"}) {
+    expectSays(picture.text(), words);
+  }
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST(PlotMotion, SaysWhyItDrawsNothing) {
+  NodeUnderTest node;
+  node.start();
+  const TemporaryFile picture(".svg");
+  const auto expect_fails = [&](const std::string& axis, const std::string& to, int code,
+                                const std::string& words) {
+    const auto end = runProgram("plot_motion", {"plan", "--node", node.name(), "--axis", axis,
+                                                "--to", to, "-o", picture.path()});
+    EXPECT_EQ(end.code, code);
+    expectSays(end.output, words);
+    EXPECT_FALSE(picture.exists());
+  };
+  expect_fails("x", "0.3", 1, "above the soft limit");
+  expect_fails("x", "0", 1, "nothing would move");
+  expect_fails("z", "0.1", 1, "has no axis z: its axes are x");
+  expect_fails("x", "nan", 2, "must be a finite number");
+}
+
+TEST(PlotMotion, DrawsThePulsesOfATrace) {
+  NodeUnderTest node;
+  const std::string trace = node.traced();
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.01, true).success);
+  node.process().signal(SIGTERM);
+  EXPECT_EQ(node.process().waitForExit(kBound), 0);
+  const TemporaryFile picture(".png");
+  const auto end =
+      runProgram("plot_motion", {"trace", trace, "--steps-per-mm", "80", "-o", picture.path()});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_EQ(picture.text().substr(1, 3), "PNG");
+  EXPECT_EQ(runProgram("plot_motion", {"trace", trace, "--axis", "y"}).code, 1);
+  EXPECT_EQ(runProgram("plot_motion", {"trace", trace, "--from", "9999"}).code, 1);
+}
+
+TEST(PlotMotion, HasHelpAndRefusesWhatItDoesNotKnow) {
+  const auto help = runProgram("plot_motion", {"--help"});
+  EXPECT_EQ(help.code, 0);
+  expectSays(help.output, "plot_motion plan --axis x --to 0.15");
+  EXPECT_EQ(runProgram("plot_motion", {}).code, 2);
+  EXPECT_EQ(runProgram("plot_motion", {"bag", "none.bag", "-o", "x.gif"}).code, 2);
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

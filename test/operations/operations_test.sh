@@ -1,0 +1,173 @@
+#!/usr/bin/env bash
+# The installed commands and what setup_system makes of a machine, without a systemd that runs.
+set -euo pipefail
+
+usage() {
+  cat <<'END'
+usage: test/operations/operations_test.sh PREFIX
+
+PREFIX is an install space. Checks --help and exit codes of every installed command; sets up an
+empty root and holds it against systemd-analyze, udevadm and the node's messages; and runs the
+lines of the service there, with its limits, as an ordinary user. What needs root is skipped
+without. Exit status 0: all passed; 1: not.
+END
+}
+case ${1:-} in
+  -h | --help) usage && exit ;;
+  '') usage >&2 && exit 2 ;;
+esac
+prefix=$(realpath "$1")
+bin=$prefix/lib/stepdriver
+config=$prefix/share/stepdriver/config
+
+failures=0
+fail() {
+  printf 'FAILED: %s\n' "$*" >&2
+  failures=$((failures + 1))
+}
+scratch=$(mktemp -d)
+jobs_started=()
+finish() {
+  local status=$? job
+  for job in "${jobs_started[@]}"; do kill -KILL "$job" 2>/dev/null || true; done
+  rm -rf "$scratch"
+  exit "$status"
+}
+trap finish EXIT
+
+# ends WANTED COMMAND...: runs it, with its output in $output.
+ends() {
+  local wanted=$1 status=0
+  shift
+  output=$("$@" 2>&1 </dev/null) || status=$?
+  ((status == wanted)) || fail "exit status $status, not $wanted: $*: $output"
+}
+says() { [[ $output == *"$1"* ]] || fail "\"$1\" isn't in: $output"; }
+
+# ---- every command ----
+
+for command in "$bin"/*; do
+  ends 0 "$command" --help
+  says "usage: ${command##*/}"
+  says "Exit codes:"
+  says "64 wrong usage"
+  ends 64 "$command" --unheard-of
+  says "usage: ${command##*/}"
+done
+
+printf 'axes: {x: {driver: a4989}}\n' >"$scratch/wrong.yaml"
+ends 1 "$bin/stepdriver_check" --config "$scratch/wrong.yaml"
+says 'is "a4989"'
+ends 1 "$bin/stepdriver_check" --config "$scratch/none.yaml"
+
+# ---- a machine that is set up ----
+
+if (($(id -u) != 0)); then
+  printf 'skipped without root: setup_system, the service\n'
+  exit "$((failures > 0))"
+fi
+machine=$scratch/machine
+mkdir -p "$machine/etc"
+ends 1 "$bin/setup_system" --root "$scratch/none"
+ends 0 "$bin/setup_system" --root "$machine"
+ends 0 "$bin/setup_system" --root "$machine"
+for entry in '^gpio:[^:]*:[0-9]*:stepdriver$' '^realtime:[^:]*:[0-9]*:stepdriver$'; do
+  grep -q "$entry" "$machine/etc/group" || fail "no line $entry in: $(<"$machine/etc/group")"
+done
+grep -q '^stepdriver:' "$machine/etc/passwd" || fail "no user stepdriver"
+units=$machine/etc/systemd/system
+! grep -rl '@prefix@' "$machine/etc" || fail "@prefix@ is left in these"
+
+# What the node tells people to write is what is installed.
+for limit in '@realtime - rtprio 98' '@realtime - memlock unlimited'; do
+  grep -qxF -e "$limit" "$machine/etc/security/limits.d/stepdriver.conf" || fail "no limit $limit"
+  grep -qF -e "$limit" "$bin/stepdriver_node" || fail "the node doesn't say $limit"
+done
+
+# It warns of what it doesn't know, and ends with 0.
+for unit in stepdriver stepdriver-roscore; do
+  output=$(systemd-analyze verify "$units/$unit.service" 2>&1) || fail "$unit.service: $output"
+  [[ $output != *"$unit"* ]] || fail "$output"
+done
+if udevadm verify --help >/dev/null 2>&1; then
+  ends 0 udevadm verify --resolve-names=never "$machine/etc/udev/rules.d/60-stepdriver-gpio.rules"
+fi
+
+# ---- the service ----
+
+# The values of a key of the unit.
+unit_values() { sed -n "s/^$1=-\{0,1\}//p" "$units/stepdriver.service"; }
+raised=(prlimit "--rtprio=$(unit_values LimitRTPRIO)" "--memlock=$(unit_values LimitMEMLOCK |
+  sed s/infinity/unlimited/)")
+chmod 755 "$scratch"
+mkdir -m 777 "$scratch/state"
+log_format=$(sed -n 's/^Environment="\(ROSCONSOLE_FORMAT=.*\)"$/\1/p' "$units/stepdriver.service")
+ordinary=(setpriv --reuid 65534 --regid 65534 --clear-groups env "HOME=$scratch/state"
+  "ROS_HOME=$scratch/state" "ROS_LOG_DIR=$scratch/state" "$log_format")
+lines_of() { unit_values "$1" | sed "s|/etc/stepdriver/|$scratch/|g"; }
+
+"${raised[@]}" true 2>/dev/null || raised=()  # a container may not
+service=("${raised[@]}" "${ordinary[@]}")
+"${service[@]}" test -x "$bin/stepdriver_node" || {
+  printf 'skipped, as others than root can'\''t reach %s: the service\n' "$prefix"
+  exit "$((failures > 0))"
+}
+ends 0 "${service[@]}" "$bin/stepdriver_check" --config "$config/a4988.yaml" --backend simulated
+if ((${#raised[@]} > 0)); then
+  says "SCHED_FIFO 50; memory locked"
+else
+  printf 'skipped, as limits can'\''t be raised here: whether those of the service suffice\n'
+fi
+
+# start FILE: runs the lines of the unit with a configuration; the node's output in node.log.
+start() {
+  local line words
+  cp "$1" "$scratch/axes.yaml"
+  while IFS= read -r line; do
+    read -ra words <<<"$line"
+    "${service[@]}" "${words[@]}" >"$scratch/pre.log" 2>&1 || [[ $line == *delete* ]] ||
+      fail "$line: $(<"$scratch/pre.log")"
+  done < <(lines_of ExecStartPre)
+  read -ra words <<<"$(lines_of ExecStart)"
+  "${service[@]}" "${words[@]}" >"$scratch/node.log" 2>&1 &
+  node=$!
+  jobs_started+=("$node")
+}
+# node_ends WANTED
+node_ends() {
+  local status=0
+  wait "$node" || status=$?
+  ((status == $1)) || fail "the node ended with $status, not $1: $(<"$scratch/node.log")"
+}
+
+"$prefix/env.sh" roscore -p "${ROS_MASTER_URI##*:}" >"$scratch/roscore.log" 2>&1 &
+jobs_started+=("$!")
+for ((i = 0; i < 600; i++)); do
+  ! "$prefix/env.sh" rosparam list >/dev/null 2>&1 || break
+  sleep 0.1
+done
+
+start "$scratch/wrong.yaml"
+node_ends 1
+{
+  sed 's/GPIO\([0-9]\)/nowhere:\1/' "$config/a4988.yaml"
+  printf 'gpio: {backend: libgpiod}\n'
+} >"$scratch/elsewhere.yaml"
+start "$scratch/elsewhere.yaml"
+node_ends 2
+{
+  cat "$config/a4988.yaml"
+  printf 'gpio: {backend: simulated}\n'
+} >"$scratch/simulated.yaml"
+start "$scratch/simulated.yaml"
+for ((i = 0; i < 600; i++)); do
+  ! grep -q Ready "$scratch/node.log" || break
+  sleep 0.1
+done
+kill -TERM "$node" 2>/dev/null || true
+node_ends 0
+grep -q '\[ *INFO\] Ending on SIGTERM' "$scratch/node.log" ||
+  fail "it doesn't say how it ended: $(<"$scratch/node.log")"
+
+((failures == 0)) || exit 1
+printf 'the installed commands and the service are as they should be\n'

@@ -1,0 +1,53 @@
+import unittest
+
+from support import ramp
+from stepdriver_plots.step_curve import StepCurve
+
+
+class StepCurveTest(unittest.TestCase):
+    def test_finds_speed_and_acceleration_of_a_ramp_from_its_edges(self):
+        curve = StepCurve.of_counts(ramp(1000, 2000.0), list(range(1, 1001)))
+        times, speeds = curve.speed()
+        for time, speed in zip(times[5:], speeds[5:]):
+            self.assertAlmostEqual(speed, 2000.0 * time, delta=1e-6 * speed)
+        for acceleration in curve.acceleration()[1][5:]:
+            self.assertAlmostEqual(acceleration, 2000.0, delta=0.1)
+
+    def test_scales_to_a_unit(self):
+        curve = StepCurve.of_counts([0.0, 0.01, 0.02], [1, 2, 3], "x", "mm", 0.5)
+        self.assertEqual(curve.position()[1], [0.25, 0.75, 1.25])
+        self.assertEqual(curve.speed()[1], [50.0, 50.0])
+        self.assertEqual(curve.period_over_position(), ([0.5, 1.0], [10000.0, 10000.0]))
+
+    def test_stands_where_no_step_comes(self):
+        curve = StepCurve.of_counts([0.0, 0.01, 1.0, 1.01], [1, 2, 3, 4])
+        times, speeds = curve.speed()
+        self.assertEqual(speeds[1:3], [0.0, 0.0])
+        self.assertTrue(0.01 < times[1] < times[2] < 1.0)
+        periods = curve.period_over_position()[1]
+        self.assertNotEqual(periods[1], periods[1], "the line breaks off")
+
+    def test_turns_where_the_count_does(self):
+        speeds = StepCurve.of_counts([0.0, 0.01, 0.02, 0.03], [1, 2, 1, 0]).speed()[1]
+        self.assertGreater(speeds[0], 0.0)
+        self.assertEqual(speeds[1], 0.0, "on the same half-step line both times")
+        self.assertLess(speeds[2], 0.0)
+
+    def test_jerk_is_above_the_noise_of_whole_nanoseconds(self):
+        times = [round(time, 9) for time in ramp(20000, 100000.0)]
+        curve = StepCurve.of_counts(times, list(range(1, 20001))).coarse(250)
+        self.assertLess(len(curve.times), 260)
+        self.assertEqual((curve.times[0], curve.times[-1]), (times[0], times[-1]))
+        for jerk in curve.jerk()[1][2:]:
+            self.assertAlmostEqual(jerk, 0.0, delta=0.1 * 100000.0 / times[-1])
+
+    def test_coarse_keeps_begin_and_end_of_each_motion(self):
+        times = [i * 0.001 for i in range(100)] + [1.0 + i * 0.001 for i in range(100)]
+        coarse = StepCurve.of_counts(times, list(range(1, 201))).coarse(10)
+        for wanted in (times[0], times[99], times[100], times[199]):
+            self.assertIn(wanted, coarse.times)
+        self.assertLess(len(coarse.times), 30)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,32 @@
+"""Where the modules under test are, and motions for them."""
+
+import pathlib
+import sys
+
+SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "stepdriver_ros/scripts"
+sys.path.insert(0, str(SCRIPTS))
+
+VCD = """\
+$version by hand $end
+$timescale 1 us $end
+$scope module x $end
+$var wire 1 a step $end
+$var wire 1 b dir $end
+$upscope $end
+$enddefinitions $end
+#0
+$dumpvars
+%da
+%db
+$end
+"""
+
+
+def vcd(levels, edges):
+    """A trace of an axis x: the levels of STEP and DIR at the begin; (us, "a" or "b", level)."""
+    return VCD % levels + "".join(f"#{time}\n{level}{pin}\n" for time, pin, level in edges)
+
+
+def ramp(steps, acceleration):
+    """Times of the steps of a motion from rest."""
+    return [(2 * (i + 0.5) / acceleration) ** 0.5 for i in range(steps)]
