@@ -10,16 +10,19 @@ usage: scripts/bench.sh [--quick]
 
 Installs what is missing, builds the benchmarks (bench/) for speed, runs them, and prints the table
 of bench/figures.txt: what was measured, its target, and whether that is held. The figures of each
-program, and the table, go to build/bench/*.json. Exit code 0: every target is held.
+program, and the table, go to build/bench/*.json. Then paced runs: how late the engine's edges come
+on this machine against the steady clock, idle and busy, beside a plain clock_nanosleep() and, where
+linuxcnc-uspace is installed, its base thread; to build/bench/paced.json. Exit code 0: every target is
+held, and no pulse was shorter, no step closer than allowed.
 
   --quick  fewer repetitions: only to see that all of it runs
 END
 }
 
-repetitions=15 seconds=0.05
+repetitions=15 seconds=0.05 paced=(--seconds 1)
 case ${1:-} in
   '') ;;
-  --quick) repetitions=1 seconds=0.01 ;;
+  --quick) repetitions=1 seconds=0.01 paced=(--quick --seconds 0.1) ;;
   -h | --help) usage && exit ;;
   *) usage >&2 && exit 2 ;;
 esac
@@ -50,5 +53,11 @@ for program in "$bench"/core/bench/*_bench; do
 done
 
 say "" "Medians of $repetitions repetitions, on $(nproc) cores, load $(cut -d' ' -f1 /proc/loadavg)" ""
+held=0
 /usr/bin/python3 "$root/scripts/bench_table.py" "$root/bench/figures.txt" "$bench/table.json" \
-  "$bench"/*_bench.json
+  "$bench"/*_bench.json || held=$?
+
+say "" "Paced runs, lateness in us" ""
+"$bench/core/bench/paced" "${paced[@]}" --json "$bench/paced.json" || held=$?
+"$root/bench/linuxcnc_base_thread.sh" || say "LinuxCNC's base thread couldn't be measured"
+((held == 0))

@@ -92,7 +92,7 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that

@@ -9,6 +9,9 @@ namespace {
 // From this time on a double's 53 bits leave more than 1/32 ns of doubt.
 constexpr double kFar = 281474.976710656;  // s, 2^48 ns, 78 hours
 
+// Up to this time the rounding of a stretch's reciprocals leaves less than 1/64 ns of doubt.
+constexpr double kShort = 20000.0;  // s
+
 // Nearest integer of a number below 2^51: the sum has no bits left for a fraction. (llrint() is a
 // call into the library.)
 std::int64_t nearest(double number) {
@@ -54,7 +57,6 @@ inline double StepFinder::cubicTime(double way) {
 }
 
 inline double StepFinder::timeFromAnchor(double way) {
-  if (!(way > 0.0)) return 0.0;
   const Stretch& s = stretch_;
   switch (s.curve) {
     case Stretch::Curve::kLine:
@@ -66,23 +68,45 @@ inline double StepFinder::timeFromAnchor(double way) {
   }
 }
 
+inline bool StepFinder::give(Step& step, std::int64_t time_ns) {
+  Stretch& s = stretch_;
+  s.begin_ns = std::min(std::max(time_ns, s.begin_ns), s.end_ns);
+  s.way += s.way_step;
+  --s.steps_left;
+  count_ += s.direction;
+  step.time_ns = s.begin_ns;
+  step.direction = s.direction;
+  return true;
+}
+
+// What is rare or long stays out of here: so there is no stack frame.
 bool StepFinder::next(Step& step) {
+  const Stretch& s = stretch_;
+  if (s.steps_left == 0) return nextOfNewStretch(step);
+  const double way = std::max(static_cast<double>(s.way) + s.way_rest, 0.0);
+  double ns = 0.0;
+  if (s.curve == Stretch::Curve::kShortLine) {
+    ns = way * s.ns_per_unit;
+  } else if (s.curve == Stretch::Curve::kShortParabola) {
+    ns = (std::sqrt(s.v_squared + s.twice_a * way) - s.v) * s.ns_per_unit;
+  } else {
+    return nextOfOther(step, way);
+  }
+  return give(step, s.anchor_ns.whole + nearest(s.anchor_ns.rest + ns));
+}
+
+bool StepFinder::nextOfNewStretch(Step& step) {
   while (stretch_.steps_left == 0) {
     if (!enterNext()) return false;
   }
-  Stretch& s = stretch_;
-  const double line = static_cast<double>(count_ - s.anchor_position.whole) + s.half;
-  const double t = timeFromAnchor(s.way_sign * (line - s.anchor_position.rest));
-  std::int64_t time =
-      t < kFar ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + t * s.ns_per_s) : refined(t, line);
-  time = std::min(std::max(time, s.begin_ns), s.end_ns);
-  s.begin_ns = time;
-  --s.steps_left;
+  return next(step);
+}
 
-  step.time_ns = time;
-  step.direction = s.direction;
-  count_ += s.direction;
-  return true;
+bool StepFinder::nextOfOther(Step& step, double way) {
+  const Stretch& s = stretch_;
+  const double t = way > 0.0 ? timeFromAnchor(way) : 0.0;
+  return give(
+      step, t < kFar ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + t * s.ns_per_s) : refined(t));
 }
 
 bool StepFinder::enterNext() {
@@ -101,9 +125,9 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   stretch_.steps_left = 0;
   const DoubleDouble from = piece.positionAt(begin);
   const DoubleDouble to = piece.positionAt(end);
-  const DoubleDouble way = to - from;
-  if (way.hi == 0.0) return;
-  const double direction = way.hi > 0.0 ? 1.0 : -1.0;
+  const double travel = (to - from).hi;
+  if (travel == 0.0) return;
+  const double direction = travel > 0.0 ? 1.0 : -1.0;
 
   // The last line that is crossed, not just touched: the largest k - 1/2 below `to` going up.
   const Split goal = split(to);
@@ -119,25 +143,36 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   const DoubleDouble anchor = backwards ? end : begin;
 
   stretch_.direction = direction > 0.0 ? 1 : -1;
-  stretch_.half = direction * 0.5;
   stretch_.time_sign = backwards ? -1.0 : 1.0;
   stretch_.ns_per_s = 1e9 * stretch_.time_sign;
-  stretch_.way_sign = direction * stretch_.time_sign;
   const auto motion_time = [&](DoubleDouble after) {
     const Split ns = splitNanoseconds(piece_start + after);
     return Split{profile_->startNs() + ns.whole, ns.rest};
   };
   stretch_.anchor_ns = motion_time(anchor);
-  stretch_.anchor_position = backwards ? goal : split(from);
+  const Split anchor_position = backwards ? goal : split(from);
+  const std::int64_t away = backwards ? -stretch_.direction : stretch_.direction;
+  stretch_.way = away * (count_ - anchor_position.whole);
+  stretch_.way_step = backwards ? -1 : 1;
+  stretch_.way_rest = static_cast<double>(away) * (direction * 0.5 - anchor_position.rest);
   stretch_.v = std::max(0.0, backwards ? v_end : v_begin);
   stretch_.v_squared = stretch_.v * stretch_.v;
-  stretch_.a = stretch_.way_sign * piece.accelerationAt(anchor).value();
+  stretch_.a = static_cast<double>(away) * piece.accelerationAt(anchor).value();
   stretch_.twice_a = 2.0 * stretch_.a;
   stretch_.j = direction * piece.j;
-  stretch_.curve = piece.j != 0.0   ? Stretch::Curve::kCubic
-                   : piece.a != 0.0 ? Stretch::Curve::kParabola
-                                    : Stretch::Curve::kLine;
   stretch_.duration = (end - begin).value();
+  if (piece.j != 0.0) {
+    stretch_.curve = Stretch::Curve::kCubic;
+  } else if (piece.a != 0.0) {
+    const double from_rest = stretch_.duration + stretch_.v / stretch_.a;
+    stretch_.curve =
+        from_rest < kShort ? Stretch::Curve::kShortParabola : Stretch::Curve::kParabola;
+    stretch_.ns_per_unit = stretch_.ns_per_s / stretch_.a;
+  } else {
+    stretch_.curve =
+        stretch_.duration < kShort ? Stretch::Curve::kShortLine : Stretch::Curve::kLine;
+    stretch_.ns_per_unit = stretch_.ns_per_s / stretch_.v;
+  }
   stretch_.last[0] = backwards ? stretch_.duration : 0.0;
   stretch_.known = 0;
   stretch_.begin_ns = motion_time(begin).whole;
@@ -168,11 +203,10 @@ double StepFinder::bracketedTime(double way) const {
   return t;
 }
 
-std::int64_t StepFinder::refined(double t, double line) const {
+std::int64_t StepFinder::refined(double t) const {
   const Stretch& s = stretch_;
   const Piece seen{s.duration, 0.0, s.v, s.a, s.j};
-  const DoubleDouble way =
-      DoubleDouble(s.way_sign) * (DoubleDouble(line) - DoubleDouble(s.anchor_position.rest));
+  const DoubleDouble way = fromInteger(s.way) + DoubleDouble(s.way_rest);
   const double correction =
       (way - seen.positionAt(DoubleDouble(t))).value() / seen.velocityAt(DoubleDouble(t)).value();
   const DoubleDouble exact = DoubleDouble(t) + DoubleDouble(correction);

@@ -39,10 +39,10 @@ struct EngineChannel {
   /// It moves at a speed that the motor can't start from or stop at at once.
   bool isFast() const { return running && next && interval() < restart_interval; }
 
-  /// It has done what comes before its first successor.
-  bool passesOn() const {
-    return !successors.empty() && !high &&
-           (!next || next->time_ns >= successors.first().profile->startNs());
+  /// The step that comes next, if any, is none any more: it would come when the first successor
+  /// has begun.
+  bool isSucceeded() const {
+    return !successors.empty() && (!next || next->time_ns >= successors.first().profile->startNs());
   }
 
   /// Serial of the profile that the next one has to go on from; 0: it is at rest.

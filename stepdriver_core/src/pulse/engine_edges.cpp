@@ -44,7 +44,10 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     const bool fall = action == Action::kFall;
     if (!fall && !(action == Action::kRise && mayStep(channel, now))) continue;
     const Signal& step = channel.config.step;
-    writes_.push_back({step.line, fall ? !step.active : step.active});
+    // Member by member: a pair that is made first and then copied whole has the processor wait.
+    gpio::LineWrite& write = writes_.emplace_back();
+    write.output = step.line;
+    write.level = step.active != fall;
     writers_.push_back(&channel);
   }
   // The reads of the switches took time, and a stop may have come in it; and what ended one channel

@@ -38,12 +38,13 @@ void PulseEngine::scheduleAll() {
 }
 
 bool PulseEngine::schedule(Channel& channel) {
-  while (channel.passesOn()) {
+  while (!channel.high && channel.isSucceeded()) {
     const Successors::Entry first = channel.successors.takeFirst();
     channel.adopt(*first.profile, first.serial);
     channel.publish();
   }
   Nanoseconds due = kNever;
+  bool slid = false;
   switch (channel.action()) {
     case Action::kRise:
       return scheduleRise(channel);
@@ -51,6 +52,9 @@ bool PulseEngine::schedule(Channel& channel) {
       break;
     case Action::kFall:
       due = channel.rose + channel.config.step_high;
+      // What a slow write takes from the next interval belongs to the same slip as its lateness.
+      slid = channel.next && !channel.isSucceeded() &&
+             slideUpTo(closestRise(channel), channel.next->time_ns + state_.slipped);
       break;
     case Action::kPin:
       due = channel.pin_run.due;
@@ -63,19 +67,27 @@ bool PulseEngine::schedule(Channel& channel) {
       break;
   }
   dues_.set(indexOf(channel), due);
-  return false;
+  return slid;
+}
+
+// As near as the next step may come to the last one.
+Nanoseconds PulseEngine::closestRise(const Channel& channel) {
+  return channel.rose +
+         static_cast<Nanoseconds>(kClosest * static_cast<double>(channel.interval()));
 }
 
 bool PulseEngine::scheduleRise(Channel& channel) {
   const ChannelConfig& config = channel.config;
   Nanoseconds earliest = std::max(channel.state.ready, channel.turned + config.dir_setup);
   if (channel.state.pulses != 0) {
-    const auto closest =
-        static_cast<Nanoseconds>(kClosest * static_cast<double>(channel.interval()));
-    earliest = std::max({earliest, channel.fell + config.step_low, channel.rose + closest});
+    earliest = std::max({earliest, channel.fell + config.step_low, closestRise(channel)});
   }
   const Nanoseconds planned = channel.next->time_ns + state_.slipped;
   dues_.set(indexOf(channel), std::max(planned, earliest));
+  return slideUpTo(earliest, planned);
+}
+
+bool PulseEngine::slideUpTo(Nanoseconds earliest, Nanoseconds planned) {
   if (earliest <= planned) return false;
   slide(earliest - planned);
   return true;

@@ -35,6 +35,10 @@ class RecordingLines : public gpio::Lines {
       }
       level = writes[i].level;
     }
+    if (write_cost > 0) {
+      // The edges are at its beginning: as near to the ones before them as they can be.
+      clock_.waitUntil(clock_.now() + write_cost);
+    }
     return 0;
   }
 
@@ -62,7 +66,8 @@ class RecordingLines : public gpio::Lines {
   std::map<int, int> inputs;
   std::size_t calls = 0;
   int fail_after = -1;  ///< so many writes are good, and the one after them fails
-  int broken = -1;      ///< a write gets as far as this output, and fails
+  pulse::Nanoseconds write_cost = 0;
+  int broken = -1;  ///< a write gets as far as this output, and fails
 
  private:
   pulse::VirtualClock& clock_;

@@ -22,7 +22,9 @@ struct Step {
 ///
 /// The curve is followed in stretches in which the speed only rises or only falls, each from its
 /// slow end. Without a jerk all terms of the equation have one sign there, and the root in the form
-/// 2 x / (v + sqrt(v^2 + 2 a x)) cancels nothing. With one it is Newton's method, from where the
+/// 2 x / (v + sqrt(v^2 + 2 a x)) cancels nothing. The form (sqrt(v^2 + 2 a x) - v)/a, which needs
+/// no division, is off by some 2^-52 V/a, with V the speed at the fast end: it serves where the
+/// motor takes less than hours from rest to V. With a jerk it is Newton's method, from where the
 /// cubic through the last four steps' times expects the next step: that is mostly so near that one
 /// iteration is enough, which the second term of its error, a dt^2/(2 v), tells without another
 /// evaluation. Else more of them follow, from the last step's time, kept inside a bracket.
@@ -46,21 +48,24 @@ class StepFinder {
   // A part of a piece in which the speed only rises or only falls, as seen from its slow end
   // ("anchor"): the way from there is v t + a t^2/2 + j t^3/6 with t away from the anchor.
   struct Stretch {
-    enum class Curve { kLine, kParabola, kCubic };
+    // The first two for all but the longest stretches.
+    enum class Curve { kShortLine, kShortParabola, kLine, kParabola, kCubic };
     Curve curve = Curve::kLine;
     int direction = 0;       // of the motion
-    double half = 0.0;       // of a step in that direction
     double time_sign = 1.0;  // +1: the anchor is the beginning, -1: it is the end
-    double way_sign = 1.0;   // of the count away from the anchor
     Split anchor_ns;         // motion time
-    Split anchor_position;   // microsteps
+    // The next line lies way + way_rest from the anchor; with each step that changes by way_step.
+    std::int64_t way = 0;
+    std::int64_t way_step = 0;
+    double way_rest = 0.0;
     double v = 0.0;
     double a = 0.0;
     double j = 0.0;
     double v_squared = 0.0;
     double twice_a = 0.0;
-    double ns_per_s = 1e9;  // with time_sign
-    double duration = 0.0;  // s
+    double ns_per_s = 1e9;     // with time_sign
+    double ns_per_unit = 0.0;  // ns_per_s / v of a kShortLine, ns_per_s / a of a kShortParabola
+    double duration = 0.0;     // s
     // s from the anchor: the times of the last steps, the latest first.
     std::array<double, 4> last = {};
     int known = 0;  // of these
@@ -71,10 +76,13 @@ class StepFinder {
 
   bool enterNext();
   void enter(const Piece& piece, DoubleDouble begin, DoubleDouble end, DoubleDouble piece_start);
+  bool give(Step& step, std::int64_t time_ns);
+  bool nextOfNewStretch(Step& step);
+  bool nextOfOther(Step& step, double way);
   double timeFromAnchor(double way);
   double cubicTime(double way);
   double bracketedTime(double way) const;
-  std::int64_t refined(double t, double line) const;
+  std::int64_t refined(double t) const;
 
   const Profile* profile_ = nullptr;
   std::size_t piece_ = 0;

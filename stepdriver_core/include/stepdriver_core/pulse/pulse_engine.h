@@ -117,6 +117,8 @@ class PulseEngine {
   void scheduleAll();
   bool schedule(Channel& channel);
   bool scheduleRise(Channel& channel);
+  static Nanoseconds closestRise(const Channel& channel);
+  bool slideUpTo(Nanoseconds earliest, Nanoseconds planned);
   void slide(Nanoseconds by);
   std::size_t indexOf(const Channel& channel) const;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -19,12 +20,16 @@ class Snapshot {
 
   /// From one thread at a time.
   void store(const T& value) {
-    std::array<std::uint64_t, kWords> words{};
-    std::memcpy(words.data(), &value, sizeof(T));
     const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);
     sequence_.store(sequence + 1, std::memory_order_relaxed);
     std::atomic_thread_fence(std::memory_order_release);
-    for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_relaxed);
+    // Word by word from where it is: a copy of the whole would cost as much again.
+    const auto* bytes = reinterpret_cast<const unsigned char*>(&value);
+    for (std::size_t i = 0; i < kWords; ++i) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, bytes + 8 * i, std::min<std::size_t>(8, sizeof(T) - 8 * i));
+      words_[i].store(word, std::memory_order_relaxed);
+    }
     sequence_.store(sequence + 2, std::memory_order_release);
   }
 
