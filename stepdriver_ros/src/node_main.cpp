@@ -42,9 +42,9 @@ Drives the axes of the parameter ~axes by services, and publishes where they are
 Ends on SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill`: decelerates, disables and releases the
 lines.
 
-  services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
-              ~AXIS/set_limits  ~AXIS/home  ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset
-              ~AXIS/stop
+  services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
+              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
+              ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~home
               ~move_line  ~hold  ~resume
               ~rig/report  ~rig/emergency_stop (on the simulated rig)

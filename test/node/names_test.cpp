@@ -7,6 +7,7 @@
 #include <stepdriver/RigReport.h>
 
 #include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 

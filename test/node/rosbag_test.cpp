@@ -2,16 +2,21 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 #include <ros/master.h>
+#include <ros/network.h>
+#include <ros/this_node.h>
 #include <sensor_msgs/JointState.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Jog.h>
 #include <stepdriver/MoveAction.h>
 #include <unistd.h>
+#include <xmlrpcpp/XmlRpc.h>
 
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -46,6 +51,30 @@ std::set<std::string> topicsBelow(const std::string& name_space) {
   return names;
 }
 
+/// Topics that a node publishes to rosbag's recorder, over a connection that is there.
+std::set<std::string> topicsToTheRecorder(const std::string& node) {
+  XmlRpc::XmlRpcValue request;
+  XmlRpc::XmlRpcValue response;
+  XmlRpc::XmlRpcValue uri;
+  request[0] = ros::this_node::getName();
+  request[1] = node;
+  if (!ros::master::execute("lookupNode", request, response, uri, false)) return {};
+  std::string host;
+  std::uint32_t port = 0;
+  if (!ros::network::splitURI(uri, host, port)) return {};
+  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+  XmlRpc::XmlRpcValue caller;
+  caller[0] = ros::this_node::getName();
+  if (!client.execute("getBusInfo", caller, response) || client.isFault()) return {};
+  std::set<std::string> topics;
+  for (int i = 0; i < response[2].size(); ++i) {
+    XmlRpc::XmlRpcValue& connection = response[2][i];
+    const std::string to = connection[1];
+    if (to.rfind("/record_", 0) == 0) topics.insert(static_cast<std::string>(connection[4]));
+  }
+  return topics;
+}
+
 class Bag : public testing::Test {
  protected:
   ~Bag() override { std::filesystem::remove(file); }
@@ -55,17 +84,17 @@ class Bag : public testing::Test {
         std::vector<std::string>{"rosrun", "rosbag", "record", "-O", file, "-e",
                                  space + "/.*|/diagnostics"},
         kEnv);
-    const auto listens = [this](const std::string& topic) {
-      return recorder->output().find("Subscribing to " + topic + "\n") != std::string::npos;
-    };
-    EXPECT_TRUE(waitUntil([&] {
-      return std::all_of(topics.begin(), topics.end(), listens) && listens("/diagnostics");
+    EXPECT_TRUE(waitUntil([this] {
+      std::set<std::string> heard = topicsToTheRecorder(node.name());
+      heard.merge(topicsToTheRecorder(ros::this_node::getName()));
+      return heard.count("/diagnostics") == 1 &&
+             std::all_of(kPublished.begin(), kPublished.end(),
+                         [&](const char* topic) { return heard.count(space + topic) == 1; });
     })) << recorder->output();
   }
 
   NodeUnderTest node;
   const std::string space = node.name().substr(0, node.name().rfind('/'));
-  std::set<std::string> topics;
   const std::string file =
       std::filesystem::temp_directory_path() / ("stepdriver_" + std::to_string(getpid()) + ".bag");
   std::unique_ptr<NodeProcess> recorder;
@@ -76,7 +105,7 @@ TEST_F(Bag, RecordsEveryTopicOfTheNodeAndPlaysItBack) {
   node.start();
   actionlib::SimpleActionClient<MoveAction> client(node.full("x/move"), false);
   ASSERT_TRUE(client.waitForServer(ros::Duration(kBound.count())));
-  topics = topicsBelow(space);
+  const std::set<std::string> topics = topicsBelow(space);
   for (const char* topic : kPublished) EXPECT_EQ(topics.count(space + topic), 1U) << topic;
   const Recorder<AxisStates> live(node.full("axis_states"));
   record();
