@@ -126,14 +126,14 @@ BENCHMARK(stepsOfCubics)->Name("NextStep/cubics");
 
 // ---- straight lines
 
-/// The axes go 1, 0.9, 0.8... times as far as the path; a step of each, in turn.
+/// Each axis goes a little less far than the one before; a step of each, in turn.
 void stepsOfLine(benchmark::State& state) {
   const Profile path = trapezoid();
   std::vector<Profile> profiles;
   std::vector<StepErrors> errors;
   std::int64_t steps = 0;
   for (std::int64_t axis = 0; axis < state.range(0); ++axis) {
-    const std::int64_t way = kSteps * (10 - axis) / 10;
+    const std::int64_t way = kSteps - 137 * axis;
     const motion::DoubleDouble scale =
         motion::fromInteger(way) / motion::DoubleDouble(static_cast<double>(kSteps));
     profiles.push_back(motion::scaled(path, 0.0, scale));

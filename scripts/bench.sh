@@ -52,6 +52,12 @@ for program in "$bench"/core/bench/*_bench; do
   quietly "${program##*/}" run_bench "$program"
 done
 
+# Only where it is on this machine: the core's figures need no ROS.
+if [[ -x /usr/bin/roscore || -x /usr/bin/catkin_make ]]; then
+  say "Running node_bench"
+  bash "$root/scripts/node_bench.sh"
+fi
+
 say "" "Medians of $repetitions repetitions, on $(nproc) cores, load $(cut -d' ' -f1 /proc/loadavg)" ""
 held=0
 /usr/bin/python3 "$root/scripts/bench_table.py" "$root/bench/figures.txt" "$bench/table.json" \

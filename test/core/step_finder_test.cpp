@@ -170,5 +170,22 @@ TEST(StepFinder, IsExactAtTheEndOfALongSlowdown) {
   }
 }
 
+TEST(StepFinder, IsExactInLongRampsFromSlowSpeeds) {
+  // Hours from rest to full speed: just below and above where it takes another form of the root.
+  for (const double speed : {19'000.0, 21'000.0}) {
+    const auto exact = [](long double line) { return std::sqrt(25.0L + 2.0L * line) - 5.0L; };
+    const Profile profile = onePiece(speed, 0.0, 5.0, 1.0, 0.0);
+    Step step;
+    for (const std::int64_t from : {0, 170'000'000}) {
+      StepFinder finder(profile, from);
+      for (std::int64_t k = from; k < from + 20'000; ++k) {
+        ASSERT_TRUE(finder.next(step));
+        ASSERT_LE(std::abs(step.time_ns - exact(k + 0.5L) * 1e9L), 0.6L) << "step " << k;
+        ASSERT_EQ(finder.count(), k + 1);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::motion

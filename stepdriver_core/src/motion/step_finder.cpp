@@ -30,8 +30,9 @@ double firstCut(const Piece& piece, double after) {
 
 }  // namespace
 
-StepFinder::StepFinder(const Profile& profile, std::int64_t count)
-    : profile_(&profile), count_(count) {}
+StepFinder::StepFinder(const Profile& profile, std::int64_t count) : profile_(&profile) {
+  stretch_.anchor_count = count;
+}
 
 // Inline: these two are the way of each step.
 inline double StepFinder::cubicTime(double way) {
@@ -70,11 +71,8 @@ inline double StepFinder::timeFromAnchor(double way) {
 
 inline bool StepFinder::give(Step& step, std::int64_t time_ns) {
   Stretch& s = stretch_;
-  s.begin_ns = std::min(std::max(time_ns, s.begin_ns), s.end_ns);
   s.way += s.way_step;
-  --s.steps_left;
-  count_ += s.direction;
-  step.time_ns = s.begin_ns;
+  step.time_ns = std::min(std::max(time_ns, s.begin_ns), s.end_ns);
   step.direction = s.direction;
   return true;
 }
@@ -82,7 +80,7 @@ inline bool StepFinder::give(Step& step, std::int64_t time_ns) {
 // What is rare or long stays out of here: so there is no stack frame.
 bool StepFinder::next(Step& step) {
   const Stretch& s = stretch_;
-  if (s.steps_left == 0) return nextOfNewStretch(step);
+  if (s.way == s.way_end) return nextOfNewStretch(step);
   const double way = std::max(static_cast<double>(s.way) + s.way_rest, 0.0);
   double ns = 0.0;
   if (s.curve == Stretch::Curve::kShortLine) {
@@ -96,7 +94,7 @@ bool StepFinder::next(Step& step) {
 }
 
 bool StepFinder::nextOfNewStretch(Step& step) {
-  while (stretch_.steps_left == 0) {
+  while (stretch_.way == stretch_.way_end) {
     if (!enterNext()) return false;
   }
   return next(step);
@@ -122,7 +120,6 @@ bool StepFinder::enterNext() {
 
 void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
                        DoubleDouble piece_start) {
-  stretch_.steps_left = 0;
   const DoubleDouble from = piece.positionAt(begin);
   const DoubleDouble to = piece.positionAt(end);
   const double travel = (to - from).hi;
@@ -134,7 +131,8 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   const std::int64_t reached =
       direction > 0.0 ? goal.whole + static_cast<std::int64_t>(std::ceil(goal.rest - 0.5))
                       : goal.whole + static_cast<std::int64_t>(std::floor(goal.rest + 0.5));
-  const std::int64_t steps = direction > 0.0 ? reached - count_ : count_ - reached;
+  const std::int64_t stands = count();
+  const std::int64_t steps = direction > 0.0 ? reached - stands : stands - reached;
   if (steps <= 0) return;
 
   const double v_begin = direction * piece.velocityAt(begin).value();
@@ -151,13 +149,16 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   };
   stretch_.anchor_ns = motion_time(anchor);
   const Split anchor_position = backwards ? goal : split(from);
-  const std::int64_t away = backwards ? -stretch_.direction : stretch_.direction;
-  stretch_.way = away * (count_ - anchor_position.whole);
+  stretch_.anchor_count = anchor_position.whole;
+  stretch_.away = backwards ? -stretch_.direction : stretch_.direction;
+  stretch_.way = stretch_.away * (stands - anchor_position.whole);
   stretch_.way_step = backwards ? -1 : 1;
-  stretch_.way_rest = static_cast<double>(away) * (direction * 0.5 - anchor_position.rest);
+  stretch_.way_end = stretch_.way + steps * stretch_.way_step;
+  const auto away = static_cast<double>(stretch_.away);
+  stretch_.way_rest = away * (direction * 0.5 - anchor_position.rest);
   stretch_.v = std::max(0.0, backwards ? v_end : v_begin);
   stretch_.v_squared = stretch_.v * stretch_.v;
-  stretch_.a = static_cast<double>(away) * piece.accelerationAt(anchor).value();
+  stretch_.a = away * piece.accelerationAt(anchor).value();
   stretch_.twice_a = 2.0 * stretch_.a;
   stretch_.j = direction * piece.j;
   stretch_.duration = (end - begin).value();
@@ -177,7 +178,6 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   stretch_.known = 0;
   stretch_.begin_ns = motion_time(begin).whole;
   stretch_.end_ns = motion_time(end).whole;
-  stretch_.steps_left = steps;
 }
 
 double StepFinder::bracketedTime(double way) const {

@@ -42,7 +42,7 @@ class StepFinder {
   bool next(Step& step);
 
   /// Where the axis stands after the steps that next() has given.
-  std::int64_t count() const { return count_; }
+  std::int64_t count() const { return stretch_.anchor_count + stretch_.away * stretch_.way; }
 
  private:
   // A part of a piece in which the speed only rises or only falls, as seen from its slow end
@@ -54,10 +54,14 @@ class StepFinder {
     int direction = 0;       // of the motion
     double time_sign = 1.0;  // +1: the anchor is the beginning, -1: it is the end
     Split anchor_ns;         // motion time
-    // The next line lies way + way_rest from the anchor; with each step that changes by way_step.
+    std::int64_t anchor_count = 0;
+    std::int64_t away = 1;  // of the count, where it goes away from the anchor: +1 or -1
+    // Steps from the anchor. It is all that a step without a jerk changes: what each step stores
+    // and the next one loads is what steps of several finders in turn wait for.
     std::int64_t way = 0;
     std::int64_t way_step = 0;
-    double way_rest = 0.0;
+    std::int64_t way_end = 0;
+    double way_rest = 0.0;  // the next line lies way + way_rest from the anchor
     double v = 0.0;
     double a = 0.0;
     double j = 0.0;
@@ -71,7 +75,6 @@ class StepFinder {
     int known = 0;  // of these
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
-    std::int64_t steps_left = 0;
   };
 
   bool enterNext();
@@ -87,7 +90,6 @@ class StepFinder {
   const Profile* profile_ = nullptr;
   std::size_t piece_ = 0;
   double done_ = 0.0;  // s of the piece that earlier stretches have covered
-  std::int64_t count_ = 0;
   Stretch stretch_;
 };
 
