@@ -84,9 +84,10 @@ double callTime(ros::ServiceClient& client, double position) {
   stepdriver::MoveTo call;
   call.request.position = position;
   const auto begin = SteadyTime::now();
-  if (!client.call(call) || !call.response.success) {
-    throw std::runtime_error("a call failed: " + call.response.message);
+  if (!client.call(call)) {
+    throw std::runtime_error("a call of " + client.getService() + " got no answer");
   }
+  if (!call.response.success) throw std::runtime_error("refused: " + call.response.message);
   return secondsSince(begin) * 1e6;
 }
 
