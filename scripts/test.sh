@@ -141,6 +141,8 @@ test_kernel() {
   ((status != skip_status)) || skip "$reason"
   ((status == 0)) || die "$reason"
   bash "$src/test/kernel/rig_test.sh" "$build/core/test/kernel/trace_to_vcd"
+  STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --chip rig:rig:8 -- \
+    bash "$src/test/operations/udev_test.sh"
   test_lines_in_kernel "$build/core"
   test_waveform_in_kernel "$build/core"
 }

@@ -91,4 +91,4 @@ on_b rosparam load "$configuration" /stepdriver
 on_b "$catkin/devel/lib/stepdriver/node_bench" "$node" 6 "$build/bench/two_hosts.json" \
   >"$build/log/two-hosts-bench.log" 2>&1 || die "node_bench failed: see $build/log/two-hosts-bench.log"
 say "A node on the other host, with its master across the cable:"
-sed 's/.*{"name": [^,]*, //; s/[}\]]*$//; s/, /\n/g' "$build/bench/two_hosts.json" | indent
+sed 's/.*{"name": [^,]*, //; s/[]}]*$//; s/, /\n/g' "$build/bench/two_hosts.json" | indent

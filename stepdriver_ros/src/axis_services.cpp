@@ -4,6 +4,28 @@
 #include "text.h"
 
 namespace stepdriver::ros_node {
+namespace {
+
+/// What differs, in words: "max_speed 0.05 m/s instead of 0.1 m/s".
+std::string changesText(const axis::AxisLimits& before, const axis::AxisLimits& now,
+                        const std::string& unit) {
+  std::string text;
+  const auto compare = [&](const char* what, double was, double is, const char* per) {
+    if (was == is) return;
+    const auto shown = [&](double value) {
+      return value > 0.0 ? numberText(value) + " " + unit + per : std::string("none");
+    };
+    text += (text.empty() ? "" : ", ") + std::string(what) + " " + shown(is) + " instead of " +
+            shown(was);
+  };
+  compare("max_speed", before.max_speed, now.max_speed, "/s");
+  compare("acceleration", before.acceleration, now.acceleration, "/s^2");
+  compare("deceleration", before.deceleration, now.deceleration, "/s^2");
+  compare("jerk", before.jerk, now.jerk, "/s^3");
+  return text.empty() ? "all limits are as they were" : text;
+}
+
+}  // namespace
 
 template <typename Service>
 void AxisServices::advertise(const std::string& name, Handler<Service> handler,
@@ -20,6 +42,7 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
   advertise<MoveRounds>("move_rounds", &AxisServices::moveRounds, own);
   advertise<Plan>("plan", &AxisServices::plan, own);
   advertise<Microstep>("microstep", &AxisServices::microstep, own);
+  advertise<SetLimits>("set_limits", &AxisServices::setLimits, own);
   advertise<SetPosition>("set_position", &AxisServices::setPosition, own);
   advertise<std_srvs::SetBool>("enable", &AxisServices::enable, own);
   advertise<std_srvs::SetBool>("sleep", &AxisServices::sleep, own);
@@ -98,6 +121,21 @@ bool AxisServices::microstep(Microstep::Request& request, Microstep::Response& r
                        (request.microsteps == 1 ? " microstep" : " microsteps") + " per full step";
   });
   response.microsteps = axis_.state().microsteps;
+  return true;
+}
+
+bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& response) {
+  answer(response, [&] {
+    const axis::AxisLimits before = axis_.limits();
+    axis_.setLimits({request.max_speed, request.acceleration, request.deceleration, request.jerk});
+    response.message = axis_.config().name + ": " +
+                       changesText(before, axis_.limits(), unitOf(axis_.config().kind));
+  });
+  const axis::AxisLimits holding = axis_.limits();
+  response.max_speed = holding.max_speed;
+  response.acceleration = holding.acceleration;
+  response.deceleration = holding.deceleration;
+  response.jerk = holding.jerk;
   return true;
 }
 

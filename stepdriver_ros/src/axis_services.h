@@ -8,6 +8,7 @@
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/Plan.h>
+#include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
 
 #include <string>
@@ -40,6 +41,7 @@ class AxisServices {
   bool moveRounds(MoveRounds::Request& request, MoveRounds::Response& response);
   bool plan(Plan::Request& request, Plan::Response& response);
   bool microstep(Microstep::Request& request, Microstep::Response& response);
+  bool setLimits(SetLimits::Request& request, SetLimits::Response& response);
   bool setPosition(SetPosition::Request& request, SetPosition::Response& response);
   bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool sleep(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);

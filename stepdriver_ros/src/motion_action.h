@@ -33,7 +33,10 @@ class MotionAction {
 
   /// Tells the clients what has become of their goals; to be called each kLookPeriod.
   void look() {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    // A goal that begins may wait for a chip to wake, or be long to plan; this thread has others to
+    // look at.
+    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock()) return;
     concludeEnded();
     looks_ = (looks_ + 1) % kLooksPerFeedback;
     for (Following& following : under_way_) watch(following, looks_ == 0);

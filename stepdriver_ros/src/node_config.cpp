@@ -55,6 +55,7 @@ NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
   config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
+  config.hardware_id = reader.text("hardware_id", config.hardware_id);
   config.state_file = reader.text("state_file", config.state_file);
   if (!config.state_file.empty() && config.state_file[0] != '/') {
     reader.issue("state_file", "is " + reader.shown("state_file") +

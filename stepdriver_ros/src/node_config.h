@@ -24,6 +24,7 @@ struct NodeConfig {
   std::vector<axis::AxisConfig> axes;
   std::optional<axis::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
   std::string state_file;                           ///< the same
+  std::string hardware_id;                          ///< of diagnostics; empty: made from the rest
 };
 
 /// Reads the node's private parameters.
@@ -39,6 +40,7 @@ struct NodeConfig {
 /// emergency_stop:                # optional; see axis::readInputSwitch()
 ///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
 /// state_file: ""                 # absolute path of a file that keeps the positions; empty: none
+/// hardware_id: ""                # of diagnostics; empty: the host and the driver chips
 /// simulation: {...}              # see readSimulation(); only a simulated node heeds it
 /// axes: {...}                    # see axis::readAxes()
 /// @endcode

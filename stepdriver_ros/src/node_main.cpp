@@ -10,6 +10,7 @@
 #include "axis_services.h"
 #include "bring_up.h"
 #include "call_queues.h"
+#include "diagnostics.h"
 #include "end_requests.h"
 #include "hardware.h"
 #include "homing_server.h"
@@ -41,15 +42,16 @@ Drives the axes of the parameter ~axes by services, and publishes where they are
 Ends on SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill`: decelerates, disables and releases the
 lines.
 
-  services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/microstep  ~AXIS/set_position
+  services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
+              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
-              ~stop  ~emergency_stop  ~recover  ~speed_override
+              ~stop  ~emergency_stop  ~recover  ~speed_override  ~home
               ~move_line  ~hold  ~resume
               ~rig/report  ~rig/emergency_stop (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states  ~jog, ~command (subscribed)
+  topics      joint_states  ~endstops  ~axis_states  /diagnostics  ~jog, ~command (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
-              ~simulation  robot_description
+              ~state_file  ~hardware_id  ~simulation  robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
 3 the machine is too slow for its axes and ~realtime is enforce, 64 wrong usage.
@@ -131,10 +133,15 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues);
   TrajectoryAction trajectory_action(private_node, machine, queues);
+  const std::string description = hardware.description();
+  const Diagnostics diagnostics(
+      node, private_node, machine, queues,
+      config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
+      config.max_lateness);
   queues.start();
   publisher.start();
   ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
-           machine.axes().size() == 1 ? "axis" : "axes", hardware.description().c_str(),
+           machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
            machine.figures().realtime.c_str());
 
   std::string who;

@@ -115,6 +115,20 @@ TEST_F(EmergencyStopInput, IsNamedAlsoWhereAnotherEmergencyStopComesFirstOrLater
   EXPECT_EQ(bench->axis().state().fault, "emergency stop input");
 }
 
+// Machine::recover() ends the stop, and then each axis's fault: a stop that comes between is none
+// that an axis may clear.
+TEST_F(EmergencyStopInput, IsNotClearedByAnAxisThatIsRecoveredWhenItHasComeMeanwhile) {
+  make({linearAxis("x"), linearAxis("y")});
+  bench->machine->emergencyStop();
+  bench->machine->recover();
+  ASSERT_EQ(bench->axis("x").state().fault, "");
+  press(true);
+  bench->machine->advance(0.1);
+  EXPECT_REFUSED(bench->axis("x").recover(), "an emergency stop has come meanwhile");
+  EXPECT_EQ(bench->axis("x").state().fault, "emergency stop input");
+  EXPECT_REFUSED(bench->axis("x").moveTo(0.001), "emergency stop input; call recover");
+}
+
 TEST(EmergencyStopInputAtStart, FindsEveryAxisAtFaultAndEnergizesNone) {
   for (const bool active_level : {true, false}) {
     const std::vector<axis::AxisConfig> axes = {linearAxis("x"), linearAxis("y")};

@@ -74,7 +74,7 @@ TEST_F(Draw, RefusesBeforeAnythingMoves) {
   expect_fails("10 10\n10 300\n", "(10, 300) mm is beyond the soft limits of y");
   expect_fails("10 10\nten 30\n", "line 2: ten 30");
   expect_fails("", "there is no line");
-  EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 2);
+  EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 64);
   EXPECT_EQ(runProgram("draw", {"--help"}).code, 0);
   EXPECT_EQ(node.pulses(), 0);
   EXPECT_FALSE(picture.exists());

@@ -40,7 +40,7 @@ TEST(PlotMotion, SaysWhyItDrawsNothing) {
   expect_fails("x", "0.3", 1, "above the soft limit");
   expect_fails("x", "0", 1, "nothing would move");
   expect_fails("z", "0.1", 1, "has no axis z: its axes are x");
-  expect_fails("x", "nan", 2, "must be a finite number");
+  expect_fails("x", "nan", 64, "must be a finite number");
 }
 
 TEST(PlotMotion, DrawsThePulsesOfATrace) {
@@ -63,8 +63,8 @@ TEST(PlotMotion, HasHelpAndRefusesWhatItDoesNotKnow) {
   const auto help = runProgram("plot_motion", {"--help"});
   EXPECT_EQ(help.code, 0);
   expectSays(help.output, "plot_motion plan --axis x --to 0.15");
-  EXPECT_EQ(runProgram("plot_motion", {}).code, 2);
-  EXPECT_EQ(runProgram("plot_motion", {"bag", "none.bag", "-o", "x.gif"}).code, 2);
+  EXPECT_EQ(runProgram("plot_motion", {}).code, 64);
+  EXPECT_EQ(runProgram("plot_motion", {"bag", "none.bag", "-o", "x.gif"}).code, 64);
 }
 
 }  // namespace

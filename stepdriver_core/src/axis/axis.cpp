@@ -66,6 +66,16 @@ void Axis::setSpeedOverride(double factor) {
   impl_->changeOverride(factor);
 }
 
+void Axis::setLimits(const AxisLimits& wanted) {
+  const Lock lock(impl_->mutex);
+  impl_->changeLimits(wanted);
+}
+
+AxisLimits Axis::limits() const {
+  const Lock lock(impl_->mutex);
+  return impl_->limits_next;
+}
+
 void Axis::stop() {
   const Lock lock(impl_->mutex);
   impl_->decelerate("it was stopped");
@@ -209,6 +219,7 @@ AxisState Axis::state() const {
   state.planned = state.position;
   state.target = state.position;
   state.fault = axis.fault;
+  if (!axis.fault.empty()) state.remedy = axis.remedy;
   if (!axis.position_valid) state.position_note = axis.position_note;
   if (axis.held && axis.held->goal.target) {
     state.target = axis.positionOf(static_cast<double>(*axis.held->goal.target));
@@ -265,7 +276,7 @@ void Axis::noteEmergencyStop() {
   Impl& axis = *impl_;
   axis.interruptHoming("emergency stop");
   axis.driver.waitFor([&axis] { return !axis.moving(); });
-  if (axis.fault != Impl::kEmergencyStopInput) axis.fault = Impl::kEmergencyStop;
+  axis.latchEmergencyStop(Impl::kEmergencyStop);
   axis.dropHeld(MoveEnd::kEmergencyStop, axis.fault);
 }
 

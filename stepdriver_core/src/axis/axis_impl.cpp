@@ -12,6 +12,11 @@ namespace {
 
 constexpr const char* kChipFault =
     "the driver chip reports over-current or over-temperature on nFAULT";
+constexpr const char* kChipRemedy =
+    "let it cool down, check the motor's wiring and the current that is set, then call recover";
+constexpr const char* kLateRemedy =
+    "lower the axis's speed or the machine's load (stepdriver_check tells what it holds), call "
+    "recover, and home it or set its position";
 
 }  // namespace
 
@@ -28,7 +33,9 @@ Axis::Impl::Impl(AxisConfig axis_config, int engine_channel, const AxisLines& ow
       channel(engine_channel),
       mutex(all_mutex),
       enabled(!pins.hasEnable()),
-      microsteps(config.microsteps) {
+      microsteps(config.microsteps),
+      limits_now{config.max_speed, config.acceleration, config.deceleration, config.jerk},
+      limits_next(limits_now) {
   if (pins.hasEnable()) on_enable_line_ = axis_lines.enable_line->join();
 }
 
@@ -38,14 +45,14 @@ pulse::ChannelState Axis::Impl::harvest() {
   const pulse::ChannelState state = driver.engine().channel(channel);
   if (state.line_errors != line_errors_seen_) {
     line_errors_seen_ = state.line_errors;
-    fault = failureText(state.failure);
+    latch(failureText(state.failure), "then call recover");
     position_valid = false;
     pins_doubtful_ = true;
   }
   if (state.chip_faults != chip_faults_seen_) {
     chip_faults_seen_ = state.chip_faults;
     if (!isAsleep()) {
-      fault = kChipFault;
+      latch(kChipFault, kChipRemedy);
       position_valid = false;
     }
   }
@@ -56,7 +63,7 @@ pulse::ChannelState Axis::Impl::harvest() {
   // Read after the state: what the input has ended is known to be its doing.
   if (const std::uint64_t stops = driver.engine().inputStops(); stops != input_stops_seen_) {
     input_stops_seen_ = stops;
-    fault = kEmergencyStopInput;
+    latchEmergencyStop(kEmergencyStopInput);
   }
   if (state.ended != ended_seen_) {
     ended_seen_ = state.ended;
@@ -64,6 +71,7 @@ pulse::ChannelState Axis::Impl::harvest() {
     conclude(state);
   }
   if (!position_valid) homed = false;
+  if (state.following == 0) limits_now = limits_next;
   log.dropBefore(state.following != 0 ? state.following : state.ended);
   if (held && !fault.empty()) {
     dropHeld(fault == kEmergencyStopInput ? MoveEnd::kEmergencyStop : MoveEnd::kFault, fault);
@@ -74,11 +82,12 @@ pulse::ChannelState Axis::Impl::harvest() {
 void Axis::Impl::conclude(const pulse::ChannelState& state) {
   switch (state.end) {
     case pulse::EndReason::kEmergencyStop:
-      if (fault != kEmergencyStopInput) fault = kEmergencyStop;
+      latchEmergencyStop(kEmergencyStop);
       break;
     case pulse::EndReason::kTooLate:
-      fault = "a pulse was " + inMilliseconds(state.end_lateness) +
-              " late, more than the motor can go on from at this speed";
+      latch("a pulse was " + inMilliseconds(state.end_lateness) +
+                " late, more than the motor can go on from at this speed",
+            kLateRemedy);
       position_valid = false;
       break;
     default:
@@ -93,6 +102,18 @@ void Axis::Impl::conclude(const pulse::ChannelState& state) {
     return;  // it goes on later
   }
   log.conclude(motion->goal.move, resultOf(*motion, state));
+}
+
+void Axis::Impl::latch(const std::string& what, const std::string& what_to_do) {
+  fault = what;
+  remedy = what_to_do;
+}
+
+// By the input it is known to be the input's.
+void Axis::Impl::latchEmergencyStop(const char* which) {
+  if (fault == kEmergencyStopInput) return;
+  latch(which, which == kEmergencyStopInput ? "release the button, then call recover"
+                                            : "call recover when all is safe");
 }
 
 MoveResult Axis::Impl::resultOf(const Motion& motion, const pulse::ChannelState& state) {
@@ -168,7 +189,7 @@ double Axis::Impl::maxSpeed() const {
   // At finer microsteps than the configured ones the chip's own limit may come first.
   const double period =
       static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
-  return std::min(config.max_speed, 1.0 / (period * stepsPerUnit()));
+  return std::min(limits_now.max_speed, 1.0 / (period * stepsPerUnit()));
 }
 
 std::int64_t Axis::Impl::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
@@ -186,8 +207,8 @@ double Axis::Impl::jointAt(double motor) {
 
 motion::MotionLimits Axis::Impl::limits(double velocity) const {
   const double scale = stepsPerUnit();
-  return {config.start_speed * scale, velocity * scale, config.acceleration * scale,
-          config.deceleration * scale, config.jerk * scale};
+  return {config.start_speed * scale, velocity * scale, limits_now.acceleration * scale,
+          limits_now.deceleration * scale, limits_now.jerk * scale};
 }
 
 double Axis::Impl::stopDeceleration() const {

@@ -82,6 +82,7 @@ class Axis::Impl {
   /// the lock while it does so.
   void takeUpBacklash(std::unique_lock<std::mutex>& lock, std::int64_t way);
   void changeOverride(double factor);
+  void changeLimits(const AxisLimits& wanted);
   /// Whether this is the axis to ask for what it follows or has kept: of a course that is the
   /// first.
   bool leads();
@@ -121,6 +122,8 @@ class Axis::Impl {
   const HomingConfig& homingConfig() const;
   void interruptHoming(const std::string& why) const;
 
+  void latch(const std::string& what, const std::string& what_to_do);
+  void latchEmergencyStop(const char* which);
   // A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const;
   int readInput(int line) const;
@@ -136,6 +139,7 @@ class Axis::Impl {
   void refuseUnlessReady();
   void refuseWhileHeld() const;
   void refuseTooFast(double speed) const;
+  double checkedLimit(const char* what, double wanted, double configured, const char* per) const;
   void refuseBeyondLimits(double position, const std::string& what) const;
   void refuseIntoEndstop(std::int64_t steps) const;
   std::optional<bool> endstopActive(int line, const std::optional<Endstop>& endstop) const;
@@ -163,7 +167,10 @@ class Axis::Impl {
   std::int64_t home_count = 0;        // a count at which the translator is at Home
   pulse::Nanoseconds rest_since = 0;  // clock time of the last thing that it did
   double speed_override = 1.0;
+  AxisLimits limits_now;   // of the motion under way
+  AxisLimits limits_next;  // of those that begin at rest; the speed is that of now
   std::string fault;
+  std::string remedy;
   std::string position_note;
   std::string closed;
   MoveLog log;

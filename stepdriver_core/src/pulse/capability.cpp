@@ -88,13 +88,13 @@ class CallMeter {
 Capability asPulseThread(Clock& clock, const std::function<bool(Capability&)>& measure_calls) {
   Capability capability;
   capability.rights.memory_error = lockMemory();
-  capability.guard = clock.guard();
   std::thread([&] {
     capability.rights.scheduler_error = askForScheduler();
     if (!measure_calls(capability)) return;
     capability.lateness = latenessOf(clock, &Clock::waitUntil, kMeasuredWakeUps);
     capability.sleep_lateness = latenessOf(clock, &Clock::sleepUntil, kMeasuredSleeps);
   }).join();
+  capability.guard = clock.guard();  // as it is after the wake-ups that it may learn from
   return capability;
 }
 

@@ -12,11 +12,6 @@
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kLongestGuard = 200'000;
-
-constexpr Nanoseconds kSpinWindow = 100'000'000;
-constexpr auto kSpinBudget = static_cast<Nanoseconds>(SteadyClock::kMostSpinning * kSpinWindow);
-
 Nanoseconds steadyNow() {
   timespec time{};
   clock_gettime(CLOCK_MONOTONIC, &time);
@@ -32,33 +27,30 @@ void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32
           time == kNever ? nullptr : &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
 }
 
+// The calling thread, as HybridWait wants it.
+struct WakeableThread {
+  std::atomic<std::uint32_t>& wakes;
+  const std::uint32_t seen;
+
+  static Nanoseconds now() { return steadyNow(); }
+  bool woken() const { return wakes.load(std::memory_order_acquire) != seen; }
+  void sleepUntil(Nanoseconds time) { sleepOnWord(time, wakes, seen); }
+};
+
 }  // namespace
 
-SteadyClock::SteadyClock(Nanoseconds guard)
-    : guard_(std::clamp<Nanoseconds>(guard, 0, kLongestGuard)) {}
+SteadyClock::SteadyClock(std::optional<Nanoseconds> guard)
+    : wait_(guard ? std::clamp<Nanoseconds>(*guard, 0, GuardLearner::kLongest) : guard) {}
 
 Nanoseconds SteadyClock::now() { return steadyNow(); }
 
-void SteadyClock::waitUntil(Nanoseconds time) {
-  const Nanoseconds now = steadyNow();
-  if (now - window_ > kSpinWindow) {
-    window_ = now;
-    spun_ = 0;
-  }
-  wait(time, spun_ < kSpinBudget ? guard_ : 0);
-}
+void SteadyClock::waitUntil(Nanoseconds time) { wait(time, true); }
 
-void SteadyClock::sleepUntil(Nanoseconds time) { wait(time, 0); }
+void SteadyClock::sleepUntil(Nanoseconds time) { wait(time, false); }
 
-void SteadyClock::wait(Nanoseconds time, Nanoseconds guard) {
-  Nanoseconds now = steadyNow();
-  while (wakes_.load(std::memory_order_acquire) == seen_ && now < time - guard) {
-    sleepOnWord(time == kNever ? kNever : time - guard, wakes_, seen_);
-    now = steadyNow();
-  }
-  const Nanoseconds spin_begin = now;
-  while (wakes_.load(std::memory_order_acquire) == seen_ && now < time) now = steadyNow();
-  spun_ += now - spin_begin;
+void SteadyClock::wait(Nanoseconds time, bool may_spin) {
+  WakeableThread thread{wakes_, seen_};
+  wait_.waitUntil(thread, time, may_spin);
   seen_ = wakes_.load(std::memory_order_acquire);
 }
 

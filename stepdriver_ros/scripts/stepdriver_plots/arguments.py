@@ -1,10 +1,24 @@
-"""Kinds of arguments on a command line."""
+"""A command line and the kinds of its arguments."""
 
 import argparse
 import math
 import pathlib
+import sys
 
 from .figure import FORMATS
+
+WRONG_USAGE = 64  # as the package's other commands have it
+
+
+class Parser(argparse.ArgumentParser):
+    """With an epilog that keeps its lines, and the exit code for wrong usage."""
+
+    def __init__(self, **options):
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+
+    def error(self, message):
+        self.print_usage(sys.stderr)
+        self.exit(WRONG_USAGE, f"{self.prog}: {message}\n")
 
 
 def picture(text):

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/axis/axis_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/homing.h"
@@ -89,6 +90,19 @@ class Axis {
   ///
   /// @param factor above 0.
   void setSpeedOverride(double factor);
+
+  /// Changes what motions keep to, within what is configured. A lower max_speed slows down a move
+  /// or a jog under way at once; axes that move together keep what they began with. Another
+  /// acceleration, deceleration or jerk holds for motions that begin at rest: one under way is
+  /// planned to come to rest by the old ones, and might not do so in time by the new ones.
+  ///
+  /// @param wanted 0: as configured.
+  /// @throw Refused where one isn't a number from 0 to what is configured, or to any where no jerk
+  ///   limit is; then nothing changes.
+  void setLimits(const AxisLimits& wanted);
+
+  /// For motions that begin at rest.
+  AxisLimits limits() const;
 
   /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
   /// The axes that move together with this one stop with it, along their path. What is held is

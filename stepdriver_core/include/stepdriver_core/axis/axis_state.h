@@ -31,7 +31,8 @@ struct AxisState {
   double target = 0.0;
   /// [s] Until the motion under way ends, as planned; 0 at rest and in a jog without an end.
   double time_left = 0.0;
-  std::string fault;  ///< in words; empty: none
+  std::string fault;   ///< in words; empty: none
+  std::string remedy;  ///< what ends the fault, in words; empty where there is none
   /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
   /// none.
   std::string position_note;

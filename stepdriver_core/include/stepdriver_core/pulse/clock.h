@@ -3,15 +3,13 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <limits>
 #include <mutex>
+#include <optional>
+
+#include "stepdriver_core/pulse/clock_time.h"
+#include "stepdriver_core/pulse/hybrid_wait.h"
 
 namespace stepdriver::pulse {
-
-/// Nanoseconds on a Clock. Its zero means nothing; the steady clock's is CLOCK_MONOTONIC's.
-using Nanoseconds = std::int64_t;
-
-constexpr Nanoseconds kNever = std::numeric_limits<Nanoseconds>::max();
 
 /// The time that pulses are put out by. now() and wake() may be called from any thread; waitUntil()
 /// only by the one that serves the pulses.
@@ -54,33 +52,29 @@ class ClockHold {
   Clock& clock_;
 };
 
-/// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins.
+/// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins (see HybridWait).
 class SteadyClock : public Clock {
  public:
-  /// Of the time it spins for no longer than this share, and only sleeps from then on: a real-time
-  /// thread that spins on is stopped for the rest of the second by the kernel
-  /// (sched_rt_runtime_us), which costs far more than one late wake-up.
-  static constexpr double kMostSpinning = 0.8;
+  static constexpr double kMostSpinning = HybridWait::kMostSpinning;
 
-  /// @param guard how long before the time the sleep ends; at most 200 us, so that the spinning
-  ///   stays far below what the kernel's real-time throttle allows.
-  explicit SteadyClock(Nanoseconds guard = 60'000);
+  /// @param guard how long before the time the sleep ends, at most GuardLearner::kLongest; none: it
+  ///   is learned from the sleeps.
+  explicit SteadyClock(std::optional<Nanoseconds> guard = {});
 
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
   void sleepUntil(Nanoseconds time) override;
-  Nanoseconds guard() const override { return guard_; }
+  /// As it is now. Not while another thread waits.
+  Nanoseconds guard() const override { return wait_.guard(); }
   void wake() override;
   bool realtime() const override { return true; }
 
  private:
-  void wait(Nanoseconds time, Nanoseconds guard);
+  void wait(Nanoseconds time, bool may_spin);
 
-  Nanoseconds guard_;
+  HybridWait wait_;
   std::atomic<std::uint32_t> wakes_{0};
   std::uint32_t seen_ = 0;
-  Nanoseconds window_ = 0;  // start of the window in which spun_ was spent spinning
-  Nanoseconds spun_ = 0;
 };
 
 /// Time that is only as real as it has to be: it goes from event to event, each at its exact

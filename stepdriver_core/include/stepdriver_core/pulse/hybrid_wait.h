@@ -1,0 +1,76 @@
+#pragma once
+
+#include <algorithm>
+#include <optional>
+
+#include "stepdriver_core/pulse/clock_time.h"
+#include "stepdriver_core/pulse/guard_learner.h"
+#include "stepdriver_core/pulse/running_share.h"
+
+namespace stepdriver::pulse {
+
+/// Waits of one thread that come to their times exactly: sleeps up to a guard before the time, then
+/// spins. It spins for no longer than kMostSpinning of the time, and leaves the other threads
+/// theirs: see RunningShare. Without a clock of its own, so that any can be under it.
+class HybridWait {
+ public:
+  /// A real-time thread that spins on is stopped for the rest of the second by the kernel
+  /// (sched_rt_runtime_us), which costs far more than one late wake-up.
+  static constexpr double kMostSpinning = 0.8;
+
+  /// @param guard how long before the time the sleep ends; none: as GuardLearner learns it.
+  explicit HybridWait(std::optional<Nanoseconds> guard) : fixed_guard_(guard) {}
+
+  Nanoseconds guard() const { return fixed_guard_.value_or(learner_.guard()); }
+
+  /// Returns when the time has come, or earlier where the system is woken.
+  ///
+  /// @param system has now(), woken(), and sleepUntil(time), which ends when it is woken.
+  template <typename System>
+  void waitUntil(System& system, Nanoseconds time, bool may_spin = true) {
+    Nanoseconds now = system.now();
+    const Nanoseconds wake = begin(now, time, may_spin);
+    while (!system.woken() && now < wake) {
+      const Nanoseconds asleep = now;
+      system.sleepUntil(wake);
+      now = system.now();
+      slept(asleep, wake, now);
+    }
+    const Nanoseconds spinning = now;
+    while (!system.woken() && now < time) now = system.now();
+    spun_ += now - spinning;
+  }
+
+ private:
+  static constexpr Nanoseconds kWindow = 100'000'000;
+
+  // Returns when the sleep is to end.
+  Nanoseconds begin(Nanoseconds now, Nanoseconds time, bool may_spin) {
+    if (running_since_) share_.ran(now - *running_since_);
+    running_since_ = now;
+    if (now - window_ > kWindow) {
+      window_ = now;
+      spun_ = 0;
+    }
+    const auto most = static_cast<Nanoseconds>(kMostSpinning * kWindow);
+    const bool spins = may_spin && spun_ < most && time != kNever;
+    const Nanoseconds wake = spins ? time - guard() : time;
+    const Nanoseconds rest = share_.rest();
+    return rest == 0 ? wake : std::max(wake, now + rest);
+  }
+
+  void slept(Nanoseconds from, Nanoseconds wake, Nanoseconds now) {
+    share_.slept(now - from);
+    running_since_ = now;
+    if (now >= wake) learner_.slept(now - wake);  // else it was woken
+  }
+
+  const std::optional<Nanoseconds> fixed_guard_;
+  GuardLearner learner_;
+  RunningShare share_;
+  std::optional<Nanoseconds> running_since_;  // what ran before that is in share_
+  Nanoseconds window_ = 0;  // start of the window in which spun_ was spent spinning
+  Nanoseconds spun_ = 0;
+};
+
+}  // namespace stepdriver::pulse

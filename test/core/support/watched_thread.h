@@ -1,0 +1,71 @@
+#pragma once
+
+#include <linux/filter.h>
+#include <linux/futex.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+
+namespace stepdriver::test {
+
+/// What one thread does that a real-time thread must not, as counted from watchThisThread() on.
+/// Allocations and locks are counted by the functions that a test program puts in front of the
+/// library's; see pulse_thread_calls_test.cpp.
+struct ThreadCalls {
+  std::atomic<std::uint64_t> allocations{0};
+  std::atomic<std::uint64_t> locks{0};
+  std::atomic<std::uint64_t> system_calls{0};  ///< other than the allowed ones
+  std::atomic<int> last_system_call{-1};
+  std::atomic<int> filter_error{-1};  ///< errno of the request for the filter; 0: it is there
+};
+
+/// Where the process counts; set before a thread is watched.
+inline ThreadCalls* thread_calls = nullptr;
+inline thread_local bool is_watched = false;
+
+inline void noteSystemCall(int /*signal*/, siginfo_t* info, void* /*context*/) {
+  ++thread_calls->system_calls;
+  thread_calls->last_system_call = info->si_syscall;
+}
+
+/// From here on the calling thread has no system calls but ioctl(), waiting for a futex as a clock
+/// does (a contended lock does it otherwise), and the end of the process. Others are counted, and
+/// don't happen. clock_gettime() is allowed: where the kernel gives programs no clock to read (no
+/// vDSO), it is the clock read itself.
+///
+/// There is no way back: for threads that live as long as their process.
+inline void watchThisThread() {
+  struct sigaction action {};
+  action.sa_sigaction = noteSystemCall;
+  action.sa_flags = SA_SIGINFO;
+  sigaction(SIGSYS, &action, nullptr);
+  const auto number = static_cast<unsigned>(offsetof(seccomp_data, nr));
+  const auto futex_call = static_cast<unsigned>(offsetof(seccomp_data, args) + sizeof(__u64));
+  sock_filter program[] = {
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, number),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 7, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_clock_gettime, 6, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_rt_sigreturn, 5, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit_group, 4, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_futex, 0, 2),
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, futex_call),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, FUTEX_WAIT_BITSET_PRIVATE, 1, 0),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+  };
+  sock_fprog filter{static_cast<unsigned short>(std::size(program)), program};
+  const bool done = prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+                    prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;
+  thread_calls->filter_error = done ? 0 : errno;
+  is_watched = true;
+}
+
+}  // namespace stepdriver::test

@@ -1,0 +1,178 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "axis_diagnostics.h"
+#include "engine_diagnostics.h"
+#include "support/says.h"
+
+// Each level is reached by one thing alone, and left where that is over.
+
+namespace stepdriver::ros_node {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+using diagnostic_updater::DiagnosticStatusWrapper;
+using node_test::expectSays;
+
+std::string valueOf(const DiagnosticStatusWrapper& status, const std::string& key) {
+  for (const auto& value : status.values) {
+    if (value.key == key) return value.value;
+  }
+  return "there is no " + key;
+}
+
+class AxisReport : public testing::Test {
+ protected:
+  AxisReport() {
+    config.name = "x";
+    config.steps_per_unit = 80'000.0;
+    config.min_position = 0.0;
+    config.max_position = 0.2;
+    reading.state.enabled = true;
+    reading.state.position_valid = true;
+    reading.state.position = 0.1;
+    reading.limits = {0.1, 0.5, 0.4, 0.0};
+    reading.endstops = {false, false};
+  }
+
+  void expect(int level, const std::string& words) const {
+    DiagnosticStatusWrapper status;
+    reportAxis(config, reading, status);
+    EXPECT_EQ(static_cast<int>(status.level), level) << status.message;
+    expectSays(status.message, words);
+  }
+
+  axis::AxisConfig config;
+  AxisReading reading;
+};
+
+TEST_F(AxisReport, IsOkWhateverItDoes) {
+  expect(DiagnosticStatus::OK, "at rest");
+  reading.state.moving = true;
+  expect(DiagnosticStatus::OK, "moves");
+  reading.state.homing = axis::HomingPhase::kSeeking;
+  expect(DiagnosticStatus::OK, "is being homed: seeking");
+  reading.state = {};
+  reading.state.position = 0.1;
+  reading.state.position_valid = true;
+  expect(DiagnosticStatus::OK, "disabled");
+}
+
+TEST_F(AxisReport, WarnsOfAnUnverifiedPositionWithItsNote) {
+  reading.state.position_valid = false;
+  expect(DiagnosticStatus::WARN, "the position is unverified: home it, or set its position");
+  reading.state.position_note = "the node was killed";
+  expect(DiagnosticStatus::WARN, "(the node was killed)");
+}
+
+TEST_F(AxisReport, WarnsOfAnActiveEndstop) {
+  reading.endstops.min = true;
+  expect(DiagnosticStatus::WARN, "the min endstop is active");
+  reading.endstops = {false, true};
+  expect(DiagnosticStatus::WARN, "the max endstop is active");
+  reading.endstops = {};
+  expect(DiagnosticStatus::OK, "at rest");
+}
+
+TEST_F(AxisReport, WarnsNearASoftLimit) {
+  reading.state.position = 0.0021;
+  expect(DiagnosticStatus::OK, "at rest");
+  reading.state.position = 0.0019;
+  expect(DiagnosticStatus::WARN, "near the soft limit min_position, 0 m");
+  reading.state.position = 0.199;
+  expect(DiagnosticStatus::WARN, "near the soft limit max_position, 0.2 m");
+  config.min_position.reset();
+  expect(DiagnosticStatus::OK, "at rest");
+  reading.state.position = 0.2;
+  expect(DiagnosticStatus::WARN, "near the soft limit max_position, 0.2 m");
+}
+
+TEST_F(AxisReport, TellsAFaultAndItsRemedyBeforeAllElse) {
+  reading.state.fault = "emergency stop";
+  reading.state.remedy = "call recover when all is safe";
+  reading.endstops.min = true;
+  expect(DiagnosticStatus::ERROR, "emergency stop: call recover when all is safe; the min endstop");
+}
+
+TEST_F(AxisReport, TellsAnEndstopThatCannotBeRead) {
+  reading.endstop_error = "x: the min endstop's line gpiochip0:5 can't be read";
+  expect(DiagnosticStatus::ERROR, "gpiochip0:5 can't be read");
+}
+
+TEST_F(AxisReport, HasTheNumbers) {
+  reading.endstops.max.reset();
+  DiagnosticStatusWrapper status;
+  reportAxis(config, reading, status);
+  EXPECT_EQ(valueOf(status, "position [m]"), "0.1");
+  EXPECT_EQ(valueOf(status, "min endstop"), "inactive");
+  EXPECT_EQ(valueOf(status, "max endstop"), "none");
+  EXPECT_EQ(valueOf(status, "deceleration [m/s^2]"), "0.4");
+}
+
+class EngineReport : public testing::Test {
+ protected:
+  EngineReport() {
+    reading.max_lateness = 0.005;
+    reading.figures.slips = reading.slips_before = 7;
+    reading.rates = {{"x", 8000.0, 20'000.0, 16'000.0, "calls"}};
+  }
+
+  void expect(int level, const std::string& words) const {
+    DiagnosticStatusWrapper status;
+    reportEngine(reading, status);
+    EXPECT_EQ(static_cast<int>(status.level), level) << status.message;
+    expectSays(status.message, words);
+  }
+
+  EngineReading reading;
+};
+
+TEST_F(EngineReport, IsOkWherePulsesAreInTime) {
+  expect(DiagnosticStatus::OK, "pulses in time");
+  reading.figures.lateness.max = 50'000'000;  // long ago
+  expect(DiagnosticStatus::OK, "pulses in time");
+}
+
+TEST_F(EngineReport, WarnsOfSlipsSinceTheLastReading) {
+  reading.figures.slips = 9;
+  expect(DiagnosticStatus::WARN, "2 times in the last second");
+}
+
+TEST_F(EngineReport, WarnsOfLatenessBeforeItIsAFault) {
+  reading.figures.lateness_last_second.max = 2'400'000;
+  expect(DiagnosticStatus::OK, "pulses in time");
+  reading.figures.lateness_last_second.max = 2'600'000;
+  expect(DiagnosticStatus::WARN, "a pulse was 2.6 ms late; beyond realtime/max_lateness_ms, 5 ms");
+  reading.figures.lateness_last_second.max = 5'100'000;
+  expect(DiagnosticStatus::ERROR, "a pulse was 5.1 ms late");
+}
+
+TEST_F(EngineReport, WarnsOfALittleMarginBeforeThereIsNone) {
+  reading.rates[0].asked = 12'700.0;
+  expect(DiagnosticStatus::OK, "pulses in time");
+  reading.rates[0].asked = 13'000.0;
+  expect(DiagnosticStatus::WARN, "little margin: x: asks for 13000 steps/s");
+  reading.rates[0].asked = 16'100.0;
+  expect(DiagnosticStatus::ERROR, "x: asks for 16100 steps/s, and this machine holds 16000");
+}
+
+TEST_F(EngineReport, HasTheNumbers) {
+  reading.figures.edges = 42;
+  reading.figures.lateness_last_second = {20, 1000, 2000, 3000, 4500};
+  DiagnosticStatusWrapper status;
+  reportEngine(reading, status);
+  EXPECT_EQ(valueOf(status, "edges"), "42");
+  EXPECT_EQ(valueOf(status, "slips"), "7");
+  EXPECT_EQ(valueOf(status, "pulses in the last second"), "20");
+  EXPECT_EQ(valueOf(status, "lateness in the last second p99 [us]"), "2");
+  EXPECT_EQ(valueOf(status, "lateness in the last second max [us]"), "4.5");
+  EXPECT_EQ(valueOf(status, "x: margin"), "2");
+  reading.rates.clear();
+  DiagnosticStatusWrapper simulated;
+  reportEngine(reading, simulated);
+  expectSays(valueOf(simulated, "margin"), "not measured");
+}
+
+}  // namespace
+}  // namespace stepdriver::ros_node
