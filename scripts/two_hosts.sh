@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# A master and nodes on two hosts: two network namespaces with a cable between them.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/two_hosts.sh
+
+Makes two network namespaces, starts a master and four nodes of six axes on the one, and on the other a
+fifth node beside a client of all of them. Prints how long it took until each was there, the rates of
+their joint_states as the other host sees them, and what node_bench measures there. Needs root, and the
+build of scripts/node_bench.sh (STEPDRIVER_CATKIN names another one).
+END
+}
+
+case ${1:-} in
+  '') ;;
+  -h | --help) usage && exit ;;
+  *) usage >&2 && exit 2 ;;
+esac
+(($(id -u) == 0)) || die "needs root, for network namespaces: sudo $0"
+
+choose_build_folder
+install_packages core ros bench
+catkin=${STEPDRIVER_CATKIN:-$build/bench/catkin}
+node=$catkin/devel/lib/stepdriver/stepdriver_node
+[[ -x $node ]] || die "$node isn't there: run scripts/node_bench.sh first"
+configuration=$build/bench/node_6.yaml
+[[ -f $configuration ]] || die "$configuration isn't there: run scripts/node_bench.sh first"
+use_ros "$catkin/devel"
+nodes=4
+
+host_a=stepdriver-a-$$ host_b=stepdriver-b-$$
+address_a=10.213.77.1 address_b=10.213.77.2
+jobs_started=()
+clean_up() {
+  local job
+  for job in "${jobs_started[@]}"; do end_group "$job" 10; done
+  ip netns del "$host_a" 2>/dev/null || true
+  ip netns del "$host_b" 2>/dev/null || true
+}
+at_exit clean_up
+ip netns add "$host_a"
+ip netns add "$host_b"
+ip link add sd0 netns "$host_a" type veth peer name sd0 netns "$host_b"
+for host in a b; do
+  name=host_$host address=address_$host
+  ip -n "${!name}" address add "${!address}/24" dev sd0
+  ip -n "${!name}" link set lo up
+  ip -n "${!name}" link set sd0 up
+done
+
+export ROS_MASTER_URI=http://$address_a:11311
+on_a() { ROS_IP=$address_a ip netns exec "$host_a" "$@"; }
+on_b() { ROS_IP=$address_b ip netns exec "$host_b" "$@"; }
+# Starts a job of its own process group on host a.
+start_on_a() {
+  local log=$1
+  shift
+  set -m
+  on_a "$@" >"$build/log/$log.log" 2>&1 </dev/null &
+  set +m
+  jobs_started=("$!" "${jobs_started[@]}")
+}
+
+start_on_a two-hosts-master roscore -p 11311
+for ((i = 0; i < 300; i++)); do
+  ! on_b rosparam list >/dev/null 2>&1 || break
+  sleep 0.1
+done
+say "The master is reached from the other host"
+
+for ((i = 0; i < nodes; i++)); do on_a rosparam load "$configuration" "/n$i/stepdriver"; done
+begin=$(date +%s%N)
+for ((i = 0; i < nodes; i++)); do
+  start_on_a "two-hosts-$i" "$node" "__ns:=/n$i" __name:=stepdriver
+done
+for ((i = 0; i < nodes; i++)); do
+  on_b timeout 60 rostopic echo -n 1 "/n$i/joint_states" >/dev/null || die "node n$i isn't heard"
+  say "node n$i is heard on the other host after $((($(date +%s%N) - begin) / 1000000)) ms"
+done
+for ((i = 0; i < nodes; i++)); do
+  rate=$(on_b timeout -s INT 8 rostopic hz "/n$i/joint_states" 2>/dev/null |
+    sed -n 's/^average rate: //p' | tail -n 1) || true
+  say "node n$i: joint_states at $rate Hz on the other host"
+done
+
+on_b rosparam load "$configuration" /stepdriver
+on_b "$catkin/devel/lib/stepdriver/node_bench" "$node" 6 "$build/bench/two_hosts.json" \
+  >"$build/log/two-hosts-bench.log" 2>&1 || die "node_bench failed: see $build/log/two-hosts-bench.log"
+say "A node on the other host, with its master across the cable:"
+sed 's/.*{"name": [^,]*, //; s/[]}]*$//; s/, /\n/g' "$build/bench/two_hosts.json" | indent
