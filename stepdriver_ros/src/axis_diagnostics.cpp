@@ -43,7 +43,7 @@ void addValues(const axis::AxisConfig& config, const AxisReading& reading,
   const axis::AxisState& state = reading.state;
   const axis::AxisLimits& limits = reading.limits;
   const std::string unit = unitOf(config.kind);
-  const auto addSwitch = [&](const char* key, const std::optional<bool>& active) {
+  const auto add_switch = [&](const char* key, const std::optional<bool>& active) {
     status.add(key, active ? (*active ? "active" : "inactive") : "none");
   };
   status.add("position [" + unit + "]", state.position);
@@ -53,8 +53,8 @@ void addValues(const axis::AxisConfig& config, const AxisReading& reading,
   status.add("homed", state.homed);
   status.add("position valid", state.position_valid);
   status.add("microsteps", state.microsteps);
-  addSwitch("min endstop", reading.endstops.min);
-  addSwitch("max endstop", reading.endstops.max);
+  add_switch("min endstop", reading.endstops.min);
+  add_switch("max endstop", reading.endstops.max);
   status.add("max_speed [" + unit + "/s]", limits.max_speed);
   status.add("acceleration [" + unit + "/s^2]", limits.acceleration);
   status.add("deceleration [" + unit + "/s^2]", limits.deceleration);

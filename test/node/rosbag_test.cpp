@@ -76,9 +76,10 @@ std::set<std::string> topicsToTheRecorder(const std::string& node) {
 }
 
 class Bag : public testing::Test {
- protected:
+ public:
   ~Bag() override { std::filesystem::remove(file); }
 
+ protected:
   void record() {
     recorder = std::make_unique<NodeProcess>(
         std::vector<std::string>{"rosrun", "rosbag", "record", "-O", file, "-e",
