@@ -33,6 +33,7 @@ class EngineUnderLoad {
  public:
   EngineUnderLoad(int axes, Steps steps) {
     std::vector<pulse::ChannelConfig> channels;
+    channels.reserve(static_cast<std::size_t>(axes));
     for (int i = 0; i < axes; ++i) channels.push_back(channelConfig(i));
     engine_ = std::make_unique<pulse::PulseEngine>(lines, clock_, channels, 1'000'000'000);
     for (int i = 0; i < axes; ++i) {

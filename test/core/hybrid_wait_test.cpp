@@ -193,7 +193,9 @@ TEST_P(EngineBehind, LeavesTheOtherThreadsTheirShareAndOnlyEverSpreadsThePulses)
   FakeThread thread;
   test::RecordingLines lines(thread.processor);
   lines.write_cost = 373 * kMicrosecond;
+  const auto count = static_cast<std::size_t>(GetParam());
   std::vector<ChannelConfig> channels;
+  channels.reserve(count);
   for (int i = 0; i < GetParam(); ++i) channels.push_back(config(i));
   PulseEngine engine(lines, thread, channels, kSecond);
   constexpr double kSpeed = 3000.0;
@@ -203,6 +205,7 @@ TEST_P(EngineBehind, LeavesTheOtherThreadsTheirShareAndOnlyEverSpreadsThePulses)
     profiles.push_back(motion::planFromRest(kMillisecond, 0, 2'000, {speed, speed, 1.0, 1.0}));
   }
   std::vector<Follow> follows;
+  follows.reserve(count);
   for (int i = 0; i < GetParam(); ++i) follows.push_back({i, 1, &profiles[std::size_t(i)]});
   Command command;
   command.follows = follows.data();

@@ -28,14 +28,14 @@ TEST(LatenessHistogram, HasPercentilesWithinASixteenthAboveTheExactOnes) {
   const LatenessFigures figures = histogram.figures();
   EXPECT_EQ(figures.count, times.size());
   EXPECT_EQ(figures.max, times.back());
-  const auto expectAt = [&times](double part, Nanoseconds figure) {
+  const auto expect_at = [&times](double part, Nanoseconds figure) {
     const auto rank = static_cast<std::size_t>(std::ceil(part * 20'000.0)) - 1;
     EXPECT_GE(figure, times[rank]) << part;
     EXPECT_LE(figure, times[rank] + times[rank] / 16) << part;
   };
-  expectAt(0.5, figures.p50);
-  expectAt(0.99, figures.p99);
-  expectAt(0.999, figures.p999);
+  expect_at(0.5, figures.p50);
+  expect_at(0.99, figures.p99);
+  expect_at(0.999, figures.p999);
 }
 
 TEST(LatenessHistogram, TakesWhatIsBelowNothingOrAboveAMinute) {

@@ -27,7 +27,9 @@ struct Delay {
   bool faults;
 };
 
-void PrintTo(const Delay& delay, std::ostream* out) { *out << delay.name; }
+void PrintTo(const Delay& delay, std::ostream* out) {  // NOLINT: GoogleTest's name
+  *out << delay.name;
+}
 
 /// A line of three axes, in which the pulse thread is held up once.
 class DelayedLine : public PulseEngineTest {

@@ -40,14 +40,14 @@ void operator delete(void* memory, std::size_t /*size*/) noexcept { operator del
 namespace {
 
 using LockCall = int (*)(pthread_mutex_t*);
-const LockCall library_lock = reinterpret_cast<LockCall>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+const LockCall kLibraryLock = reinterpret_cast<LockCall>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
 
 }  // namespace
 
 extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) noexcept {
   if (is_watched) ++thread_calls->locks;
   // Before that is known there is one thread.
-  return library_lock == nullptr ? 0 : library_lock(mutex);
+  return kLibraryLock == nullptr ? 0 : kLibraryLock(mutex);
 }
 
 namespace stepdriver::pulse {
