@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "free_hardware.h"
 #include "stepdriver_core/motion/planner.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
+#include "support/free_hardware.h"
 
 namespace stepdriver::bench {
 namespace {

@@ -14,12 +14,12 @@
 #include <string>
 #include <thread>
 
-#include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/motion/profile.h"
 #include "stepdriver_core/motion/step_finder.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "stepdriver_core/pulse/realtime.h"
+#include "support/free_hardware.h"
 
 namespace stepdriver::bench {
 namespace {
@@ -37,43 +37,34 @@ struct Edge {
   bool level;
 };
 
-/// Lines that cost nothing but the reading of the clock. STEP of axis i is output 2 i, DIR the one
-/// after it.
-class FreeLines : public gpio::Lines {
+/// Remembers the edges of the STEP lines; costs nothing but the reading of the clock. STEP of axis
+/// i is output 2 i, DIR the one after it.
+class PacedLines : public FreeLines {
  public:
-  FreeLines(int axes, std::size_t edges_of_each) : edges_(static_cast<std::size_t>(axes)) {
-    for (auto& edges : edges_) edges.reserve(edges_of_each);
+  PacedLines(int axes, std::size_t edges_of_each) : edges_of_(static_cast<std::size_t>(axes)) {
+    for (auto& kept : edges_of_) kept.reserve(edges_of_each);
   }
 
-  int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
+  int write(const gpio::LineWrite* lines, std::size_t count) noexcept override {
     const Nanoseconds now = clock_.now();
     for (std::size_t i = 0; i < count; ++i) {
-      if (writes[i].output % 2 != 0) continue;
-      auto& edges = edges_[static_cast<std::size_t>(writes[i].output / 2)];
+      if (lines[i].output % 2 != 0) continue;
+      auto& kept = edges_of_[static_cast<std::size_t>(lines[i].output / 2)];
       // Never more than was reserved: the pulse thread doesn't allocate.
-      if (edges.size() < edges.capacity()) {
-        edges.push_back({now, engine_->state().slipped, writes[i].level});
+      if (kept.size() < kept.capacity()) {
+        kept.push_back({now, engine_->state().slipped, lines[i].level});
       }
     }
     return 0;
   }
-  int read(int /*input*/) noexcept override { return 0; }
-  int waitForEdges(std::int64_t /*timeout_ns*/, gpio::EdgeEvent* /*events*/,
-                   std::size_t /*capacity*/) noexcept override {
-    return 0;
-  }
-  void interrupt() noexcept override {}
-  const std::string& outputName(int /*output*/) const override { return name_; }
-  const std::string& inputName(int /*input*/) const override { return name_; }
 
   void serve(const pulse::PulseEngine& engine) { engine_ = &engine; }
-  const std::vector<Edge>& edges(std::size_t axis) const { return edges_[axis]; }
+  const std::vector<Edge>& edgesOf(std::size_t axis) const { return edges_of_[axis]; }
 
  private:
   pulse::SteadyClock clock_;
   const pulse::PulseEngine* engine_ = nullptr;
-  std::vector<std::vector<Edge>> edges_;
-  std::string name_ = "free";
+  std::vector<std::vector<Edge>> edges_of_;
 };
 
 std::vector<pulse::ChannelConfig> channelsOf(int axes) {
@@ -168,7 +159,7 @@ Nanoseconds PacedFigures::percentile(double part) const {
 PacedFigures runPaced(int axes, double rate, double seconds) {
   pulse::SteadyClock clock;
   const auto steps = static_cast<std::size_t>(std::ceil(rate * seconds));
-  FreeLines lines(axes, 2 * steps + 2);
+  PacedLines lines(axes, 2 * steps + 2);
   pulse::PulseEngine engine(lines, clock, channelsOf(axes), kMaxLateness);
   lines.serve(engine);
   pulse::PulseDriver driver(engine, clock, true);
@@ -187,7 +178,7 @@ PacedFigures runPaced(int axes, double rate, double seconds) {
   figures.scheduler_error = driver.rights().scheduler_error;
   driver.stop();
   for (int i = 0; i < axes; ++i) {
-    take(figures, lines.edges(static_cast<std::size_t>(i)),
+    take(figures, lines.edgesOf(static_cast<std::size_t>(i)),
          *plan.profiles[static_cast<std::size_t>(i)]);
   }
   figures.slips = engine.state().slips;
