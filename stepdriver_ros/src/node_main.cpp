@@ -79,7 +79,9 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
 
 void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
                     const pulse::Capability& capability) {
-  if (!capability.rights.granted()) ROS_WARN("Pulse thread: %s", capability.rights.text().c_str());
+  if (capability.rights.anyRefused()) {
+    ROS_WARN("Pulse thread: %s", capability.rights.text().c_str());
+  }
   for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
     ROS_WARN("%s. stepdriver_check says more", complaint.c_str());
   }
@@ -105,6 +107,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   options.enforce = config.enforce_realtime;
   options.emergency_stop = config.emergency_stop;
   options.state_file = config.state_file;
+  options.latency_device = latencyDevice(config);
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   if (machine.emergencyStopped()) {
