@@ -79,7 +79,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
 
 void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
                     const pulse::Capability& capability) {
-  if (!capability.rights.granted()) {
+  if (capability.rights.anyRefused()) {
     ROS_WARN_NAMED("realtime", "Pulse thread: %s", capability.rights.text().c_str());
   }
   for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
@@ -108,6 +108,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   options.enforce = config.enforce_realtime;
   options.emergency_stop = config.emergency_stop;
   options.state_file = config.state_file;
+  options.latency_device = latencyDevice(config);
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   if (machine.emergencyStopped()) {

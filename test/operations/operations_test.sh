@@ -85,6 +85,13 @@ for limit in '@realtime - rtprio 98' '@realtime - memlock unlimited'; do
   grep -qF -e "$limit" "$bin/stepdriver_node" || fail "the node doesn't say $limit"
 done
 
+# So is the device that it tells of: for the group, and within the service's device policy.
+latency=/dev/cpu_dma_latency
+grep -qF "KERNEL==\"${latency##*/}\", GROUP=\"realtime\"" \
+  "$machine/etc/udev/rules.d/60-stepdriver-gpio.rules" || fail "no rule for $latency"
+grep -qx "DeviceAllow=$latency rw" "$units/stepdriver.service" || fail "the service can't open $latency"
+grep -qF "$latency" "$bin/stepdriver_node" || fail "the node doesn't say $latency"
+
 # It warns of what it doesn't know, and ends with 0.
 for unit in stepdriver stepdriver-roscore; do
   output=$(systemd-analyze verify "$units/$unit.service" 2>&1) || fail "$unit.service: $output"
