@@ -21,9 +21,8 @@ HomingServer::HomingServer(const ros::NodeHandle& node, std::size_t index, axis:
     : axis_(axis),
       node_(onQueue(queues.ofAxis(index), ros::NodeHandle(node, axis.config().name))),
       service_(node_.advertiseService("home", &HomingServer::home, this)),
-      action_(
-          onQueue(queues.control(), node_), "homing",
-          [this](const HomeGoalConstPtr& goal) { execute(goal); }, false) {
+      action_(onQueue(queues.control(), node_), "homing", false) {
+  action_.registerGoalCallback([this] { takeGoal(); });
   action_.start();
 }
 
@@ -49,7 +48,28 @@ bool HomingServer::home(Home::Request& request, Home::Response& response) {
   return true;
 }
 
-void HomingServer::execute(const HomeGoalConstPtr& /*goal*/) {
+// The server calls it with each new goal.
+void HomingServer::takeGoal() {
+  const std::lock_guard<std::mutex> lock(goals_mutex_);
+  if (executing_) return;
+  goals_ = std::async(std::launch::async, [this] { executeGoals(); });
+  executing_ = true;
+}
+
+void HomingServer::executeGoals() {
+  for (;;) {
+    while (action_.isNewGoalAvailable()) {
+      action_.acceptNewGoal();
+      execute();
+    }
+    const std::lock_guard<std::mutex> lock(goals_mutex_);
+    if (action_.isNewGoalAvailable()) continue;
+    executing_ = false;
+    return;
+  }
+}
+
+void HomingServer::execute() {
   HomeResult answer;
   axis::HomingEnd end = axis::HomingEnd::kFailed;
   try {

@@ -7,6 +7,8 @@
 #include <stepdriver/HomeAction.h>
 
 #include <chrono>
+#include <future>
+#include <mutex>
 
 #include "background.h"
 #include "call_queues.h"
@@ -15,7 +17,8 @@
 namespace stepdriver::ros_node {
 
 /// The homing of one axis: a service `home`, and an action `homing` with feedback and
-/// cancel, below the axis's name. The action has a thread of its own, in which it waits.
+/// cancel, below the axis's name. While the action has goals it has a thread of its own, in which
+/// it waits.
 class HomingServer {
  public:
   /// @param node the node's private handle.
@@ -30,7 +33,9 @@ class HomingServer {
   using Clock = std::chrono::steady_clock;
 
   bool home(Home::Request& request, Home::Response& response);
-  void execute(const HomeGoalConstPtr& goal);
+  void takeGoal();
+  void executeGoals();
+  void execute();
   void tell();
 
   axis::Axis& axis_;
@@ -39,6 +44,9 @@ class HomingServer {
   actionlib::SimpleActionServer<HomeAction> action_;
   axis::HomingPhase told_ = axis::HomingPhase::kNone;  // of the action's thread, as told_at_
   Clock::time_point told_at_;
+  std::mutex goals_mutex_;
+  bool executing_ = false;
+  std::future<void> goals_;
   Background background_;
 };
 

@@ -4,6 +4,7 @@
 #include <ros/node_handle.h>
 #include <stepdriver/MoveAction.h>
 
+#include <functional>
 #include <string>
 
 #include "motion_action.h"
@@ -25,7 +26,8 @@ class AxisMoveAction : public MotionAction<MoveAction, FollowingMove> {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
   /// @param axis outlives the action.
-  AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis);
+  /// @param begun is called when a goal has begun: from then on look() is to be called.
+  AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, std::function<void()> begun);
 
  private:
   FollowingMove begin(const GoalHandle& handle) override;

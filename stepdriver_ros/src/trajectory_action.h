@@ -2,13 +2,13 @@
 
 #include <actionlib/server/action_server.h>
 #include <ros/node_handle.h>
-#include <ros/steady_timer.h>
 
 #include <string>
 #include <vector>
 
 #include "call_queues.h"
 #include "follow_joint_trajectory.h"
+#include "looking.h"
 #include "motion_action.h"
 #include "stepdriver_core/machine/machine.h"
 #include "trajectory_message.h"
@@ -36,7 +36,7 @@ class TrajectoryAction
  public:
   /// @param node the node's private handle.
   /// @param machine, queues outlive the action.
-  TrajectoryAction(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues);
+  TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
 
  private:
   using Following = FollowingTrajectory;
@@ -64,7 +64,7 @@ class TrajectoryAction
 
   machine::Machine& machine_;
   const AxisOfJoint axes_;
-  ros::SteadyTimer timer_;
+  Looking looking_;
 };
 
 }  // namespace stepdriver::ros_node
