@@ -1,6 +1,5 @@
 #pragma once
 
-#include <actionlib/server/action_server.h>
 #include <actionlib_msgs/GoalStatus.h>
 #include <ros/duration.h>
 #include <ros/node_handle.h>
@@ -12,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "action_server.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::ros_node {
@@ -54,16 +54,17 @@ class MotionAction {
   }
 
  protected:
-  using Server = actionlib::ActionServer<Action>;
+  using Server = ActionServer<Action>;
   using GoalHandle = typename Server::GoalHandle;
 
   /// @param node with the queue of the goals and cancels.
   /// @param begun is called when a goal has begun.
-  MotionAction(const ros::NodeHandle& node, const std::string& name, std::function<void()> begun)
+  MotionAction(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
+               std::function<void()> begun)
       : begun_(std::move(begun)),
         server_(
-            node, name, [this](const GoalHandle& handle) { take(handle); },
-            [this](const GoalHandle& handle) { cancel(handle); }, false) {}
+            node, name, statuses, [this](const GoalHandle& handle) { take(handle); },
+            [this](const GoalHandle& handle) { cancel(handle); }) {}
 
   /// To be called when the action is whole.
   void start() { server_.start(); }

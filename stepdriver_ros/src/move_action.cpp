@@ -38,8 +38,8 @@ double progressOf(double from, double position, double target) {
 }  // namespace
 
 AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis,
-                               std::function<void()> begun)
-    : MotionAction(node, "move", std::move(begun)), axis_(axis) {
+                               ActionStatuses& statuses, std::function<void()> begun)
+    : MotionAction(node, "move", statuses, std::move(begun)), axis_(axis) {
   start();
 }
 

@@ -4,6 +4,7 @@
 
 #include <deque>
 
+#include "action_statuses.h"
 #include "call_queues.h"
 #include "looking.h"
 #include "move_action.h"
@@ -15,13 +16,14 @@ namespace stepdriver::ros_node {
 class MoveActions {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the actions.
-  MoveActions(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues)
+  /// @param machine, queues, statuses outlive the actions.
+  MoveActions(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+              ActionStatuses& statuses)
       : looking_(onQueue(queues.control(), node), kLookPeriod, [this] { return look(); }) {
     for (std::size_t i = 0; i < machine.axes().size(); ++i) {
       axis::Axis& axis = *machine.axes()[i];
       actions_.emplace_back(onQueue(queues.ofAxis(i), ros::NodeHandle(node, axis.config().name)),
-                            axis, [this] { looking_.begin(); });
+                            axis, statuses, [this] { looking_.begin(); });
     }
   }
   MoveActions(const MoveActions&) = delete;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "action_statuses.h"
 #include "axis_services.h"
 #include "bring_up.h"
 #include "call_queues.h"
@@ -118,21 +119,22 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
+  ActionStatuses statuses(private_node);
   std::deque<AxisServices> axis_services;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
   std::deque<HomingServer> homing_servers;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
-    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
+    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues, statuses);
   }
-  MoveActions move_actions(private_node, machine, queues);
+  MoveActions move_actions(private_node, machine, queues, statuses);
   const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues);
-  TrajectoryAction trajectory_action(private_node, machine, queues);
+  TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
   const std::string description = hardware.description();
   const Diagnostics diagnostics(
       node, private_node, machine, queues,

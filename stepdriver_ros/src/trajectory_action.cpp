@@ -36,8 +36,8 @@ int errorCodeOf(BadTrajectory::Kind kind) {
 }  // namespace
 
 TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine,
-                                   CallQueues& queues)
-    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory",
+                                   CallQueues& queues, ActionStatuses& statuses)
+    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory", statuses,
                    [this] { looking_.begin(); }),
       machine_(machine),
       axes_(axisOfJoint(machine)),

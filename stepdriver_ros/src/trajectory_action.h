@@ -1,11 +1,11 @@
 #pragma once
 
-#include <actionlib/server/action_server.h>
 #include <ros/node_handle.h>
 
 #include <string>
 #include <vector>
 
+#include "action_statuses.h"
 #include "call_queues.h"
 #include "follow_joint_trajectory.h"
 #include "looking.h"
@@ -35,8 +35,9 @@ class TrajectoryAction
     : public MotionAction<action_msgs::FollowJointTrajectoryAction, FollowingTrajectory> {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the action.
-  TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
+  /// @param machine, queues, statuses outlive the action.
+  TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+                   ActionStatuses& statuses);
 
  private:
   using Following = FollowingTrajectory;
