@@ -1,7 +1,9 @@
+#include <pthread.h>
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
+#include <cstddef>
 #include <deque>
 #include <exception>
 #include <string>
@@ -36,6 +38,9 @@ constexpr int kExitTooSlow = 3;
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
+
+// Where memory is locked, each thread's stack is in memory as a whole, by default 8 MB.
+constexpr std::size_t kThreadStack = 1024 * 1024;
 
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 
@@ -76,6 +81,15 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   queues.finish(kLastAnswers);
   publisher.stop();
   return exit_code;
+}
+
+void setThreadStacks() {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  if (pthread_attr_setstacksize(&attributes, kThreadStack) == 0) {
+    pthread_setattr_default_np(&attributes);
+  }
+  pthread_attr_destroy(&attributes);
 }
 
 void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
@@ -185,6 +199,7 @@ int runOrExplain(EndRequests& end_requests) {
 
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
+  node::setThreadStacks();
   node::EndRequests end_requests;
   if (const auto code = node::answerArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
