@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "session.h"
+
+namespace stepdriver::console {
+
+struct Options {
+  bool help = false;
+  std::string driver = "stepdriver";
+  JogSpeeds speeds;
+};
+
+/// How the program is used and how it ends.
+extern const char* const kUsage;
+
+/// @throw Error where they can't be understood.
+Options parseOptions(const std::vector<std::string>& arguments);
+
+}  // namespace stepdriver::console
