@@ -38,9 +38,9 @@ bool HomingServer::home(Home::Request& request, Home::Response& response) {
     background_.start([this] { axis_.checkHoming(); },
                       [this] {
                         try {
-                          ROS_INFO("%s", axis_.home().message.c_str());
+                          ROS_INFO_NAMED("homing", "%s", axis_.home().message.c_str());
                         } catch (const std::exception& error) {
-                          ROS_ERROR("%s", error.what());
+                          ROS_ERROR_NAMED("homing", "%s", error.what());
                         }
                       });
     response.message = axis_.config().name + ": is being homed";

@@ -35,7 +35,7 @@ void JogSubscriber::take(const Jog::ConstPtr& message) {
     const std::vector<std::size_t> axes = axesOf(*message);
     for (std::size_t i = 0; i < axes.size(); ++i) jog(axes[i], message->velocity[i]);
   } catch (const Refused& refused) {
-    ROS_WARN_THROTTLE(1.0, "jog: %s", refused.what());
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", refused.what());
   }
 }
 
@@ -67,7 +67,7 @@ void JogSubscriber::jog(std::size_t axis, double velocity) {
     machine_.axes()[axis]->jog(velocity);
     heard_[axis] = velocity == 0.0 ? ros::SteadyTime() : ros::SteadyTime::now();
   } catch (const Error& error) {
-    ROS_WARN_THROTTLE(1.0, "jog: %s", error.what());
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
   }
 }
 
@@ -76,8 +76,8 @@ void JogSubscriber::endWhatIsOver() {
   const ros::SteadyTime now = ros::SteadyTime::now();
   for (std::size_t axis = 0; axis < heard_.size(); ++axis) {
     if (heard_[axis].isZero() || now - heard_[axis] < timeout_) continue;
-    ROS_INFO("%s: no jog for %g s, it comes to rest", machine_.axes()[axis]->config().name.c_str(),
-             timeout_.toSec());
+    ROS_INFO_NAMED("jog", "%s: no jog for %g s, it comes to rest",
+                   machine_.axes()[axis]->config().name.c_str(), timeout_.toSec());
     jog(axis, 0.0);
     heard_[axis] = ros::SteadyTime();
   }

@@ -103,7 +103,7 @@ void MachineServices::advertiseRig(Simulation& simulation) {
         try {
           response = simulation.report();
         } catch (const std::exception& error) {
-          ROS_ERROR("%s", error.what());
+          ROS_ERROR_NAMED("rig", "%s", error.what());
           return false;
         }
         return true;

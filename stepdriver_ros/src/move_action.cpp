@@ -62,7 +62,7 @@ void AxisMoveAction::stop(const FollowingMove& following) {
   try {
     axis_.stop(following.move);
   } catch (const Error& error) {
-    ROS_ERROR("%s/move: %s", axis_.config().name.c_str(), error.what());
+    ROS_ERROR_NAMED("move", "%s/move: %s", axis_.config().name.c_str(), error.what());
   }
 }
 

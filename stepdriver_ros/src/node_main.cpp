@@ -67,7 +67,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   try {
     machine.shutdown();
   } catch (const Error& error) {
-    ROS_ERROR("Not all could be disabled: %s", error.what());
+    ROS_ERROR_NAMED("node", "Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
   }
   move_actions.tellEnded();
@@ -79,9 +79,11 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
 
 void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
                     const pulse::Capability& capability) {
-  if (!capability.rights.granted()) ROS_WARN("Pulse thread: %s", capability.rights.text().c_str());
+  if (!capability.rights.granted()) {
+    ROS_WARN_NAMED("realtime", "Pulse thread: %s", capability.rights.text().c_str());
+  }
   for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
-    ROS_WARN("%s. stepdriver_check says more", complaint.c_str());
+    ROS_WARN_NAMED("realtime", "%s. stepdriver_check says more", complaint.c_str());
   }
 }
 
@@ -89,7 +91,8 @@ void warnOfPositions(const machine::Machine& machine) {
   for (const auto& axis : machine.axes()) {
     const std::string note = axis->state().position_note;
     if (note.empty()) continue;
-    ROS_WARN("%s: its position is unverified: %s", axis->config().name.c_str(), note.c_str());
+    ROS_WARN_NAMED("position", "%s: its position is unverified: %s", axis->config().name.c_str(),
+                   note.c_str());
   }
 }
 
@@ -108,7 +111,9 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   if (machine.emergencyStopped()) {
-    ROS_WARN("The emergency stop input is active: no axis is enabled, none moves until recover");
+    ROS_WARN_NAMED(
+        "emergency_stop",
+        "The emergency stop input is active: no axis is enabled, none moves until recover");
   }
   warnOfPositions(machine);
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
@@ -140,18 +145,18 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
       config.max_lateness);
   queues.start();
   publisher.start();
-  ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
-           machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
-           machine.figures().realtime.c_str());
+  ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
+                 machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
+                 machine.figures().realtime.c_str());
 
   std::string who;
   while (who.empty()) {
     who = end_requests.waitFor(kPoll);
     if (const std::string error = machine.stateFileError(); !error.empty()) {
-      ROS_ERROR_THROTTLE(60.0, "%s", error.c_str());
+      ROS_ERROR_THROTTLE_NAMED(60.0, "state_file", "%s", error.c_str());
     }
   }
-  ROS_INFO("Ending on %s", who.c_str());
+  ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
   return shutDown(machine, queues, move_actions, trajectory_action, publisher);
 }
 
@@ -167,13 +172,13 @@ int runOrExplain(EndRequests& end_requests) {
     explain(error, "Not started, no line was touched");
     return kExitConfig;
   } catch (const GpioError& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitGpio;
   } catch (const Refused& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitTooSlow;
   } catch (const std::exception& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitConfig;
   }
 }

@@ -141,7 +141,7 @@ void StatePublisher::publishEndstopsOnChange() {
       endstops_unreadable_[i] = false;
     } catch (const GpioError& error) {
       // What was read last stands; the other axes' switches are read all the same.
-      if (!endstops_unreadable_[i]) ROS_ERROR("%s", error.what());
+      if (!endstops_unreadable_[i]) ROS_ERROR_NAMED("endstops", "%s", error.what());
       endstops_unreadable_[i] = true;
     }
   }

@@ -81,7 +81,7 @@ void TrajectoryAction::stop(const Following& following) {
     const auto& first = following.move.members.front();
     machine_.axis(first.axis).stop(first.move);
   } catch (const Error& error) {
-    ROS_ERROR("follow_joint_trajectory: %s", error.what());
+    ROS_ERROR_NAMED("trajectory", "follow_joint_trajectory: %s", error.what());
   }
 }
 

@@ -50,7 +50,9 @@ void Joystick::rest() {
 void Joystick::take(const sensor_msgs::Joy& message) {
   heard_ = ros::SteadyTime::now();
   const std::string mistake = mistakeIn(message);
-  if (!mistake.empty()) ROS_ERROR_THROTTLE(kLogPeriod, "joy: %s", mistake.c_str());
+  if (!mistake.empty()) {
+    ROS_ERROR_THROTTLE_NAMED(kLogPeriod, "joystick", "joy: %s", mistake.c_str());
+  }
   const bool jogs = mistake.empty() && deadmanHeld(message);
   bool changed = false;
   for (Jogged& axis : axes_) {
@@ -94,8 +96,8 @@ void Joystick::endWithoutMessages() {
   heard_ = ros::SteadyTime();
   for (Jogged& axis : axes_) {
     if (axis.velocity == 0.0) continue;
-    ROS_WARN("%s: no message from the joystick for %g s, the jog ends", axis.config.name.c_str(),
-             config_.joy_timeout);
+    ROS_WARN_NAMED("joystick", "%s: no message from the joystick for %g s, the jog ends",
+                   axis.config.name.c_str(), config_.joy_timeout);
     axis.velocity = 0.0;
   }
 }
@@ -129,7 +131,8 @@ void Joystick::takeAnswer(Jogged& axis, double now) {
   if (!answer) return;
   axis.sequence.answered(answer->success, now);
   if (answer->success) return;
-  ROS_ERROR_THROTTLE(kLogPeriod, "%s: %s", axis.service.c_str(), answer->message.c_str());
+  ROS_ERROR_THROTTLE_NAMED(kLogPeriod, "joystick", "%s: %s", axis.service.c_str(),
+                           answer->message.c_str());
 }
 
 }  // namespace stepdriver::joystick
