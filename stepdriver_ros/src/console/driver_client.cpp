@@ -108,20 +108,23 @@ void DriverClient::poll() {
     const auto answer = lane->background.takeAnswer();
     if (answer) session_.answered(lane->call, answer->success, answer->message);
   }
-  readParametersAgain();
+  if (!parameters_.valid()) noticeTheDriver();
+  takeParameters();
 }
 
-/// Where another driver has taken the name, or the same has started anew.
-void DriverClient::readParametersAgain() {
-  const bool has_publisher = states_.getNumPublishers() > 0;
-  const bool came_back = has_publisher && !had_publisher_ && ever_had_publisher_;
-  if (!has_publisher && had_publisher_) session_.messages().say(driver_ + " has gone");
-  if (came_back) session_.messages().say(driver_ + " is there again");
-  had_publisher_ = has_publisher;
-  ever_had_publisher_ = ever_had_publisher_ || has_publisher;
-  if (came_back && !parameters_.valid()) {
-    parameters_ = std::async(std::launch::async, readDriverParameters, driver_);
+void DriverClient::noticeTheDriver() {
+  const bool live = session_.driver().live(steadyNow());
+  if (live == was_live_) return;
+  was_live_ = live;
+  if (!live) {
+    session_.messages().say("no state of " + driver_ + " comes any more");
+    return;
   }
+  // It may be another one by now, or one that was started with other parameters.
+  parameters_ = std::async(std::launch::async, readDriverParameters, driver_);
+}
+
+void DriverClient::takeParameters() {
   if (!parameters_.valid() ||
       parameters_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
     return;

@@ -47,7 +47,8 @@ class DriverClient {
   void take(const Endstops& endstops);
   void take(const rosgraph_msgs::Log& log);
   void configure(const DriverParameters& parameters);
-  void readParametersAgain();
+  void noticeTheDriver();
+  void takeParameters();
   void start(const Call& call);
   void publish(const std::vector<HeldJog::Order>& jogs);
   double unitsOf(const std::string& axis) const;
@@ -57,8 +58,7 @@ class DriverClient {
   std::map<std::string, std::unique_ptr<Lane>> lanes_;  // one for each name of a call
   EmergencyStopClient emergency_stop_;
   std::future<DriverParameters> parameters_;  // while they are read again
-  bool had_publisher_ = false;
-  bool ever_had_publisher_ = false;
+  bool was_live_ = false;
   ros::Publisher jog_;
   ros::Subscriber states_;
   ros::Subscriber endstops_;
