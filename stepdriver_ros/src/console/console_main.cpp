@@ -22,6 +22,8 @@ namespace {
 
 using ros_node::EndRequests;
 
+constexpr int kExitNothingWritten = 2;
+
 void complain(const std::string& text) { std::fprintf(stderr, "console: %s\n", text.c_str()); }
 
 /// @throw Error where there is no such driver.
@@ -47,8 +49,13 @@ int run(const Options& options, EndRequests& end_requests) {
     }
     const std::string driver = node.resolveName(options.driver);
     findDriver(driver);
-    runConsole(node, driver, options, end_requests);
-    return ros_node::kExitOk;
+    if (!options.wizard) {
+      runConsole(node, driver, options, end_requests);
+      return ros_node::kExitOk;
+    }
+    const bool written = runWizard(node, driver, options.wizard_options, end_requests);
+    ros::shutdown();
+    return written ? ros_node::kExitOk : kExitNothingWritten;
   } catch (const std::exception& error) {
     complain(error.what());
   }

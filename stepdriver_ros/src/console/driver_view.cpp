@@ -19,6 +19,7 @@ void DriverView::update(std::vector<AxisView> axes, double now) {
   axes_ = std::move(axes);
   for (AxisView& axis : axes_) takeSwitches(axis);
   updated_ = now;
+  ++updates_;
 }
 
 void DriverView::updateEndstops(const std::string& axis, bool min_active, bool max_active) {

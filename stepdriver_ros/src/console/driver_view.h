@@ -51,6 +51,8 @@ class DriverView {
   /// [s] since the last state; none: there was none yet.
   std::optional<double> age(double now) const;
   bool live(double now) const;
+  /// How many states there were so far.
+  int updates() const { return updates_; }
   bool anyFault() const;
   bool anyMoving() const;
 
@@ -66,6 +68,7 @@ class DriverView {
   std::vector<AxisView> axes_;
   std::vector<Switches> switches_;
   std::optional<double> updated_;
+  int updates_ = 0;
 };
 
 /// [mm|deg] that one step of the axis moves it, in the microstep mode of now.

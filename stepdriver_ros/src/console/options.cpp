@@ -21,6 +21,7 @@ double partOf(const std::string& option, const std::string& text) {
 
 const char* const kUsage =
     R"(usage: console [--driver NAME] [--slow PERCENT] [--fast PERCENT] [name:=value ...]
+       console --wizard [--driver NAME] [--axis NAME] [--output FILE] [--overwrite]
 
 A screen for whoever stands in front of a machine: the axes of a stepdriver_node, live, and keys to
 enable, jog, step and home them. It runs in any terminal, over ssh too (ssh -t), and gives it back
@@ -43,11 +44,21 @@ the last repeat; where the console or the connection dies, after the driver's jo
   --slow PERCENT    of an axis's highest speed to jog at; default: 5
   --fast PERCENT    default: 50
 
-Exit codes: 0 ended as asked, 1 no master, no driver or no terminal, 64 wrong usage.
+The wizard is a first bring-up, line by line: do the switches read right, which way is plus, is the
+distance right? Each move comes after a question, is small and slow, and is stopped by Enter and by
+any switch that changes. It writes a configuration with what it has found; what runs isn't changed.
+
+  --axis NAME       that axis only
+  --output FILE     default: stepdriver_wizard.yaml
+  --overwrite       replaces a file that is there
+
+Exit codes: 0 ended as asked, 1 no master, no driver, no terminal, or a file that can't be written,
+2 the wizard was ended before it wrote a file, 64 wrong usage.
 )";
 
 Options parseOptions(const std::vector<std::string>& arguments) {
   Options options;
+  std::string for_wizard;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& name = arguments[i];
     const auto value = [&] {
@@ -64,9 +75,21 @@ Options parseOptions(const std::vector<std::string>& arguments) {
       options.speeds.slow = partOf(name, value());
     } else if (name == "--fast") {
       options.speeds.fast = partOf(name, value());
+    } else if (name == "--wizard") {
+      options.wizard = true;
+    } else if (name == "--axis") {
+      options.wizard_options.axis = for_wizard = value();
+    } else if (name == "--output") {
+      options.wizard_options.output = for_wizard = value();
+    } else if (name == "--overwrite") {
+      options.wizard_options.overwrite = true;
+      for_wizard = name;
     } else {
       throw Error(name + " isn't known");
     }
+  }
+  if (!options.wizard && !for_wizard.empty()) {
+    throw Error("--axis, --output and --overwrite go with --wizard");
   }
   return options;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "session.h"
+#include "wizard/wizard.h"
 
 namespace stepdriver::console {
 
@@ -11,6 +12,8 @@ struct Options {
   bool help = false;
   std::string driver = "stepdriver";
   JogSpeeds speeds;
+  bool wizard = false;
+  WizardOptions wizard_options;
 };
 
 /// How the program is used and how it ends.
