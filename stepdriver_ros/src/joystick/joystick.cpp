@@ -2,10 +2,13 @@
 
 #include <ros/console.h>
 #include <ros/transport_hints.h>
+#include <std_srvs/SetBool.h>
 #include <stepdriver/Jog.h>
 
 #include <cmath>
 #include <utility>
+
+#include "../client/ask_service.h"
 
 namespace stepdriver::joystick {
 namespace {
@@ -24,7 +27,7 @@ Joystick::Joystick(ros::NodeHandle node, const std::string& driver, JoystickConf
     jogged.service = driver + "/" + axis.name + "/enable";
     if (axis.disable_in_dead_band) {
       jogged.sequence = JogSequence::disabling(axis.disable_after);
-      jogged.enable = std::make_unique<EnableClient>(jogged.service);
+      jogged.enable = std::make_unique<client::BackgroundCall>();
     }
     axes_.push_back(std::move(jogged));
   }
@@ -105,7 +108,7 @@ void Joystick::send() {
   for (Jogged& axis : axes_) {
     if (axis.enable) takeAnswer(axis, now);
     const JogOrders orders = axis.sequence.orders(axis.velocity, now);
-    if (orders.enable) axis.enable->call(*orders.enable);
+    if (orders.enable) callEnable(axis, *orders.enable);
     if (!orders.velocity) continue;
     message.name.push_back(axis.config.name);
     message.velocity.push_back(*orders.velocity);
@@ -113,6 +116,14 @@ void Joystick::send() {
   if (message.name.empty()) return;
   message.header.stamp = ros::Time::now();
   publisher_.publish(message);
+}
+
+void Joystick::callEnable(const Jogged& axis, bool on) {
+  std_srvs::SetBool::Request request;
+  request.data = on;
+  axis.enable->start([service = axis.service, request] {
+    return client::askService<std_srvs::SetBool>(service, request);
+  });
 }
 
 void Joystick::takeAnswer(Jogged& axis, double now) {
