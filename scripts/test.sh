@@ -198,7 +198,7 @@ build_node() {
     quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
 }
 test_node() {
-  (cd "$build/catkin" && ctest --timeout 600 --no-tests=error --output-on-failure)
+  (cd "$build/catkin" && ctest -j "$jobs" --timeout 600 --no-tests=error --output-on-failure)
 }
 
 # The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and

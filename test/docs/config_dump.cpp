@@ -72,7 +72,7 @@ class Dump {
 std::string dump(const ros_node::NodeConfig& config) {
   Dump dump;
   dump.all(static_cast<int>(config.backend), config.joint_state_rate, config.jog_timeout,
-           config.max_lateness, config.enforce_realtime, config.emergency_stop, config.state_file,
+           config.max_lateness, config.enforce_realtime, config.keep_cpus_awake, config.emergency_stop, config.state_file,
            config.hardware_id);
   for (const auto& axis : config.axes) dump.add(axis);
   dump.all(config.simulation.speed, config.simulation.trace, config.simulation.emergency_stop);

@@ -13,6 +13,7 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
 #include "stepdriver_core/pulse/lateness.h"
 
 namespace stepdriver::machine {
@@ -34,6 +35,9 @@ struct MachineOptions {
   /// Absolute path of the file that keeps positions over a restart; empty: none. See
   /// machine::StateFile.
   std::string state_file{};
+  /// On a clock that is real, held open to keep the processors awake; empty: they may sleep. See
+  /// pulse::CpuLatencyHold.
+  std::string latency_device = pulse::CpuLatencyHold::kDevice;
 };
 
 /// What the pulse engine has done since the start.

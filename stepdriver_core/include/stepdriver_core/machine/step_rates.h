@@ -63,8 +63,10 @@ std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
 /// Takes the lines of the axes as a Machine does, measures, and releases them. Nothing moves, and
 /// ENABLE isn't asserted.
 ///
+/// @param latency_device see MachineOptions.
 /// @throw GpioError where a line can't be had, written or read; none is held then.
 pulse::Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
-                          pulse::Clock& clock);
+                          pulse::Clock& clock,
+                          const std::string& latency_device = pulse::CpuLatencyHold::kDevice);
 
 }  // namespace stepdriver::machine

@@ -152,12 +152,13 @@ class Rig : public gpio::Board {
   /// @throw Error where the trace can't be written.
   void flushTrace();
 
-  void onRequest(const std::string& line, bool level, std::int64_t time_ns) override;
-  void onEdge(const std::string& line, bool level, std::int64_t time_ns) override;
-  void onRelease(const std::string& line, std::int64_t time_ns) override;
-  bool inputLevel(const std::string& line, std::int64_t time_ns) override;
-  int writeFault(const std::string& line, std::int64_t time_ns) override;
-  void watchInput(const std::string& line, gpio::EdgeListener listener) override;
+  int lineIndex(const std::string& line) override;
+  void onRequest(int line, bool level, std::int64_t time_ns) override;
+  void onEdge(int line, bool level, std::int64_t time_ns) override;
+  void onRelease(int line, std::int64_t time_ns) override;
+  bool inputLevel(int line, std::int64_t time_ns) override;
+  int writeFault(int line, std::int64_t time_ns) override;
+  void watchInput(int line, gpio::EdgeListener listener) override;
 
  private:
   class Impl;
