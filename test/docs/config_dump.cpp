@@ -48,6 +48,8 @@ class Dump {
   void add(const ros_node::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
         rig.max_switch, rig.fail_step_write_after);
+    all(rig.wiring.dir_inverted, rig.wiring.steps_per_unit, rig.wiring.min_pin, rig.wiring.max_pin,
+        rig.wiring.min_active_level, rig.wiring.max_active_level);
     all(rig.faults.min_stuck, rig.faults.max_stuck, rig.faults.lose_every,
         rig.faults.chip_fault_after);
   }
@@ -72,8 +74,8 @@ class Dump {
 std::string dump(const ros_node::NodeConfig& config) {
   Dump dump;
   dump.all(static_cast<int>(config.backend), config.joint_state_rate, config.jog_timeout,
-           config.max_lateness, config.enforce_realtime, config.keep_cpus_awake, config.emergency_stop, config.state_file,
-           config.hardware_id);
+           config.max_lateness, config.enforce_realtime, config.keep_cpus_awake,
+           config.emergency_stop, config.state_file, config.hardware_id);
   for (const auto& axis : config.axes) dump.add(axis);
   dump.all(config.simulation.speed, config.simulation.trace, config.simulation.emergency_stop);
   for (const auto& rig : config.simulation.axes) dump.add(rig.second);

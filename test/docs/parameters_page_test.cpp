@@ -219,7 +219,8 @@ bool isRequired(const Parameter& parameter) {
 
 /// The default as a value; none where the page has it in words.
 std::optional<ConfigValue> literal(const Parameter& parameter) {
-  static const std::set<std::string> words = {"none", "host, chips, lines", "the axis's name"};
+  static const std::set<std::string> words = {"none", "as configured", "host, chips, lines",
+                                              "the axis's name"};
   const std::string& text = parameter.fallback;
   if (parameter.type == "text" || parameter.type == "bias") {
     if (words.count(text) > 0) return {};
