@@ -74,7 +74,8 @@ class Page:
         with (self.folder / log).open("w") as output:
             return subprocess.Popen(
                 # What is started ends with this program, however that ends.
-                ["setpriv", "--pdeathsig", "TERM", *command], cwd=self.folder, env=self.environment, start_new_session=True,
+                ["setpriv", "--pdeathsig", "TERM", *command],
+                cwd=self.folder, env=self.environment, start_new_session=True,
                 stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
             )
 
@@ -185,7 +186,9 @@ def differences(page, entries):
 
 def untested(page, entries):
     """Commands that are said to be tested elsewhere, and where nothing is."""
-    stages = re.findall(r"^ *(?:.* \|\| )?stage ([\w-]+) ", (pages.ROOT / "scripts/test.sh").read_text(), re.M)
+    stages = re.findall(
+        r"^ *(?:.* \|\| )?stage ([\w-]+) ", (pages.ROOT / "scripts/test.sh").read_text(), re.M
+    )
     for entry in entries:
         if "elsewhere" not in entry:
             continue
@@ -204,7 +207,8 @@ def follow(page, entries):
 def main():
     table = yaml.safe_load(TABLE.read_text(encoding="utf-8"))
     wanted = sys.argv[1:] or pages.names()
-    wrong = [f"{TABLE.name}: there is no page {page}" for page in table if page not in pages.names()]
+    there = pages.names()
+    wrong = [f"{TABLE.name}: there is no page {page}" for page in table if page not in there]
     for page in wanted:
         wrong += differences(page, table.get(page, []))
         wrong += untested(page, table.get(page, []))

@@ -88,7 +88,10 @@ def actions(topics):
     wrong = list(compare(
         "action",
         # Debian has no control_msgs: the node's own action is the same on the wire.
-        {name: of_type.replace("stepdriver/Follow", "control_msgs/Follow") for name, of_type in there.items()},
+        {
+            name: of_type.replace("stepdriver/Follow", "control_msgs/Follow")
+            for name, of_type in there.items()
+        },
         {name: row[1] for name, row in said.items()},
     ))
     for name in sorted(there.keys() & said.keys()):
@@ -96,9 +99,11 @@ def actions(topics):
         result, _, feedback = rest.partition(";")
         for part, text in (("Goal", goal), ("Result", result), ("Feedback", feedback)):
             message = roslib.message.get_message_class(there[name] + part)
-            fields = set(message.__slots__) - {"header"}
-            if fields != fields_in(text):
-                wrong.append(f"{name} {part}: {sorted(fields)}, and on the page {sorted(fields_in(text))}")
+            fields, said_fields = set(message.__slots__) - {"header"}, fields_in(text)
+            if fields != said_fields:
+                wrong.append(
+                    f"{name} {part}: {sorted(fields)}, and on the page {sorted(said_fields)}"
+                )
     return wrong
 
 
@@ -126,11 +131,16 @@ def topics(types, published):
             yield f"topic {name} has no field {field}"
 
 
+def of_node(state):
+    return {
+        name for name, nodes in state if NODE in nodes and not re.fullmatch(OF_ROS, name)
+    }
+
+
 def main():
     rospy.init_node("interfaces_test", disable_signals=True)
     master = rosgraph.Master(rospy.get_name())
     publishers, subscribers, providers = master.getSystemState()
-    of_node = lambda state: {name for name, nodes in state if NODE in nodes and not re.fullmatch(OF_ROS, name)}
     types = dict(master.getTopicTypes())
     published, subscribed = of_node(publishers), of_node(subscribers)
     there = {name: types[name] for name in published | subscribed}

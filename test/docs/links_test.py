@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Looks whether what the project's pages link to, and the files that they name, are there.
+"""Looks whether what the pages link to, and the files and messages that they name, are there.
 
 usage: test/docs/links_test.py
 
@@ -39,8 +39,8 @@ def is_there(name, files):
     if name.split("/")[0] in ROOMS:
         if not re.search(r"/$|\.(h|cpp)$", name):
             return True  # a parameter: `gpio/backend`
-        return any(re.search(rf"stepdriver_core/(include/stepdriver_core|src)/{re.escape(name)}", file)
-                   for file in files)
+        place = rf"stepdriver_core/(include/stepdriver_core|src)/{re.escape(name)}"
+        return any(re.search(place, file) for file in files)
     if "/" not in name:
         return any(file.endswith(f"/{name}") for file in files)
     return any(True for _ in pages.ROOT.glob(name.rstrip("/")))
@@ -58,12 +58,32 @@ def missing_files(page, files):
             yield f"the file {name}"
 
 
+def unsaid_messages():
+    """Messages in the first column of troubleshooting.md that the programs don't have."""
+    page = "docs/troubleshooting.md"
+    sources = "".join(
+        file.read_text(encoding="utf-8")
+        for folder in ("stepdriver_core/src", "stepdriver_ros/src")
+        for file in (pages.ROOT / folder).rglob("*.cpp")
+    )
+    sources = re.sub(r'"\s*\n\s*"', "", sources)
+    for _, rows in pages.tables(pages.text_of(page)):
+        quoted = [text for row in rows for text in re.findall(r"`([^`]+)`", row[0])]
+        for message in quoted:
+            if " " not in message or re.fullmatch(r"\w+: \w+", message):
+                continue  # a name, or the value of a field
+            for part in re.split(r"\.\.\.;?", message):
+                if part.strip() not in sources:
+                    yield f"{page}: the message {message}"
+
+
 def main():
     # Those of the reader, and what is made.
     of_reader = {"my_axis.yaml", "my_axes.yaml", "NAME.yaml", "controllers.yaml"}
+    made = re.compile(r"build.*|\.git")
+    tops = [top for top in pages.ROOT.iterdir() if top.is_dir() and not made.fullmatch(top.name)]
     files = [
-        str(file.relative_to(pages.ROOT)) for file in pages.ROOT.rglob("*")
-        if file.is_file() and not re.match(r"(build[^/]*|\.git)/", str(file.relative_to(pages.ROOT)))
+        str(file.relative_to(pages.ROOT)) for top in tops for file in top.rglob("*") if file.is_file()
     ]
     wrong = [
         f"{page}: {what} isn't there"
@@ -71,9 +91,10 @@ def main():
         for what in list(broken_links(page)) + list(missing_files(page, files))
         if what.split("/")[-1].split(" ")[-1] not in of_reader
     ]
+    wrong += [f"{message} isn't there" for message in unsaid_messages()]
     for text in wrong:
         print(f"FAILED: {text}", file=sys.stderr)
-    print(f"{len(pages.names())} pages, {len(wrong)} dead links and files that aren't there")
+    print(f"{len(pages.names())} pages, {len(wrong)} dead links, files and messages")
     return 1 if wrong else 0
 
 
