@@ -10,7 +10,8 @@ Run from an install space, as root: rosrun stepdriver setup_system. Makes the gr
 realtime and the user stepdriver, and installs
 
   /etc/sysusers.d/stepdriver.conf             these groups and the user
-  /etc/udev/rules.d/60-stepdriver-gpio.rules  /dev/gpiochip* belong to the group gpio
+  /etc/udev/rules.d/60-stepdriver-gpio.rules  /dev/gpiochip* belong to the group gpio, and
+                                              /dev/cpu_dma_latency to the group realtime
   /etc/security/limits.d/stepdriver.conf      real-time scheduling for the group realtime
   /etc/systemd/system/stepdriver.service      the node, with the parameters of
                                               /etc/stepdriver/axes.yaml
@@ -66,6 +67,7 @@ if [[ -z $target && -d /run/systemd/system ]]; then
   systemctl daemon-reload
   udevadm control --reload
   udevadm trigger --subsystem-match=gpio
+  udevadm trigger --sysname-match=cpu_dma_latency
 fi
 cat <<'END'
 Next: your configuration to /etc/stepdriver/axes.yaml, then

@@ -10,7 +10,8 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
 
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
-  --lint  clang-format, clang-tidy and shellcheck over the project's own files
+  --lint  clang-format, clang-tidy and shellcheck over the project's own files; doxygen over the
+          public headers
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS; what of its
           benchmarks is exact; the pictures of docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
@@ -94,6 +95,8 @@ check_format() {
 check_shell() {
   (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
+
+check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
 # is the one to the version that is installed.
@@ -259,6 +262,7 @@ install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
 
 if wants lint; then
   stage shell check_shell
+  stage doxygen check_doxygen
   # Debian 12's clang says what the format is; another one formats some lines in its own way.
   if [[ $(clang-format --version) == *' 14.'* ]]; then
     stage format check_format

@@ -4,6 +4,7 @@
 
 #include "stepdriver_core/axis/config_reader.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -35,6 +36,7 @@ void readRealtime(ConfigReader realtime, NodeConfig& config) {
   const double milliseconds = realtime.number(
       "max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, config.max_lateness * 1e3);
   config.max_lateness = milliseconds * 1e-3;
+  config.keep_cpus_awake = realtime.boolean("keep_cpus_awake", config.keep_cpus_awake);
   realtime.rejectUnknown();
 }
 
@@ -46,6 +48,10 @@ const ConfigValue& valueOf(const ConfigValue& tree, const std::string& key) {
 }
 
 }  // namespace
+
+std::string latencyDevice(const NodeConfig& config) {
+  return config.keep_cpus_awake ? pulse::CpuLatencyHold::kDevice : "";
+}
 
 NodeConfig readNodeConfig(const ConfigValue& tree, const std::string& name,
                           std::vector<ConfigIssue>& issues) {

@@ -20,12 +20,16 @@ struct NodeConfig {
   double jog_timeout = 0.5;        ///< [s] without a jog message; then the axis comes to rest
   double max_lateness = 0.005;     ///< [s] of a pulse; beyond it is a fault
   bool enforce_realtime = false;   ///< don't start where the machine is too slow for its axes
+  bool keep_cpus_awake = true;     ///< see machine::MachineOptions::latency_device
   SimulationConfig simulation;
   std::vector<axis::AxisConfig> axes;
   std::optional<axis::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
   std::string state_file;                           ///< the same
   std::string hardware_id;                          ///< of diagnostics; empty: made from the rest
 };
+
+/// @return machine::MachineOptions::latency_device
+std::string latencyDevice(const NodeConfig& config);
 
 /// Reads the node's private parameters.
 ///
@@ -37,6 +41,7 @@ struct NodeConfig {
 ///   policy: warn                 # where the machine is too slow for its axes: warn, or enforce:
 ///                                # not start
 ///   max_lateness_ms: 5.0
+///   keep_cpus_awake: true        # on real lines; false: they may sleep, and wake late
 /// emergency_stop:                # optional; see axis::readInputSwitch()
 ///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
 /// state_file: ""                 # absolute path of a file that keeps the positions; empty: none

@@ -1,12 +1,15 @@
+#include <pthread.h>
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
+#include <cstddef>
 #include <deque>
 #include <exception>
 #include <string>
 #include <vector>
 
+#include "action_statuses.h"
 #include "axis_services.h"
 #include "bring_up.h"
 #include "call_queues.h"
@@ -35,6 +38,9 @@ constexpr int kExitTooSlow = 3;
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
+
+// Where memory is locked, each thread's stack is in memory as a whole, by default 8 MB.
+constexpr std::size_t kThreadStack = 1024 * 1024;
 
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 
@@ -77,9 +83,18 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   return exit_code;
 }
 
+void setThreadStacks() {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  if (pthread_attr_setstacksize(&attributes, kThreadStack) == 0) {
+    pthread_setattr_default_np(&attributes);
+  }
+  pthread_attr_destroy(&attributes);
+}
+
 void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
                     const pulse::Capability& capability) {
-  if (!capability.rights.granted()) {
+  if (capability.rights.anyRefused()) {
     ROS_WARN_NAMED("realtime", "Pulse thread: %s", capability.rights.text().c_str());
   }
   for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
@@ -108,6 +123,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   options.enforce = config.enforce_realtime;
   options.emergency_stop = config.emergency_stop;
   options.state_file = config.state_file;
+  options.latency_device = latencyDevice(config);
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   if (machine.emergencyStopped()) {
@@ -123,21 +139,22 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
+  ActionStatuses statuses(private_node);
   std::deque<AxisServices> axis_services;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
   std::deque<HomingServer> homing_servers;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
-    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
+    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues, statuses);
   }
-  MoveActions move_actions(private_node, machine, queues);
+  MoveActions move_actions(private_node, machine, queues, statuses);
   const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues);
-  TrajectoryAction trajectory_action(private_node, machine, queues);
+  TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
   const std::string description = hardware.description();
   const Diagnostics diagnostics(
       node, private_node, machine, queues,
@@ -188,6 +205,7 @@ int runOrExplain(EndRequests& end_requests) {
 
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
+  node::setThreadStacks();
   node::EndRequests end_requests;
   if (const auto code = node::answerArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);

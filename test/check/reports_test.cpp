@@ -138,16 +138,17 @@ TEST(PermissionsText, NamesTheRemedyOnlyWhereItIsNeeded) {
 }
 
 TEST(LimitsText, TellsWhatWasGrantedAndWhatTheLimitsAre) {
-  const std::string good = limitsText(facts(), {0, 0});
-  EXPECT_TRUE(has(good, "SCHED_FIFO 50; memory locked")) << good;
+  const std::string good = limitsText(facts(), {0, 0, 0});
+  EXPECT_TRUE(has(good, "SCHED_FIFO 50; memory locked; processors kept awake")) << good;
   EXPECT_TRUE(has(good, "RLIMIT_RTPRIO         98\n")) << good;
   EXPECT_TRUE(has(good, "950000 of each 1000000 us")) << good;
   EXPECT_TRUE(has(good, "PREEMPT_RT            no\n")) << good;
   SystemFacts poor = facts();
   poor.rt_runtime_us = "-1";
   poor.preempt_rt = true;
-  const std::string text = limitsText(poor, {EPERM, EPERM});
+  const std::string text = limitsText(poor, {EPERM, EPERM, EACCES});
   EXPECT_TRUE(has(text, "SCHED_FIFO refused")) << text;
+  EXPECT_TRUE(has(text, "processors not kept awake")) << text;
   EXPECT_TRUE(has(text, "throttle              none")) << text;
   EXPECT_TRUE(has(text, "PREEMPT_RT            yes\n")) << text;
 }

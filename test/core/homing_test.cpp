@@ -352,7 +352,7 @@ TEST(HomingThreaded, WorksWithAPulseThreadOfItsOwn) {
 class SilentRig : public sim::Rig {
  public:
   using sim::Rig::Rig;
-  void watchInput(const std::string& /*line*/, gpio::EdgeListener /*listener*/) override {}
+  void watchInput(int /*line*/, gpio::EdgeListener /*listener*/) override {}
 };
 
 TEST(HomingWithoutEdges, KnowsTheTriggerPointToAStepByTheCount) {

@@ -145,11 +145,26 @@ TEST_F(DelayedLine, CountsOnceWhereTheWriteIsSlowToo) {
   EXPECT_EQ(engine->lateness().max, engine->state().worst_lateness);
 }
 
+// The slow write leaves each axis less time than the one before it: the timeline is slid for each.
 TEST_F(DelayedLine, CountsOnceForAllAxesOfAnInstant) {
-  startLine(20'000.0);
-  for (Follow& order : follows) order.group = 0;
-  runUntil(500 * kMillisecond);
-  clock.waitUntil(clock.now() + 4 * kMillisecond);
+  make({config(0), config(1), config(2)}, 1'000 * kMillisecond);
+  for (const int axis : {0, 1, 2}) {
+    const Nanoseconds interval = kMillisecond >> axis;
+    const double speed = 1e9 / static_cast<double>(interval);
+    // Their first steps are half an interval after their starts, and at one instant.
+    follow(cruise(2 * kMillisecond - interval / 2, 0, 100, speed), axis);
+  }
+  runUntil(9 * kMillisecond + 900'000);
+  ASSERT_EQ(engine->state().slips, 0U);
+  const std::uint64_t before = engine->state().pulses;
+  clock.waitUntil(10 * kMillisecond);
+  lines.write_cost = 600'000;
+  const Nanoseconds due = engine->serve();
+  lines.write_cost = 0;
+  ASSERT_EQ(engine->state().pulses, before + 3) << "not one instant";
+  EXPECT_EQ(engine->state().slips, 1U);
+  EXPECT_EQ(engine->state().slipped, 600'000 - kMillisecond / 4 / 4);
+  while (clock.now() < due) clock.waitUntil(due);
   runOut();
   EXPECT_EQ(engine->state().slips, 1U);
 }

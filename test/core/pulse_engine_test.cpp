@@ -110,6 +110,20 @@ TEST_F(PulseEngineTest, AbsorbsASmallLatenessAndBunchesNothing) {
   EXPECT_EQ(engine->latenessLastSecond().max, 100'000);
 }
 
+TEST_F(PulseEngineTest, AbsorbsAQuarterOfAnIntervalToTheNanosecond) {
+  for (const Nanoseconds beyond : {0, 1}) {
+    SCOPED_TRACE(beyond);
+    make({config(0)});
+    const Nanoseconds start = clock.now() + 1'000'000;
+    follow(cruise(start, 0, 100, 1000.0));
+    runUntil(start + 50'000'000);
+    clock.waitUntil(start + 50'500'000 + 250'000 + beyond);
+    runOut();
+    EXPECT_EQ(engine->state().slips, static_cast<std::uint64_t>(beyond));
+    EXPECT_EQ(engine->state().slipped, beyond);
+  }
+}
+
 TEST_F(PulseEngineTest, SlidesTheTimelineOfAllAxesByAGap) {
   make({config(0), config(1)}, 1'000'000'000);
   follow(cruise(1'000'000, 0, 200, 1000.0), 0);
@@ -147,9 +161,26 @@ TEST_F(PulseEngineTest, FaultsWhereTheMotorCantGoOnAfterAGap) {
   EXPECT_FALSE(lines.levels[0]) << "the pulse that was out is finished";
 }
 
+TEST_F(PulseEngineTest, FaultsBeyondTheLimitAndNotAtIt) {
+  constexpr Nanoseconds kLimit = 5'000'000;
+  for (const Nanoseconds beyond : {0, 1}) {
+    SCOPED_TRACE(beyond);
+    make({config(0)}, kLimit);
+    restart_interval = 2'000'000;
+    const Nanoseconds start = clock.now() + 1'000'000;
+    follow(cruise(start, 0, 200, 1000.0));
+    runUntil(start + 99'000'000);
+    clock.waitUntil(start + 99'500'000 + kLimit + beyond);
+    runOut();
+    EXPECT_EQ(engine->channel(0).end, beyond == 0 ? EndReason::kDone : EndReason::kTooLate);
+    EXPECT_EQ(engine->channel(0).count, beyond == 0 ? 200 : 99);
+    EXPECT_EQ(engine->channel(0).end_lateness, beyond == 0 ? 0 : kLimit + 1);
+  }
+}
+
 TEST_F(PulseEngineTest, GoesOnAfterAGapAtASpeedThatTheMotorStartsFrom) {
   make({config(0)}, 5'000'000);
-  restart_interval = 500'000;
+  restart_interval = 1'000'000;  // just so: closer ones are too fast
   follow(cruise(1'000'000, 0, 200, 1000.0));
   runUntil(100'000'000);
   clock.waitUntil(clock.now() + 10'000'000);

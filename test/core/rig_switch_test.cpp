@@ -77,7 +77,7 @@ TEST(RigSwitch, BouncesAfterEachChangeAndSettles) {
   const std::int64_t hit = bench.now;
   std::string levels;
   for (const std::int64_t after : {0, 99, 100, 199, 200, 299, 300, 399, 400, 5'000}) {
-    levels += bench.rig.inputLevel("x.max", hit + after) ? '1' : '0';
+    levels += bench.rig.inputLevel(bench.line("x.max"), hit + after) ? '1' : '0';
   }
   EXPECT_EQ(levels, "1100110011");
   EXPECT_EQ(bench.trace->times("x", "endstop_max", true),
@@ -153,13 +153,14 @@ TEST(RigSwitch, TellsWhoWatchesItsLineOfEachChangeOnce) {
   HandRig bench(spec);
   bench.ready().pulse(4);
   std::vector<bool> told;
-  bench.rig.watchInput("x.max", [&](bool level, std::int64_t) { told.push_back(level); });
+  bench.rig.watchInput(bench.line("x.max"),
+                       [&](bool level, std::int64_t) { told.push_back(level); });
   EXPECT_EQ(told, std::vector<bool>{}) << "nothing has changed yet";
   bench.pulse(3);
   EXPECT_EQ(told, std::vector<bool>{true}) << "of the press, and not of the bounces after it";
   bench.direction(false).pulse(3);
   EXPECT_EQ(told, (std::vector<bool>{true, false}));
-  bench.rig.watchInput("x.max", nullptr);
+  bench.rig.watchInput(bench.line("x.max"), nullptr);
   bench.direction(true).pulse(3);
   EXPECT_EQ(told.size(), 2U) << "told after the watch has ended";
 }

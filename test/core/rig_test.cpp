@@ -183,7 +183,7 @@ TEST(Rig, SharedLineReachesAllItsPins) {
 TEST(Rig, IgnoresLinesThatItDoesNotKnow) {
   HandRig bench(Model::kA4988);
   bench.ready().request("lamp", true).set("lamp", false);
-  bench.rig.onRelease("lamp", bench.now);
+  bench.rig.onRelease(bench.line("lamp"), bench.now);
   EXPECT_FALSE(bench.reads("door"));
   EXPECT_TRUE(bench.trace->edges().empty());
 }
@@ -191,7 +191,7 @@ TEST(Rig, IgnoresLinesThatItDoesNotKnow) {
 TEST(Rig, ReleasedLineKeepsItsLevelAndTheNextRequestMayChangeIt) {
   HandRig bench(Model::kA4988);
   bench.ready().pulse(2);
-  bench.rig.onRelease("x.enable", bench.now);
+  bench.rig.onRelease(bench.line("x.enable"), bench.now);
   EXPECT_TRUE(bench.report().energized);
   bench.request("x.enable", true);
   EXPECT_FALSE(bench.report().energized);

@@ -105,7 +105,7 @@ TEST(RigTrace, ShowsASwitchThatGetsStuckAtTheLatestTimeKnown) {
 TEST(RigTrace, NeverFallsBackInTime) {
   HandRig bench(axisWithBouncingSwitch());
   bench.ready().set("x.dir", false);
-  bench.rig.onEdge("x.dir", true, bench.now - 700);
+  bench.rig.onEdge(bench.line("x.dir"), true, bench.now - 700);
   EXPECT_EQ(bench.trace->times("x", "dir", true), (std::vector<std::int64_t>{bench.now}));
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "stepdriver_core/error.h"
+#include "support/line_names.h"
 
 namespace stepdriver::gpio {
 namespace {
@@ -18,32 +19,27 @@ namespace {
 /// Writes down what it is told, as `edge a 1 @5`.
 class Notebook : public Board {
  public:
-  void onRequest(const std::string& line, bool level, std::int64_t time_ns) override {
+  int lineIndex(const std::string& line) override { return names.indexOf(line); }
+  void onRequest(int line, bool level, std::int64_t time_ns) override {
     note("request", line, level ? " 1" : " 0", time_ns);
   }
-  void onEdge(const std::string& line, bool level, std::int64_t time_ns) override {
+  void onEdge(int line, bool level, std::int64_t time_ns) override {
     note("edge", line, level ? " 1" : " 0", time_ns);
   }
-  void onRelease(const std::string& line, std::int64_t time_ns) override {
-    note("release", line, "", time_ns);
-  }
-  bool inputLevel(const std::string& line, std::int64_t /*time_ns*/) override {
-    return levels[line];
-  }
-  int writeFault(const std::string& line, std::int64_t /*time_ns*/) override {
-    return faults[line];
-  }
+  void onRelease(int line, std::int64_t time_ns) override { note("release", line, "", time_ns); }
+  bool inputLevel(int line, std::int64_t /*time_ns*/) override { return levels[names[line]]; }
+  int writeFault(int line, std::int64_t /*time_ns*/) override { return faults[names[line]]; }
 
   std::vector<std::string> take() { return std::exchange(notes, {}); }
 
+  test::LineNames names;
   std::map<std::string, bool> levels;
   std::map<std::string, int> faults;
   std::vector<std::string> notes;
 
  private:
-  void note(const std::string& event, const std::string& line, const std::string& level,
-            std::int64_t time_ns) {
-    notes.push_back(event + " " + line + level + " @" + std::to_string(time_ns));
+  void note(const std::string& event, int line, const std::string& level, std::int64_t time_ns) {
+    notes.push_back(event + " " + names[line] + level + " @" + std::to_string(time_ns));
   }
 };
 

@@ -121,8 +121,9 @@ TEST_F(VcdTraceTest, IsTheSameForTheSameEdges) {
   const auto run = [&] {
     const auto trace = std::make_shared<VcdTrace>(path_);
     Rig rig({test::plainAxis(chip::Model::kA4988)}, trace);
-    rig.onRequest("x.step", false, 42);
-    for (int i = 0; i < 10; ++i) rig.onEdge("x.step", i % 2 == 0, 42 + 1'000 * i);
+    const int step = rig.lineIndex("x.step");
+    rig.onRequest(step, false, 42);
+    for (int i = 0; i < 10; ++i) rig.onEdge(step, i % 2 == 0, 42 + 1'000 * i);
     rig.flushTrace();
     return text();
   };

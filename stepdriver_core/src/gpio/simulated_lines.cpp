@@ -10,7 +10,7 @@
 namespace stepdriver::gpio {
 
 // NOLINTNEXTLINE(performance-unnecessary-value-param): a board that knows its edges keeps it
-void Board::watchInput(const std::string& /*line*/, EdgeListener /*listener*/) {}
+void Board::watchInput(int /*line*/, EdgeListener /*listener*/) {}
 
 struct SimulatedBackend::Shared {
   Shared(Board& wired_board, TimeSource time_source)
@@ -26,14 +26,28 @@ class SimulatedBackend::HeldLines : public Lines {
  public:
   HeldLines(std::shared_ptr<Shared> shared, const std::vector<OutputRequest>& outputs,
             const std::vector<InputRequest>& inputs)
-      : shared_(std::move(shared)), inputs_(inputs) {
+      : shared_(std::move(shared)) {
+    Board& board = shared_->board;
     outputs_.reserve(outputs.size());
-    for (const OutputRequest& output : outputs) outputs_.push_back({output, output.safe_level});
-    for (std::size_t i = 0; i < inputs.size(); ++i) {
-      if (!inputs[i].edges) continue;
-      shared_->board.watchInput(inputs[i].line, [this, i](bool level, std::int64_t time_ns) {
-        edges_.add({static_cast<int>(i), level, time_ns});
+    for (const OutputRequest& output : outputs) {
+      outputs_.push_back({output, board.lineIndex(output.line), output.safe_level});
+    }
+    inputs_.reserve(inputs.size());
+    for (const InputRequest& input : inputs) {
+      const int index = static_cast<int>(inputs_.size());
+      inputs_.push_back({input, board.lineIndex(input.line)});
+      if (!input.edges) continue;
+      board.watchInput(inputs_.back().line, [this, index](bool level, std::int64_t time_ns) {
+        edges_.add({index, level, time_ns});
       });
+    }
+  }
+
+  /// Tells the board of the levels that the request gave the outputs.
+  void begin() {
+    const std::int64_t time_ns = shared_->now();
+    for (const Output& output : outputs_) {
+      shared_->board.onRequest(output.line, output.level, time_ns);
     }
   }
 
@@ -44,12 +58,12 @@ class SimulatedBackend::HeldLines : public Lines {
       if (!output.request.keep_on_release) drive(output, output.request.safe_level, time_ns);
     }
     for (const Output& output : outputs_) {
-      shared_->board.onRelease(output.request.line, time_ns);
+      shared_->board.onRelease(output.line, time_ns);
       shared_->held.erase(output.request.line);
     }
-    for (const InputRequest& input : inputs_) {
-      if (input.edges) shared_->board.watchInput(input.line, nullptr);
-      shared_->held.erase(input.line);
+    for (const Input& input : inputs_) {
+      if (input.request.edges) shared_->board.watchInput(input.line, nullptr);
+      shared_->held.erase(input.request.line);
     }
   }
 
@@ -60,7 +74,7 @@ class SimulatedBackend::HeldLines : public Lines {
       if (!has(outputs_, writes[i].output)) return EINVAL;
     }
     for (std::size_t i = 0; i < count; ++i) {
-      const int error = shared_->board.writeFault(outputOf(writes[i]).request.line, time_ns);
+      const int error = shared_->board.writeFault(outputOf(writes[i]).line, time_ns);
       if (error != 0) return error;
     }
     for (std::size_t i = 0; i < count; ++i) drive(outputOf(writes[i]), writes[i].level, time_ns);
@@ -70,7 +84,7 @@ class SimulatedBackend::HeldLines : public Lines {
   int read(int input) noexcept override {
     const std::lock_guard<std::mutex> lock(shared_->mutex);
     if (!has(inputs_, input)) return -EINVAL;
-    const std::string& line = inputs_[static_cast<std::size_t>(input)].line;
+    const int line = inputs_[static_cast<std::size_t>(input)].line;
     return shared_->board.inputLevel(line, shared_->now()) ? 1 : 0;
   }
 
@@ -85,13 +99,18 @@ class SimulatedBackend::HeldLines : public Lines {
     return outputs_.at(static_cast<std::size_t>(output)).request.line;
   }
   const std::string& inputName(int input) const override {
-    return inputs_.at(static_cast<std::size_t>(input)).line;
+    return inputs_.at(static_cast<std::size_t>(input)).request.line;
   }
 
  private:
   struct Output {
     OutputRequest request;
+    int line;  // the board's index
     bool level;
+  };
+  struct Input {
+    InputRequest request;
+    int line;
   };
 
   template <typename Items>
@@ -106,12 +125,12 @@ class SimulatedBackend::HeldLines : public Lines {
   void drive(Output& output, bool level, std::int64_t time_ns) {
     if (output.level == level) return;
     output.level = level;
-    shared_->board.onEdge(output.request.line, level, time_ns);
+    shared_->board.onEdge(output.line, level, time_ns);
   }
 
   const std::shared_ptr<Shared> shared_;
   std::vector<Output> outputs_;
-  const std::vector<InputRequest> inputs_;
+  std::vector<Input> inputs_;
   EdgeQueue edges_;
 };
 
@@ -122,7 +141,7 @@ SimulatedBackend::~SimulatedBackend() = default;
 
 std::unique_ptr<Lines> SimulatedBackend::request(const std::vector<OutputRequest>& outputs,
                                                  const std::vector<InputRequest>& inputs) {
-  std::unique_ptr<Lines> lines;  // outlives the lock, which its destructor would take again
+  std::unique_ptr<HeldLines> lines;  // outlives the lock, which its destructor would take again
   const std::lock_guard<std::mutex> lock(shared_->mutex);
 
   std::unordered_map<std::string, std::string> wanted;
@@ -144,10 +163,7 @@ std::unique_ptr<Lines> SimulatedBackend::request(const std::vector<OutputRequest
 
   lines = std::make_unique<HeldLines>(shared_, outputs, inputs);
   shared_->held.merge(wanted);
-  const std::int64_t time_ns = shared_->now();
-  for (const OutputRequest& output : outputs) {
-    shared_->board.onRequest(output.line, output.safe_level, time_ns);
-  }
+  lines->begin();
   return lines;
 }
 

@@ -47,13 +47,15 @@ class Machine::Impl {
     emergency_stop_ = wiring.emergency_stop;
     lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
-      capability_ = pulse::measureCapability(*lines_, clock, wiring.channels);
+      capability_ =
+          pulse::measureCapability(*lines_, clock, wiring.channels, options.latency_device);
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
       if (!why.empty()) throw Refused(why);
     }
     engine_ = std::make_unique<pulse::PulseEngine>(
         *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
-    driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded);
+    driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded,
+                                                   options.latency_device);
     edges_ = std::make_unique<axis::EdgeLog>(*lines_, options.threaded);
     for (std::size_t i = 0; i < configs.size(); ++i) {
       axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),

@@ -16,10 +16,10 @@ Wiring::Wiring(const std::vector<axis::AxisConfig>& axes,
 }
 
 pulse::Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
-                          pulse::Clock& clock) {
+                          pulse::Clock& clock, const std::string& latency_device) {
   const Wiring wiring(axes);
   const auto lines = backend.request(wiring.outputs, wiring.inputs);
-  return pulse::measureCapability(*lines, clock, wiring.channels);
+  return pulse::measureCapability(*lines, clock, wiring.channels, latency_device);
 }
 
 }  // namespace stepdriver::machine

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -85,9 +86,15 @@ class CallMeter {
 };
 
 /// @param measure_calls false: one failed, and nothing else is measured.
-Capability asPulseThread(Clock& clock, const std::function<bool(Capability&)>& measure_calls) {
+Capability asPulseThread(Clock& clock, const std::string& latency_device,
+                         const std::function<bool(Capability&)>& measure_calls) {
   Capability capability;
   capability.rights.memory_error = lockMemory();
+  std::optional<CpuLatencyHold> awake;
+  if (!latency_device.empty()) {
+    awake.emplace(latency_device);
+    capability.rights.latency_error = awake->error();
+  }
   std::thread([&] {
     capability.rights.scheduler_error = askForScheduler();
     if (!measure_calls(capability)) return;
@@ -110,9 +117,10 @@ Spread spreadOf(std::vector<Nanoseconds> samples) {
 }
 
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
-                             const std::vector<ChannelConfig>& channels) {
+                             const std::vector<ChannelConfig>& channels,
+                             const std::string& latency_device) {
   CallMeter meter(lines, clock);
-  Capability capability = asPulseThread(clock, [&](Capability& measured) {
+  Capability capability = asPulseThread(clock, latency_device, [&](Capability& measured) {
     for (const ChannelConfig& channel : channels) {
       measured.channels.push_back(meter.measure(channel));
     }
@@ -122,8 +130,8 @@ Capability measureCapability(gpio::Lines& lines, Clock& clock,
   return capability;
 }
 
-Capability measureWakeUps(Clock& clock) {
-  return asPulseThread(clock, [](Capability& /*measured*/) { return true; });
+Capability measureWakeUps(Clock& clock, const std::string& latency_device) {
+  return asPulseThread(clock, latency_device, [](Capability& /*measured*/) { return true; });
 }
 
 }  // namespace stepdriver::pulse

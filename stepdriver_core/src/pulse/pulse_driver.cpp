@@ -8,10 +8,15 @@
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::pulse {
-PulseDriver::PulseDriver(PulseEngine& engine, Clock& clock, bool threaded)
+
+PulseDriver::PulseDriver(PulseEngine& engine, Clock& clock, bool threaded,
+                         const std::string& latency_device)
     : engine_(engine), clock_(clock) {
   if (!threaded) return;
-  if (clock_.realtime()) lock_error_ = lockMemory();
+  if (clock_.realtime()) {
+    lock_error_ = lockMemory();
+    if (!latency_device.empty()) latency_.emplace(latency_device);
+  }
   thread_ = std::thread([this] { run(); });
 }
 
@@ -22,6 +27,7 @@ void PulseDriver::stop() {
   stopping_ = true;
   clock_.wake();
   thread_.join();
+  latency_.reset();
 }
 
 void PulseDriver::post(const Command& command) {
@@ -64,6 +70,8 @@ void PulseDriver::advance(Nanoseconds time) {
   }
 }
 
-RealtimeRights PulseDriver::rights() const { return {scheduler_error_.load(), lock_error_.load()}; }
+RealtimeRights PulseDriver::rights() const {
+  return {scheduler_error_.load(), lock_error_.load(), latency_ ? latency_->error() : -1};
+}
 
 }  // namespace stepdriver::pulse

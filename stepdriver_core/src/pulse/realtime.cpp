@@ -9,7 +9,25 @@
 #include <cerrno>
 #include <cstring>
 
+#include "stepdriver_core/pulse/cpu_latency.h"
+
 namespace stepdriver::pulse {
+namespace {
+
+std::string latencyText(int error) {
+  if (error < 0) return "";
+  if (error == 0) return "; processors kept awake";
+  std::string text = std::string("; processors not kept awake: ") + CpuLatencyHold::kDevice;
+  if (error == EACCES || error == EPERM) {
+    return text +
+           " is closed to this user: config/udev/60-stepdriver-gpio.rules opens it to the "
+           "group realtime";
+  }
+  if (error == ENOENT) return text + " isn't there: this kernel or container hasn't got it";
+  return text + " can't be held (" + std::strerror(error) + ")";
+}
+
+}  // namespace
 
 int askForScheduler() {
   // Half of the lateness of a wake-up is the default slack of 50 us.
@@ -36,7 +54,7 @@ std::string RealtimeRights::text() const {
   text += memory_error == 0
               ? "; memory locked"
               : "; memory not locked: `@realtime - memlock unlimited` there allows it";
-  return text;
+  return text + latencyText(latency_error);
 }
 
 }  // namespace stepdriver::pulse

@@ -37,6 +37,7 @@ ChipModel::ChipModel(const RigAxisSpec& spec)
     pins_[i].inverted = wire.inverted;
     pins_[i].level = idleLevel(pin, !wire.line.empty(), straps);
   }
+  decode();
 }
 
 bool ChipModel::idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const {
@@ -69,6 +70,7 @@ std::optional<ChipModel::Pulse> ChipModel::request(Pin pin, bool line_level, std
   const bool changes_state = pin == Pin::kEnable || pin == Pin::kSleep || pin == Pin::kReset;
   if (level != state.level && changes_state) state.changed_ns = time_ns;
   state.level = level;
+  decode();
   return std::nullopt;
 }
 
@@ -124,7 +126,7 @@ void ChipModel::checkPins(std::int64_t time_ns) {
   checkTime(step_inactive_ns_, time_ns, timing_.step_low_ns, Violation::kShortStepLow);
   checkTime(at(Pin::kDir).changed_ns, time_ns, timing_.dir_setup_ns, Violation::kDirSetup);
   checkTime(mode_changed_ns_, time_ns, timing_.mode_setup_ns, Violation::kModeSetup);
-  if (!decodedMicrosteps()) count(Violation::kUndefinedMode);
+  if (!decoded_) count(Violation::kUndefinedMode);
 }
 
 void ChipModel::checkReadiness(std::int64_t time_ns) {
@@ -147,9 +149,10 @@ void ChipModel::checkReadiness(std::int64_t time_ns) {
 
 void ChipModel::onMode(std::int64_t time_ns) {
   if (chip_.modes.empty()) return;
+  decode();
   mode_changed_ns_ = time_ns;
   checkTime(step_active_ns_, time_ns, timing_.mode_hold_ns, Violation::kModeHold);
-  if (!decodedMicrosteps()) count(Violation::kUndefinedMode);
+  if (!decoded_) count(Violation::kUndefinedMode);
 }
 
 std::optional<int> ChipModel::decodedMicrosteps() const {
@@ -159,7 +162,7 @@ std::optional<int> ChipModel::decodedMicrosteps() const {
 
 std::int64_t ChipModel::advance(bool forward) {
   // Where nobody knows what the pins select, the mode before is as good a guess as any.
-  microsteps_ = decodedMicrosteps().value_or(microsteps_);
+  microsteps_ = decoded_.value_or(microsteps_);
   const std::int64_t unit = finest_ / microsteps_;
   const std::int64_t before = translator_;
   // From a place that a coarser mode doesn't have, it goes to the next one that the mode has.

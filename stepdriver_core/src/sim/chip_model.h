@@ -63,6 +63,7 @@ class ChipModel {
 
   bool idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const;
   std::optional<int> decodedMicrosteps() const;
+  void decode() { decoded_ = decodedMicrosteps(); }
   void checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int64_t limit_ns,
                  Violation violation);
   std::optional<Pulse> onStep(std::int64_t time_ns);
@@ -81,6 +82,7 @@ class ChipModel {
   std::int64_t step_inactive_ns_ = kForEver;
   std::int64_t mode_changed_ns_ = kForEver;
   std::int64_t translator_ = 0;
+  std::optional<int> decoded_;  // of the levels on the microstep pins
   int microsteps_;
   std::map<Violation, std::int64_t> violations_;
 };

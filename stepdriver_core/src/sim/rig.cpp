@@ -1,8 +1,10 @@
 #include "stepdriver_core/sim/rig.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <unordered_map>
 #include <utility>
@@ -11,6 +13,43 @@
 #include "trace_feed.h"
 
 namespace stepdriver::sim {
+namespace {
+
+struct PinOnLine {
+  RigAxis* axis;
+  Pin pin;
+  int trace_pin;
+};
+
+struct WriteFault {
+  std::int64_t writes_left;
+  int error;
+};
+
+/// What is on a line: pins that it drives, or contacts that drive it.
+struct Line {
+  std::vector<PinOnLine> pins;
+  std::vector<const SwitchModel*> contacts;
+  bool other_level = false;  // of an input that no axis has
+  std::optional<WriteFault> write_fault;
+  gpio::EdgeListener listener;
+  bool told_level = false;  // what the listener knows
+
+  /// The level of an input by what each of its switches is.
+  template <typename Active>
+  bool level(const Active& active) const {
+    if (contacts.empty()) return other_level;
+    const auto first = std::find_if(contacts.begin(), contacts.end(), active);
+    return first != contacts.end() ? (*first)->spec().active_level
+                                   : !contacts.front()->spec().active_level;
+  }
+
+  bool settledLevel() const {
+    return level([](const SwitchModel* contact) { return contact->settled(); });
+  }
+};
+
+}  // namespace
 
 class Rig::Impl {
  public:
@@ -43,56 +82,38 @@ class Rig::Impl {
     return latest_ns;
   }
 
-  /// The level of an input by what each of its switches is.
-  template <typename Active>
-  bool levelOf(const std::string& line, const Active& active) const {
-    const auto contacts = inputs.find(line);
-    if (contacts == inputs.end()) {
-      const auto other = other_inputs.find(line);
-      return other != other_inputs.end() && other->second;
-    }
-    const auto& all = contacts->second;
-    const auto first = std::find_if(all.begin(), all.end(), active);
-    return first != all.end() ? (*first)->spec().active_level : !all.front()->spec().active_level;
+  int indexOf(const std::string& line) {
+    const auto known = indexes_.emplace(line, lines.size());
+    if (known.second) lines.emplace_back();
+    return static_cast<int>(known.first->second);
   }
-
-  bool settledLevelOf(const std::string& line) const {
-    return levelOf(line, [](const SwitchModel* contact) { return contact->settled(); });
-  }
+  Line& lineOf(const std::string& line) { return at(indexOf(line)); }
+  Line& at(int line) { return lines[static_cast<std::size_t>(line)]; }
 
   /// Tells the trace and whoever watches what switches did just now.
   void switchesMoved(std::int64_t time_ns) {
     feed.switchesMoved(time_ns);
-    for (auto& [line, watch] : watches) {
-      const bool level = settledLevelOf(line);
-      if (level == watch.level) continue;
-      watch.level = level;
-      watch.listener(level, time_ns);
+    for (const int index : watched) {
+      Line& line = at(index);
+      const bool level = line.settledLevel();
+      if (level == line.told_level) continue;
+      line.told_level = level;
+      line.listener(level, time_ns);
     }
   }
 
-  struct Watch {
-    gpio::EdgeListener listener;
-    bool level;
-  };
-  struct PinOnLine {
-    RigAxis* axis;
-    Pin pin;
-    int trace_pin;
-  };
-  struct WriteFault {
-    std::int64_t writes_left;
-    int error;
-  };
+  void failWrites(const std::string& name, const std::optional<WriteFault>& fault) {
+    Line& line = lineOf(name);
+    failing_lines += (fault ? 1 : 0) - (line.write_fault ? 1 : 0);
+    line.write_fault = fault;
+  }
 
   std::mutex mutex;
   std::vector<std::unique_ptr<RigAxis>> axes;
   TraceFeed feed;
-  std::unordered_map<std::string, std::vector<PinOnLine>> outputs;
-  std::unordered_map<std::string, std::vector<const SwitchModel*>> inputs;
-  std::unordered_map<std::string, bool> other_inputs;  // levels of those that no axis has
-  std::unordered_map<std::string, WriteFault> write_faults;
-  std::unordered_map<std::string, Watch> watches;
+  std::vector<Line> lines;
+  std::vector<int> watched;           // of them, those that someone listens to
+  std::atomic<int> failing_lines{0};  // those with a write_fault: each write asks
   std::int64_t latest_ns = kForEver;
 
  private:
@@ -102,7 +123,8 @@ class Rig::Impl {
       const std::string& line = wireOf(axis.spec(), pin).line;
       if (line.empty()) continue;
       const TracePin trace_pin{axis.spec().name, nameOf(pin)};
-      outputs[line].push_back({&axis, pin, feed.addPin(trace_pin, axis.chip().lineLevel(pin))});
+      const int index = feed.addPin(trace_pin, axis.chip().lineLevel(pin));
+      lineOf(line).pins.push_back({&axis, pin, index});
     }
     wire(axis, axis.switchAt(Side::kMin), "endstop_min");
     wire(axis, axis.switchAt(Side::kMax), "endstop_max");
@@ -111,9 +133,11 @@ class Rig::Impl {
 
   void wire(const RigAxis& axis, const SwitchModel* contact, const char* variable) {
     if (contact == nullptr || contact->spec().line.empty()) return;
-    inputs[contact->spec().line].push_back(contact);
+    lineOf(contact->spec().line).contacts.push_back(contact);
     feed.addSwitch({axis.spec().name, variable}, contact);
   }
+
+  std::unordered_map<std::string, std::size_t> indexes_;  // of the lines, by their names
 };
 
 Rig::Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace)
@@ -140,18 +164,18 @@ void Rig::setFaults(const std::string& axis, const RigFaults& faults) {
 
 void Rig::failWrites(const std::string& line, std::int64_t writes, int error) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
-  impl_->write_faults[line] = {writes, error};
+  impl_->failWrites(line, WriteFault{writes, error});
 }
 
 void Rig::clearWriteFault(const std::string& line) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
-  impl_->write_faults.erase(line);
+  impl_->failWrites(line, std::nullopt);
 }
 
 void Rig::setInput(const std::string& line, bool level, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  impl_->other_inputs[line] = level;
+  impl_->lineOf(line).other_level = level;
   impl_->switchesMoved(now_ns);
 }
 
@@ -167,58 +191,65 @@ void Rig::flushTrace() {
   impl_->feed.flush();
 }
 
-void Rig::onRequest(const std::string& line, bool level, std::int64_t time_ns) {
+int Rig::lineIndex(const std::string& line) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->indexOf(line);
+}
+
+void Rig::onRequest(int line, bool level, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  const auto pins = impl_->outputs.find(line);
-  if (pins == impl_->outputs.end()) return;
-  for (const Impl::PinOnLine& pin : pins->second) {
+  const std::vector<PinOnLine>& pins = impl_->at(line).pins;
+  if (pins.empty()) return;
+  for (const PinOnLine& pin : pins) {
     impl_->feed.settle(pin.trace_pin, level, now_ns);
     pin.axis->request(pin.pin, level, now_ns);
   }
   impl_->switchesMoved(now_ns);
 }
 
-void Rig::onEdge(const std::string& line, bool level, std::int64_t time_ns) {
+void Rig::onEdge(int line, bool level, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  const auto pins = impl_->outputs.find(line);
-  if (pins == impl_->outputs.end()) return;
-  for (const Impl::PinOnLine& pin : pins->second) {
+  const std::vector<PinOnLine>& pins = impl_->at(line).pins;
+  if (pins.empty()) return;
+  for (const PinOnLine& pin : pins) {
     impl_->feed.edge(pin.trace_pin, level, now_ns);
     pin.axis->edge(pin.pin, level, now_ns);
   }
   impl_->switchesMoved(now_ns);
 }
 
-void Rig::onRelease(const std::string& /*line*/, std::int64_t time_ns) {
+void Rig::onRelease(int /*line*/, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   impl_->advance(time_ns);
 }
 
-bool Rig::inputLevel(const std::string& line, std::int64_t time_ns) {
+bool Rig::inputLevel(int line, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  return impl_->levelOf(line,
-                        [now_ns](const SwitchModel* contact) { return contact->active(now_ns); });
+  return impl_->at(line).level(
+      [now_ns](const SwitchModel* contact) { return contact->active(now_ns); });
 }
 
-void Rig::watchInput(const std::string& line, gpio::EdgeListener listener) {
+void Rig::watchInput(int line, gpio::EdgeListener listener) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
-  if (listener) {
-    impl_->watches[line] = {std::move(listener), impl_->settledLevelOf(line)};
-  } else {
-    impl_->watches.erase(line);
-  }
+  std::vector<int>& watched = impl_->watched;
+  watched.erase(std::remove(watched.begin(), watched.end(), line), watched.end());
+  Line& input = impl_->at(line);
+  input.listener = std::move(listener);
+  if (!input.listener) return;
+  input.told_level = input.settledLevel();
+  watched.push_back(line);
 }
 
-int Rig::writeFault(const std::string& line, std::int64_t /*time_ns*/) {
+int Rig::writeFault(int line, std::int64_t /*time_ns*/) {
+  if (impl_->failing_lines.load(std::memory_order_relaxed) == 0) return 0;
   const std::lock_guard<std::mutex> lock(impl_->mutex);
-  if (impl_->write_faults.empty()) return 0;
-  const auto fault = impl_->write_faults.find(line);
-  if (fault == impl_->write_faults.end()) return 0;
-  if (fault->second.writes_left == 0) return fault->second.error;
-  --fault->second.writes_left;
+  std::optional<WriteFault>& fault = impl_->at(line).write_fault;
+  if (!fault) return 0;
+  if (fault->writes_left == 0) return fault->error;
+  --fault->writes_left;
   return 0;
 }
 

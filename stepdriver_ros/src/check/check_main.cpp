@@ -93,13 +93,13 @@ class Check {
     if (real_ && exit_code_ == kExitGood) {
       try {
         const auto backend = gpio::makeLibgpiodBackend();
-        capability_ = machine::measure(config_.axes, *backend, clock_);
+        capability_ = machine::measure(config_.axes, *backend, clock_, latencyDevice(config_));
         return;
       } catch (const GpioError& error) {
         note(kExitLines, error.what());
       }
     }
-    capability_ = pulse::measureWakeUps(clock_);
+    capability_ = pulse::measureWakeUps(clock_, latencyDevice(config_));
   }
 
   void reportRates() {
@@ -127,8 +127,8 @@ class Check {
     bool back = false;
     try {
       if (InterruptWatch::comesWithin(kWarning)) throw Error("interrupted");
-      const MoveOrder order{config_.axes, options_.axis, options_.distance, config_.max_lateness,
-                            config_.emergency_stop};
+      const MoveOrder order{config_.axes,         options_.axis,          options_.distance,
+                            config_.max_lateness, config_.emergency_stop, latencyDevice(config_)};
       const auto backend = gpio::makeLibgpiodBackend();
       back = moveForthAndBack(order, *backend, clock_,
                               [](const std::string& line) { print(line + "\n"); });

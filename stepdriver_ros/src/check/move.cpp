@@ -72,6 +72,7 @@ bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clo
   machine::MachineOptions options;
   options.max_lateness = order.max_lateness;
   options.emergency_stop = order.emergency_stop;
+  options.latency_device = order.latency_device;
   machine::Machine machine(axes, backend, clock, options);
   InterruptWatch watch([&] {
     say("  interrupted: decelerating");

@@ -18,6 +18,7 @@ struct MoveOrder {
   std::optional<double> distance;      ///< [mm|deg] 1 mm or 10 degrees by default
   double max_lateness = 0.005;         ///< [s] see machine::MachineOptions
   std::optional<axis::InputSwitch> emergency_stop{};
+  std::string latency_device{};  ///< the same
 };
 
 /// Where an axis is declared to stand before a stroke of this length, both in its unit, so that the

@@ -62,12 +62,12 @@ struct HandRig {
     return wait(1'000'000'000);
   }
 
-  HandRig& request(const std::string& line, bool level) {
-    rig.onRequest(line, level, now);
+  HandRig& request(const std::string& name, bool level) {
+    rig.onRequest(line(name), level, now);
     return *this;
   }
-  HandRig& set(const std::string& line, bool level) {
-    rig.onEdge(line, level, now);
+  HandRig& set(const std::string& name, bool level) {
+    rig.onEdge(line(name), level, now);
     return *this;
   }
   HandRig& wait(std::int64_t nanoseconds) {
@@ -82,7 +82,8 @@ struct HandRig {
   }
   HandRig& direction(bool forward) { return wait(kHalf).set("x.dir", forward).wait(kHalf); }
 
-  bool reads(const std::string& line) { return rig.inputLevel(line, now); }
+  int line(const std::string& name) { return rig.lineIndex(name); }
+  bool reads(const std::string& name) { return rig.inputLevel(line(name), now); }
   sim::RigAxisReport report(const std::string& axis = "x") const { return rig.report(axis); }
 
   static constexpr std::int64_t kHalf = 10'000;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "stepdriver_core/gpio/simulated_lines.h"
+#include "support/line_names.h"
 #include "support/test_board.h"
 
 namespace stepdriver::test {
@@ -41,32 +42,38 @@ class SimulatedTestBoard : public TestBoard, private gpio::Board {
   }
 
  private:
-  void onRequest(const std::string& line, bool level, std::int64_t time_ns) override {
+  int lineIndex(const std::string& line) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return names_.indexOf(line);
+  }
+
+  void onRequest(int line, bool level, std::int64_t time_ns) override {
     onEdge(line, level, time_ns);
   }
 
-  void onEdge(const std::string& line, bool level, std::int64_t /*time_ns*/) override {
+  void onEdge(int line, bool level, std::int64_t /*time_ns*/) override {
     const std::lock_guard<std::mutex> lock(mutex_);
-    levels_[line] = level;
-    driven_.push_back({line, level});
+    levels_[names_[line]] = level;
+    driven_.push_back({names_[line], level});
   }
 
-  void onRelease(const std::string& /*line*/, std::int64_t /*time_ns*/) override {}
+  void onRelease(int /*line*/, std::int64_t /*time_ns*/) override {}
 
-  bool inputLevel(const std::string& line, std::int64_t /*time_ns*/) override {
+  bool inputLevel(int line, std::int64_t /*time_ns*/) override {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return levels_[line];
+    return levels_[names_[line]];
   }
 
-  int writeFault(const std::string& /*line*/, std::int64_t /*time_ns*/) override { return 0; }
+  int writeFault(int /*line*/, std::int64_t /*time_ns*/) override { return 0; }
 
-  void watchInput(const std::string& line, gpio::EdgeListener listener) override {
+  void watchInput(int line, gpio::EdgeListener listener) override {
     const std::lock_guard<std::mutex> lock(mutex_);
-    listeners_.erase(line);
-    if (listener) listeners_.emplace(line, std::move(listener));
+    listeners_.erase(names_[line]);
+    if (listener) listeners_.emplace(names_[line], std::move(listener));
   }
 
   std::mutex mutex_;
+  LineNames names_;
   std::map<std::string, bool> levels_;
   std::map<std::string, gpio::EdgeListener> listeners_;
   std::vector<Driven> driven_;

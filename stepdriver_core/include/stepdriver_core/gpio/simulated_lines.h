@@ -16,33 +16,37 @@ using EdgeListener = std::function<void(bool level, std::int64_t time_ns)>;
 
 /// What is wired to simulated lines: it sees every change of an output and decides every input.
 ///
-/// The calls come one at a time, in the order of the changes, from whichever thread writes.
+/// The calls come one at a time, in the order of the changes, from whichever thread writes. A line
+/// is looked up by its name when it is requested, and from then on named by its index.
 class Board {
  public:
   virtual ~Board() = default;
 
+  /// @return the board's index of a line, the same each time. Any name is a line.
+  virtual int lineIndex(const std::string& line) = 0;
+
   /// The line was requested as an output and has this level from now on.
-  virtual void onRequest(const std::string& line, bool level, std::int64_t time_ns) = 0;
+  virtual void onRequest(int line, bool level, std::int64_t time_ns) = 0;
 
   /// The output changed. Called once for each line that changed, not for one that was set to the
   /// level that it had.
-  virtual void onEdge(const std::string& line, bool level, std::int64_t time_ns) = 0;
+  virtual void onEdge(int line, bool level, std::int64_t time_ns) = 0;
 
   /// The output was released. Its last edge, if any, was the one to the safe level.
-  virtual void onRelease(const std::string& line, std::int64_t time_ns) = 0;
+  virtual void onRelease(int line, std::int64_t time_ns) = 0;
 
   /// The level of an input now. Never called for outputs.
-  virtual bool inputLevel(const std::string& line, std::int64_t time_ns) = 0;
+  virtual bool inputLevel(int line, std::int64_t time_ns) = 0;
 
   /// Called before each write, once for each line that it names, changed or not.
   ///
   /// @return 0, or the errno with which the write fails; then all lines of it keep their levels.
-  virtual int writeFault(const std::string& line, std::int64_t time_ns) = 0;
+  virtual int writeFault(int line, std::int64_t time_ns) = 0;
 
   /// From now on the board tells this listener of the input's edges; an empty one ends that, and
   /// when this returns the earlier one isn't called any more. A board that doesn't know when its
   /// inputs change leaves it at that: waiting for edges then ends with the time-out.
-  virtual void watchInput(const std::string& line, EdgeListener listener);
+  virtual void watchInput(int line, EdgeListener listener);
 };
 
 /// Simulated lines: any name is a line, each can be held once; a Board is wired to them.

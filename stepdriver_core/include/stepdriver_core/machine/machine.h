@@ -13,10 +13,12 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
 #include "stepdriver_core/pulse/lateness.h"
 
 namespace stepdriver::machine {
 
+/// What a Machine is made with, beside its axes.
 struct MachineOptions {
   /// Serve the pulses in a thread of the machine's own. Without, waiting calls serve them, and
   /// advance() does: for tests on a virtual clock.
@@ -33,6 +35,9 @@ struct MachineOptions {
   /// Absolute path of the file that keeps positions over a restart; empty: none. See
   /// machine::StateFile.
   std::string state_file{};
+  /// On a clock that is real, held open to keep the processors awake; empty: they may sleep. See
+  /// pulse::CpuLatencyHold.
+  std::string latency_device = pulse::CpuLatencyHold::kDevice;
 };
 
 /// What the pulse engine has done since the start.
@@ -121,6 +126,7 @@ class Machine {
   /// motors stay energized. MachineOptions::emergency_stop does the same; where it is active at the
   /// start no motor is energized.
   void emergencyStop();
+  /// From an emergency stop on until recover().
   bool emergencyStopped() const;
 
   /// Ends the emergency stop and all faults. Nothing moves.
@@ -133,6 +139,7 @@ class Machine {
   /// Returns when that is done. @throw Error where a line can't be written; all others are, then.
   void shutdown();
 
+  /// What the engine has done, read while it goes on.
   EngineFigures figures() const;
 
   /// Why the state file couldn't be written the last time; empty: it could, or there is none.

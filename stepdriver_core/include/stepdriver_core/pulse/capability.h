@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "stepdriver_core/pulse/realtime.h"
 
@@ -48,11 +50,14 @@ constexpr int kMeasuredCalls = 200;    // of each line; fewer where they take mo
 /// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
 ///   inactive level.
 /// @param clock not waited on by anyone else meanwhile.
+/// @param latency_device as the PulseDriver's.
 /// @throw GpioError where a line can't be written or read.
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
-                             const std::vector<ChannelConfig>& channels);
+                             const std::vector<ChannelConfig>& channels,
+                             const std::string& latency_device = CpuLatencyHold::kDevice);
 
 /// The same without lines: of a machine alone. There are no channels in it.
-Capability measureWakeUps(Clock& clock);
+Capability measureWakeUps(Clock& clock,
+                          const std::string& latency_device = CpuLatencyHold::kDevice);
 
 }  // namespace stepdriver::pulse

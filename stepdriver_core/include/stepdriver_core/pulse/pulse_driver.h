@@ -4,9 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
 
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "stepdriver_core/pulse/realtime.h"
 
@@ -14,12 +17,14 @@ namespace stepdriver::pulse {
 
 /// Keeps an engine served: in a thread of its own, or, on a virtual clock, by whoever waits.
 ///
-/// The thread asks for SCHED_FIFO 50 and locked memory where the clock says that being late
-/// matters; where that is refused it goes on without, and rights() says so.
+/// The thread asks for SCHED_FIFO 50, locked memory and processors that don't sleep where the clock
+/// says that being late matters; where that is refused it goes on without, and rights() says so.
 class PulseDriver {
  public:
   /// @param engine, clock outlive the driver.
-  PulseDriver(PulseEngine& engine, Clock& clock, bool threaded);
+  /// @param latency_device see CpuLatencyHold; empty: the processors may sleep.
+  PulseDriver(PulseEngine& engine, Clock& clock, bool threaded,
+              const std::string& latency_device = CpuLatencyHold::kDevice);
 
   /// stop(), where that wasn't called.
   ~PulseDriver();
@@ -63,6 +68,7 @@ class PulseDriver {
   std::atomic<bool> stopping_{false};
   std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not asked for
   std::atomic<int> lock_error_{-1};
+  std::optional<CpuLatencyHold> latency_;
   std::thread thread_;
 };
 
