@@ -168,6 +168,9 @@ class Axis {
 
   AxisState state() const;
 
+  /// [microsteps/s] The highest rate of the motion under way, as planned; 0 at rest.
+  double peakRate() const;
+
   /// @throw GpioError where a line can't be read.
   EndstopState endstops() const;
 
