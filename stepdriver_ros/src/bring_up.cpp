@@ -21,7 +21,8 @@ std::vector<LimitSources> applyDescriptionParameter(const ros::NodeHandle& node,
   std::string name;
   XmlRpc::XmlRpcValue value;
   if (!node.searchParam("robot_description", name) || !ros::param::get(name, value)) {
-    ROS_INFO("There is no robot_description: the limits are those of the axes' configuration");
+    ROS_INFO_NAMED(
+        "limits", "There is no robot_description: the limits are those of the axes' configuration");
     return std::vector<LimitSources>(axes.size());
   }
   const axis::ConfigValue description = configValue(value);
@@ -48,9 +49,9 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
   }
   if (!issues.empty()) throw ConfigError(issues);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
-    ROS_INFO("%s", limitsText(config.axes[i], sources[i]).c_str());
+    ROS_INFO_NAMED("limits", "%s", limitsText(config.axes[i], sources[i]).c_str());
     if (sources[i].limited_though_continuous) {
-      ROS_WARN("%s", continuousJointText(config.axes[i]).c_str());
+      ROS_WARN_NAMED("limits", "%s", continuousJointText(config.axes[i]).c_str());
     }
   }
   return config;

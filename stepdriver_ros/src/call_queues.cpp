@@ -6,21 +6,27 @@ namespace stepdriver::ros_node {
 namespace {
 
 constexpr int kControlThreads = 2;
+constexpr int kEmergencyThreads = 1;
 constexpr int kTrajectoryThreads = 2;
 constexpr int kSpareLineThreads = 3;
+// Those that are there before anything waits.
+constexpr int kFirstThreads = 2;
 constexpr std::chrono::milliseconds kPoll{5};
 
 }  // namespace
 
-CallQueues::CallQueues(std::size_t axes) : axes_(axes) {}
+CallQueues::CallQueues(std::size_t axes)
+    : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
+      trajectories_(waiting_pool_, kTrajectoryThreads),
+      control_(control_pool_, kControlThreads),
+      emergency_(emergency_pool_, kEmergencyThreads) {
+  for (std::size_t i = 0; i < axes; ++i) axes_.emplace_back(waiting_pool_, kThreadsPerAxis);
+}
 
 void CallQueues::start() {
-  for (ros::CallbackQueue& queue : axes_) spinners_.emplace_back(kThreadsPerAxis, &queue);
-  spinners_.emplace_back(static_cast<std::uint32_t>(axes_.size()) + kSpareLineThreads, &lines_);
-  spinners_.emplace_back(kTrajectoryThreads, &trajectories_);
-  spinners_.emplace_back(kControlThreads, &control_);
-  spinners_.emplace_back(1, &emergency_);
-  for (ros::AsyncSpinner& spinner : spinners_) spinner.start();
+  waiting_pool_.start(kFirstThreads);
+  control_pool_.start(kControlThreads);
+  emergency_pool_.start(kEmergencyThreads);
 }
 
 void CallQueues::finish(std::chrono::milliseconds bound) {
@@ -28,8 +34,13 @@ void CallQueues::finish(std::chrono::milliseconds bound) {
   while (!allAnswered() && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(kPoll);
   }
-  // Each waits for the calls that its threads are in.
-  for (ros::AsyncSpinner& spinner : spinners_) spinner.stop();
+  stop();
+}
+
+void CallQueues::stop() {
+  waiting_pool_.stop();
+  control_pool_.stop();
+  emergency_pool_.stop();
 }
 
 bool CallQueues::allAnswered() {

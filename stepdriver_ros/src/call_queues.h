@@ -2,31 +2,35 @@
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
-#include <ros/spinner.h>
 
 #include <chrono>
 #include <cstddef>
 #include <deque>
-#include <vector>
+
+#include "call_pool.h"
 
 namespace stepdriver::ros_node {
 
 /// The queues of service calls and their threads, made so that a call that waits holds up no other.
 ///
-/// Each axis has a queue of its own. Of its threads a waiting move takes one, as an axis moves once
-/// at a time, and a disable or a microstep change that waits for rest another; calls that find the
-/// rest taken wait no longer than a chip takes to wake or to be reset. Lines of several axes have a
-/// thread for each axis, as each moves in one line at a time, and some for lines that wait for
-/// their axes to rest. What stops or recovers shares no thread with what may wait, nor do
-/// trajectories, and the emergency stop shares its thread with nothing.
+/// Each axis has a queue of its own. Of its share of threads a waiting move takes one, as an axis
+/// moves once at a time, and a disable or a microstep change that waits for rest another; calls
+/// that find the rest taken wait no longer than a chip takes to wake or to be reset. Lines of
+/// several axes have a thread for each axis, as each moves in one line at a time, and some for
+/// lines that wait for their axes to rest. Threads are started when so many calls are under way at
+/// once, and then shared by all axes. What stops or recovers has threads of its own from the start,
+/// and the emergency stop shares its thread with nothing. At rest no thread wakes.
 ///
 /// Made and used by one thread; the queues themselves may be used by any.
 class CallQueues {
  public:
-  /// The threads of an axis's queue.
+  /// How many calls of an axis are under way at once, at most.
   static constexpr int kThreadsPerAxis = 4;
 
   explicit CallQueues(std::size_t axes);
+  ~CallQueues() { stop(); }
+  CallQueues(const CallQueues&) = delete;
+  CallQueues& operator=(const CallQueues&) = delete;
 
   /// Calls that may take as long as a motion of this axis.
   ros::CallbackQueue& ofAxis(std::size_t axis) { return axes_.at(axis); }
@@ -47,13 +51,16 @@ class CallQueues {
 
  private:
   bool allAnswered();
+  void stop();
 
-  std::deque<ros::CallbackQueue> axes_;
-  ros::CallbackQueue lines_;
-  ros::CallbackQueue trajectories_;
-  ros::CallbackQueue control_;
-  ros::CallbackQueue emergency_;
-  std::vector<ros::AsyncSpinner> spinners_;
+  CallPool waiting_pool_;
+  CallPool control_pool_;
+  CallPool emergency_pool_;
+  std::deque<PooledQueue> axes_;
+  PooledQueue lines_;
+  PooledQueue trajectories_;
+  PooledQueue control_;
+  PooledQueue emergency_;
 };
 
 /// A handle for what is to be served by a queue.

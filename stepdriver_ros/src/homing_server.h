@@ -1,44 +1,36 @@
 #pragma once
 
-#include <actionlib/server/simple_action_server.h>
 #include <ros/node_handle.h>
 #include <ros/service_server.h>
 #include <stepdriver/Home.h>
-#include <stepdriver/HomeAction.h>
 
-#include <chrono>
-
+#include "action_statuses.h"
 #include "background.h"
 #include "call_queues.h"
+#include "homing_action.h"
 #include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::ros_node {
 
-/// The homing of one axis: a service `home`, and an action `homing` with feedback and
-/// cancel, below the axis's name. The action has a thread of its own, in which it waits.
+/// The homing of one axis: a service `home`, and the action `homing`, below the axis's name.
 class HomingServer {
  public:
   /// @param node the node's private handle.
   /// @param index of the axis, which says its queue.
-  /// @param axis, queues outlive the server; before its end the machine has been shut down.
-  HomingServer(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
-               CallQueues& queues);
+  /// @param axis, queues, statuses outlive the server; before its end the machine has been shut
+  ///   down.
+  HomingServer(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis, CallQueues& queues,
+               ActionStatuses& statuses);
   HomingServer(const HomingServer&) = delete;
   HomingServer& operator=(const HomingServer&) = delete;
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   bool home(Home::Request& request, Home::Response& response);
-  void execute(const HomeGoalConstPtr& goal);
-  void tell();
 
   axis::Axis& axis_;
   ros::NodeHandle node_;
   ros::ServiceServer service_;
-  actionlib::SimpleActionServer<HomeAction> action_;
-  axis::HomingPhase told_ = axis::HomingPhase::kNone;  // of the action's thread, as told_at_
-  Clock::time_point told_at_;
+  HomingAction action_;
   Background background_;
 };
 

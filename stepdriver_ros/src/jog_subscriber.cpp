@@ -20,13 +20,14 @@ constexpr double kTimeoutPart = 0.05;
 
 JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
                              double timeout)
-    : machine_(machine), timeout_(timeout), heard_(machine.axes().size()) {
+    : machine_(machine),
+      timeout_(timeout),
+      heard_(machine.axes().size()),
+      looking_(onQueue(queues.control(), node), ros::WallDuration(timeout * kTimeoutPart),
+               [this] { return endWhatIsOver(); }) {
   node.setCallbackQueue(&queues.control());
   subscriber_ = node.subscribe("jog", kQueued, &JogSubscriber::take, this,
                                ros::TransportHints().tcpNoDelay());
-  timer_ = node.createSteadyTimer(
-      ros::WallDuration(timeout * kTimeoutPart),
-      [this](const ros::SteadyTimerEvent& /*event*/) { endWhatIsOver(); }, false);
 }
 
 void JogSubscriber::take(const Jog::ConstPtr& message) {
@@ -35,7 +36,7 @@ void JogSubscriber::take(const Jog::ConstPtr& message) {
     const std::vector<std::size_t> axes = axesOf(*message);
     for (std::size_t i = 0; i < axes.size(); ++i) jog(axes[i], message->velocity[i]);
   } catch (const Refused& refused) {
-    ROS_WARN_THROTTLE(1.0, "jog: %s", refused.what());
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", refused.what());
   }
 }
 
@@ -66,21 +67,24 @@ void JogSubscriber::jog(std::size_t axis, double velocity) {
   try {
     machine_.axes()[axis]->jog(velocity);
     heard_[axis] = velocity == 0.0 ? ros::SteadyTime() : ros::SteadyTime::now();
+    if (velocity != 0.0) looking_.begin();
   } catch (const Error& error) {
-    ROS_WARN_THROTTLE(1.0, "jog: %s", error.what());
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
   }
 }
 
-void JogSubscriber::endWhatIsOver() {
+bool JogSubscriber::endWhatIsOver() {
   const std::lock_guard<std::mutex> lock(mutex_);
   const ros::SteadyTime now = ros::SteadyTime::now();
   for (std::size_t axis = 0; axis < heard_.size(); ++axis) {
     if (heard_[axis].isZero() || now - heard_[axis] < timeout_) continue;
-    ROS_INFO("%s: no jog for %g s, it comes to rest", machine_.axes()[axis]->config().name.c_str(),
-             timeout_.toSec());
+    ROS_INFO_NAMED("jog", "%s: no jog for %g s, it comes to rest",
+                   machine_.axes()[axis]->config().name.c_str(), timeout_.toSec());
     jog(axis, 0.0);
     heard_[axis] = ros::SteadyTime();
   }
+  return std::any_of(heard_.begin(), heard_.end(),
+                     [](const ros::SteadyTime& heard) { return !heard.isZero(); });
 }
 
 }  // namespace stepdriver::ros_node

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ros/node_handle.h>
-#include <ros/steady_timer.h>
 #include <ros/subscriber.h>
 #include <ros/time.h>
 #include <stepdriver/Jog.h>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "call_queues.h"
+#include "looking.h"
 #include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
@@ -33,14 +33,15 @@ class JogSubscriber {
   /// @return the axes that the message names, by their index. @throw Refused
   std::vector<std::size_t> axesOf(const Jog& message) const;
   void jog(std::size_t axis, double velocity);
-  void endWhatIsOver();
+  /// @return whether there are axes that still jog.
+  bool endWhatIsOver();
 
   machine::Machine& machine_;
   const ros::WallDuration timeout_;
   std::mutex mutex_;
   std::vector<ros::SteadyTime> heard_;  // the last message of each axis; zero: none, or it is over
+  Looking looking_;
   ros::Subscriber subscriber_;
-  ros::SteadyTimer timer_;
 };
 
 }  // namespace stepdriver::ros_node

@@ -28,9 +28,9 @@ std::string messageOf(const std::vector<axis::HomingResult>& results) {
 
 void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names) {
   try {
-    ROS_INFO("%s", messageOf(machine.home(names)).c_str());
+    ROS_INFO_NAMED("homing", "%s", messageOf(machine.home(names)).c_str());
   } catch (const std::exception& error) {
-    ROS_ERROR("%s", error.what());
+    ROS_ERROR_NAMED("homing", "%s", error.what());
   }
 }
 

@@ -103,7 +103,7 @@ void MachineServices::advertiseRig(Simulation& simulation) {
         try {
           response = simulation.report();
         } catch (const std::exception& error) {
-          ROS_ERROR("%s", error.what());
+          ROS_ERROR_NAMED("rig", "%s", error.what());
           return false;
         }
         return true;
@@ -120,6 +120,25 @@ void MachineServices::advertiseRig(Simulation& simulation) {
         });
       };
   servers_.push_back(node_.advertiseService("rig/emergency_stop", press));
+  for (const axis::AxisConfig& axis : simulation.axes()) {
+    if (axis.endstop_min) advertiseEndstop(simulation, axis.name, Simulation::End::kMin);
+    if (axis.endstop_max) advertiseEndstop(simulation, axis.name, Simulation::End::kMax);
+  }
+}
+
+void MachineServices::advertiseEndstop(Simulation& simulation, const std::string& axis,
+                                       Simulation::End end) {
+  using Press = std_srvs::SetBool;
+  const std::string name = end == Simulation::End::kMin ? "min" : "max";
+  const boost::function<bool(Press::Request&, Press::Response&)> press =
+      [&simulation, axis, end, name](Press::Request& request, Press::Response& response) {
+        return answer(response, [&] {
+          simulation.pressEndstop(axis, end, request.data != 0);
+          response.message = axis + ": the switch at the " + name + " end is " +
+                             (request.data != 0 ? "pressed" : "let go");
+        });
+      };
+  servers_.push_back(node_.advertiseService("rig/" + axis + "/press_" + name, press));
 }
 
 }  // namespace stepdriver::ros_node

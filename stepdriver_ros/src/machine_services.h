@@ -29,6 +29,7 @@ class MachineServices {
   void advertise(const std::string& name, ros::CallbackQueue& queue, const std::string& done,
                  const std::function<void()>& action);
 
+  void advertiseEndstop(Simulation& simulation, const std::string& axis, Simulation::End end);
   void advertiseSpeedOverride(machine::Machine& machine);
   void advertiseMoveLine(machine::Machine& machine);
 

@@ -1,21 +1,22 @@
 #pragma once
 
-#include <actionlib/server/action_server.h>
 #include <actionlib_msgs/GoalStatus.h>
 #include <ros/duration.h>
 #include <ros/node_handle.h>
 
+#include <functional>
 #include <iterator>
 #include <list>
 #include <mutex>
 #include <string>
 #include <utility>
 
+#include "action_server.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::ros_node {
 
-/// How often an action asks how its goals are.
+/// How often an action asks how its goals are, while it has any.
 inline const ros::WallDuration kLookPeriod(0.01);
 
 /// An action whose goals are motions. It asks each kLookPeriod how these are: no thread waits for a
@@ -31,15 +32,19 @@ class MotionAction {
   MotionAction& operator=(const MotionAction&) = delete;
   virtual ~MotionAction() = default;
 
-  /// Tells the clients what has become of their goals; to be called each kLookPeriod.
-  void look() {
+  /// Tells the clients what has become of their goals; to be called each kLookPeriod, from a goal
+  /// that has begun on.
+  ///
+  /// @return whether there may be goals under way.
+  bool look() {
     // A goal that begins may wait for a chip to wake, or be long to plan; this thread has others to
     // look at.
     const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-    if (!lock.owns_lock()) return;
+    if (!lock.owns_lock()) return true;
     concludeEnded();
     looks_ = (looks_ + 1) % kLooksPerFeedback;
     for (Following& following : under_way_) watch(following, looks_ == 0);
+    return !under_way_.empty();
   }
 
   /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
@@ -49,14 +54,17 @@ class MotionAction {
   }
 
  protected:
-  using Server = actionlib::ActionServer<Action>;
+  using Server = ActionServer<Action>;
   using GoalHandle = typename Server::GoalHandle;
 
   /// @param node with the queue of the goals and cancels.
-  MotionAction(const ros::NodeHandle& node, const std::string& name)
-      : server_(
-            node, name, [this](const GoalHandle& handle) { take(handle); },
-            [this](const GoalHandle& handle) { cancel(handle); }, false) {}
+  /// @param begun is called when a goal has begun.
+  MotionAction(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
+               std::function<void()> begun)
+      : begun_(std::move(begun)),
+        server_(
+            node, name, statuses, [this](const GoalHandle& handle) { take(handle); },
+            [this](const GoalHandle& handle) { cancel(handle); }) {}
 
   /// To be called when the action is whole.
   void start() { server_.start(); }
@@ -88,6 +96,7 @@ class MotionAction {
       for (Following& older : under_way_) takeOver(following, older);
       under_way_.push_back(std::move(following));
       concludeEnded();
+      begun_();
     } catch (const Error& error) {
       reject(handle, error);
     }
@@ -108,6 +117,7 @@ class MotionAction {
     }
   }
 
+  const std::function<void()> begun_;
   std::mutex mutex_;
   Server server_;
   std::list<Following> under_way_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace stepdriver::ros_node {
 namespace {
@@ -36,8 +37,9 @@ double progressOf(double from, double position, double target) {
 
 }  // namespace
 
-AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis)
-    : MotionAction(node, "move"), axis_(axis) {
+AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis,
+                               ActionStatuses& statuses, std::function<void()> begun)
+    : MotionAction(node, "move", statuses, std::move(begun)), axis_(axis) {
   start();
 }
 
@@ -62,7 +64,7 @@ void AxisMoveAction::stop(const FollowingMove& following) {
   try {
     axis_.stop(following.move);
   } catch (const Error& error) {
-    ROS_ERROR("%s/move: %s", axis_.config().name.c_str(), error.what());
+    ROS_ERROR_NAMED("move", "%s/move: %s", axis_.config().name.c_str(), error.what());
   }
 }
 

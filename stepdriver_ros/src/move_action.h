@@ -1,11 +1,12 @@
 #pragma once
 
-#include <actionlib/server/action_server.h>
 #include <ros/node_handle.h>
 #include <stepdriver/MoveAction.h>
 
+#include <functional>
 #include <string>
 
+#include "action_statuses.h"
 #include "motion_action.h"
 #include "stepdriver_core/axis/axis.h"
 
@@ -24,8 +25,10 @@ struct FollowingMove {
 class AxisMoveAction : public MotionAction<MoveAction, FollowingMove> {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
-  /// @param axis outlives the action.
-  AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis);
+  /// @param axis, statuses outlive the action.
+  /// @param begun is called when a goal has begun: from then on look() is to be called.
+  AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses,
+                 std::function<void()> begun);
 
  private:
   FollowingMove begin(const GoalHandle& handle) override;

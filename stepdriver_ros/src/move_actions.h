@@ -1,11 +1,12 @@
 #pragma once
 
 #include <ros/node_handle.h>
-#include <ros/steady_timer.h>
 
 #include <deque>
 
+#include "action_statuses.h"
 #include "call_queues.h"
+#include "looking.h"
 #include "move_action.h"
 #include "stepdriver_core/machine/machine.h"
 
@@ -15,20 +16,15 @@ namespace stepdriver::ros_node {
 class MoveActions {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the actions.
-  MoveActions(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues) {
+  /// @param machine, queues, statuses outlive the actions.
+  MoveActions(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+              ActionStatuses& statuses)
+      : looking_(onQueue(queues.control(), node), kLookPeriod, [this] { return look(); }) {
     for (std::size_t i = 0; i < machine.axes().size(); ++i) {
       axis::Axis& axis = *machine.axes()[i];
       actions_.emplace_back(onQueue(queues.ofAxis(i), ros::NodeHandle(node, axis.config().name)),
-                            axis);
+                            axis, statuses, [this] { looking_.begin(); });
     }
-    node.setCallbackQueue(&queues.control());
-    timer_ = node.createSteadyTimer(
-        kLookPeriod,
-        [this](const ros::SteadyTimerEvent& /*event*/) {
-          for (AxisMoveAction& action : actions_) action.look();
-        },
-        false);
   }
   MoveActions(const MoveActions&) = delete;
   MoveActions& operator=(const MoveActions&) = delete;
@@ -39,8 +35,14 @@ class MoveActions {
   }
 
  private:
+  bool look() {
+    bool more = false;
+    for (AxisMoveAction& action : actions_) more = action.look() || more;
+    return more;
+  }
+
   std::deque<AxisMoveAction> actions_;
-  ros::SteadyTimer timer_;
+  Looking looking_;
 };
 
 }  // namespace stepdriver::ros_node

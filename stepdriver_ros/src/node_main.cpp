@@ -1,12 +1,15 @@
+#include <pthread.h>
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
+#include <cstddef>
 #include <deque>
 #include <exception>
 #include <string>
 #include <vector>
 
+#include "action_statuses.h"
 #include "axis_services.h"
 #include "bring_up.h"
 #include "call_queues.h"
@@ -35,6 +38,9 @@ constexpr int kExitTooSlow = 3;
 constexpr std::chrono::milliseconds kPoll{1000};
 // For the calls that came in while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
+
+// Where memory is locked, each thread's stack is in memory as a whole, by default 8 MB.
+constexpr std::size_t kThreadStack = 1024 * 1024;
 
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 
@@ -67,7 +73,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   try {
     machine.shutdown();
   } catch (const Error& error) {
-    ROS_ERROR("Not all could be disabled: %s", error.what());
+    ROS_ERROR_NAMED("node", "Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
   }
   move_actions.tellEnded();
@@ -77,13 +83,22 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   return exit_code;
 }
 
+void setThreadStacks() {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  if (pthread_attr_setstacksize(&attributes, kThreadStack) == 0) {
+    pthread_setattr_default_np(&attributes);
+  }
+  pthread_attr_destroy(&attributes);
+}
+
 void warnOfSlowness(const std::vector<axis::AxisConfig>& axes,
                     const pulse::Capability& capability) {
   if (capability.rights.anyRefused()) {
-    ROS_WARN("Pulse thread: %s", capability.rights.text().c_str());
+    ROS_WARN_NAMED("realtime", "Pulse thread: %s", capability.rights.text().c_str());
   }
   for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
-    ROS_WARN("%s. stepdriver_check says more", complaint.c_str());
+    ROS_WARN_NAMED("realtime", "%s. stepdriver_check says more", complaint.c_str());
   }
 }
 
@@ -91,7 +106,8 @@ void warnOfPositions(const machine::Machine& machine) {
   for (const auto& axis : machine.axes()) {
     const std::string note = axis->state().position_note;
     if (note.empty()) continue;
-    ROS_WARN("%s: its position is unverified: %s", axis->config().name.c_str(), note.c_str());
+    ROS_WARN_NAMED("position", "%s: its position is unverified: %s", axis->config().name.c_str(),
+                   note.c_str());
   }
 }
 
@@ -111,7 +127,9 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
 
   if (machine.emergencyStopped()) {
-    ROS_WARN("The emergency stop input is active: no axis is enabled, none moves until recover");
+    ROS_WARN_NAMED(
+        "emergency_stop",
+        "The emergency stop input is active: no axis is enabled, none moves until recover");
   }
   warnOfPositions(machine);
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
@@ -121,21 +139,22 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
+  ActionStatuses statuses(private_node);
   std::deque<AxisServices> axis_services;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
   }
   std::deque<HomingServer> homing_servers;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
-    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues);
+    homing_servers.emplace_back(private_node, i, *machine.axes()[i], queues, statuses);
   }
-  MoveActions move_actions(private_node, machine, queues);
+  MoveActions move_actions(private_node, machine, queues, statuses);
   const MachineHoming machine_homing(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues);
-  TrajectoryAction trajectory_action(private_node, machine, queues);
+  TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
   const std::string description = hardware.description();
   const Diagnostics diagnostics(
       node, private_node, machine, queues,
@@ -143,18 +162,18 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
       config.max_lateness);
   queues.start();
   publisher.start();
-  ROS_INFO("Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
-           machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
-           machine.figures().realtime.c_str());
+  ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
+                 machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
+                 machine.figures().realtime.c_str());
 
   std::string who;
   while (who.empty()) {
     who = end_requests.waitFor(kPoll);
     if (const std::string error = machine.stateFileError(); !error.empty()) {
-      ROS_ERROR_THROTTLE(60.0, "%s", error.c_str());
+      ROS_ERROR_THROTTLE_NAMED(60.0, "state_file", "%s", error.c_str());
     }
   }
-  ROS_INFO("Ending on %s", who.c_str());
+  ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
   return shutDown(machine, queues, move_actions, trajectory_action, publisher);
 }
 
@@ -170,13 +189,13 @@ int runOrExplain(EndRequests& end_requests) {
     explain(error, "Not started, no line was touched");
     return kExitConfig;
   } catch (const GpioError& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitGpio;
   } catch (const Refused& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitTooSlow;
   } catch (const std::exception& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitConfig;
   }
 }
@@ -186,6 +205,7 @@ int runOrExplain(EndRequests& end_requests) {
 
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
+  node::setThreadStacks();
   node::EndRequests end_requests;
   if (const auto code = node::answerArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);

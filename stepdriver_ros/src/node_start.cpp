@@ -31,7 +31,7 @@ std::optional<int> answerArguments(int argc, char** argv, const char* usage) {
 
 bool waitForMaster(EndRequests& end_requests) {
   while (!ros::master::check()) {
-    ROS_WARN_ONCE("Waiting for the ROS master at %s", ros::master::getURI().c_str());
+    ROS_WARN_ONCE_NAMED("node", "Waiting for the ROS master at %s", ros::master::getURI().c_str());
     if (!end_requests.waitFor(kMasterPoll).empty()) return false;
   }
   return true;
@@ -45,10 +45,10 @@ axis::ConfigValue privateParameters(const ros::NodeHandle& private_node) {
 
 void explain(const ConfigError& error, const std::string& what_follows) {
   const std::size_t count = error.issues().size();
-  ROS_FATAL("%s: %zu %s wrong in the parameters", what_follows.c_str(), count,
-            count == 1 ? "thing is" : "things are");
+  ROS_FATAL_NAMED("node", "%s: %zu %s wrong in the parameters", what_follows.c_str(), count,
+                  count == 1 ? "thing is" : "things are");
   for (const ConfigIssue& issue : error.issues()) {
-    ROS_ERROR("%s %s", issue.key.c_str(), issue.message.c_str());
+    ROS_ERROR_NAMED("node", "%s %s", issue.key.c_str(), issue.message.c_str());
   }
 }
 

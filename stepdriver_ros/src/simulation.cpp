@@ -54,7 +54,25 @@ std::optional<sim::SwitchSpec> switchOf(const std::optional<axis::Endstop>& ends
   return spec;
 }
 
-sim::RigAxisSpec rigAxisOf(const AxisConfig& axis, const SimulatedAxis& simulated) {
+/// The axis as it really is.
+AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
+  if (wiring.dir_inverted) axis.pins.dir.inverted = *wiring.dir_inverted;
+  if (wiring.steps_per_unit) {
+    axis.steps_per_unit = *wiring.steps_per_unit * axis::configUnitsPerUnit(axis.kind);
+  }
+  if (axis.endstop_min && wiring.min_pin) axis.endstop_min->line = *wiring.min_pin;
+  if (axis.endstop_max && wiring.max_pin) axis.endstop_max->line = *wiring.max_pin;
+  if (axis.endstop_min && wiring.min_active_level) {
+    axis.endstop_min->active_level = *wiring.min_active_level;
+  }
+  if (axis.endstop_max && wiring.max_active_level) {
+    axis.endstop_max->active_level = *wiring.max_active_level;
+  }
+  return axis;
+}
+
+sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& simulated) {
+  const AxisConfig axis = wired(configured, simulated.wiring);
   sim::RigAxisSpec spec;
   spec.name = axis.name;
   spec.model = axis.driver;
@@ -126,6 +144,7 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
       backend_(rig_, [this] { return clock_.now(); }) {
   for (const AxisConfig& axis : axes) {
     const SimulatedAxis& simulated = config.axes.at(axis.name);
+    faults_[axis.name] = simulated.faults;
     rig_.setFaults(axis.name, simulated.faults);
     if (simulated.fail_step_write_after) {
       rig_.failWrites(axis.pins.step.line, *simulated.fail_step_write_after, EIO);
@@ -137,6 +156,15 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
 void Simulation::pressEmergencyStop(bool pressed) {
   if (!emergency_stop_) throw Refused("emergency_stop isn't configured: there is no button");
   rig_.setInput(emergency_stop_->line, pressed == emergency_stop_->active_level, clock_.now());
+}
+
+void Simulation::pressEndstop(const std::string& axis, End end, bool pressed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sim::RigFaults& now = pressed_.try_emplace(axis, faults_.at(axis)).first->second;
+  const sim::RigFaults& always = faults_.at(axis);
+  if (end == End::kMin) now.min_stuck = pressed ? std::optional<bool>(true) : always.min_stuck;
+  if (end == End::kMax) now.max_stuck = pressed ? std::optional<bool>(true) : always.max_stuck;
+  rig_.setFaults(axis, now);
 }
 
 RigReport::Response Simulation::report() {

@@ -2,8 +2,11 @@
 
 #include <stepdriver/RigReport.h>
 
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "simulation_config.h"
@@ -36,13 +39,26 @@ class Simulation {
   /// Also makes the trace readable up to now. @throw Error where the trace can't be written.
   RigReport::Response report();
 
+  const std::vector<axis::AxisConfig>& axes() const { return axes_; }
+
   /// Presses the button of the emergency-stop input, or releases it. @throw Refused where none is
   /// configured.
   void pressEmergencyStop(bool pressed);
 
+  enum class End { kMin, kMax };
+  /// Presses an endstop by hand, or lets it go. What else is wrong with the axis by configuration
+  /// counts from here on anew.
+  ///
+  /// @param axis of the configuration.
+  /// @param end of the axis; which line that changes is a matter of the wiring.
+  void pressEndstop(const std::string& axis, End end, bool pressed);
+
  private:
   std::vector<axis::AxisConfig> axes_;
   const std::optional<axis::InputSwitch> emergency_stop_;
+  std::map<std::string, sim::RigFaults> faults_;
+  std::mutex mutex_;
+  std::map<std::string, sim::RigFaults> pressed_;  // faults, and the switches that are pressed
   pulse::VirtualClock clock_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;

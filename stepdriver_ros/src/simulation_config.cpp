@@ -31,6 +31,7 @@ class SimulatedAxisReader {
     axis.bounces = reader_.integer("bounces", 0, kMostBounces, axis.bounces);
     axis.bounce_ms =
         reader_.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, axis.bounce_ms);
+    readWiring(axis.wiring);
     axis.faults.min_stuck = stuck("min_stuck");
     axis.faults.max_stuck = stuck("max_stuck");
     axis.faults.lose_every = reader_.integer("lose_every", 0, kMostWrites, 0);
@@ -50,6 +51,29 @@ class SimulatedAxisReader {
     reader_.findNumber(what + "_mm", range, Presence::kOptional);
     reader_.findNumber(what + "_deg", range, Presence::kOptional);
     return {};
+  }
+
+  void readWiring(SimulatedWiring& wiring) {
+    ConfigReader reader = reader_.map("wiring");
+    wiring.dir_inverted = reader.findBoolean("dir_inverted", Presence::kOptional);
+    for (const char* key : {"steps_per_mm", "steps_per_degree"}) {
+      const bool wanted = unit_.empty() || (unit_ == "mm") == (key == std::string("steps_per_mm"));
+      if (!wanted) continue;
+      const auto steps = reader.findNumber(key, Range::positive(), Presence::kOptional);
+      if (steps) wiring.steps_per_unit = steps;
+    }
+    wiring.min_pin = reader.findText("min_pin", Presence::kOptional);
+    wiring.max_pin = reader.findText("max_pin", Presence::kOptional);
+    wiring.min_active_level = level(reader, "min_active_level");
+    wiring.max_active_level = level(reader, "max_active_level");
+    reader.rejectUnknown();
+  }
+
+  static std::optional<bool> level(ConfigReader& reader, const std::string& key) {
+    const auto level =
+        reader.findOneOf(key, std::vector<std::string>{"low", "high"}, Presence::kOptional);
+    if (!level) return {};
+    return *level == "high";
   }
 
   std::optional<bool> stuck(const std::string& key) {

@@ -11,6 +11,17 @@
 
 namespace stepdriver::ros_node {
 
+/// What a machine really is where its configuration is wrong about it; what isn't set is as
+/// configured.
+struct SimulatedWiring {
+  std::optional<bool> dir_inverted;      ///< DIR, on its way to the chip
+  std::optional<double> steps_per_unit;  ///< [microsteps/mm|deg] at the configured microsteps
+  std::optional<std::string> min_pin;    ///< the line that the switch at the min end is at
+  std::optional<std::string> max_pin;
+  std::optional<bool> min_active_level;  ///< of that line, while the switch is pressed
+  std::optional<bool> max_active_level;
+};
+
 /// How the rig of one axis is built, and what is wrong with it. Lengths are in mm on a linear axis,
 /// in degrees on a rotary one.
 struct SimulatedAxis {
@@ -20,6 +31,7 @@ struct SimulatedAxis {
   double bounce_ms = 0.2;            ///< [ms] from one bounce edge to the next
   std::optional<double> min_switch;  ///< [mm|deg] place of the switch; none: outside the soft limit
   std::optional<double> max_switch;
+  SimulatedWiring wiring;
   sim::RigFaults faults;
   std::optional<int> fail_step_write_after;  ///< [writes] to STEP that work before all others fail
 };
@@ -46,6 +58,13 @@ struct SimulationConfig {
 ///       switch_hysteresis_mm: 0.0
 ///       bounces: 0
 ///       bounce_ms: 0.2
+///       wiring:                # what the configuration is wrong about; default: nothing
+///         dir_inverted: true
+///         steps_per_mm: 100.0  # steps_per_degree
+///         min_pin: GPIO24      # the line of the switch at the min end
+///         max_pin: GPIO23
+///         min_active_level: low
+///         max_active_level: low
 ///       min_stuck: none          # active, inactive or none
 ///       max_stuck: none
 ///       lose_every: 0            # every n-th step slips; 0: none

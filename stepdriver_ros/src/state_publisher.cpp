@@ -3,6 +3,7 @@
 #include <ros/console.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <string>
 
 #include "stepdriver_core/error.h"
@@ -10,7 +11,9 @@
 namespace stepdriver::ros_node {
 namespace {
 
-constexpr std::chrono::milliseconds kPollPeriod{10};
+// Of the looks for what has changed.
+constexpr std::chrono::milliseconds kMovingPeriod{10};
+constexpr std::chrono::milliseconds kRestPeriod{20};
 constexpr std::chrono::milliseconds kAxisStatePeriod{100};
 constexpr int kQueueSize = 10;
 
@@ -23,35 +26,12 @@ Time nextTime(Time last, Duration period, Time now) {
 }
 
 /// Whether anything but the progress of a motion differs.
-bool differ(const AxisStates& one, const AxisStates& other) {
+bool differ(const axis::AxisState& one, const axis::AxisState& other) {
   return one.enabled != other.enabled || one.asleep != other.asleep || one.idle != other.idle ||
          one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
          one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
          one.target != other.target || one.fault != other.fault ||
          one.position_note != other.position_note;
-}
-
-AxisStates read(const machine::Machine& machine) {
-  AxisStates states;
-  states.header.stamp = ros::Time::now();
-  for (const auto& axis : machine.axes()) {
-    const axis::AxisState state = axis->state();
-    states.name.push_back(axis->config().name);
-    states.enabled.push_back(state.enabled);
-    states.asleep.push_back(state.asleep);
-    states.idle.push_back(state.idle);
-    states.moving.push_back(state.moving);
-    states.held.push_back(state.held);
-    states.homed.push_back(state.homed);
-    states.position_valid.push_back(state.position_valid);
-    states.microsteps.push_back(state.microsteps);
-    states.position.push_back(state.position);
-    states.velocity.push_back(state.velocity);
-    states.target.push_back(state.target);
-    states.fault.push_back(state.fault);
-    states.position_note.push_back(state.position_note);
-  }
-  return states;
 }
 
 }  // namespace
@@ -74,6 +54,7 @@ StatePublisher::StatePublisher(ros::NodeHandle node, ros::NodeHandle private_nod
   endstops_.min.resize(axes);
   endstops_.max.resize(axes);
   endstops_unreadable_.resize(axes);
+  states_.resize(axes);
 }
 
 StatePublisher::~StatePublisher() { stop(); }
@@ -98,6 +79,7 @@ void StatePublisher::run() {
   auto axis_states_due = joint_states_due;
   do {
     const auto now = Clock::now();
+    readStates();
     if (now >= joint_states_due) {
       publishJointStates();
       joint_states_due = nextTime(joint_states_due, joint_state_period_, now);
@@ -108,9 +90,12 @@ void StatePublisher::run() {
       publishAxisStates(!due);
       if (due)
         axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
-      poll_due = nextTime<Clock::time_point>(poll_due, kPollPeriod, now);
+      const bool moving = std::any_of(states_.begin(), states_.end(),
+                                      [](const axis::AxisState& state) { return state.moving; });
+      poll_due = nextTime<Clock::time_point>(poll_due, moving ? kMovingPeriod : kRestPeriod, now);
     }
   } while (sleepUntil(std::min(joint_states_due, poll_due)));
+  readStates();
   publishJointStates();
   publishEndstopsOnChange();
   publishAxisStates(false);
@@ -121,42 +106,70 @@ bool StatePublisher::sleepUntil(Clock::time_point time) {
   return !stop_asked_.wait_until(lock, time, [this] { return stopping_; });
 }
 
+void StatePublisher::readStates() {
+  states_read_ = ros::Time::now();
+  for (std::size_t i = 0; i < states_.size(); ++i) states_[i] = machine_.axes()[i]->state();
+}
+
 void StatePublisher::publishJointStates() {
-  joint_states_.header.stamp = ros::Time::now();
-  for (std::size_t i = 0; i < machine_.axes().size(); ++i) {
-    const axis::AxisState state = machine_.axes()[i]->state();
-    joint_states_.position[i] = state.position;
-    joint_states_.velocity[i] = state.velocity;
+  joint_states_.header.stamp = states_read_;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    joint_states_.position[i] = states_[i].position;
+    joint_states_.velocity[i] = states_[i].velocity;
   }
   joint_state_publisher_.publish(joint_states_);
 }
 
 void StatePublisher::publishEndstopsOnChange() {
-  Endstops read = endstops_;
+  bool changed = !endstops_published_;
   for (std::size_t i = 0; i < machine_.axes().size(); ++i) {
     try {
       const axis::EndstopState state = machine_.axes()[i]->endstops();
-      read.min[i] = state.min.value_or(false);
-      read.max[i] = state.max.value_or(false);
+      const std::uint8_t min = state.min.value_or(false);
+      const std::uint8_t max = state.max.value_or(false);
+      changed = changed || min != endstops_.min[i] || max != endstops_.max[i];
+      endstops_.min[i] = min;
+      endstops_.max[i] = max;
       endstops_unreadable_[i] = false;
     } catch (const GpioError& error) {
       // What was read last stands; the other axes' switches are read all the same.
-      if (!endstops_unreadable_[i]) ROS_ERROR("%s", error.what());
+      if (!endstops_unreadable_[i]) ROS_ERROR_NAMED("endstops", "%s", error.what());
       endstops_unreadable_[i] = true;
     }
   }
-  if (endstops_published_ && read.min == endstops_.min && read.max == endstops_.max) return;
-  read.header.stamp = ros::Time::now();
-  endstops_ = read;
+  if (!changed) return;
+  endstops_.header.stamp = ros::Time::now();
   endstops_published_ = true;
   endstop_publisher_.publish(endstops_);
 }
 
 void StatePublisher::publishAxisStates(bool only_on_change) {
-  AxisStates states = read(machine_);
-  if (only_on_change && !differ(states, axis_states_)) return;
-  axis_states_ = std::move(states);
-  axis_state_publisher_.publish(axis_states_);
+  if (only_on_change &&
+      std::equal(states_.begin(), states_.end(), published_states_.begin(), published_states_.end(),
+                 [](const auto& now, const auto& then) { return !differ(now, then); })) {
+    return;
+  }
+  published_states_ = states_;
+  AxisStates message;
+  message.header.stamp = states_read_;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    const axis::AxisState& state = states_[i];
+    message.name.push_back(machine_.axes()[i]->config().name);
+    message.enabled.push_back(state.enabled);
+    message.asleep.push_back(state.asleep);
+    message.idle.push_back(state.idle);
+    message.moving.push_back(state.moving);
+    message.held.push_back(state.held);
+    message.homed.push_back(state.homed);
+    message.position_valid.push_back(state.position_valid);
+    message.microsteps.push_back(state.microsteps);
+    message.position.push_back(state.position);
+    message.velocity.push_back(state.velocity);
+    message.target.push_back(state.target);
+    message.fault.push_back(state.fault);
+    message.position_note.push_back(state.position_note);
+  }
+  axis_state_publisher_.publish(message);
 }
 
 }  // namespace stepdriver::ros_node

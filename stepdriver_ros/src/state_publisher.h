@@ -39,6 +39,7 @@ class StatePublisher {
 
   void run();
   bool sleepUntil(Clock::time_point time);
+  void readStates();
   void publishJointStates();
   void publishEndstopsOnChange();
   void publishAxisStates(bool only_on_change);
@@ -52,7 +53,9 @@ class StatePublisher {
   // Of the thread alone.
   sensor_msgs::JointState joint_states_;
   Endstops endstops_;
-  AxisStates axis_states_;
+  std::vector<axis::AxisState> states_;
+  ros::Time states_read_;
+  std::vector<axis::AxisState> published_states_;
   bool endstops_published_ = false;
   std::vector<bool> endstops_unreadable_;  // of each axis
 

@@ -35,14 +35,13 @@ int errorCodeOf(BadTrajectory::Kind kind) {
 
 }  // namespace
 
-TrajectoryAction::TrajectoryAction(ros::NodeHandle node, machine::Machine& machine,
-                                   CallQueues& queues)
-    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory"),
+TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine,
+                                   CallQueues& queues, ActionStatuses& statuses)
+    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory", statuses,
+                   [this] { looking_.begin(); }),
       machine_(machine),
-      axes_(axisOfJoint(machine)) {
-  node.setCallbackQueue(&queues.trajectories());
-  timer_ = node.createSteadyTimer(
-      kLookPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { look(); }, false);
+      axes_(axisOfJoint(machine)),
+      looking_(onQueue(queues.trajectories(), node), kLookPeriod, [this] { return look(); }) {
   start();
 }
 
@@ -81,7 +80,7 @@ void TrajectoryAction::stop(const Following& following) {
     const auto& first = following.move.members.front();
     machine_.axis(first.axis).stop(first.move);
   } catch (const Error& error) {
-    ROS_ERROR("follow_joint_trajectory: %s", error.what());
+    ROS_ERROR_NAMED("trajectory", "follow_joint_trajectory: %s", error.what());
   }
 }
 

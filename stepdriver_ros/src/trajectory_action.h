@@ -1,14 +1,14 @@
 #pragma once
 
-#include <actionlib/server/action_server.h>
 #include <ros/node_handle.h>
-#include <ros/steady_timer.h>
 
 #include <string>
 #include <vector>
 
+#include "action_statuses.h"
 #include "call_queues.h"
 #include "follow_joint_trajectory.h"
+#include "looking.h"
 #include "motion_action.h"
 #include "stepdriver_core/machine/machine.h"
 #include "trajectory_message.h"
@@ -35,8 +35,9 @@ class TrajectoryAction
     : public MotionAction<action_msgs::FollowJointTrajectoryAction, FollowingTrajectory> {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the action.
-  TrajectoryAction(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues);
+  /// @param machine, queues, statuses outlive the action.
+  TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+                   ActionStatuses& statuses);
 
  private:
   using Following = FollowingTrajectory;
@@ -64,7 +65,7 @@ class TrajectoryAction
 
   machine::Machine& machine_;
   const AxisOfJoint axes_;
-  ros::SteadyTimer timer_;
+  Looking looking_;
 };
 
 }  // namespace stepdriver::ros_node

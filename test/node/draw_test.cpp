@@ -13,6 +13,7 @@
 #include "support/program.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/temporary_file.h"
 #include "support/two_axes.h"
 
 namespace stepdriver::node_test {

@@ -19,6 +19,7 @@
 #include "support/program.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/temporary_file.h"
 #include "support/wait.h"
 
 // Each example does here what the system was for whose place it takes.

@@ -221,5 +221,30 @@ TEST_F(HomingAction, AbortsWithTheReason) {
   expectSays(client->getResult()->message, "disabled");
 }
 
+TEST_F(HomingAction, TakesGoalAfterGoal) {
+  start();
+  for (int i = 0; i < 5; ++i) {
+    send();
+    ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count()))) << "goal " << i;
+    EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::SUCCEEDED);
+  }
+}
+
+TEST_F(HomingAction, IsReplacedByANewerGoal) {
+  node.set("simulation/speed", 4.0);
+  start();
+  Client newer(node.full("x/homing"), true);
+  ASSERT_TRUE(newer.waitForServer(ros::Duration(kBound.count())));
+  send();
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 100 && told("seeking"); }));
+  newer.sendGoal(HomeGoal());
+  ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::PREEMPTED);
+  ASSERT_TRUE(newer.waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(newer.getState(), actionlib::SimpleClientGoalState::SUCCEEDED)
+      << newer.getResult()->message;
+  expectStandsHomed(newer.getResult()->position);
+}
+
 }  // namespace
 }  // namespace stepdriver::node_test

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 #include <ros/node_handle.h>
+#include <ros/service.h>
+#include <roscpp/SetLoggerLevel.h>
 #include <stepdriver/Jog.h>
 
 #include <chrono>
@@ -91,6 +93,18 @@ TEST_F(LogTest, HasWhatIsRefusedOnceASecondByTheNameOfTheAxis) {
   EXPECT_GE(said, 2) << node.process().output();
   EXPECT_LE(said, static_cast<int>(took.count()) + 1);
   EXPECT_EQ(lines().size(), before + static_cast<std::size_t>(said) + 1);
+}
+
+TEST_F(LogTest, IsSilentWhereALoggerIsSetSoByName) {
+  start();
+  roscpp::SetLoggerLevel silence;
+  silence.request.logger = "ros.stepdriver.jog";
+  silence.request.level = "error";
+  ASSERT_TRUE(ros::service::call(node.full("set_logger_level"), silence));
+  const std::size_t before = lines().size();
+  jogFor3s(5.0);
+  end();
+  EXPECT_EQ(lines().size(), before + 1) << node.process().output();
 }
 
 }  // namespace

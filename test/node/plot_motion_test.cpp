@@ -6,6 +6,7 @@
 #include "support/node_under_test.h"
 #include "support/program.h"
 #include "support/says.h"
+#include "support/temporary_file.h"
 
 namespace stepdriver::node_test {
 namespace {

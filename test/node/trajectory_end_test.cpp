@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "action_statuses.h"
 #include "call_queues.h"
 #include "core/support/bench.h"
 #include "support/control_msgs_client.h"
@@ -21,7 +22,8 @@ TEST(TrajectoryAtTheEnd, IsTheClientToldOfByTheThreadThatEndsTheNode) {
   const ros::NodeHandle node("trajectory_end");
   test::Bench bench({test::linearAxis("x")});
   ros_node::CallQueues queues(1);  // without threads
-  ros_node::TrajectoryAction action(node, *bench.machine, queues);
+  ros_node::ActionStatuses statuses(node);
+  ros_node::TrajectoryAction action(node, *bench.machine, queues, statuses);
   TrajectoryClient client(node.resolveName("follow_joint_trajectory"), false);
   const auto serve_until = [&](const auto& condition) {
     return waitUntil([&] {

@@ -103,8 +103,8 @@ fi
 
 # ---- the service ----
 
-# The values of a key of the unit.
-unit_values() { sed -n "s/^$1=-\{0,1\}//p" "$units/stepdriver.service"; }
+# unit_values KEY [UNIT]: the values of a key of the unit.
+unit_values() { sed -n "s/^$1=-\{0,1\}//p" "$units/${2:-stepdriver}.service"; }
 raised=(prlimit "--rtprio=$(unit_values LimitRTPRIO)" "--memlock=$(unit_values LimitMEMLOCK |
   sed s/infinity/unlimited/)")
 chmod 755 "$scratch"
@@ -127,16 +127,19 @@ else
   printf 'skipped, as limits can'\''t be raised here: whether those of the service suffice\n'
 fi
 
+# Sets words to those of a line of a unit, which are quoted as in a shell.
+words=()
+words_of() { eval "words=($1)"; }
 # start FILE: runs the lines of the unit with a configuration; the node's output in node.log.
 start() {
-  local line words
+  local line
   cp "$1" "$scratch/axes.yaml"
   while IFS= read -r line; do
-    read -ra words <<<"$line"
+    words_of "$line"
     "${service[@]}" "${words[@]}" >"$scratch/pre.log" 2>&1 || [[ $line == *delete* ]] ||
       fail "$line: $(<"$scratch/pre.log")"
   done < <(lines_of ExecStartPre)
-  read -ra words <<<"$(lines_of ExecStart)"
+  words_of "$(lines_of ExecStart)"
   "${service[@]}" "${words[@]}" >"$scratch/node.log" 2>&1 &
   node=$!
   jobs_started+=("$node")
@@ -150,10 +153,8 @@ node_ends() {
 
 "$prefix/env.sh" roscore -p "${ROS_MASTER_URI##*:}" >"$scratch/roscore.log" 2>&1 &
 jobs_started+=("$!")
-for ((i = 0; i < 600; i++)); do
-  ! "$prefix/env.sh" rosparam list >/dev/null 2>&1 || break
-  sleep 0.1
-done
+words_of "$(unit_values ExecStartPost stepdriver-roscore)"
+ends 0 timeout 60 "${words[@]}"
 
 start "$scratch/wrong.yaml"
 node_ends 1
@@ -167,6 +168,8 @@ node_ends 2
   cat "$config/a4988.yaml"
   printf 'gpio: {backend: simulated}\n'
 } >"$scratch/simulated.yaml"
+# A parameter that the node doesn't know, left over from an earlier start.
+ends 0 "$prefix/env.sh" rosparam set /stepdriver/left_over 1
 start "$scratch/simulated.yaml"
 for ((i = 0; i < 600; i++)); do
   ! grep -q Ready "$scratch/node.log" || break

@@ -2,10 +2,13 @@
 
 #include <ros/console.h>
 #include <ros/transport_hints.h>
+#include <std_srvs/SetBool.h>
 #include <stepdriver/Jog.h>
 
 #include <cmath>
 #include <utility>
+
+#include "../client/ask_service.h"
 
 namespace stepdriver::joystick {
 namespace {
@@ -24,7 +27,7 @@ Joystick::Joystick(ros::NodeHandle node, const std::string& driver, JoystickConf
     jogged.service = driver + "/" + axis.name + "/enable";
     if (axis.disable_in_dead_band) {
       jogged.sequence = JogSequence::disabling(axis.disable_after);
-      jogged.enable = std::make_unique<EnableClient>(jogged.service);
+      jogged.enable = std::make_unique<client::BackgroundCall>();
     }
     axes_.push_back(std::move(jogged));
   }
@@ -47,7 +50,9 @@ void Joystick::rest() {
 void Joystick::take(const sensor_msgs::Joy& message) {
   heard_ = ros::SteadyTime::now();
   const std::string mistake = mistakeIn(message);
-  if (!mistake.empty()) ROS_ERROR_THROTTLE(kLogPeriod, "joy: %s", mistake.c_str());
+  if (!mistake.empty()) {
+    ROS_ERROR_THROTTLE_NAMED(kLogPeriod, "joystick", "joy: %s", mistake.c_str());
+  }
   const bool jogs = mistake.empty() && deadmanHeld(message);
   bool changed = false;
   for (Jogged& axis : axes_) {
@@ -91,8 +96,8 @@ void Joystick::endWithoutMessages() {
   heard_ = ros::SteadyTime();
   for (Jogged& axis : axes_) {
     if (axis.velocity == 0.0) continue;
-    ROS_WARN("%s: no message from the joystick for %g s, the jog ends", axis.config.name.c_str(),
-             config_.joy_timeout);
+    ROS_WARN_NAMED("joystick", "%s: no message from the joystick for %g s, the jog ends",
+                   axis.config.name.c_str(), config_.joy_timeout);
     axis.velocity = 0.0;
   }
 }
@@ -103,7 +108,7 @@ void Joystick::send() {
   for (Jogged& axis : axes_) {
     if (axis.enable) takeAnswer(axis, now);
     const JogOrders orders = axis.sequence.orders(axis.velocity, now);
-    if (orders.enable) axis.enable->call(*orders.enable);
+    if (orders.enable) callEnable(axis, *orders.enable);
     if (!orders.velocity) continue;
     message.name.push_back(axis.config.name);
     message.velocity.push_back(*orders.velocity);
@@ -113,12 +118,21 @@ void Joystick::send() {
   publisher_.publish(message);
 }
 
+void Joystick::callEnable(const Jogged& axis, bool on) {
+  std_srvs::SetBool::Request request;
+  request.data = on;
+  axis.enable->start([service = axis.service, request] {
+    return client::askService<std_srvs::SetBool>(service, request);
+  });
+}
+
 void Joystick::takeAnswer(Jogged& axis, double now) {
   const auto answer = axis.enable->takeAnswer();
   if (!answer) return;
   axis.sequence.answered(answer->success, now);
   if (answer->success) return;
-  ROS_ERROR_THROTTLE(kLogPeriod, "%s: %s", axis.service.c_str(), answer->message.c_str());
+  ROS_ERROR_THROTTLE_NAMED(kLogPeriod, "joystick", "%s: %s", axis.service.c_str(),
+                           answer->message.c_str());
 }
 
 }  // namespace stepdriver::joystick

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "enable_client.h"
+#include "../client/background_call.h"
 #include "jog_sequence.h"
 #include "joystick_config.h"
 
@@ -38,7 +38,7 @@ class Joystick {
     std::string service;
     double velocity = 0.0;
     JogSequence sequence;
-    std::unique_ptr<EnableClient> enable;  ///< where it is disabled in the dead band
+    std::unique_ptr<client::BackgroundCall> enable;  ///< where it is disabled in the dead band
   };
 
   void take(const sensor_msgs::Joy& message);
@@ -47,6 +47,7 @@ class Joystick {
   bool deadmanHeld(const sensor_msgs::Joy& message) const;
   void endWithoutMessages();
   void send();
+  static void callEnable(const Jogged& axis, bool on);
   void takeAnswer(Jogged& axis, double now);
 
   const JoystickConfig config_;

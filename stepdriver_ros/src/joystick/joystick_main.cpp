@@ -69,7 +69,8 @@ void warnOfTooLowRate(const std::string& driver, double rate) {
   double timeout = 0.0;
   if (!ros::param::get(driver + "/jog_timeout", timeout)) return;
   if (rate * timeout >= kMessagesInTimeout) return;
-  ROS_WARN(
+  ROS_WARN_NAMED(
+      "joystick",
       "~rate is %g Hz, and %s/jog_timeout %g s: the driver ends a jog when a message is late. "
       "Take %g Hz or more",
       rate, driver.c_str(), timeout, kMessagesInTimeout / timeout);
@@ -84,14 +85,14 @@ int run(EndRequests& end_requests) {
     const JoystickConfig config = readParameters(node, private_node, driver);
     warnOfTooLowRate(driver, config.rate);
     Joystick joystick(node, driver, config);
-    ROS_INFO("Ready: %s jogs %zu %s of %s", node.resolveName("joy").c_str(), config.axes.size(),
-             config.axes.size() == 1 ? "axis" : "axes", driver.c_str());
+    ROS_INFO_NAMED("joystick", "Ready: %s jogs %zu %s of %s", node.resolveName("joy").c_str(),
+                   config.axes.size(), config.axes.size() == 1 ? "axis" : "axes", driver.c_str());
     std::string who;
     while (who.empty()) {
       ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kPoll));
       who = end_requests.waitFor(std::chrono::milliseconds(0));
     }
-    ROS_INFO("Ending on %s", who.c_str());
+    ROS_INFO_NAMED("joystick", "Ending on %s", who.c_str());
     joystick.rest();
     std::this_thread::sleep_for(kLastWords);
     ros::shutdown();  // also ends the calls that nobody answers
@@ -99,7 +100,7 @@ int run(EndRequests& end_requests) {
   } catch (const ConfigError& error) {
     ros_node::explain(error, "Not started");
   } catch (const std::exception& error) {
-    ROS_FATAL("Not started: %s", error.what());
+    ROS_FATAL_NAMED("joystick", "Not started: %s", error.what());
   }
   return ros_node::kExitConfig;
 }

@@ -1,9 +1,6 @@
 #include "support/node_under_test.h"
 
-#include <unistd.h>
-
 #include <csignal>
-#include <filesystem>
 
 #include "support/wait.h"
 
@@ -55,11 +52,9 @@ NodeUnderTest::~NodeUnderTest() {
 void NodeUnderTest::erase(const std::string& key) { ros::param::del(full(key)); }
 
 std::string NodeUnderTest::traced() {
-  std::string file = std::filesystem::temp_directory_path() /
-                     (testName() + "_" + std::to_string(getpid()) + ".vcd");
-  std::filesystem::remove(file);
-  set("simulation/trace", file);
-  return file;
+  trace_ = std::make_unique<TemporaryFile>(".vcd");
+  set("simulation/trace", trace_->path());
+  return trace_->path();
 }
 
 NodeProcess& NodeUnderTest::launch() {

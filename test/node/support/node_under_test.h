@@ -11,6 +11,7 @@
 
 #include "support/call_service.h"
 #include "support/node_process.h"
+#include "support/temporary_file.h"
 
 namespace stepdriver::node_test {
 
@@ -39,7 +40,7 @@ class NodeUnderTest {
   }
   void erase(const std::string& key);
   void describe(const std::string& urdf) { ros::param::set(beside("robot_description"), urdf); }
-  /// Lets the rig write its trace. @return the file.
+  /// Lets the rig write its trace. @return the file, which is there as long as this is.
   std::string traced();
 
   /// Starts the node and doesn't wait for it.
@@ -67,6 +68,7 @@ class NodeUnderTest {
  private:
   std::string space_;
   std::string name_;
+  std::unique_ptr<TemporaryFile> trace_;  // the node writes it to its end
   std::unique_ptr<NodeProcess> process_;
 };
 

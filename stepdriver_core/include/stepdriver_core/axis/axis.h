@@ -46,6 +46,7 @@ class Axis {
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
 
+  /// As configured; what setLimits() and setMicrosteps() change is in limits() and state().
   const AxisConfig& config() const;
 
   /// Moves to a position and rests there. A motion under way is replaced: the axis goes on from the
@@ -166,6 +167,7 @@ class Axis {
   /// @throw Refused while moving, where the number isn't finite or is beyond a soft limit.
   void setPosition(double position);
 
+  /// What the axis is and does now, whole and from one instant.
   AxisState state() const;
 
   /// [microsteps/s] The highest rate of the motion under way, as planned; 0 at rest.
@@ -174,7 +176,8 @@ class Axis {
   /// @throw GpioError where a line can't be read.
   EndstopState endstops() const;
 
-  // What follows is the machine's side.
+  /// @name The machine's side
+  /// @{
 
   /// What is to be kept over a restart; none while it moves.
   std::optional<AxisMemory> memory();
@@ -215,6 +218,7 @@ class Axis {
 
   /// After close(): waits for the rest, and disables where the configuration says so.
   void shutDown();
+  /// @}
 
  private:
   friend class Coordination;

@@ -99,6 +99,7 @@ enum class MoveEnd {
   kCompanion,  ///< an axis that it moved together with was stopped by one of these
 };
 
+/// How and where a move ended, as one that waits for it is told.
 struct MoveResult {
   MoveEnd end = MoveEnd::kReached;
   std::string message;    ///< a sentence that says how and where

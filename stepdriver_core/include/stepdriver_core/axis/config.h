@@ -9,6 +9,7 @@
 
 namespace stepdriver::axis {
 
+/// What an axis moves along, and so its units.
 enum class Kind {
   kLinear,  ///< mm in configurations, m outside
   kRotary,  ///< degrees in configurations, rad outside
@@ -27,6 +28,7 @@ struct Pin {
   bool wired() const { return !line.empty(); }
 };
 
+/// The lines to the pins of a driver chip. ms1 to ms3 are M0 to M2 on a DRV8825.
 struct Pins {
   Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
 };
@@ -38,6 +40,7 @@ struct InputSwitch {
   gpio::Bias bias = gpio::Bias::kAsIs;
 };
 
+/// A switch at one end of an axis.
 using Endstop = InputSwitch;
 
 /// The chip's nFAULT: an open drain that is pulled low at over-current or over-temperature.

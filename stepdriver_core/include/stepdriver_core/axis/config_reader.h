@@ -53,15 +53,18 @@ class ConfigReader {
   /// @param key empty: the map itself.
   std::string fullName(const std::string& key) const;
 
-  // With a default the key may be missing; without, that is an issue.
+  /// @name Values of keys. With a default the key may be missing; without, that is an issue.
+  /// @{
   double number(const std::string& key, const Range& range, std::optional<double> fallback = {});
   int integer(const std::string& key, int min, int max, std::optional<int> fallback = {});
   bool boolean(const std::string& key, std::optional<bool> fallback = {});
   std::string text(const std::string& key, const std::optional<std::string>& fallback = {});
   std::string oneOf(const std::string& key, const std::vector<std::string>& allowed,
                     const std::optional<std::string>& fallback = {});
+  /// @}
 
-  // None where the key is missing, or where its value is wrong, which is an issue.
+  /// @name None where the key is missing, or where its value is wrong, which is an issue.
+  /// @{
   std::optional<double> findNumber(const std::string& key, const Range& range, Presence presence);
   std::optional<int> findInteger(const std::string& key, int min, int max, Presence presence);
   std::optional<int> findOneOf(const std::string& key, const std::vector<int>& allowed,
@@ -72,6 +75,7 @@ class ConfigReader {
                                       const std::string& wanted = "a string");
   std::optional<std::string> findOneOf(const std::string& key,
                                        const std::vector<std::string>& allowed, Presence presence);
+  /// @}
 
   /// A map below this one; an empty one where the key is missing.
   ConfigReader map(const std::string& key);

@@ -12,6 +12,7 @@ namespace stepdriver::axis {
 /// YAML file holds.
 class ConfigValue {
  public:
+  /// Both may hold values of any type, also each other.
   using List = std::vector<ConfigValue>;
   using Map = std::map<std::string, ConfigValue>;
 
@@ -34,6 +35,7 @@ class ConfigValue {
     return std::get_if<T>(&value_);
   }
 
+  /// Whether there is a key with no value behind it, as `key:` in YAML.
   bool isNothing() const { return std::holds_alternative<std::monostate>(value_); }
 
   /// The value as messages show it: `"abc"`, `1.5`, `true`, `a map of 3`, `nothing`.

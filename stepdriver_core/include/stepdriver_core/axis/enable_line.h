@@ -16,6 +16,7 @@ class EnableLine {
     return wanted_.size() - 1;
   }
 
+  /// Whether the line stays asserted where this axis lets go of it.
   bool isWantedByOthers(std::size_t member) const {
     for (std::size_t i = 0; i < wanted_.size(); ++i) {
       if (i != member && wanted_[i]) return true;

@@ -32,8 +32,10 @@ enum class HomingPhase {
 /// In words, as in messages: `seeking`.
 const char* nameOf(HomingPhase phase);
 
+/// How a homing ended.
 enum class HomingEnd { kHomed, kCancelled, kFailed };
 
+/// How and where the homing of an axis ended.
 struct HomingResult {
   std::string axis;
   HomingEnd end = HomingEnd::kFailed;

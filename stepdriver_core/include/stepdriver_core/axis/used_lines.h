@@ -12,6 +12,7 @@ namespace stepdriver::axis {
 /// The lines of the whole configuration: each may serve one purpose only, but ENABLE lines.
 class UsedLines {
  public:
+  /// @param issues where a line with two purposes is told of; outlives this.
   explicit UsedLines(std::vector<ConfigIssue>& issues) : issues_(issues) {}
 
   /// @param key full name of the parameter that names the line.

@@ -12,6 +12,7 @@
 /// DFRobot's TB6600 manual V1.2; where that gives no figure, what its slower clones need.
 namespace stepdriver::chip {
 
+/// The driver chips that there are data of.
 enum class Model { kA4988, kDrv8825, kTb6600 };
 
 /// The levels of the microstep pins MS1 MS2 MS3 (M0 M1 M2 on the DRV8825); true is high.
@@ -55,6 +56,7 @@ struct Chip {
   bool reset_held;             ///< level of RESET that holds the translator at Home
 };
 
+/// The data of a chip; they live as long as the program.
 const Chip& chipOf(Model model);
 
 /// @return nullptr where there is no driver of that name.

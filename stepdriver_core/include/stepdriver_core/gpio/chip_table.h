@@ -9,12 +9,14 @@
 /// The GPIO chips of a machine as plain data, and how the names of lines are found in it.
 namespace stepdriver::gpio {
 
+/// A line of a chip.
 struct LineInfo {
   std::string name;      ///< the kernel's name of the line; most have none
   bool used = false;     ///< held by a program or by the kernel
   std::string consumer;  ///< who holds it, as it calls itself; may be empty
 };
 
+/// A chip, whether it could be opened or not.
 struct ChipInfo {
   std::string name;             ///< `gpiochip0`; may change from one boot to the next
   std::string label;            ///< as `pinctrl-bcm2711`: stays

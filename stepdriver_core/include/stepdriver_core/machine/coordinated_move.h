@@ -24,6 +24,7 @@ struct LineRequest {
 /// Where a trajectory wants its axes to be at one time.
 using TrajectoryPoint = axis::CoursePoint;
 
+/// A trajectory of several axes, as Machine::followTrajectory() takes it.
 struct TrajectoryRequest {
   std::vector<std::string> names;  ///< of the axes, each once; need not be all
   std::vector<TrajectoryPoint> points;
@@ -31,6 +32,7 @@ struct TrajectoryRequest {
 
 /// A motion of several axes that was accepted.
 struct CoordinatedMove {
+  /// The part of one axis in it.
   struct Member {
     std::string axis;
     axis::Move move;
@@ -39,6 +41,7 @@ struct CoordinatedMove {
   double duration = 0.0;        ///< [s] as planned
 };
 
+/// How and where a motion of several axes ended.
 struct CoordinatedResult {
   /// How it ended: kReached, or what ended it first.
   axis::MoveEnd end = axis::MoveEnd::kReached;

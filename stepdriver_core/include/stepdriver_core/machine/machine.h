@@ -18,6 +18,7 @@
 
 namespace stepdriver::machine {
 
+/// What a Machine is made with, beside its axes.
 struct MachineOptions {
   /// Serve the pulses in a thread of the machine's own. Without, waiting calls serve them, and
   /// advance() does: for tests on a virtual clock.
@@ -125,6 +126,7 @@ class Machine {
   /// motors stay energized. MachineOptions::emergency_stop does the same; where it is active at the
   /// start no motor is energized.
   void emergencyStop();
+  /// From an emergency stop on until recover().
   bool emergencyStopped() const;
 
   /// Ends the emergency stop and all faults. Nothing moves.
@@ -137,6 +139,7 @@ class Machine {
   /// Returns when that is done. @throw Error where a line can't be written; all others are, then.
   void shutdown();
 
+  /// What the engine has done, read while it goes on.
   EngineFigures figures() const;
 
   /// Why the state file couldn't be written the last time; empty: it could, or there is none.

@@ -35,6 +35,7 @@ class StateFile {
   /// Returns when the disk has it. @throw Error
   void save(const KeptState& state) const;
 
+  /// Of the file itself, not of its lock.
   const std::string& path() const { return path_; }
 
  private:

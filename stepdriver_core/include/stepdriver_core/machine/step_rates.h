@@ -18,6 +18,7 @@ struct StepRate {
   double held = 0.0;    ///< [steps/s] that can be held while all others move at their top speeds
   std::string limited;  ///< `held` is, by what, in words
 
+  /// Whether the axis can have the rate that it asks for.
   bool holds() const { return asked <= held; }
   /// "x: asks for 8000 steps/s, and this machine holds 12500 steps/s: ..."
   std::string text() const;
@@ -27,6 +28,7 @@ struct StepRate {
 struct StepRates {
   std::vector<StepRate> axes;
 
+  /// Whether all of them can.
   bool holds() const;
   /// What doesn't hold, a sentence each; empty: all does.
   std::vector<std::string> complaints() const;

@@ -17,6 +17,7 @@ struct DoubleDouble {
   constexpr DoubleDouble(double value) : hi(value) {}  // NOLINT: a double is one of these
   constexpr DoubleDouble(double high, double low) : hi(high), lo(low) {}
 
+  /// Rounded to a double.
   double value() const { return hi + lo; }
 };
 

@@ -8,6 +8,7 @@
 
 namespace stepdriver::motion {
 
+/// @file
 /// The planners take over from whatever state an axis is in: at rest, moving either way, speeding
 /// up or slowing down, faster than the limits or with more acceleration than they allow. The speed
 /// never jumps, but by the start speed; the acceleration jumps where there is no jerk limit. A
@@ -27,6 +28,7 @@ namespace stepdriver::motion {
 /// some 20 us, and at most some 200 us, of a processor of 3 GHz.
 /// @pre finite states; positions and targets of less than 2^53 microsteps.
 
+/// A motion of a planner, and whether it keeps to its target.
 struct Plan {
   Profile profile;
   /// How far the motion passes its target before it turns and comes back [microsteps]; 0 where it

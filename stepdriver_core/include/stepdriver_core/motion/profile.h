@@ -17,6 +17,7 @@ struct Piece {
   double v0_rest = 0.0;   ///< what v0 leaves of the exact speed
   double a_rest = 0.0;    ///< what a leaves of the exact acceleration
 
+  /// At t [s] from the beginning of the piece; in the units of p0, v0 and a.
   DoubleDouble positionAt(DoubleDouble t) const;
   DoubleDouble velocityAt(DoubleDouble t) const;
   DoubleDouble accelerationAt(DoubleDouble t) const;
@@ -46,16 +47,20 @@ class Profile {
 
   static constexpr double kLongest = 4.0e9;  ///< [s] a good 126 years; nanoseconds stay in int64
 
+  /// Motion time at which the first piece begins.
   std::int64_t startNs() const { return start_ns_; }
   /// When the motion is over, to the nearest nanosecond; no step is later.
   std::int64_t endNs() const { return end_ns_; }
   DoubleDouble duration() const { return starts_.back(); }  ///< [s]
+  /// Where it rests in the end [microsteps].
   DoubleDouble endPosition() const { return end_position_; }
   /// Highest speed on the way [microsteps/s].
   double peakSpeed() const;
 
+  /// At rest before the start and after the end.
   MotionState stateAt(std::int64_t time_ns) const;
 
+  /// In the order of time; none where nothing moves.
   const std::vector<Piece>& pieces() const { return pieces_; }
   /// When a piece begins, counted from the start [s]; one more than there are pieces: the end.
   DoubleDouble pieceStart(std::size_t index) const { return starts_[index]; }

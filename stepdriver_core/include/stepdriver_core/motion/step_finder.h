@@ -8,6 +8,7 @@
 
 namespace stepdriver::motion {
 
+/// A microstep that is due at one time.
 struct Step {
   std::int64_t time_ns = 0;  ///< motion time
   int direction = 0;         ///< +1 or -1

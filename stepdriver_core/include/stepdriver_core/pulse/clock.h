@@ -17,6 +17,7 @@ class Clock {
  public:
   virtual ~Clock() = default;
 
+  /// Never falls.
   virtual Nanoseconds now() = 0;
 
   /// Returns when the time has come, or earlier after a wake(). kNever waits for a wake() alone.

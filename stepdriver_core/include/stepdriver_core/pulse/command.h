@@ -13,6 +13,7 @@ namespace stepdriver::pulse {
 /// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
 /// before what comes next: the next write, or the first step.
 struct PinSequence {
+  /// One write of a pin, and how long nothing else of the channel goes out after it.
   struct Write {
     int line;
     bool level;
@@ -23,6 +24,7 @@ struct PinSequence {
   std::array<Write, kCapacity> writes{};
   std::size_t size = 0;
 
+  /// @throw std::out_of_range beyond kCapacity.
   void add(int line, bool level, Nanoseconds then_wait) {
     writes.at(size++) = {line, level, then_wait};
   }
@@ -46,6 +48,7 @@ struct Follow {
 
 /// An order to the pulse thread. Serials rise by one on each channel.
 struct Command {
+  /// What it orders.
   enum class Kind {
     kFollow,  ///< follow the profiles, all of them, or where one can't be taken none
     kPins,    ///< write the pins, at rest; then, where a scale is given, take that

@@ -19,9 +19,11 @@ class DueTree {
     nodes_.assign(2 * leaves_, kNever);
   }
 
+  /// Of all channels; kNever where none is due.
   Nanoseconds earliest() const { return nodes_[1]; }
   Nanoseconds operator[](std::size_t channel) const { return nodes_[leaves_ + channel]; }
 
+  /// Gives a channel another time.
   void set(std::size_t channel, Nanoseconds due) {
     std::size_t node = leaves_ + channel;
     nodes_[node] = due;

@@ -20,6 +20,7 @@ class GuardLearner {
   /// At 1000 waits in a second the spin is 20 % of the time then.
   static constexpr Nanoseconds kLongest = 200'000;
 
+  /// @param late by how much the sleep ended after the time that it was to end at.
   void slept(Nanoseconds late) {
     const double step = kStep * guard_;
     guard_ += late > guard() ? step * kPart / (1.0 - kPart) : -step;

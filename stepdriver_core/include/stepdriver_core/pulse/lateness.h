@@ -13,7 +13,7 @@ namespace stepdriver::pulse {
 /// at most a sixteenth.
 struct LatenessFigures {
   std::uint64_t count = 0;  ///< of the pulses
-  Nanoseconds p50 = 0;
+  Nanoseconds p50 = 0;      ///< the median
   Nanoseconds p99 = 0;
   Nanoseconds p999 = 0;
   Nanoseconds max = 0;  ///< exact

@@ -17,6 +17,7 @@
 
 namespace stepdriver::pulse {
 
+/// What the engine has done since the start, whole and from one instant.
 struct EngineState {
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;  ///< times that the timeline was slid, for one instant's edges once
@@ -52,6 +53,7 @@ class PulseEngine {
   PulseEngine(const PulseEngine&) = delete;
   PulseEngine& operator=(const PulseEngine&) = delete;
 
+  /// Of the planned interval: a late step leaves the next one so much of it at least.
   static constexpr double kClosest = 0.75;
 
   /// Does what is due. @return the clock time at which it wants to be called again, which may be
@@ -65,6 +67,8 @@ class PulseEngine {
   /// often; what it isn't told of it sees before the next step, where that depends on it.
   void inputsChanged();
 
+  /// Lets the pulse that is out finish and sends no other, on any channel, until
+  /// clearEmergencyStop().
   void emergencyStop();
   void clearEmergencyStop();
   bool emergencyStopped() const { return emergency_.load(std::memory_order_acquire); }
@@ -72,6 +76,7 @@ class PulseEngine {
   /// Times that the emergency-stop input stopped all channels.
   std::uint64_t inputStops() const { return input_stops_.load(std::memory_order_acquire); }
 
+  /// What a channel does, whole and from one instant.
   ChannelState channel(int index) const;
   EngineState state() const { return figures_.load(); }
 

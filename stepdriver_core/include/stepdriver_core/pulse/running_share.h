@@ -20,6 +20,7 @@ class RunningShare {
   static constexpr Nanoseconds kRest = 200'000;
   static constexpr Nanoseconds kLongestRest = 1'000'000;
 
+  /// The thread ran, and then slept, for this long.
   void ran(Nanoseconds time) {
     owed_ += static_cast<double>(time) * (1.0 - kMost) / kMost;
     owed_ = std::min(owed_, static_cast<double>(kAllowed + kLongestRest - kRest));

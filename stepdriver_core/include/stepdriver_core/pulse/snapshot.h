@@ -33,6 +33,7 @@ class Snapshot {
     sequence_.store(sequence + 2, std::memory_order_release);
   }
 
+  /// From any thread.
   T load() const {
     std::array<std::uint64_t, kWords> words{};
     std::uint64_t before = 0;

@@ -20,6 +20,7 @@ class PinTrace {
   /// Called once, before any edge: the pins (an edge names one by its index) and their levels.
   virtual void begin(const std::vector<TracePin>& pins, const std::vector<bool>& levels,
                      std::int64_t time_ns) = 0;
+  /// A pin changed to this level. Called in the order of time.
   virtual void edge(int pin, bool level, std::int64_t time_ns) = 0;
 
   /// Makes what came so far visible to whoever reads the trace while it grows.
@@ -29,6 +30,7 @@ class PinTrace {
 /// Keeps every edge in memory, for tests. Read it while nothing moves.
 class MemoryTrace : public PinTrace {
  public:
+  /// A pin that changed to a level.
   struct Edge {
     int pin;
     bool level;

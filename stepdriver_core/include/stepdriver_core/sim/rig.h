@@ -36,6 +36,7 @@ struct SwitchSpec {
   std::int64_t bounce_ns = 0;  ///< time from one bounce edge to the next
 };
 
+/// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
   chip::Model model = chip::Model::kA4988;
@@ -82,6 +83,7 @@ struct RigAxisReport {
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
 
+  /// Of all kinds together.
   std::int64_t totalViolations() const;
 };
 
@@ -124,6 +126,7 @@ class Rig : public gpio::Board {
 
   /// @throw std::out_of_range where there is no such axis; so do all that take an axis.
   RigAxisReport report(const std::string& axis) const;
+  /// Their names, in the order in which they were given.
   std::vector<std::string> axes() const;
 
   /// Takes effect at the latest time that the rig was told.
@@ -133,6 +136,7 @@ class Rig : public gpio::Board {
   /// (an errno), and so do all after it until clearWriteFault(). A write that fails for the sake of
   /// another line may count.
   void failWrites(const std::string& line, std::int64_t writes, int error);
+  /// Writes of this line succeed again.
   void clearWriteFault(const std::string& line);
 
   /// Gives an input that no axis has a level, as a switch beside the axes does: the emergency stop.

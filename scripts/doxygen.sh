@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# Makes the pages of the core's public headers, and says what is wrong with their comments.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/doxygen.sh
+
+Installs doxygen where it is missing, and makes pages of stepdriver_core/include in
+build/doxygen/html. Exit code 0: no warning; every class, struct and enumeration has a comment; and
+what comments name, as Machine::stop(), is there. What has a name that says all, a member most
+often, needs no comment.
+END
+}
+
+case ${1:-} in
+  '') ;;
+  -h | --help) usage && exit ;;
+  *) usage >&2 && exit 2 ;;
+esac
+
+# doxygen_warnings [SETTING=VALUE...]: runs it, and says its warnings, which it may call errors.
+doxygen_warnings() {
+  {
+    cat "$root/Doxyfile"
+    printf '%s\n' "OUTPUT_DIRECTORY=\"$build/doxygen\"" "STRIP_FROM_PATH=\"$root\"" "$@"
+  } >"$build/doxygen/Doxyfile"
+  (cd "$root" && doxygen "$build/doxygen/Doxyfile" 2>&1) || true
+}
+
+# The names in comments, as Machine::stop(), that nothing has.
+dead_names() {
+  local include=$root/stepdriver_core/include
+  grep -rhoE '///.*' "$include" | grep -oE '\b[A-Z][A-Za-z]*::[A-Za-z_]+' | sort -u |
+    grep -vxFf <(awk -F '[<>]' '
+      /<compound / { compound = "" }
+      /<member / { member = 1 }
+      /<name>/ && compound == "" { compound = $3; sub(/.*::/, "", compound); next }
+      /<name>/ && member { print compound "::" $3; member = 0 }' "$build/doxygen/tags") |
+    while IFS= read -r name; do
+      grep -rnF "$name" "$include" | sed "s|^$root/\([^:]*:[0-9]*\):.*|\1: warning: there is no $name|"
+    done
+}
+
+choose_build_folder
+install_packages lint
+rm -rf "$build/doxygen"
+mkdir -p "$build/doxygen"
+
+warnings=$(
+  doxygen_warnings "GENERATE_TAGFILE=\"$build/doxygen/tags\""
+  dead_names
+  doxygen_warnings EXTRACT_ALL=NO GENERATE_HTML=NO |
+    grep -E 'Compound .* is not documented|\(enumeration\) .* is not documented' || true
+)
+[[ -z $warnings ]] || say "$warnings"
+say "doxygen $(doxygen --version): $(grep -cE '(warning|error): ' <<<"$warnings" || true) warnings"
+[[ -z $warnings && -s $build/doxygen/html/index.html ]] || die "the comments need a hand (above)"
+say "The pages: $build/doxygen/html/index.html"

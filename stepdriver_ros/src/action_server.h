@@ -1,0 +1,99 @@
+#pragma once
+
+#include <actionlib/server/action_server.h>
+#include <actionlib_msgs/GoalID.h>
+#include <actionlib_msgs/GoalStatusArray.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/subscriber.h>
+
+#include <functional>
+#include <string>
+
+#include "action_statuses.h"
+
+namespace stepdriver::ros_node {
+
+/// An action's topics: actionlib::ActionServer, but its status comes at the beat of all actions.
+template <typename Action>
+class ActionServer : public actionlib::ActionServerBase<Action> {
+  using Base = actionlib::ActionServerBase<Action>;
+
+ public:
+  ACTION_DEFINITION(Action)
+  using GoalHandle = typename Base::GoalHandle;
+
+  /// @param node with the queue of the goals and cancels.
+  /// @param statuses outlives the server.
+  ActionServer(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
+               const std::function<void(const GoalHandle&)>& take,
+               const std::function<void(const GoalHandle&)>& cancel)
+      : Base(take, cancel), node_(node, name), statuses_(statuses) {}
+
+ private:
+  using Lock = boost::recursive_mutex::scoped_lock;
+
+  static constexpr int kQueueSize = 50;
+  static constexpr double kKeptInStatus = 5.0;  // [s] that a goal is, after its end
+
+  void initialize() override {
+    this->status_list_timeout_ = ros::Duration(kKeptInStatus);
+    result_publisher_ = node_.advertise<ActionResult>("result", kQueueSize);
+    feedback_publisher_ = node_.advertise<ActionFeedback>("feedback", kQueueSize);
+    status_publisher_ =
+        node_.advertise<actionlib_msgs::GoalStatusArray>("status", kQueueSize, true);
+    goal_subscriber_ = node_.subscribe("goal", kQueueSize, &Base::goalCallback, asBase());
+    cancel_subscriber_ = node_.subscribe("cancel", kQueueSize, &Base::cancelCallback, asBase());
+    statuses_.add([this] { beat(); });
+  }
+  Base* asBase() { return this; }
+
+  // Without goals and subscribers nobody hears it: whoever comes later gets the last one.
+  void beat() {
+    const Lock lock(this->lock_);
+    if (!this->status_list_.empty() || status_publisher_.getNumSubscribers() > 0) publishStatus();
+  }
+
+  void publishResult(const actionlib_msgs::GoalStatus& status, const Result& result) override {
+    const Lock lock(this->lock_);
+    ActionResult message;
+    message.header.stamp = ros::Time::now();
+    message.status = status;
+    message.result = result;
+    result_publisher_.publish(message);
+    publishStatus();
+  }
+
+  void publishFeedback(const actionlib_msgs::GoalStatus& status,
+                       const Feedback& feedback) override {
+    const Lock lock(this->lock_);
+    ActionFeedback message;
+    message.header.stamp = ros::Time::now();
+    message.status = status;
+    message.feedback = feedback;
+    feedback_publisher_.publish(message);
+  }
+
+  void publishStatus() override {
+    const Lock lock(this->lock_);
+    const ros::Time now = ros::Time::now();
+    this->status_list_.remove_if([&](const actionlib::StatusTracker<Action>& goal) {
+      const ros::Time end = goal.handle_destruction_time_;
+      return !end.isZero() && end + this->status_list_timeout_ < now;
+    });
+    actionlib_msgs::GoalStatusArray message;
+    message.header.stamp = now;
+    for (const auto& goal : this->status_list_) message.status_list.push_back(goal.status_);
+    status_publisher_.publish(message);
+  }
+
+  ros::NodeHandle node_;
+  ActionStatuses& statuses_;
+  ros::Publisher result_publisher_;
+  ros::Publisher feedback_publisher_;
+  ros::Publisher status_publisher_;
+  ros::Subscriber goal_subscriber_;
+  ros::Subscriber cancel_subscriber_;
+};
+
+}  // namespace stepdriver::ros_node

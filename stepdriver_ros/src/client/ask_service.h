@@ -1,0 +1,33 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/service_client.h>
+
+#include <string>
+
+#include "background_call.h"
+
+namespace stepdriver::client {
+
+constexpr const char* kNobodyAnswers = "nobody answers";
+
+/// @param client persistent: of the other kind roscpp may report a call as failed that was carried
+///   out.
+template <typename Service>
+Answer ask(ros::ServiceClient& client, const typename Service::Request& request = {}) {
+  Service call;
+  call.request = request;
+  if (!client.call(call)) return {false, kNobodyAnswers};
+  return {call.response.success != 0, call.response.message};
+}
+
+/// The same by a connection for this one call.
+///
+/// @param service its full name.
+template <typename Service>
+Answer askService(const std::string& service, const typename Service::Request& request = {}) {
+  ros::ServiceClient client = ros::NodeHandle().serviceClient<Service>(service, true);
+  return ask<Service>(client, request);
+}
+
+}  // namespace stepdriver::client

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+namespace stepdriver::client {
+
+/// What a service of the driver answered.
+struct Answer {
+  bool success = false;
+  std::string message;
+};
+
+/// Makes one call at a time in a thread of its own, so that nobody waits for it: a disable answers
+/// when the axis rests, a homing when it is over.
+///
+/// To be used by one thread. Its destructor waits for the call under way, which ends with an
+/// answer, or with ros::shutdown().
+class BackgroundCall {
+ public:
+  using Ask = std::function<Answer()>;
+
+  BackgroundCall();
+  ~BackgroundCall();
+  BackgroundCall(const BackgroundCall&) = delete;
+  BackgroundCall& operator=(const BackgroundCall&) = delete;
+
+  /// Not to be called before the last call's answer was taken.
+  ///
+  /// @param ask makes the call; it must not throw.
+  void start(Ask ask);
+  /// The answer of the last call, once.
+  std::optional<Answer> takeAnswer();
+
+ private:
+  void run();
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool ending_ = false;
+  Ask wanted_;
+  std::optional<Answer> answer_;
+  std::thread thread_;
+};
+
+}  // namespace stepdriver::client

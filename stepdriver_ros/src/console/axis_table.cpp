@@ -1,0 +1,121 @@
+#include "axis_table.h"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace stepdriver::console {
+namespace {
+
+constexpr std::size_t kGap = 1;
+
+struct Column {
+  std::string title;
+  int importance = 0;     ///< the highest goes first where there is no room
+  std::size_t width = 0;  ///< grows with what is in it
+  bool right_aligned = false;
+  std::vector<std::string> cells;
+};
+
+std::string numberText(const char* format, double number, const std::string& unit) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, number);
+  return text + (" " + unit);
+}
+
+std::string switchText(bool there, bool known, bool active) {
+  if (!there) return "-";
+  if (!known) return "?";
+  return active ? "PRESSED" : "open";
+}
+
+std::string motorText(const AxisView& axis) {
+  if (axis.enabled) return "on";
+  if (axis.idle) return "idle";
+  return axis.asleep ? "asleep" : "off";
+}
+
+std::string stateText(const AxisView& axis) {
+  if (!axis.fault.empty()) return "FAULT";
+  const std::string motion = axis.held ? "HELD" : axis.moving ? "moving" : "rest";
+  if (axis.homed) return motion + " homed";
+  return axis.position_valid ? motion : motion + " unverified";
+}
+
+std::string fitted(const std::string& text, std::size_t width, bool right_aligned) {
+  const std::string shown = text.substr(0, width);
+  const std::string space(width - shown.size(), ' ');
+  return right_aligned ? space + shown : shown + space;
+}
+
+std::vector<Column> columnsOf(const Session& session, bool live) {
+  std::vector<Column> all = {{"axis", 0, 6, false, {}},    {"position", 1, 14, true, {}},
+                             {"speed", 5, 14, true, {}},   {"min end", 4, 7, false, {}},
+                             {"max end", 4, 7, false, {}}, {"motor", 3, 6, false, {}},
+                             {"state", 2, 12, false, {}}};
+  for (const AxisView& axis : session.driver().axes()) {
+    const axis::AxisConfig* config = session.driver().config(axis.name);
+    const std::string unit = config == nullptr ? "?" : unitOf(config->kind);
+    const bool chosen = axis.name == session.chosen();
+    const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
+    const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,
+                                            old(numberText("%.4f", axis.position, unit)),
+                                            old(numberText("%.2f", axis.velocity, unit + "/s")),
+                                            old(switchText(config != nullptr && config->endstop_min,
+                                                           axis.switches_known, axis.min_active)),
+                                            old(switchText(config != nullptr && config->endstop_max,
+                                                           axis.switches_known, axis.max_active)),
+                                            old(motorText(axis)),
+                                            live ? stateText(axis) : "STALE"};
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      all[i].width = std::max(all[i].width, cells[i].size());
+      all[i].cells.push_back(cells[i]);
+    }
+  }
+  return all;
+}
+
+std::size_t widthOf(const std::vector<Column>& columns) {
+  std::size_t width = 0;
+  for (const Column& column : columns) width += (width == 0 ? 0 : kGap) + column.width;
+  return width;
+}
+
+/// Takes the least important column out. @return its title.
+std::string dropOne(std::vector<Column>& columns) {
+  const auto least = std::max_element(
+      columns.begin(), columns.end(),
+      [](const Column& one, const Column& other) { return one.importance < other.importance; });
+  std::string title = least->title;
+  columns.erase(least);
+  return title;
+}
+
+std::string rowText(const std::vector<Column>& columns, int index) {
+  std::string text;
+  for (const Column& column : columns) {
+    if (!text.empty()) text += std::string(kGap, ' ');
+    const std::string& cell = index < 0 ? column.title : column.cells[index];
+    text += fitted(index < 0 && &column == &columns.front() ? "  " + cell : cell, column.width,
+                   column.right_aligned);
+  }
+  return text;
+}
+
+}  // namespace
+
+AxisTable axisTable(const Session& session, int columns, double now) {
+  std::vector<Column> shown = columnsOf(session, session.driver().live(now));
+  AxisTable table;
+  while (shown.size() > 1 && widthOf(shown) > static_cast<std::size_t>(columns)) {
+    table.hidden.push_back(dropOne(shown));
+  }
+  table.titles.text = rowText(shown, -1);
+  const auto& axes = session.driver().axes();
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i].name == session.chosen()) table.chosen = static_cast<int>(i);
+    table.rows.push_back({rowText(shown, static_cast<int>(i)), !axes[i].fault.empty()});
+  }
+  return table;
+}
+
+}  // namespace stepdriver::console

@@ -1,0 +1,188 @@
+#include "driver_client.h"
+
+#include <ros/transport_hints.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/Home.h>
+#include <stepdriver/HomeAxes.h>
+#include <stepdriver/Jog.h>
+#include <stepdriver/MoveTo.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+
+#include "../client/ask_service.h"
+
+namespace stepdriver::console {
+namespace {
+
+constexpr std::uint32_t kQueued = 10;
+// So many messages come in the driver's jog_timeout: one that is late ends no jog.
+constexpr double kMessagesInTimeout = 3.0;
+constexpr double kLongestJogPeriod = 0.04;  // [s]
+
+client::Answer carryOutCall(const std::string& driver, const Call& call) {
+  const std::string axis = driver + "/" + call.axis + "/";
+  switch (call.what) {
+    case Call::What::kEnable:
+    case Call::What::kDisable: {
+      std_srvs::SetBool::Request request;
+      request.data = call.what == Call::What::kEnable;
+      return client::askService<std_srvs::SetBool>(axis + "enable", request);
+    }
+    case Call::What::kStep: {
+      MoveTo::Request request;
+      request.position = call.distance;
+      request.relative = true;
+      return client::askService<MoveTo>(axis + "move_to", request);
+    }
+    case Call::What::kHome: {
+      Home::Request request;
+      request.wait = true;
+      return client::askService<Home>(axis + "home", request);
+    }
+    case Call::What::kHomeAll: {
+      HomeAxes::Request request;
+      request.wait = true;
+      return client::askService<HomeAxes>(driver + "/home", request);
+    }
+    case Call::What::kStop:
+      return client::askService<std_srvs::Trigger>(driver + "/stop");
+    case Call::What::kRecover:
+      break;
+  }
+  return client::askService<std_srvs::Trigger>(driver + "/recover");
+}
+
+}  // namespace
+
+DriverClient::DriverClient(ros::NodeHandle node, Session& session,
+                           const DriverParameters& parameters)
+    : session_(session),
+      driver_(session.driverName()),
+      emergency_stop_(driver_ + "/emergency_stop"),
+      jog_(node.advertise<Jog>(driver_ + "/jog", 1)) {
+  configure(parameters);
+  const auto hints = ros::TransportHints().tcpNoDelay();
+  states_ = node.subscribe<AxisStates>(
+      driver_ + "/axis_states", kQueued,
+      [this](const AxisStates::ConstPtr& message) { take(*message); }, {}, hints);
+  endstops_ = node.subscribe<Endstops>(
+      driver_ + "/endstops", kQueued, [this](const Endstops::ConstPtr& message) { take(*message); },
+      {}, hints);
+  log_ = node.subscribe<rosgraph_msgs::Log>(
+      "/rosout", 10 * kQueued,
+      [this](const rosgraph_msgs::Log::ConstPtr& message) { take(*message); });
+}
+
+void DriverClient::carryOut(const Orders& orders) {
+  if (orders.emergency_stop) emergency_stop_.press();
+  publish(orders.jogs);
+  for (const Call& call : orders.calls) start(call);
+}
+
+void DriverClient::publish(const std::vector<HeldJog::Order>& jogs) {
+  // One after the other: an axis that is named twice in a message is refused.
+  for (const HeldJog::Order& order : jogs) {
+    Jog message;
+    message.header.stamp = ros::Time::now();
+    message.name.push_back(order.axis);
+    message.velocity.push_back(order.velocity / unitsOf(order.axis));
+    jog_.publish(message);
+  }
+}
+
+void DriverClient::start(const Call& call) {
+  auto& lane = lanes_[call.name()];
+  if (!lane) lane = std::make_unique<Lane>();
+  lane->call = call;
+  lane->background.start([driver = driver_, call] { return carryOutCall(driver, call); });
+}
+
+void DriverClient::poll() {
+  if (const auto answer = emergency_stop_.takeAnswer()) {
+    session_.emergencyAnswered(answer->success, answer->message);
+  }
+  for (const auto& [name, lane] : lanes_) {
+    const auto answer = lane->background.takeAnswer();
+    if (answer) session_.answered(lane->call, answer->success, answer->message);
+  }
+  if (!parameters_.valid()) noticeTheDriver();
+  takeParameters();
+}
+
+void DriverClient::noticeTheDriver() {
+  const bool live = session_.driver().live(steadyNow());
+  if (live == was_live_) return;
+  was_live_ = live;
+  if (!live) {
+    session_.driver().forgetEndstops();
+    session_.messages().say("no state of " + driver_ + " comes any more");
+    return;
+  }
+  // It may be another one by now, or one that was started with other parameters.
+  parameters_ = std::async(std::launch::async, readDriverParameters, driver_);
+}
+
+void DriverClient::takeParameters() {
+  if (!parameters_.valid() ||
+      parameters_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    return;
+  }
+  try {
+    configure(parameters_.get());
+  } catch (const std::exception& error) {
+    session_.messages().say(std::string("the driver's parameters: ") + error.what());
+  }
+}
+
+void DriverClient::configure(const DriverParameters& parameters) {
+  session_.driver().configure(parameters.axes);
+  session_.jog().setPeriod(
+      std::min(parameters.jog_timeout / kMessagesInTimeout, kLongestJogPeriod));
+}
+
+double DriverClient::unitsOf(const std::string& axis) const {
+  const axis::AxisConfig* config = session_.driver().config(axis);
+  return config == nullptr ? 1.0 : axis::configUnitsPerUnit(config->kind);
+}
+
+void DriverClient::take(const AxisStates& states) {
+  std::vector<AxisView> axes;
+  for (std::size_t i = 0; i < states.name.size(); ++i) {
+    AxisView& axis = axes.emplace_back();
+    axis.name = states.name[i];
+    axis.enabled = states.enabled[i] != 0;
+    axis.asleep = states.asleep[i] != 0;
+    axis.idle = states.idle[i] != 0;
+    axis.moving = states.moving[i] != 0;
+    axis.held = states.held[i] != 0;
+    axis.homed = states.homed[i] != 0;
+    axis.position_valid = states.position_valid[i] != 0;
+    axis.microsteps = states.microsteps[i];
+    axis.position = states.position[i] * unitsOf(axis.name);
+    axis.velocity = states.velocity[i] * unitsOf(axis.name);
+    axis.fault = states.fault[i];
+    axis.position_note = states.position_note[i];
+  }
+  session_.update(std::move(axes), steadyNow());
+}
+
+void DriverClient::take(const Endstops& endstops) {
+  for (std::size_t i = 0; i < endstops.name.size(); ++i) {
+    session_.driver().updateEndstops(endstops.name[i], endstops.min[i] != 0, endstops.max[i] != 0);
+  }
+}
+
+// Jogs have no answer: why one was refused is in the driver's log only.
+void DriverClient::take(const rosgraph_msgs::Log& log) {
+  if (log.name != driver_ || log.level < rosgraph_msgs::Log::WARN) return;
+  session_.messages().say(log.msg);
+}
+
+double steadyNow() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace stepdriver::console

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/subscriber.h>
+#include <rosgraph_msgs/Log.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/Endstops.h>
+
+#include <future>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "../client/background_call.h"
+#include "driver_parameters.h"
+#include "emergency_stop_client.h"
+#include "session.h"
+
+namespace stepdriver::console {
+
+/// Tells a session what the driver publishes and answers, and the driver what the session orders.
+/// None of its functions waits for the driver or the master.
+///
+/// To be used by one thread, which also serves the global callback queue. Its destructor waits for
+/// the calls under way, which end with ros::shutdown().
+class DriverClient {
+ public:
+  /// @param parameters as readDriverParameters() has them now.
+  /// @param session outlives this.
+  DriverClient(ros::NodeHandle node, Session& session, const DriverParameters& parameters);
+  DriverClient(const DriverClient&) = delete;
+  DriverClient& operator=(const DriverClient&) = delete;
+
+  void carryOut(const Orders& orders);
+  /// Hands over the answers that have come. To be called often.
+  void poll();
+
+ private:
+  struct Lane {
+    Call call;
+    client::BackgroundCall background;
+  };
+
+  void take(const AxisStates& states);
+  void take(const Endstops& endstops);
+  void take(const rosgraph_msgs::Log& log);
+  void configure(const DriverParameters& parameters);
+  void noticeTheDriver();
+  void takeParameters();
+  void start(const Call& call);
+  void publish(const std::vector<HeldJog::Order>& jogs);
+  double unitsOf(const std::string& axis) const;
+
+  Session& session_;
+  const std::string driver_;
+  std::map<std::string, std::unique_ptr<Lane>> lanes_;  // one for each name of a call
+  EmergencyStopClient emergency_stop_;
+  std::future<DriverParameters> parameters_;  // while they are read again
+  bool was_live_ = false;
+  ros::Publisher jog_;
+  ros::Subscriber states_;
+  ros::Subscriber endstops_;
+  ros::Subscriber log_;
+};
+
+/// [s] on the clock of sessions.
+double steadyNow();
+
+}  // namespace stepdriver::console

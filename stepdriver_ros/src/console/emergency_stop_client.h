@@ -1,0 +1,42 @@
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "../client/background_call.h"
+
+namespace stepdriver::console {
+
+/// Calls the driver's emergency stop, in a thread of its own and over a connection that is made
+/// beforehand, so that nothing else that is under way keeps it.
+///
+/// To be used by one thread. Its destructor ends with an answer, or with ros::shutdown().
+class EmergencyStopClient {
+ public:
+  /// @param service its full name.
+  explicit EmergencyStopClient(std::string service);
+  ~EmergencyStopClient();
+  EmergencyStopClient(const EmergencyStopClient&) = delete;
+  EmergencyStopClient& operator=(const EmergencyStopClient&) = delete;
+
+  /// May be called again before the answer has come: then there is one more stop.
+  void press();
+  /// The answer to the latest stop, once.
+  std::optional<client::Answer> takeAnswer();
+
+ private:
+  void run();
+
+  const std::string service_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool ending_ = false;
+  bool wanted_ = false;
+  std::optional<client::Answer> answer_;
+  std::thread thread_;
+};
+
+}  // namespace stepdriver::console

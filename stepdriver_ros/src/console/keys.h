@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+
+namespace stepdriver::console {
+
+/// A key as the terminal gives it: a character's code, or one of these.
+using Key = int;
+constexpr Key kKeyUp = 0x110001;  // beyond every character
+constexpr Key kKeyDown = 0x110002;
+constexpr Key kKeyLeft = 0x110003;
+constexpr Key kKeyRight = 0x110004;
+constexpr Key kKeyShiftLeft = 0x110005;
+constexpr Key kKeyShiftRight = 0x110006;
+constexpr Key kKeyCtrlC = 3;
+constexpr Key kKeyEscape = 27;
+
+enum class Action {
+  kEmergencyStop,
+  kStop,
+  kRecover,
+  kPreviousAxis,
+  kNextAxis,
+  kChooseAxis,
+  kJog,
+  kStep,
+  kEnable,
+  kDisable,
+  kHome,
+  kHomeAll,
+  kHelp,
+  kQuit,
+};
+
+enum class JogSpeed { kSlow, kFast };
+
+/// What a key asks for.
+struct Command {
+  Action action = Action::kHelp;
+  int direction = 0;                 ///< of a jog or a step: -1 or 1
+  JogSpeed speed = JogSpeed::kSlow;  ///< of a jog
+  int index = 0;                     ///< of the axis to choose, from 0
+};
+
+/// @return none: the key has no meaning.
+std::optional<Command> commandOf(Key key);
+
+}  // namespace stepdriver::console

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <string>
+
+namespace stepdriver::console {
+
+/// The last things that were said, the newest last. One that is said again and again is kept once.
+class Messages {
+ public:
+  static constexpr std::size_t kKept = 100;
+
+  struct Message {
+    std::string text;
+    int times = 1;
+  };
+
+  void say(const std::string& text);
+
+  const std::deque<Message>& all() const { return all_; }
+
+ private:
+  std::deque<Message> all_;
+};
+
+}  // namespace stepdriver::console

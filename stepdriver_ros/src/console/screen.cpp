@@ -1,0 +1,216 @@
+#include "screen.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "axis_table.h"
+#include "wrapped.h"
+
+namespace stepdriver::console {
+namespace {
+
+constexpr int kFewestMessages = 3;  // rows; before the help takes any
+
+std::string secondsText(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f s", seconds);
+  return text;
+}
+
+std::vector<Row> rowsOf(const std::string& text, int columns, bool loud = false) {
+  std::vector<Row> rows;
+  for (const std::string& line : wrapped(text, columns)) rows.push_back({line, loud});
+  return rows;
+}
+
+void append(std::vector<Row>& rows, const std::vector<Row>& more) {
+  rows.insert(rows.end(), more.begin(), more.end());
+}
+
+Row titleRow(const Session& session, int columns, double now) {
+  const auto age = session.driver().age(now);
+  const bool live = session.driver().live(now);
+  const std::string state = live  ? "live"
+                            : age ? "NO STATE FOR " + secondsText(*age) + ": values are old"
+                                  : "NO STATE YET";
+  std::string text = "stepdriver console  " + session.driverName();
+  const auto width = static_cast<std::size_t>(columns);
+  if (text.size() + 2 + state.size() > width) text = session.driverName();
+  if (text.size() + 2 + state.size() > width) return {state.substr(0, width), !live};
+  text += std::string(width - text.size() - state.size(), ' ') + state;
+  return {text, !live};
+}
+
+std::vector<Row> emergencyRows(const Session& session, int columns, double now) {
+  switch (session.emergency()) {
+    case Session::Emergency::kNone:
+      return {};
+    case Session::Emergency::kSent:
+      return rowsOf("*** EMERGENCY STOP sent " + secondsText(now - session.emergencySince()) +
+                        " ago, NO ANSWER YET: be ready to cut the power ***",
+                    columns, true);
+    case Session::Emergency::kFailed:
+      return rowsOf("*** EMERGENCY STOP FAILED: " + session.emergencyMessage() +
+                        ". CUT THE POWER BY HAND ***",
+                    columns, true);
+    case Session::Emergency::kStopped:
+      break;
+  }
+  std::vector<Row> rows =
+      rowsOf("*** EMERGENCY STOP: the driver has stopped every axis ***", columns, true);
+  append(rows,
+         rowsOf("    Motors keep their current. All safe? r recovers, and nothing moves by that.",
+                columns, true));
+  return rows;
+}
+
+/// What is left of the window, given away in the order of importance.
+class Body {
+ public:
+  explicit Body(int room) : room_(std::max(room, 0)) {}
+
+  int left() const { return room_; }
+  /// @return as many of the rows as there is room for.
+  std::vector<Row> take(std::vector<Row> rows) {
+    if (static_cast<int>(rows.size()) > room_) rows.resize(room_);
+    room_ -= static_cast<int>(rows.size());
+    return rows;
+  }
+  std::vector<Row> takeWhole(std::vector<Row> rows, int but_leave = 0) {
+    if (static_cast<int>(rows.size()) + but_leave > room_) return {};
+    return take(std::move(rows));
+  }
+
+ private:
+  int room_;
+};
+
+/// The axes that fit, around the chosen one, and how many don't.
+std::vector<Row> axisRows(const AxisTable& table, Body& body) {
+  const int count = static_cast<int>(table.rows.size());
+  if (count <= body.left() || body.left() < 1) return body.take(table.rows);
+  const int fit = std::max(body.left() - 1, 1);
+  const int first = std::clamp(table.chosen - fit / 2, 0, count - fit);
+  std::vector<Row> rows(table.rows.begin() + first, table.rows.begin() + first + fit);
+  rows.push_back({"axes " + std::to_string(first + 1) + " to " + std::to_string(first + fit) +
+                      " of " + std::to_string(count) + "; up, down: the others",
+                  false});
+  return body.take(rows);
+}
+
+std::vector<Row> faultRows(const Session& session, int columns) {
+  std::vector<Row> rows;
+  for (const AxisView& axis : session.driver().axes()) {
+    if (!axis.fault.empty()) {
+      append(rows, rowsOf("FAULT " + axis.name + ": " + axis.fault, columns, true));
+    }
+  }
+  const bool told = session.emergency() == Session::Emergency::kStopped;
+  if (!rows.empty() && !told) append(rows, rowsOf("  r recovers: it ends the faults", columns));
+  return rows;
+}
+
+std::vector<Row> hiddenRows(const AxisTable& table, int columns) {
+  if (table.hidden.empty()) return {};
+  std::string text = "too narrow to show:";
+  for (const std::string& title : table.hidden) {
+    text += (&title == &table.hidden.front() ? " " : ", ") + title;
+  }
+  return rowsOf(text, columns);
+}
+
+std::vector<Row> pendingRows(const Session& session, int columns, double now) {
+  std::vector<Row> rows;
+  for (const Session::PendingCall& pending : session.pending()) {
+    const double since = now - pending.since;
+    if (since < 0.5) continue;
+    append(rows,
+           rowsOf("... " + pending.call.name() + ": under way for " + secondsText(since), columns));
+  }
+  return rows;
+}
+
+std::vector<Row> helpRows(const Session& session, int columns) {
+  const std::string axis = session.chosen().empty() ? "the axis" : session.chosen();
+  std::vector<std::string> lines = {
+      "up down 1-9 choose an axis    e enable " + axis + "    d disable " + axis,
+      "left right  jog slowly while held    shift+left shift+right, < >  fast",
+      "- +  one step    h home " + axis + "    a home all    r recover from faults"};
+  if (session.showsHelp()) {
+    lines.insert(lines.end(),
+                 {", .  jog slowly too    k j tab  choose an axis too    = one step too",
+                  "A jog ends 0.2 s after the last key; keys held repeat by themselves.",
+                  "- is towards min, + towards max. s and Esc decelerate, SPACE doesn't."});
+  }
+  std::vector<Row> rows;
+  for (const std::string& line : lines) append(rows, rowsOf(line, columns));
+  return rows;
+}
+
+std::vector<Row> messageRows(const Session& session, int columns, int room) {
+  std::vector<Row> rows;
+  const auto& all = session.messages().all();
+  for (auto message = all.rbegin(); message != all.rend(); ++message) {
+    const std::string times =
+        message->times > 1 ? " (" + std::to_string(message->times) + " times)" : "";
+    const std::vector<Row> lines = rowsOf(message->text + times, columns);
+    if (static_cast<int>(rows.size() + lines.size()) > room) {
+      // The newest is worth its beginning at least.
+      if (rows.empty()) rows.assign(lines.begin(), lines.begin() + room);
+      break;
+    }
+    rows.insert(rows.begin(), lines.begin(), lines.end());
+  }
+  return rows;
+}
+
+Row keyRow(int columns) {
+  static const std::vector<std::string> texts = {
+      "SPACE EMERGENCY STOP    s stop all axes    q quit    ? all keys",
+      "SPACE EMERGENCY STOP  s stop  q quit", "SPACE EMERG. STOP", "SPACE STOP"};
+  for (const std::string& text : texts) {
+    if (static_cast<int>(text.size()) <= columns) return {text, true};
+  }
+  return {texts.back().substr(0, columns), true};
+}
+
+}  // namespace
+
+std::vector<Row> draw(const Session& session, int rows, int columns, double now) {
+  std::vector<Row> screen = emergencyRows(session, columns, now);
+  if (static_cast<int>(screen.size()) >= rows) {
+    screen.resize(rows);
+    return screen;
+  }
+  Body body(rows - static_cast<int>(screen.size()) - 1);  // but for the row of keys
+  append(screen, body.take({titleRow(session, columns, now)}));
+  const AxisTable table = axisTable(session, columns, now);
+  const std::vector<Row> axes = axisRows(table, body);
+  const std::vector<Row> faults = body.take(faultRows(session, columns));
+  const std::vector<Row> hidden = body.take(hiddenRows(table, columns));
+  const std::vector<Row> titles = body.take({table.titles});
+  const std::vector<Row> pending = body.take(pendingRows(session, columns, now));
+  std::vector<Row> help = body.takeWhole(helpRows(session, columns), kFewestMessages + 2);
+  if (!help.empty()) {
+    help.insert(help.begin(), Row{std::string(columns, '-'), false});
+    body.take({Row{}});
+  }
+  std::vector<Row> messages = body.takeWhole({{std::string(columns, '-'), false}}, 1);
+  append(messages, messageRows(session, columns, body.left()));
+
+  append(screen, titles);
+  append(screen, axes);
+  append(screen, hidden);
+  append(screen, faults);
+  append(screen, messages);
+  append(screen, pending);
+  // The keys stay at the bottom, whatever there is to say.
+  const int below = static_cast<int>(help.size()) + 1;
+  screen.resize(std::max<int>(static_cast<int>(screen.size()), rows - below));
+  append(screen, help);
+  screen.push_back(keyRow(columns));
+  for (Row& row : screen) row.text = row.text.substr(0, columns);
+  return screen;
+}
+
+}  // namespace stepdriver::console

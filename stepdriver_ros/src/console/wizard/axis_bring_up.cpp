@@ -1,0 +1,57 @@
+#include "axis_bring_up.h"
+
+#include "../../text.h"
+#include "bring_up_checks.h"
+
+namespace stepdriver::console {
+namespace {
+
+/// The motor's current for as long as this object lives.
+class Current {
+ public:
+  Current(MachineAtHand& machine, std::string axis) : machine_(machine), axis_(std::move(axis)) {}
+  ~Current() {
+    if (given_) machine_.enable(axis_, false);
+  }
+  Current(const Current&) = delete;
+  Current& operator=(const Current&) = delete;
+
+  /// @return whether it flows.
+  bool ask(Dialogue& dialogue) {
+    if (machine_.state(axis_).enabled) return true;
+    if (!askYesNo(dialogue, axis_ + " isn't enabled. Give its motor current?", false)) return false;
+    const client::Answer answer = machine_.enable(axis_, true);
+    if (!answer.success) dialogue.say("The driver refuses: " + answer.message);
+    given_ = answer.success;
+    return given_;
+  }
+
+ private:
+  MachineAtHand& machine_;
+  const std::string axis_;
+  bool given_ = false;
+};
+
+}  // namespace
+
+Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config) {
+  Findings findings;
+  findings.axis = config.name;
+  const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
+  dialogue.say("\n==== Axis " + config.name + ": " + ros_node::numberText(steps) + " steps per " +
+               unitOf(config.kind) + " at " + std::to_string(config.microsteps) + " microsteps");
+  dialogue.say("\n-- 1. Do the switches read right?");
+  checkSwitches(dialogue, machine, config, findings);
+  Current current(machine, config.name);
+  dialogue.say("\n-- 2. Which way is plus?");
+  if (!current.ask(dialogue)) {
+    dialogue.say("Without current neither the direction nor the distance is looked at.");
+    return findings;
+  }
+  checkDirection(dialogue, machine, config, findings);
+  dialogue.say("\n-- 3. Is the distance right?");
+  checkDistance(dialogue, machine, config, findings);
+  return findings;
+}
+
+}  // namespace stepdriver::console

@@ -1,0 +1,84 @@
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "../../text.h"
+#include "bring_up_checks.h"
+#include "hand_move.h"
+
+namespace stepdriver::console {
+namespace {
+
+using ros_node::numberText;
+
+// Nearer than this a rule and an eye don't tell.
+constexpr double kAsGoodAsRight = 0.002;
+// A factor that is as near as this to a power of two comes from the microsteps, not from a gear.
+constexpr double kNearPower = 0.05;
+
+/// What is usually behind such a factor; empty: nothing that is known.
+std::string usualCause(double factor) {
+  const double power = std::log2(factor);
+  const double whole = std::round(power);
+  if (whole == 0.0 || std::abs(power - whole) > kNearPower) return {};
+  return "That is near a factor of " + numberText(std::exp2(std::abs(whole))) +
+         ": look at the microsteps first, at straps and DIP switches against `microsteps`.";
+}
+
+struct Measured {
+  double commanded = 0.0;  ///< [mm|deg]
+  double really = 0.0;     ///< [mm|deg]
+};
+
+/// @return none: a move wasn't made to its end, or its length isn't known.
+std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
+                                const axis::AxisConfig& config) {
+  const std::string unit = unitOf(config.kind);
+  SmallMove move = measurableMove(config);
+  SmallMove play = visibleMove(config);
+  move.distance = *askNumber(dialogue, "How far is it to go?", unit, move.distance);
+  if (!askYesNo(dialogue, "Is there room for it towards plus, as it is configured?", true)) {
+    move.distance = -move.distance;
+    play.distance = -play.distance;
+  }
+  dialogue.say("First a little the same way, to take up the play.");
+  if (hand_move.ask(play) == 0.0) return {};
+  dialogue.ask("Mark where it stands now, or set the dial to 0; then press Enter. ");
+  const double moved = std::abs(hand_move.ask(move));
+  if (moved == 0.0) return {};
+  const auto really = askNumber(dialogue, "How far did it really go?", unit);
+  if (!really) return {};
+  return Measured{moved, *really};
+}
+
+}  // namespace
+
+void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+                   Findings& findings) {
+  if (findings.wrong_way) {
+    dialogue.say("Until the driver is started with the new configuration, its plus is your minus.");
+  }
+  HandMove hand_move(dialogue, machine, config);
+  std::optional<Measured> measured = measure(dialogue, hand_move, config);
+  while (!measured) {
+    if (!askYesNo(dialogue, "Nothing is measured. Try again?", false)) return;
+    measured = measure(dialogue, hand_move, config);
+  }
+  const double factor = measured->commanded / measured->really;
+  const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
+  const std::string unit = unitOf(config.kind);
+  const std::string commanded = numberText(measured->commanded);
+  const std::string really = numberText(measured->really);
+  dialogue.say("Commanded " + commanded + " " + unit + ", measured " + really + " " + unit + ": " +
+               numberText(steps) + " x " + commanded + " / " + really + " = " +
+               numberText(steps * factor) + " steps per " + unit + ".");
+  if (std::abs(factor - 1.0) < kAsGoodAsRight) {
+    dialogue.say("That is as good as right; it stays.");
+    return;
+  }
+  const std::string cause = usualCause(factor);
+  if (!cause.empty()) dialogue.say(cause);
+  if (askYesNo(dialogue, "Take that?", true)) findings.scale = factor;
+}
+
+}  // namespace stepdriver::console

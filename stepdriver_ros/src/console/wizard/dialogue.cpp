@@ -1,0 +1,52 @@
+#include "dialogue.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+
+#include "../../text.h"
+
+namespace stepdriver::console {
+namespace {
+
+std::string trimmed(const std::string& text) {
+  const auto is_space = [](unsigned char c) { return std::isspace(c) != 0; };
+  const auto begin = std::find_if_not(text.begin(), text.end(), is_space);
+  const auto end = std::find_if_not(text.rbegin(), text.rend(), is_space).base();
+  return begin < end ? std::string(begin, end) : std::string();
+}
+
+}  // namespace
+
+bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_default) {
+  for (;;) {
+    const std::string answer =
+        trimmed(dialogue.ask(question + (yes_by_default ? " [Y/n] " : " [y/N] ")));
+    if (answer.empty()) return yes_by_default;
+    if (answer == "y" || answer == "Y" || answer == "yes") return true;
+    if (answer == "n" || answer == "N" || answer == "no") return false;
+    dialogue.say("\"" + answer + "\" isn't understood: y, n, or q to end all of it.");
+  }
+}
+
+std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
+                                const std::string& unit, std::optional<double> fallback) {
+  const std::string shown =
+      fallback ? " [" + ros_node::numberText(*fallback) + " " + unit + "] " : " [" + unit + "] ";
+  for (;;) {
+    const std::string answer = trimmed(dialogue.ask(question + shown));
+    if (answer.empty()) return fallback;
+    char* end = nullptr;
+    const double number = std::strtod(answer.c_str(), &end);
+    const std::string rest = trimmed(end);
+    if (end != answer.c_str() && (rest.empty() || rest == unit) && std::isfinite(number) &&
+        number > 0.0) {
+      return number;
+    }
+    dialogue.say("\"" + answer + "\" isn't understood: it must be a number above 0, in " + unit +
+                 ".");
+  }
+}
+
+}  // namespace stepdriver::console

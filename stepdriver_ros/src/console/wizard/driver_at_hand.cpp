@@ -1,0 +1,84 @@
+#include "driver_at_hand.h"
+
+#include <ros/callback_queue.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/MoveTo.h>
+
+#include <algorithm>
+
+#include "../../client/ask_service.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::console {
+namespace {
+
+constexpr double kPoll = 0.02;        // [s]
+constexpr double kFirstState = 10.0;  // [s]
+// Longer than the screen waits before it calls a state stale: here it ends everything.
+constexpr double kGone = 2.0;  // [s]
+
+}  // namespace
+
+void DriverAtHand::wait() {
+  ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kPoll));
+  client_.poll();
+}
+
+void DriverAtHand::poll() {
+  ros::getGlobalCallbackQueue()->callAvailable();
+  client_.poll();
+  if (session_.driver().age(steadyNow()).value_or(0.0) > kGone) {
+    throw Error("no state of " + session_.driverName() + " comes any more");
+  }
+}
+
+bool DriverAtHand::complete() const {
+  const auto& axes = session_.driver().axes();
+  return !axes.empty() && std::all_of(axes.begin(), axes.end(),
+                                      [](const AxisView& axis) { return axis.switches_known; });
+}
+
+void DriverAtHand::awaitState() {
+  const double begin = steadyNow();
+  while (!complete()) {
+    if (steadyNow() - begin > kFirstState) {
+      throw Error("no state of " + session_.driverName() + " comes: is it running?");
+    }
+    wait();
+  }
+}
+
+AxisView DriverAtHand::state(const std::string& axis) {
+  poll();
+  const AxisView* const view = session_.driver().axis(axis);
+  if (view == nullptr) throw Error(session_.driverName() + " has no axis " + axis + " any more");
+  return *view;
+}
+
+client::Answer DriverAtHand::enable(const std::string& axis, bool on) {
+  std_srvs::SetBool::Request request;
+  request.data = on;
+  return client::askService<std_srvs::SetBool>(service(axis, "enable"), request);
+}
+
+client::Answer DriverAtHand::move(const std::string& axis, double distance, double speed) {
+  const axis::AxisConfig* const config = session_.driver().config(axis);
+  if (config == nullptr) return {false, axis + " has no configuration any more"};
+  const double units = axis::configUnitsPerUnit(config->kind);
+  MoveTo::Request request;
+  request.position = distance / units;
+  request.relative = true;
+  request.velocity = speed / units;
+  return client::askService<MoveTo>(service(axis, "move_to"), request);
+}
+
+client::Answer DriverAtHand::stop(const std::string& axis) {
+  return client::askService<std_srvs::Trigger>(service(axis, "stop"));
+}
+
+std::string DriverAtHand::service(const std::string& axis, const std::string& name) const {
+  return session_.driverName() + "/" + axis + "/" + name;
+}
+
+}  // namespace stepdriver::console

@@ -1,0 +1,113 @@
+#include "findings.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include "../../text.h"
+#include "../driver_view.h"
+
+namespace stepdriver::console {
+namespace {
+
+using axis::ConfigValue;
+using axis::Kind;
+using ros_node::numberText;
+using Map = ConfigValue::Map;
+
+/// The map below a key, which is made where it isn't there.
+Map& below(Map& map, const std::string& key) {
+  ConfigValue& value = map[key];
+  if (value.as<Map>() == nullptr) value = ConfigValue(Map{});
+  return *value.as<Map>();
+}
+
+std::optional<double> numberAt(const Map& map, const std::string& key) {
+  const auto found = map.find(key);
+  if (found == map.end()) return {};
+  if (const int* integer = found->second.as<int>()) return *integer;
+  if (const double* real = found->second.as<double>()) return *real;
+  return {};
+}
+
+void invertDirection(Map& axis) {
+  Map& invert = below(axis, "invert");
+  const bool* const inverted = invert["dir"].as<bool>();
+  invert["dir"] = inverted == nullptr || !*inverted;
+}
+
+void invertSwitch(Map& endstops, const std::string& end) {
+  const auto found = endstops.find(end);
+  if (found == endstops.end()) return;
+  Map& endstop = below(endstops, end);
+  const std::string* const level = endstop["active_level"].as<std::string>();
+  endstop["active_level"] = level != nullptr && *level == "low" ? "high" : "low";
+}
+
+void swapSwitches(Map& endstops) {
+  Map swapped;
+  for (auto& [end, endstop] : endstops) {
+    swapped[end == "min" ? "max" : end == "max" ? "min" : end] = std::move(endstop);
+  }
+  endstops = std::move(swapped);
+}
+
+/// To what a rule can tell, and a reader can read.
+double rounded(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.7g", number);
+  return std::strtod(text, nullptr);
+}
+
+/// The scale is changed in the key that the axis is scaled by: a length for a round is the longer,
+/// the fewer steps there are for a mm.
+void scale(Map& axis, double factor) {
+  for (const char* steps : {"steps_per_mm", "steps_per_degree"}) {
+    if (const auto number = numberAt(axis, steps)) {
+      axis[steps] = rounded(*number * factor);
+      return;
+    }
+  }
+  for (const char* length : {"mm_per_round", "wheel_diameter_mm"}) {
+    if (const auto number = numberAt(axis, length)) {
+      axis[length] = rounded(*number / factor);
+      return;
+    }
+  }
+  axis["gear_ratio"] = rounded(numberAt(axis, "gear_ratio").value_or(1.0) * factor);
+}
+
+}  // namespace
+
+ConfigValue corrected(ConfigValue parameters, const Findings& findings) {
+  Map& axis = below(below(*parameters.as<Map>(), "axes"), findings.axis);
+  if (findings.wrong_way) invertDirection(axis);
+  if (findings.min_inverted) invertSwitch(below(axis, "endstops"), "min");
+  if (findings.max_inverted) invertSwitch(below(axis, "endstops"), "max");
+  if (findings.switches_swapped) swapSwitches(below(axis, "endstops"));
+  if (findings.scale) scale(axis, *findings.scale);
+  return parameters;
+}
+
+std::vector<std::string> changesText(const Findings& findings, const axis::AxisConfig& config) {
+  std::vector<std::string> changes;
+  const std::string& axis = findings.axis;
+  if (findings.wrong_way) changes.push_back(axis + ": invert/dir is changed: plus was minus");
+  if (findings.min_inverted) {
+    changes.push_back(axis + ": endstops/min/active_level is changed: it read the wrong way");
+  }
+  if (findings.max_inverted) {
+    changes.push_back(axis + ": endstops/max/active_level is changed: it read the wrong way");
+  }
+  if (findings.switches_swapped) {
+    changes.push_back(axis + ": endstops/min and endstops/max are swapped");
+  }
+  if (findings.scale) {
+    const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
+    changes.push_back(axis + ": " + numberText(steps * *findings.scale) + " steps per " +
+                      unitOf(config.kind) + " instead of " + numberText(steps));
+  }
+  return changes;
+}
+
+}  // namespace stepdriver::console

@@ -1,0 +1,97 @@
+#include "wizard.h"
+
+#include <ros/init.h>
+
+#include <vector>
+
+#include "../../node_config.h"
+#include "../../node_start.h"
+#include "../driver_parameters.h"
+#include "axis_bring_up.h"
+#include "configuration_file.h"
+#include "driver_at_hand.h"
+#include "line_dialogue.h"
+
+namespace stepdriver::console {
+namespace {
+
+std::vector<axis::AxisConfig> chosenAxes(const DriverParameters& parameters,
+                                         const std::string& only) {
+  std::vector<axis::AxisConfig> axes;
+  std::string names;
+  for (const axis::AxisConfig& axis : parameters.axes) {
+    names += (names.empty() ? "" : ", ") + axis.name;
+    if (only.empty() || axis.name == only) axes.push_back(axis);
+  }
+  if (axes.empty()) throw Error("--axis " + only + ": there is no such axis, but " + names);
+  return axes;
+}
+
+/// The driver must take what is written for it.
+///
+/// @throw ConfigError
+void check(const axis::ConfigValue& parameters, const std::string& driver) {
+  std::vector<ConfigIssue> issues;
+  ros_node::readNodeConfig(parameters, driver, issues);
+  if (!issues.empty()) throw ConfigError(issues);
+}
+
+std::vector<std::string> commentOf(const std::string& driver,
+                                   const std::vector<std::string>& changes) {
+  std::vector<std::string> comment = {"The parameters of " + driver +
+                                      ", by `rosrun stepdriver console --wizard`."};
+  if (changes.empty()) comment.emplace_back("Nothing had to be changed.");
+  for (const std::string& change : changes) comment.push_back(change + ".");
+  return comment;
+}
+
+/// @return what must be changed, in words.
+std::vector<std::string> bringUpAll(Dialogue& dialogue, MachineAtHand& machine,
+                                    const std::vector<axis::AxisConfig>& axes,
+                                    axis::ConfigValue& parameters) {
+  std::vector<std::string> changes;
+  for (const axis::AxisConfig& axis : axes) {
+    if (axes.size() > 1 && !askYesNo(dialogue, "Look at axis " + axis.name + "?", true)) continue;
+    const Findings findings = bringUp(dialogue, machine, axis);
+    parameters = corrected(std::move(parameters), findings);
+    for (const std::string& change : changesText(findings, axis)) changes.push_back(change);
+  }
+  return changes;
+}
+
+}  // namespace
+
+bool runWizard(const ros::NodeHandle& node, const std::string& driver, const WizardOptions& options,
+               ros_node::EndRequests& end_requests) {
+  checkNewFile(options.output, options.overwrite);
+  const DriverParameters known = readDriverParameters(driver);
+  const std::vector<axis::AxisConfig> axes = chosenAxes(known, options.axis);
+  axis::ConfigValue parameters = ros_node::privateParameters(ros::NodeHandle(driver));
+  DriverAtHand machine(node, driver, known);
+  LineDialogue dialogue(end_requests, [&machine] { machine.poll(); });
+  try {
+    machine.awaitState();
+    dialogue.say("First bring-up of " + driver +
+                 ".\nNothing moves before you say so, and then a little and slowly.\n"
+                 "Have a hand on the power switch. Enter stops a move; q at any question, or "
+                 "Ctrl-C at any time,\nends all of it, and nothing is written.");
+    const std::vector<std::string> changes = bringUpAll(dialogue, machine, axes, parameters);
+    dialogue.say("\n==== Result");
+    if (changes.empty()) dialogue.say("Nothing has to be changed.");
+    for (const std::string& change : changes) dialogue.say("  " + change);
+    check(parameters, driver);
+    if (!askYesNo(dialogue, "Write it to " + options.output + "?", true)) return false;
+    writeFile(options.output, configurationText(parameters, commentOf(driver, changes)),
+              options.overwrite);
+    dialogue.say(
+        "Written. The driver that runs hasn't changed: start it anew with\n"
+        "  roslaunch stepdriver axis.launch config:=$(realpath " +
+        options.output + ")\nand what else you start it with; then look at it once more.");
+    return true;
+  } catch (const Ended& ended) {
+    dialogue.say(std::string("\nNothing is written: ") + ended.what() + ".");
+    return false;
+  }
+}
+
+}  // namespace stepdriver::console

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <string>
+
+#include "../../end_requests.h"
+
+namespace stepdriver::console {
+
+struct WizardOptions {
+  std::string axis;  ///< the only one to look at; empty: all, one after the other
+  std::string output = "stepdriver_wizard.yaml";
+  bool overwrite = false;
+};
+
+/// A guided first bring-up at standard input and output: switches, direction and distance of each
+/// axis, and a configuration with what they must be.
+///
+/// @param driver full name of the node.
+/// @return whether the file was written.
+/// @throw Error where the driver goes away, or the file can't be written; ConfigError where its
+///   parameters are wrong.
+bool runWizard(const ros::NodeHandle& node, const std::string& driver, const WizardOptions& options,
+               ros_node::EndRequests& end_requests);
+
+}  // namespace stepdriver::console

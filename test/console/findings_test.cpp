@@ -1,0 +1,145 @@
+#include "wizard/findings.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "../../stepdriver_ros/src/check/yaml_value.h"
+#include "stepdriver_core/error.h"
+#include "support/axes.h"
+#include "wizard/configuration_file.h"
+
+namespace stepdriver::console {
+namespace {
+
+using axis::ConfigValue;
+
+std::string text(const ConfigValue& value) { return configurationText(value, {}); }
+
+ConfigValue yaml(const std::string& source) { return check::parseYaml(source, "test"); }
+
+constexpr const char* kAxis = R"(axes:
+  x:
+    driver: a4988
+    steps_per_mm: 80.0
+    endstops:
+      min: {pin: GPIO23, active_level: high, bias: pull_up}
+      max: {pin: GPIO24, active_level: low}
+  y: {mm_per_round: 40.0}
+  w: {wheel_diameter_mm: 65}
+  r: {full_steps_per_round: 200}
+)";
+
+Findings of(const std::string& axis) {
+  Findings findings;
+  findings.axis = axis;
+  return findings;
+}
+
+TEST(Findings, WithoutAnyTheConfigurationStaysTheSame) {
+  EXPECT_EQ(text(corrected(yaml(kAxis), of("x"))), text(yaml(kAxis)));
+}
+
+TEST(Findings, TurnTheDirectionRound) {
+  Findings findings = of("x");
+  findings.wrong_way = true;
+  ConfigValue once = corrected(yaml(kAxis), findings);
+  EXPECT_NE(text(once).find("invert:\n      dir: true"), std::string::npos) << text(once);
+  EXPECT_NE(text(corrected(once, findings)).find("dir: false"), std::string::npos);
+}
+
+TEST(Findings, InvertASwitchBeforeTheyAreSwapped) {
+  Findings findings = of("x");
+  findings.min_inverted = true;
+  findings.switches_swapped = true;
+  const std::string wanted = R"(axes:
+  x:
+    driver: a4988
+    steps_per_mm: 80.0
+    endstops:
+      min: {pin: GPIO24, active_level: low}
+      max: {pin: GPIO23, active_level: low, bias: pull_up}
+  y: {mm_per_round: 40.0}
+  w: {wheel_diameter_mm: 65}
+  r: {full_steps_per_round: 200}
+)";
+  EXPECT_EQ(text(corrected(yaml(kAxis), findings)), text(yaml(wanted)));
+}
+
+TEST(Findings, MoveASingleSwitchToTheOtherEnd) {
+  Findings findings = of("x");
+  findings.switches_swapped = true;
+  const ConfigValue after =
+      corrected(yaml("axes: {x: {endstops: {min: {pin: GPIO23, active_level: high}}}}"), findings);
+  EXPECT_EQ(text(after),
+            text(yaml("axes: {x: {endstops: {max: {pin: GPIO23, active_level: high}}}}")));
+}
+
+TEST(Findings, ScaleTheAxisInItsOwnKey) {
+  const auto scaled = [](const std::string& axis, double factor) {
+    Findings findings = of(axis);
+    findings.scale = factor;
+    return text(corrected(yaml(kAxis), findings));
+  };
+  EXPECT_NE(scaled("x", 0.8).find("steps_per_mm: 64.0"), std::string::npos) << scaled("x", 0.8);
+  EXPECT_NE(scaled("y", 0.8).find("mm_per_round: 50.0"), std::string::npos) << scaled("y", 0.8);
+  EXPECT_NE(scaled("w", 1.3).find("wheel_diameter_mm: 50.0"), std::string::npos);
+  EXPECT_NE(scaled("r", 3.0).find("gear_ratio: 3.0"), std::string::npos) << scaled("r", 3.0);
+}
+
+TEST(Findings, AreSaidInTheUnitOfTheAxis) {
+  Findings findings = of("x");
+  findings.scale = 1.25;
+  EXPECT_EQ(changesText(findings, axisConfig("x")),
+            std::vector<std::string>{"x: 100 steps per mm instead of 80"});
+}
+
+TEST(ConfigurationText, IsReadAsTheSameAgain) {
+  const ConfigValue all = yaml(R"(
+a: {yes_word: "yes", number: "017", empty: "", line: "gpiochip0:17", tabbed: "a\tb", hash: "a #b"}
+"on": 3
+b: [1, 2.5, [true, "off"], {c: d}]
+tiny: 1.0e-07
+third: 0.3333333333333333
+huge: 1.0e+22
+whole: 5.0
+none: null
+)");
+  const std::string written = configurationText(all, {"one", "", "two"});
+  EXPECT_EQ(written.rfind("# one\n#\n# two\n", 0), 0U);
+  const ConfigValue again = yaml(written);
+  EXPECT_EQ(text(again), text(all));
+  const auto& map = *again.as<ConfigValue::Map>();
+  EXPECT_NE(map.at("whole").as<double>(), nullptr) << "a double stays one";
+  EXPECT_EQ(*map.at("third").as<double>(), 1.0 / 3.0);
+  EXPECT_EQ(*map.at("a").as<ConfigValue::Map>()->at("yes_word").as<std::string>(), "yes");
+  EXPECT_EQ(*map.at("a").as<ConfigValue::Map>()->at("number").as<std::string>(), "017");
+}
+
+TEST(ConfigurationFile, NeverReplacesAnotherWithoutBeingTold) {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("wizard_" + std::to_string(getpid()))).string();
+  const auto read = [&] {
+    std::ifstream file(path);
+    return std::string{std::istreambuf_iterator<char>(file), {}};
+  };
+  std::filesystem::remove(path);
+  writeFile(path, "one\n", false);
+  EXPECT_EQ(read(), "one\n");
+  EXPECT_THROW(checkNewFile(path, false), Error);
+  EXPECT_THROW(writeFile(path, "two\n", false), Error);
+  EXPECT_EQ(read(), "one\n");
+  writeFile(path, "three\n", true);
+  EXPECT_EQ(read(), "three\n");
+  EXPECT_FALSE(std::filesystem::exists(path + ".new"));
+  std::filesystem::remove(path);
+  EXPECT_THROW(writeFile(path + "/none/x.yaml", "", false), Error);
+}
+
+}  // namespace
+}  // namespace stepdriver::console

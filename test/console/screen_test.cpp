@@ -1,0 +1,154 @@
+#include "screen.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "support/axes.h"
+#include "wrapped.h"
+
+namespace stepdriver::console {
+namespace {
+
+std::string screenText(const Session& session, int rows, int columns, double now = 0.0) {
+  std::string text;
+  for (const Row& row : draw(session, rows, columns, now)) text += row.text + "\n";
+  return text;
+}
+
+testing::AssertionResult shows(const std::string& screen, const std::string& words) {
+  if (screen.find(words) != std::string::npos) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "\"" << words << "\" isn't on\n" << screen;
+}
+
+std::vector<AxisView> sixAxes() {
+  std::vector<AxisView> axes;
+  for (const char* name : {"x", "y", "z", "a", "b", "c"}) {
+    axes.push_back(axisView(name));
+    axes.back().position = -170.0;
+    axes.back().velocity = -100.0;
+    axes.back().moving = true;
+  }
+  return axes;
+}
+
+TEST(Screen, ShowsEachAxisInMmWithItsSwitchesAndStates) {
+  AxisView x = axisView("x");
+  x.position = 12.3456;
+  x.velocity = -3.5;
+  x.moving = true;
+  x.homed = true;
+  x.max_active = true;
+  const std::string screen = screenText(sessionWith({x}), 24, 80);
+  for (const char* words :
+       {"> x", "12.3456 mm", "-3.50 mm/s", "open    PRESSED", "on", "moving homed"}) {
+    EXPECT_TRUE(shows(screen, words));
+  }
+  EXPECT_TRUE(shows(screen, "live"));
+}
+
+TEST(Screen, EverythingOfSixAxesFitsIntoTheSmallestUsualWindow) {
+  Session session = sessionWith(sixAxes());
+  const std::string screen = screenText(session, 24, 80);
+  for (const char* words : {"> x", "  c ", "speed", "min end", "max end", "moving unverified",
+                            "SPACE EMERGENCY STOP", "home all"}) {
+    EXPECT_TRUE(shows(screen, words));
+  }
+  EXPECT_EQ(screen.find("too narrow"), std::string::npos) << screen;
+}
+
+TEST(Screen, FillsTheWindowAndNeverMore) {
+  Session session = sessionWith(sixAxes());
+  session.messages().say(
+      "a refusal that is so long that it can't be shown in one row of any window");
+  session.press({' ', '?'}, 0.0);
+  session.emergencyAnswered(true, "");
+  AxisView faulty = axisView("x");
+  faulty.fault = "the chip reports over-current or over-temperature";
+  session.update({faulty, axisView("y")}, 0.0);
+  for (int rows = 1; rows < 60; ++rows) {
+    for (int columns = 1; columns < 140; columns += 3) {
+      const std::vector<Row> screen = draw(session, rows, columns, 0.0);
+      ASSERT_EQ(static_cast<int>(screen.size()), rows) << columns;
+      for (const Row& row : screen) ASSERT_LE(static_cast<int>(row.text.size()), columns);
+    }
+  }
+}
+
+TEST(Screen, SaysWhatASmallWindowCannotShow) {
+  Session session = sessionWith(sixAxes());
+  session.press({'6'}, 0.0);
+  const std::string low = screenText(session, 6, 80);
+  EXPECT_TRUE(shows(low, "of 6; up, down: the others"));
+  EXPECT_TRUE(shows(low, "> c")) << "the chosen one is always there";
+  EXPECT_TRUE(shows(low, "SPACE EMERGENCY STOP"));
+  const std::string narrow = screenText(session, 24, 40);
+  EXPECT_TRUE(shows(narrow, "too narrow to show: speed"));
+  EXPECT_TRUE(shows(narrow, "-170.0000 mm"));
+}
+
+TEST(Screen, StaleValuesAreShownAsStale) {
+  AxisView x = axisView("x");
+  x.position = 7.0;
+  const Session session = sessionWith({x});
+  EXPECT_FALSE(shows(screenText(session, 24, 80, 0.9), "STALE"));
+  const std::string screen = screenText(session, 24, 80, 3.5);
+  EXPECT_TRUE(shows(screen, "NO STATE FOR 3.5 s"));
+  EXPECT_TRUE(shows(screen, "(7.0000 mm)"));
+  EXPECT_TRUE(shows(screen, "(open)"));
+  EXPECT_TRUE(shows(screen, "STALE"));
+  EXPECT_EQ(screen.find(" live"), std::string::npos);
+  EXPECT_TRUE(shows(screenText(Session("/stepdriver", {}), 24, 80), "NO STATE YET"));
+}
+
+TEST(Screen, SwitchesThatAreNotKnownAreNotShownAsOpen) {
+  Session session = sessionWith({axisView("x")});
+  session.driver().forgetEndstops();
+  const std::string screen = screenText(session, 24, 80);
+  EXPECT_FALSE(shows(screen, "open"));
+  EXPECT_TRUE(shows(screen, "mm/s ?       ?"));
+}
+
+TEST(Screen, SaysLoudlyThatAnEmergencyStopWasMadeAndWhatEndsIt) {
+  Session session = sessionWith({axisView("x")});
+  session.press({' '}, 0.0);
+  EXPECT_TRUE(
+      shows(screenText(session, 24, 80, 2.0), "EMERGENCY STOP sent 2.0 s ago, NO ANSWER YET"));
+  session.emergencyAnswered(true, "");
+  const std::vector<Row> screen = draw(session, 24, 80, 0.0);
+  EXPECT_TRUE(screen[0].loud);
+  EXPECT_TRUE(shows(screen[0].text, "*** EMERGENCY STOP: the driver has stopped every axis"));
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "r recovers"));
+  session.press({' '}, 0.0);
+  session.emergencyAnswered(false, "nobody answers");
+  EXPECT_TRUE(shows(screenText(session, 24, 80),
+                    "EMERGENCY STOP FAILED: nobody answers. CUT THE POWER BY HAND"));
+}
+
+TEST(Screen, ShowsFaultsAndRefusalsInTheirWords) {
+  AxisView x = axisView("x");
+  x.fault = "a pulse was 7 ms late";
+  Session session = sessionWith({x});
+  session.answered({Call::What::kEnable, "x"}, false, "x: at fault: a pulse was 7 ms late");
+  const std::string screen = screenText(session, 24, 80);
+  EXPECT_TRUE(shows(screen, "FAULT x: a pulse was 7 ms late"));
+  EXPECT_TRUE(shows(screen, "x: enable REFUSED: x: at fault: a pulse was 7 ms late"));
+}
+
+TEST(Screen, ARotaryAxisIsInDegrees) {
+  Session session = sessionWith({axisView("x")});
+  axis::AxisConfig config = axisConfig("x");
+  config.kind = axis::Kind::kRotary;
+  session.driver().configure({config});
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "0.0000 deg"));
+}
+
+TEST(Wrapped, CutsBetweenWordsAndKeepsThemAll) {
+  EXPECT_EQ(wrapped("one two three", 8), (std::vector<std::string>{"one two", "three"}));
+  EXPECT_EQ(wrapped("abcdefghij", 4), (std::vector<std::string>{"abcd", "efgh", "ij"}));
+  EXPECT_EQ(wrapped("m\xc2\xb5\n", 8), (std::vector<std::string>{"m?? "}));
+}
+
+}  // namespace
+}  // namespace stepdriver::console

@@ -1,0 +1,198 @@
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/program.h"
+#include "support/says.h"
+#include "support/tmux.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+const std::string kConsole = std::string(STEPDRIVER_PROGRAMS) + "/console";
+
+/// The console of a node under test, in a terminal of 80 by 24.
+class ConsoleTest : public testing::Test {
+ protected:
+  ConsoleTest() {
+    node.set("simulation/speed", 1.0);
+    node.set("axes/x/homing/switch", "min");
+    node.set("axes/x/homing/seek_speed_mm_s", 20.0);
+    node.set("axes/x/homing/latch_speed_mm_s", 5.0);
+    node.set("axes/x/homing/pull_off_mm", 4.0);
+    node.set("axes/x/homing/offset_mm", -2.0);
+    node.set("axes/x/homing/max_travel_mm", 250.0);
+  }
+
+  /// Starts it as a user does, and keeps how the terminal was before and after.
+  void open() {
+    terminal.type("stty -a >" + before.path() + "; sh -c 'echo $$ >" + process.path() + "; exec " +
+                  kConsole + " --driver " + node.name() + "'; echo ended $?; stty -a >" +
+                  after.path());
+    ASSERT_TRUE(terminal.waitFor("SPACE EMERGENCY STOP"));
+    ASSERT_TRUE(terminal.waitFor(" live"));
+  }
+  void expectTerminalGivenBack() {
+    EXPECT_TRUE(terminal.waitFor("ended 0"));
+    EXPECT_TRUE(terminal.waitUntilGone("SPACE EMERGENCY STOP"));
+    EXPECT_TRUE(waitUntil([this] { return after.text().size() == before.text().size(); }));
+    EXPECT_EQ(after.text(), before.text());
+    EXPECT_FALSE(before.text().empty());
+  }
+  void signalConsole(int number) const { kill(std::stoi(process.text()), number); }
+
+  /// Holds a key until something has happened.
+  bool holdUntil(const std::string& key, const std::function<bool()>& happened) const {
+    return waitUntil([&] {
+      terminal.press(key);
+      return happened();
+    });
+  }
+
+  NodeUnderTest node;
+  const Tmux terminal{80, 24};
+  const TemporaryFile before{"_before"};
+  const TemporaryFile after{"_after"};
+  const TemporaryFile process{"_pid"};
+};
+
+TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
+  node.set("axes/x/enable_on_start", false);
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  EXPECT_TRUE(terminal.waitFor("off    rest unverified"));
+  terminal.press("Right");
+  terminal.press("+");
+  EXPECT_TRUE(terminal.waitFor("x isn't moved: it isn't enabled"));
+  EXPECT_EQ(node.pulses(), 0) << "nothing moves that isn't enabled";
+
+  terminal.press("e");
+  EXPECT_TRUE(terminal.waitFor("on     rest"));
+  terminal.press("+");
+  EXPECT_TRUE(terminal.waitFor("0.0125 mm"));
+  EXPECT_EQ(node.pulses(), 1) << "one step is one edge";
+  terminal.press("-");
+  EXPECT_TRUE(terminal.waitFor(" 0.0000 mm"));
+  EXPECT_EQ(node.pulses(), 2);
+  EXPECT_EQ(node.rig().pulses_backward.at(0), 1);
+
+  EXPECT_TRUE(holdUntil("Right", [this] { return node.pulses() > 500; }));
+  EXPECT_TRUE(terminal.waitFor("rest unverified")) << "without repeats it comes to rest";
+  const std::int64_t rested = node.pulses();
+  EXPECT_TRUE(holdUntil("<", [&] { return node.pulses() > rested + 100; }));
+  EXPECT_TRUE(terminal.waitFor("rest unverified"));
+  EXPECT_GT(node.rig().pulses_backward.at(0), 100);
+
+  terminal.press("h");
+  EXPECT_TRUE(terminal.waitFor("rest homed"));
+  EXPECT_TRUE(node.moveTo(0.01, true).success);
+  EXPECT_TRUE(terminal.waitFor("10.00")) << "what others do is shown too";
+  terminal.press("d");
+  EXPECT_TRUE(terminal.waitFor("off    rest"));
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+  terminal.press("q");
+  expectTerminalGivenBack();
+}
+
+TEST_F(ConsoleTest, SpaceStopsEverythingWhileACallIsUnderWay) {
+  node.set("simulation/axes/x/start_mm", 190.0);
+  node.set("axes/x/homing/seek_speed_mm_s", 2.0);
+  node.set("axes/x/homing/latch_speed_mm_s", 1.0);
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  terminal.press("h");
+  EXPECT_TRUE(terminal.waitFor("x: home: under way"));
+  terminal.press("Space");
+  EXPECT_TRUE(terminal.waitFor("*** EMERGENCY STOP: the driver has stopped every axis ***"));
+  EXPECT_TRUE(terminal.waitFor("FAULT x: emergency stop"));
+  EXPECT_TRUE(terminal.waitFor("x: home REFUSED"));
+  const std::int64_t pulses = node.pulses();
+  EXPECT_GT(pulses, 0);
+  terminal.press("+");
+  EXPECT_TRUE(terminal.waitFor("it has a fault; r recovers"));
+  EXPECT_EQ(node.pulses(), pulses);
+  terminal.press("r");
+  EXPECT_TRUE(terminal.waitUntilGone("*** EMERGENCY STOP"));
+  EXPECT_TRUE(terminal.waitUntilGone("FAULT"));
+}
+
+TEST_F(ConsoleTest, StopDeceleratesAndRefusalsAreShownInTheirWords) {
+  node.erase("axes/x/homing");
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  terminal.press("h");
+  EXPECT_TRUE(terminal.waitFor("x: home REFUSED: x: homing isn't configured"));
+  ASSERT_TRUE(node.moveTo(0.19, false, 0.005).success);
+  EXPECT_TRUE(terminal.waitFor("moving"));
+  terminal.press("s");
+  EXPECT_TRUE(terminal.waitFor("all axes stop"));
+  EXPECT_TRUE(terminal.waitFor("rest unverified"));
+  EXPECT_LT(node.pulses(), 15200);
+}
+
+TEST_F(ConsoleTest, GivesTheTerminalBackWhenItIsTerminated) {
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  EXPECT_TRUE(holdUntil("Right", [this] { return node.pulses() > 0; }));
+  signalConsole(SIGTERM);
+  expectTerminalGivenBack();
+  EXPECT_EQ(node.process().waitForExit(std::chrono::seconds(0)).value_or(-1), -1);
+}
+
+TEST_F(ConsoleTest, OutlivesItsDriverAndFindsItAgain) {
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  node.process().signal(SIGKILL);
+  EXPECT_TRUE(terminal.waitFor("NO STATE FOR"));
+  EXPECT_TRUE(terminal.waitFor("(0.0000 mm)"));
+  EXPECT_TRUE(terminal.waitFor("no state of " + node.name()));
+  terminal.press("Space");
+  EXPECT_TRUE(terminal.waitFor("EMERGENCY STOP FAILED: nobody answers. CUT THE POWER BY HAND"));
+  node.set("axes/x/enable_on_start", false);
+  node.start();
+  EXPECT_TRUE(terminal.waitFor(" live"));
+  EXPECT_TRUE(terminal.waitFor("off    rest"));
+  terminal.press("Space");
+  EXPECT_TRUE(terminal.waitFor("the driver has stopped every axis"));
+  node.process().signal(SIGKILL);
+  EXPECT_TRUE(terminal.waitFor("NO STATE FOR"));
+  terminal.press("q");
+  expectTerminalGivenBack();
+}
+
+TEST_F(ConsoleTest, FollowsTheSizeOfItsWindow) {
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  EXPECT_TRUE(terminal.waitFor("mm/s"));
+  terminal.resize(40, 10);
+  EXPECT_TRUE(terminal.waitFor("too narrow to show: speed"));
+  EXPECT_TRUE(terminal.waitFor("SPACE EMERGENCY STOP"));
+  terminal.resize(100, 30);
+  EXPECT_TRUE(terminal.waitFor("mm/s"));
+}
+
+TEST_F(ConsoleTest, SaysWhatItNeedsToStart) {
+  const ProgramEnd no_driver = runProgram("console", {"--driver", "nobody"});
+  EXPECT_EQ(no_driver.code, 1);
+  expectSays(no_driver.output, "no stepdriver_node is running as /nobody");
+  node.start();
+  const ProgramEnd no_terminal = runProgram("console", {"--driver", node.name()});
+  EXPECT_EQ(no_terminal.code, 1);
+  expectSays(no_terminal.output, "must be a terminal");
+  const ProgramEnd other = runProgram("console", {"--driver", "nobody"});
+  expectSays(other.output, node.name());
+  expectSays(other.output, "give its name by --driver");
+  terminal.type("ROS_MASTER_URI=http://127.0.0.1:1 " + kConsole + "; echo ended $?");
+  EXPECT_TRUE(terminal.waitFor("there is no ROS master at http://127.0.0.1:1"));
+  EXPECT_TRUE(terminal.waitFor("ended 1"));
+  EXPECT_EQ(runProgram("console", {"--hlep"}).code, 64);
+  expectSays(runProgram("console", {"--slow", "101"}).output, "--slow 101: it must be a number");
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test

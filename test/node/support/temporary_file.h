@@ -1,0 +1,37 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+namespace stepdriver::node_test {
+
+/// A file of a test's own, which is removed before and after it.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& ending)
+      : path_(std::filesystem::temp_directory_path() /
+              (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
+               std::to_string(getpid()) + ending)) {
+    std::filesystem::remove(path_);
+  }
+  ~TemporaryFile() { std::filesystem::remove(path_); }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  std::string path() const { return path_.string(); }
+  bool exists() const { return std::filesystem::exists(path_); }
+  std::string text() const {
+    std::ifstream file(path_);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace stepdriver::node_test
