@@ -106,7 +106,7 @@ check_tidy() {
   quietly tidy-configure configure_tidy
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | compiled_by "$build/core" |
     tidy "$build/core" || status=1
-  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/joystick|test/docs)/' |
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/' |
     tidy "$build/catkin" || status=1
   return "$status"
 }

@@ -6,20 +6,23 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 // What the node costs: how long its start and a service call take, and what it uses at rest.
 // scripts/node_bench.sh starts a master, sets the node's parameters and calls it:
 //
 //   node_bench stepdriver_node AXES OUT.JSON
-//   node_bench --serve                         the empty service that calls are measured against
+//   node_bench --serve AXES                    a node of roscpp's that does nothing else: an empty
+//                                              service, and joint_states of as many axes at 50 Hz
 
 namespace {
 
@@ -57,16 +60,12 @@ class Child {
 
 /// [s] of a processor that a process has used.
 double processorTime(pid_t process) {
-  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  std::istringstream fields(text.substr(text.rfind(')') + 2));
-  std::string skipped;
-  for (int i = 0; i < 11; ++i) fields >> skipped;
-  double user = 0.0;
-  double system = 0.0;
-  fields >> user >> system;
-  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  clockid_t clock{};
+  timespec time{};
+  if (clock_getcpuclockid(process, &clock) != 0 || clock_gettime(clock, &time) != 0) {
+    throw std::runtime_error("the processor time of a process can't be read");
+  }
+  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) * 1e-9;
 }
 
 /// [MB] that a process has in memory.
@@ -80,24 +79,26 @@ double residentMemory(pid_t process) {
   return kilobytes / 1024.0;
 }
 
-int unanswered = 0;
-
 /// [us] Negative where there was no answer.
 double callTime(ros::ServiceClient& client, double position) {
   stepdriver::MoveTo call;
   call.request.position = position;
   const auto begin = SteadyTime::now();
-  if (!client.call(call)) {
-    ++unanswered;
-    return -1.0;
-  }
+  if (!client.call(call)) return -1.0;
   if (!call.response.success) throw std::runtime_error("refused: " + call.response.message);
   return secondsSince(begin) * 1e6;
 }
 
+/// Takes the calls without an answer out. @return how many they were.
+int removeUnanswered(std::vector<double>& samples) {
+  const auto answered =
+      std::remove_if(samples.begin(), samples.end(), [](double t) { return t < 0.0; });
+  const auto count = static_cast<int>(samples.end() - answered);
+  samples.erase(answered, samples.end());
+  return count;
+}
+
 double median(std::vector<double> samples) {
-  samples.erase(std::remove_if(samples.begin(), samples.end(), [](double t) { return t < 0.0; }),
-                samples.end());
   if (samples.empty()) throw std::runtime_error("no call was answered");
   std::nth_element(samples.begin(), samples.begin() + static_cast<long>(samples.size() / 2),
                    samples.end());
@@ -107,6 +108,8 @@ double median(std::vector<double> samples) {
 struct CallTimes {
   double node = 0.0;
   double empty = 0.0;
+  int node_unanswered = 0;
+  int empty_unanswered = 0;
 };
 
 /// Calls take turns, so that noise meets both. The target is a new one each time, so that each call
@@ -126,7 +129,9 @@ CallTimes measureCalls(ros::NodeHandle& handle, bool persistent, double way) {
     node_times.push_back(callTime(node, position));
     empty_times.push_back(callTime(empty, position));
   }
-  return {median(node_times), median(empty_times)};
+  const int node_unanswered = removeUnanswered(node_times);
+  const int empty_unanswered = removeUnanswered(empty_times);
+  return {median(node_times), median(empty_times), node_unanswered, empty_unanswered};
 }
 
 bool answer(stepdriver::MoveTo::Request& /*request*/, stepdriver::MoveTo::Response& response) {
@@ -134,19 +139,57 @@ bool answer(stepdriver::MoveTo::Request& /*request*/, stepdriver::MoveTo::Respon
   return true;
 }
 
-int serve(int argc, char** argv) {
+int serve(int argc, char** argv, std::size_t axes) {
   ros::init(argc, argv, "empty");
   ros::NodeHandle handle("~");
   const auto service = handle.advertiseService("move_to", answer);
-  ros::spin();
+  const auto publisher = handle.advertise<sensor_msgs::JointState>("joint_states", 10);
+  std::thread states([&] {
+    sensor_msgs::JointState message;
+    message.name.resize(axes, "a0_joint");
+    message.position.resize(axes);
+    message.velocity.resize(axes);
+    for (auto due = SteadyTime::now(); ros::ok(); due += std::chrono::milliseconds(20)) {
+      std::this_thread::sleep_until(due);
+      message.header.stamp = ros::Time::now();
+      publisher.publish(message);
+    }
+  });
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  states.join();
   return 0;
+}
+
+struct Idle {
+  double node_percent = 0.0;
+  double empty_percent = 0.0;
+  double rate = 0.0;  ///< [Hz] of the node's joint_states
+};
+
+/// Both at once, so that noise meets both.
+Idle measureIdle(pid_t node, pid_t empty, const std::atomic<int>& states) {
+  constexpr double kIdle = 10.0;
+  ros::WallDuration(3.0).sleep();
+  const int states_before = states;
+  const double node_before = processorTime(node);
+  const double empty_before = processorTime(empty);
+  const auto begin = SteadyTime::now();
+  ros::WallDuration(kIdle).sleep();
+  const double idle = secondsSince(begin);
+  return {100.0 * (processorTime(node) - node_before) / idle,
+          100.0 * (processorTime(empty) - empty_before) / idle, (states - states_before) / idle};
 }
 
 int measure(const std::string& self, const std::string& program, int axes, const std::string& out) {
   ros::NodeHandle handle;
-  int states = 0;
+  std::atomic<int> states{0};
   const auto subscriber = handle.subscribe<sensor_msgs::JointState>(
       "/joint_states", 100, [&states](const sensor_msgs::JointState::ConstPtr&) { ++states; });
+  std::atomic<int> other_states{0};
+  const auto other_subscriber = handle.subscribe<sensor_msgs::JointState>(
+      "/empty/joint_states", 100,
+      [&other_states](const sensor_msgs::JointState::ConstPtr&) { ++other_states; });
   ros::AsyncSpinner spinner(1);
   spinner.start();
 
@@ -159,20 +202,11 @@ int measure(const std::string& self, const std::string& program, int axes, const
   }
   const double start = secondsSince(begin);
 
-  constexpr double kIdle = 10.0;
-  ros::WallDuration(3.0).sleep();
-  const int states_before = states;
-  const double used_before = processorTime(node.id());
-  const auto idle_begin = SteadyTime::now();
-  ros::WallDuration(kIdle).sleep();
-  const double idle = secondsSince(idle_begin);
-  const double used = processorTime(node.id()) - used_before;
-  const double rate = (states - states_before) / idle;
-
-  const Child empty({self, "--serve"});
+  const Child empty({self, "--serve", std::to_string(axes)});
   if (!ros::service::waitForService("/empty/move_to", 20000)) {
     throw std::runtime_error("the empty service doesn't come up");
   }
+  const Idle idle = measureIdle(node.id(), empty.id(), states);
   // A step there and back leaves the processor to the calls; a long way, with 8000 steps/s on the
   // simulated rig, doesn't.
   constexpr double kStep = 12.5e-6;
@@ -182,13 +216,17 @@ int measure(const std::string& self, const std::string& program, int axes, const
   const CallTimes moving = measureCalls(handle, false, kLong);
 
   std::ofstream(out) << "{\"benchmarks\": [{\"name\": \"Node/axes/" << axes << "\""
-                     << ", \"start_s\": " << start << ", \"idle_percent\": " << 100.0 * used / idle
-                     << ", \"joint_states_hz\": " << rate
+                     << ", \"start_s\": " << start << ", \"idle_percent\": " << idle.node_percent
+                     << ", \"empty_idle_percent\": " << idle.empty_percent
+                     << ", \"joint_states_hz\": " << idle.rate
                      << ", \"memory_mb\": " << residentMemory(node.id())
                      << ", \"call_us\": " << calls.node << ", \"empty_call_us\": " << calls.empty
                      << ", \"kept_call_us\": " << kept.node
                      << ", \"empty_kept_call_us\": " << kept.empty
-                     << ", \"unanswered\": " << unanswered
+                     << ", \"unanswered\": " << calls.node_unanswered + moving.node_unanswered
+                     << ", \"empty_unanswered\": "
+                     << calls.empty_unanswered + moving.empty_unanswered
+                     << ", \"kept_unanswered\": " << kept.node_unanswered + kept.empty_unanswered
                      << ", \"moving_call_us\": " << moving.node
                      << ", \"empty_moving_call_us\": " << moving.empty << "}]}\n";
   return 0;
@@ -197,7 +235,9 @@ int measure(const std::string& self, const std::string& program, int axes, const
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 2 && std::string(argv[1]) == "--serve") return serve(argc, argv);
+  if (argc == 3 && std::string(argv[1]) == "--serve") {
+    return serve(argc, argv, std::stoul(argv[2]));
+  }
   if (argc != 4) {
     std::fprintf(stderr, "usage: node_bench stepdriver_node AXES OUT.JSON\n");
     return 2;

@@ -1,5 +1,6 @@
 #include "state_publisher.h"
 
+#include <pthread.h>
 #include <ros/console.h>
 
 #include <algorithm>
@@ -74,6 +75,7 @@ void StatePublisher::stop() {
 }
 
 void StatePublisher::run() {
+  pthread_setname_np(pthread_self(), "states");
   auto joint_states_due = Clock::now();
   auto poll_due = joint_states_due;
   auto axis_states_due = joint_states_due;
@@ -86,12 +88,13 @@ void StatePublisher::run() {
     }
     if (now >= poll_due) {
       publishEndstopsOnChange();
-      const bool due = now >= axis_states_due;
-      publishAxisStates(!due);
-      if (due)
-        axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
       const bool moving = std::any_of(states_.begin(), states_.end(),
                                       [](const axis::AxisState& state) { return state.moving; });
+      const bool due = now >= axis_states_due;
+      // At rest nobody is told the same again, but whoever listens gets his beat.
+      publishAxisStates(!due || (!moving && axis_state_publisher_.getNumSubscribers() == 0));
+      if (due)
+        axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
       poll_due = nextTime<Clock::time_point>(poll_due, moving ? kMovingPeriod : kRestPeriod, now);
     }
   } while (sleepUntil(std::min(joint_states_due, poll_due)));

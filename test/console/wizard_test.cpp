@@ -249,6 +249,21 @@ TEST(WizardDistance, ScalesByCommandedOverMeasured) {
   EXPECT_TRUE(person.heardOf("80 x 20 / 25 = 64 steps per mm")) << person.heard;
 }
 
+TEST(WizardDistance, IsTriedAgainWhereAMoveIsRefused) {
+  Machine machine;
+  machine.refusal = "x: the target is beyond the soft limit";
+  Person person({"", "y", "y", "y", "", "n", "y", "", "y", "25", "y"});
+  person.on_say = [&](const std::string& text) {
+    if (text.find("beyond the soft limit") != std::string::npos) machine.refusal.clear();
+  };
+  Findings findings;
+  findings.wrong_way = true;
+  checkDistance(person, machine, axisConfig("x"), findings);
+  EXPECT_EQ(machine.moves, (std::vector<double>{2.0, -2.0, -20.0})) << person.heard;
+  EXPECT_TRUE(findings.scale) << person.heard;
+  EXPECT_TRUE(person.heardOf("its plus is your minus")) << person.heard;
+}
+
 TEST(WizardDistance, KnowsTheMicrostepsByTheirFactor) {
   Machine machine;
   Person person({"30", "n", "y", "", "y", "60 mm", "n"});

@@ -53,6 +53,36 @@ TEST(GuardLearner, StaysWithinItsBounds) {
   EXPECT_EQ(learner.guard(), GuardLearner::kShortest);
 }
 
+TEST(GuardLearner, TakesASleepThatEndsAtTheGuardAsInTime) {
+  GuardLearner in_time;
+  in_time.slept(GuardLearner::kFirst);
+  EXPECT_LT(in_time.guard(), GuardLearner::kFirst);
+  GuardLearner late;
+  late.slept(GuardLearner::kFirst + 1);
+  EXPECT_GT(late.guard(), GuardLearner::kFirst);
+}
+
+TEST(RunningShare, AllowsARunAndHasItPaidBackByRests) {
+  RunningShare share;
+  share.ran(89 * kMillisecond);
+  EXPECT_EQ(share.rest(), 0);
+  share.ran(2 * kMillisecond);
+  const Nanoseconds rest = share.rest();
+  EXPECT_GE(rest, RunningShare::kRest);
+  EXPECT_LT(rest, 2 * RunningShare::kRest);
+  share.slept(rest);
+  EXPECT_EQ(share.rest(), 0);
+  share.ran(2 * kMillisecond);
+  EXPECT_GT(share.rest(), 0) << "a rest pays for less than two milliseconds";
+}
+
+TEST(RunningShare, SavesUpNoSleep) {
+  RunningShare share;
+  share.slept(100 * kSecond);
+  share.ran(91 * kMillisecond);
+  EXPECT_GT(share.rest(), 0);
+}
+
 /// A thread on a processor that is late as it is told to be, and a clock for whoever runs in it.
 class FakeThread : public Clock {
  public:

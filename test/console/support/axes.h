@@ -35,6 +35,9 @@ inline Session sessionWith(const std::vector<AxisView>& axes) {
   for (const AxisView& axis : axes) configs.push_back(axisConfig(axis.name));
   session.driver().configure(configs);
   session.update(axes, 0.0);
+  for (const AxisView& axis : axes) {
+    session.driver().updateEndstops(axis.name, axis.min_active, axis.max_active);
+  }
   return session;
 }
 

@@ -5,6 +5,8 @@
 #include <std_srvs/Trigger.h>
 #include <stepdriver/MoveTo.h>
 
+#include <algorithm>
+
 #include "../../client/ask_service.h"
 #include "stepdriver_core/error.h"
 
@@ -13,6 +15,8 @@ namespace {
 
 constexpr double kPoll = 0.02;        // [s]
 constexpr double kFirstState = 10.0;  // [s]
+// Longer than the screen waits before it calls a state stale: here it ends everything.
+constexpr double kGone = 2.0;  // [s]
 
 }  // namespace
 
@@ -24,11 +28,20 @@ void DriverAtHand::wait() {
 void DriverAtHand::poll() {
   ros::getGlobalCallbackQueue()->callAvailable();
   client_.poll();
+  if (session_.driver().age(steadyNow()).value_or(0.0) > kGone) {
+    throw Error("no state of " + session_.driverName() + " comes any more");
+  }
+}
+
+bool DriverAtHand::complete() const {
+  const auto& axes = session_.driver().axes();
+  return !axes.empty() && std::all_of(axes.begin(), axes.end(),
+                                      [](const AxisView& axis) { return axis.switches_known; });
 }
 
 void DriverAtHand::awaitState() {
   const double begin = steadyNow();
-  while (states() == 0) {
+  while (!complete()) {
     if (steadyNow() - begin > kFirstState) {
       throw Error("no state of " + session_.driverName() + " comes: is it running?");
     }
@@ -39,9 +52,7 @@ void DriverAtHand::awaitState() {
 AxisView DriverAtHand::state(const std::string& axis) {
   poll();
   const AxisView* const view = session_.driver().axis(axis);
-  if (view == nullptr || !session_.driver().live(steadyNow())) {
-    throw Error("no state of " + session_.driverName() + " comes any more");
-  }
+  if (view == nullptr) throw Error(session_.driverName() + " has no axis " + axis + " any more");
   return *view;
 }
 

@@ -22,12 +22,13 @@ class DriverAtHand : public MachineAtHand {
   client::Answer move(const std::string& axis, double distance, double speed) override;
   client::Answer stop(const std::string& axis) override;
 
-  /// Takes what the driver has said.
+  /// Takes what the driver has said. @throw Error where it says nothing any more.
   void poll();
-  /// Waits for the first state. @throw Error where none comes.
+  /// Waits for the first state of the axes and of their switches. @throw Error where none comes.
   void awaitState();
 
  private:
+  bool complete() const;
   std::string service(const std::string& axis, const std::string& name) const;
 
   Session session_;
