@@ -43,7 +43,8 @@ def is_there(name, files):
         return any(re.search(place, file) for file in files)
     if "/" not in name:
         return any(file.endswith(f"/{name}") for file in files)
-    return any(True for _ in pages.ROOT.glob(name.rstrip("/")))
+    # A program goes by its source.
+    return any(list(pages.ROOT.glob(name.rstrip("/") + ending)) for ending in ("", ".cpp"))
 
 
 def missing_files(page, files):
