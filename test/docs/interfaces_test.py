@@ -31,7 +31,7 @@ def full_name(name, axis):
     name = name.split("`")[1]
     if name.startswith("/"):
         return name
-    return f"{NODE}/" + (axis + name[1:] if name.startswith("x/") else name)
+    return f"{NODE}/" + re.sub(r"(^|/)x/", rf"\g<1>{axis}/", name)
 
 
 def on_page(heading, axes=("x", "r")):
@@ -55,9 +55,10 @@ def compare(what, there, said):
 
 def services(running):
     said = on_page("Services")
-    # Without a homing an axis has no service for it.
-    if f"{NODE}/r/home" not in running:
-        said.pop(f"{NODE}/r/home")
+    # Of an axis without a homing, and without switches.
+    for name in ("r/home", "rig/r/press_min", "rig/r/press_max"):
+        if f"{NODE}/{name}" not in running:
+            said.pop(f"{NODE}/{name}")
     types = {name: rosservice.get_service_type(name) for name in running}
     yield from compare("service", types, {name: row[1] for name, row in said.items()})
     for name in sorted(types.keys() & said.keys()):

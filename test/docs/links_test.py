@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Looks whether what the pages link to, and the files and messages that they name, are there.
+"""Looks whether what the pages link to and name is there: files, messages, launch arguments.
 
 usage: test/docs/links_test.py
 
@@ -43,7 +43,8 @@ def is_there(name, files):
         return any(re.search(place, file) for file in files)
     if "/" not in name:
         return any(file.endswith(f"/{name}") for file in files)
-    return any(True for _ in pages.ROOT.glob(name.rstrip("/")))
+    # A program goes by its source.
+    return any(list(pages.ROOT.glob(name.rstrip("/") + ending)) for ending in ("", ".cpp"))
 
 
 def missing_files(page, files):
@@ -77,6 +78,20 @@ def unsaid_messages():
                     yield f"{page}: the message {message}"
 
 
+def wrong_arguments():
+    """Launch files whose arguments aren't those in the table of interfaces.md."""
+    page, heading, said = "docs/interfaces.md", "Launch files", set()
+    [rows] = [rows for under, rows in pages.tables(pages.text_of(page)) if under == heading]
+    for file, _, text in rows[1:]:
+        file = file.strip("`")
+        launch = (pages.ROOT / "launch" / file).read_text(encoding="utf-8")
+        arguments = set(re.findall(r'^  <arg name="(\w+)"', launch, re.M))
+        if "the same" not in text:
+            said = set(re.findall(r"`(\w+)` \(", text))
+        for argument in sorted(said ^ arguments):
+            yield f"{page}: the argument {argument} of {file}"
+
+
 def main():
     # Those of the reader, and what is made.
     of_reader = {"my_axis.yaml", "my_axes.yaml", "NAME.yaml", "controllers.yaml"}
@@ -92,6 +107,7 @@ def main():
         if what.split("/")[-1].split(" ")[-1] not in of_reader
     ]
     wrong += [f"{message} isn't there" for message in unsaid_messages()]
+    wrong += [f"{argument} isn't both there and on the page" for argument in wrong_arguments()]
     for text in wrong:
         print(f"FAILED: {text}", file=sys.stderr)
     print(f"{len(pages.names())} pages, {len(wrong)} dead links, files and messages")

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <functional>
 #include <optional>
+#include <ostream>
 #include <set>
 #include <string>
 #include <vector>
@@ -29,6 +30,8 @@ struct Node {
   std::function<Reading(const ConfigValue&)> read;
   ConfigValue base;
 };
+
+void PrintTo(const Node& node, std::ostream* out) { *out << node.name; }
 
 Reading readNode(const ConfigValue& tree) {
   Reading reading;

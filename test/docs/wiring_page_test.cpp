@@ -69,13 +69,14 @@ std::int64_t firstTime(const std::string& cell) {
   return std::llround(number * ns);
 }
 
-class WiringPageOfAChip : public testing::TestWithParam<const char*> {
+class WiringPageOfAChip : public testing::TestWithParam<std::string> {
  protected:
   const chip::Chip& chip() const { return *chip::findChip(GetParam()); }
   std::map<std::string, std::string> facts() const {
     const auto names = chip::chipNames();
     const auto found = std::find(names.begin(), names.end(), GetParam());
-    return column("The chips", 1 + static_cast<std::size_t>(found - names.begin()), 4);
+    return column("The chips", 1 + static_cast<std::size_t>(found - names.begin()),
+                  1 + names.size());
   }
 };
 
@@ -113,7 +114,7 @@ TEST_P(WiringPageOfAChip, HasTheModesAndTheirCodes) {
   EXPECT_EQ(shown, codes.empty() ? "switches" : codes);
 }
 
-INSTANTIATE_TEST_SUITE_P(Chips, WiringPageOfAChip, testing::Values("a4988", "drv8825", "tb6600"));
+INSTANTIATE_TEST_SUITE_P(Chips, WiringPageOfAChip, testing::ValuesIn(chip::chipNames()));
 
 }  // namespace
 }  // namespace stepdriver::docs
