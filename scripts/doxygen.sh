@@ -8,7 +8,7 @@ usage() {
   cat <<'END'
 usage: scripts/doxygen.sh
 
-Installs doxygen where it is missing, and makes pages of stepdriver_core/include and docs in
+Installs doxygen where it is missing, and makes pages of stepdriver_core/include in
 build/doxygen/html. Exit code 0: no warning; every class, struct and enumeration has a comment; and
 what comments name, as Machine::stop(), is there. What has a name that says all, a member most
 often, needs no comment.

@@ -11,14 +11,14 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files; doxygen over the
-          public headers
+          public headers; links of the pages, and the files that they name
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS; what of its
           benchmarks is exact; the pictures of docs/motion.md from what that build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space with all its commands and its service,
-          and the trace of a move from there, read by sigrok-cli; with --kernel also the whole node
-          on that kernel's GPIO chips
+          and the trace of a move from there, read by sigrok-cli; the commands of the pages; with
+          --kernel also the whole node on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -96,6 +96,7 @@ check_shell() {
   (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
 }
 
+check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
 check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
@@ -105,7 +106,7 @@ check_tidy() {
   quietly tidy-configure configure_tidy
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | compiled_by "$build/core" |
     tidy "$build/core" || status=1
-  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/joystick)/' |
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/' |
     tidy "$build/catkin" || status=1
   return "$status"
 }
@@ -236,7 +237,7 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
-  for program in draw plot_motion; do
+  for program in console draw plot_motion; do
     rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
       die "$program --help doesn't work"
   done
@@ -253,6 +254,12 @@ check_operations() {
   bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
+# The commands of the pages, with what was built.
+check_docs() {
+  use_ros "$build/catkin/devel"
+  /usr/bin/python3 -B "$root/test/docs/commands_test.py"
+}
+
 check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
 choose_build_folder
@@ -263,6 +270,7 @@ install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
 if wants lint; then
   stage shell check_shell
   stage doxygen check_doxygen
+  stage links check_links
   # Debian 12's clang says what the format is; another one formats some lines in its own way.
   if [[ $(clang-format --version) == *' 14.'* ]]; then
     stage format check_format
@@ -294,6 +302,7 @@ if wants ros; then
   stage install check_install node-build
   stage operations check_operations install
   stage trace check_trace install
+  stage docs check_docs node-build
 fi
 
 say "" "$summary"

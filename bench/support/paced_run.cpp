@@ -16,6 +16,7 @@
 
 #include "stepdriver_core/motion/profile.h"
 #include "stepdriver_core/motion/step_finder.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
 #include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "stepdriver_core/pulse/realtime.h"
@@ -195,6 +196,7 @@ PacedFigures runNanosleep(double rate, double seconds) {
   const double used = processSeconds();
   std::thread([&] {
     figures.scheduler_error = pulse::askForScheduler();
+    const pulse::CpuLatencyHold awake;
     const Nanoseconds begin = clock.now() + kBegin;
     for (std::size_t i = 0; i < count; ++i) {
       const Nanoseconds due = begin + std::llround(static_cast<double>(i) * 1e9 / rate);

@@ -43,8 +43,9 @@ void CallPool::makeReady(PooledQueue& queue) {
   try {
     startThread();
   } catch (const std::system_error& error) {
-    ROS_ERROR_THROTTLE(1.0, "A call waits until another ends: no thread can be started for it: %s",
-                       error.what());
+    ROS_ERROR_THROTTLE_NAMED(1.0, "node",
+                             "A call waits until another ends: no thread can be started for it: %s",
+                             error.what());
   }
 }
 

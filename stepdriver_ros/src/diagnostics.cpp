@@ -16,15 +16,18 @@ namespace {
 const ros::WallDuration kPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 
-/// Against the limits that hold now.
-std::vector<machine::StepRate> ratesOf(const machine::Machine& machine) {
-  if (!machine.capability()) return {};
+/// Against the limits that hold now, and against the motions under way.
+void readRates(const machine::Machine& machine, EngineReading& reading) {
+  if (!machine.capability()) return;
   std::vector<axis::AxisConfig> axes;
+  std::vector<double> rates;
   for (const auto& axis : machine.axes()) {
     axes.push_back(axis->config());
     axes.back().max_speed = axis->limits().max_speed;
+    rates.push_back(axis->peakRate());
   }
-  return machine::stepRates(axes, *machine.capability()).axes;
+  reading.rates = machine::stepRates(axes, *machine.capability()).axes;
+  reading.rates_in_motion = machine::stepRatesInMotion(axes, *machine.capability(), rates).axes;
 }
 
 }  // namespace
@@ -56,7 +59,11 @@ void Diagnostics::tellAxis(const axis::Axis& axis, Status& status) {
 }
 
 void Diagnostics::tellEngine(Status& status) {
-  const EngineReading reading{machine_.figures(), slips_before_, max_lateness_, ratesOf(machine_)};
+  EngineReading reading;
+  reading.figures = machine_.figures();
+  reading.slips_before = slips_before_;
+  reading.max_lateness = max_lateness_;
+  readRates(machine_, reading);
   slips_before_ = reading.figures.slips;
   reportEngine(reading, status);
 }

@@ -1,6 +1,8 @@
 #include "engine_diagnostics.h"
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "text.h"
 
@@ -33,13 +35,37 @@ void judgeSlips(const EngineReading& reading, DiagnosticStatusWrapper& status) {
 }
 
 void judgeMargins(const EngineReading& reading, DiagnosticStatusWrapper& status) {
-  for (const machine::StepRate& rate : reading.rates) {
+  for (const machine::StepRate& rate : reading.rates_in_motion) {
     if (!rate.holds()) {
-      status.mergeSummary(DiagnosticStatus::ERROR, rate.text());
+      status.mergeSummary(DiagnosticStatus::ERROR, "too fast a motion: " + rate.text());
     } else if (rate.held < rate.asked * kLeastMargin) {
       status.mergeSummary(DiagnosticStatus::WARN, "little margin: " + rate.text());
     }
   }
+  for (const machine::StepRate& rate : reading.rates) {
+    if (!rate.holds()) status.mergeSummary(DiagnosticStatus::WARN, "at top speed " + rate.text());
+  }
+}
+
+/// The first one of an axis; nullptr: there is none.
+const machine::StepRate* find(const std::vector<machine::StepRate>& rates,
+                              const std::string& axis) {
+  const auto found =
+      std::find_if(rates.begin(), rates.end(), [&](const auto& rate) { return rate.axis == axis; });
+  return found != rates.end() ? &*found : nullptr;
+}
+
+void addMargins(const EngineReading& reading, DiagnosticStatusWrapper& status) {
+  for (const machine::StepRate& rate : reading.rates) {
+    const machine::StepRate* const now = find(reading.rates_in_motion, rate.axis);
+    status.add(rate.axis + ": steps/s", numberText(now != nullptr ? now->asked : 0.0));
+    status.add(rate.axis + ": margin",
+               now != nullptr ? numberText(now->held / now->asked) : "at rest");
+    status.add(rate.axis + ": steps/s at top speed", numberText(rate.asked));
+    status.add(rate.axis + ": steps/s held while all move", numberText(rate.held));
+    status.add(rate.axis + ": margin at top speed", numberText(rate.held / rate.asked));
+  }
+  if (reading.rates.empty()) status.add("margin", "not measured: the lines are simulated");
 }
 
 void addLateness(const std::string& when, const pulse::LatenessFigures& figures,
@@ -65,12 +91,7 @@ void reportEngine(const EngineReading& reading, DiagnosticStatusWrapper& status)
   addLateness("since the start", figures.lateness, status);
   addLateness("in the last second", figures.lateness_last_second, status);
   status.add("pulse thread", figures.realtime);
-  for (const machine::StepRate& rate : reading.rates) {
-    status.add(rate.axis + ": steps/s asked for", numberText(rate.asked));
-    status.add(rate.axis + ": steps/s held", numberText(rate.held));
-    status.add(rate.axis + ": margin", numberText(rate.held / rate.asked));
-  }
-  if (reading.rates.empty()) status.add("margin", "not measured: the lines are simulated");
+  addMargins(reading, status);
 }
 
 }  // namespace stepdriver::ros_node

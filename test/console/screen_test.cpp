@@ -102,6 +102,14 @@ TEST(Screen, StaleValuesAreShownAsStale) {
   EXPECT_TRUE(shows(screenText(Session("/stepdriver", {}), 24, 80), "NO STATE YET"));
 }
 
+TEST(Screen, SwitchesThatAreNotKnownAreNotShownAsOpen) {
+  Session session = sessionWith({axisView("x")});
+  session.driver().forgetEndstops();
+  const std::string screen = screenText(session, 24, 80);
+  EXPECT_FALSE(shows(screen, "open"));
+  EXPECT_TRUE(shows(screen, "mm/s ?       ?"));
+}
+
 TEST(Screen, SaysLoudlyThatAnEmergencyStopWasMadeAndWhatEndsIt) {
   Session session = sessionWith({axisView("x")});
   session.press({' '}, 0.0);

@@ -47,6 +47,16 @@ class AxisLimitsTest : public testing::Test {
   std::unique_ptr<Bench> bench;
 };
 
+TEST_F(AxisLimitsTest, TellsTheHighestStepRateOfTheMotionUnderWay) {
+  EXPECT_EQ(x().peakRate(), 0.0);
+  const axis::Move move = x().moveTo(0.08);  // a triangle up to 0.4 m/s
+  advance(0.05);
+  EXPECT_NEAR(x().peakRate(), 400.0, 0.1) << "though it is slow still";
+  EXPECT_LT(velocity(), 0.11);
+  x().wait(move);
+  EXPECT_EQ(x().peakRate(), 0.0);
+}
+
 TEST_F(AxisLimitsTest, MovesWithinThemFromTheNextMotionOn) {
   EXPECT_NEAR(bench->move(2.0).duration, 2.5, 1e-3);
   x().setLimits({0.5, 1.0, 0.25, 0.0});

@@ -21,8 +21,8 @@ namespace {
 /// A file in place of the kernel's device.
 class CpuLatency : public testing::Test {
  protected:
-  CpuLatency() { std::ofstream(device).flush(); }
-  ~CpuLatency() override { std::filesystem::remove(device); }
+  void SetUp() override { std::ofstream(device).flush(); }
+  void TearDown() override { std::filesystem::remove(device); }
 
   bool isOpen() const {
     for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {

@@ -53,6 +53,36 @@ TEST(GuardLearner, StaysWithinItsBounds) {
   EXPECT_EQ(learner.guard(), GuardLearner::kShortest);
 }
 
+TEST(GuardLearner, TakesASleepThatEndsAtTheGuardAsInTime) {
+  GuardLearner in_time;
+  in_time.slept(GuardLearner::kFirst);
+  EXPECT_LT(in_time.guard(), GuardLearner::kFirst);
+  GuardLearner late;
+  late.slept(GuardLearner::kFirst + 1);
+  EXPECT_GT(late.guard(), GuardLearner::kFirst);
+}
+
+TEST(RunningShare, AllowsARunAndHasItPaidBackByRests) {
+  RunningShare share;
+  share.ran(89 * kMillisecond);
+  EXPECT_EQ(share.rest(), 0);
+  share.ran(2 * kMillisecond);
+  const Nanoseconds rest = share.rest();
+  EXPECT_GE(rest, RunningShare::kRest);
+  EXPECT_LT(rest, 2 * RunningShare::kRest);
+  share.slept(rest);
+  EXPECT_EQ(share.rest(), 0);
+  share.ran(2 * kMillisecond);
+  EXPECT_GT(share.rest(), 0) << "a rest pays for less than two milliseconds";
+}
+
+TEST(RunningShare, SavesUpNoSleep) {
+  RunningShare share;
+  share.slept(100 * kSecond);
+  share.ran(91 * kMillisecond);
+  EXPECT_GT(share.rest(), 0);
+}
+
 /// A thread on a processor that is late as it is told to be, and a clock for whoever runs in it.
 class FakeThread : public Clock {
  public:
@@ -63,6 +93,10 @@ class FakeThread : public Clock {
   void waitUntil(Nanoseconds time) override {
     System system{*this};
     wait_.waitUntil(system, time);
+  }
+  void sleepUntil(Nanoseconds time) override {
+    System system{*this};
+    wait_.waitUntil(system, time, false);
   }
   Nanoseconds guard() const override { return wait_.guard(); }
   void pass(Nanoseconds time) { processor.waitUntil(now() + time); }
@@ -84,6 +118,7 @@ class FakeThread : public Clock {
   }
 
   std::function<Nanoseconds()> oversleeps = [] { return 40 * kMicrosecond; };
+  Nanoseconds woken_at = kNever;
   struct Sleep {
     Nanoseconds begin;
     Nanoseconds end;
@@ -110,10 +145,10 @@ class FakeThread : public Clock {
       thread.pass(kLook);
       return thread.now();
     }
-    static bool woken() { return false; }
+    bool woken() const { return thread.now() >= thread.woken_at; }
     void sleepUntil(Nanoseconds time) const {
       const Nanoseconds begin = thread.now();
-      thread.processor.waitUntil(time + thread.oversleeps());
+      thread.processor.waitUntil(std::min(time + thread.oversleeps(), thread.woken_at));
       const Nanoseconds before =
           thread.sleeps.empty()
               ? 0
@@ -163,6 +198,33 @@ TEST(HybridWait, SpinsForLessThanTheRealtimeThrottleAllowsWhateverTheIntervals) 
     EXPECT_LT(thread.mostRunningIn(kSecond), 0.91);
     EXPECT_LT(thread.shareOf(0, 2 * kSecond), 0.85);
   }
+}
+
+TEST(HybridWait, OnlySleepsWhereItIsAskedTo) {
+  FakeThread thread;
+  const Nanoseconds time = thread.now() + kMillisecond;
+  thread.sleepUntil(time);
+  EXPECT_GE(thread.now(), time + 40 * kMicrosecond);
+  const Nanoseconds next = thread.now() + kMillisecond;
+  thread.waitUntil(next);
+  EXPECT_LT(thread.now(), next + kMicrosecond);
+}
+
+TEST(HybridWait, LearnsNothingFromASleepThatWasEndedByAWake) {
+  FakeThread thread;
+  thread.woken_at = kMillisecond;
+  thread.waitUntil(10 * kMillisecond);
+  EXPECT_LT(thread.now(), kMillisecond + kMicrosecond);
+  EXPECT_EQ(thread.guard(), GuardLearner::kFirst);
+}
+
+TEST(HybridWait, SleepsUpToItsGuardThoughItIsToRestForLess) {
+  FakeThread thread;
+  thread.waitUntil(0);
+  thread.pass(95 * kMillisecond);
+  const Nanoseconds begin = thread.now();
+  thread.waitUntil(begin + 10 * kMillisecond);
+  EXPECT_LT(thread.shareOf(begin, thread.now()), 0.05) << "it spins on after the rest";
 }
 
 TEST(HybridWait, RestsShortlyAfterAStall) {

@@ -68,6 +68,25 @@ TEST(StepRates, AreLimitedByLatenessAndCallsInAQuarterOfAnInterval) {
             "quarter of a step's interval");
 }
 
+TEST(StepRatesInMotion, AreThoseOfTheAxesThatMoveBesideTheOthersThatMove) {
+  const Times times{10'000, 1'000'000, 2000, 500};
+  Capability capability = capabilityOf(times, 3);
+  capability.channels[2].write.p99 = 7000;
+  const std::vector<axis::AxisConfig> axes{axisOf(8000.0), axisOf(8000.0, "y"),
+                                           axisOf(8000.0, "z")};
+  EXPECT_TRUE(machine::stepRatesInMotion(axes, capability, {0.0, 0.0, 0.0}).axes.empty());
+  const auto one = machine::stepRatesInMotion(axes, capability, {3000.0, 0.0, 0.0}).axes;
+  ASSERT_EQ(one.size(), 1U);
+  EXPECT_EQ(one[0].axis, "x");
+  EXPECT_DOUBLE_EQ(one[0].asked, 3000.0);
+  EXPECT_DOUBLE_EQ(one[0].held, 1e9 / (4.0 * 12'500.0));
+  const auto two = machine::stepRatesInMotion(axes, capability, {3000.0, 0.0, 500.0}).axes;
+  ASSERT_EQ(two.size(), 2U);
+  EXPECT_DOUBLE_EQ(two[0].held, 1e9 / (4.0 * (12'500.0 + 7'500.0)));
+  EXPECT_EQ(two[1].axis, "z");
+  EXPECT_DOUBLE_EQ(two[1].asked, 500.0);
+}
+
 TEST(StepRates, AreLimitedByThePulseItself) {
   axis::AxisConfig config = axisOf(8000.0);
   config.timing.step_high_ns = 30'000;

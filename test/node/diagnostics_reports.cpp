@@ -115,7 +115,9 @@ class EngineReport : public testing::Test {
   EngineReport() {
     reading.max_lateness = 0.005;
     reading.figures.slips = reading.slips_before = 7;
-    reading.rates = {{"x", 8000.0, 20'000.0, 16'000.0, "calls"}};
+    reading.rates = {{"x", 8000.0, 20'000.0, 16'000.0, "calls"},
+                     {"y", 1000.0, 20'000.0, 10'000.0, "calls"}};
+    reading.rates_in_motion = {{"x", 4000.0, 20'000.0, 20'000.0, "calls"}};
   }
 
   void expect(int level, const std::string& words) const {
@@ -149,12 +151,22 @@ TEST_F(EngineReport, WarnsOfLatenessBeforeItIsAFault) {
 }
 
 TEST_F(EngineReport, WarnsOfALittleMarginBeforeThereIsNone) {
-  reading.rates[0].asked = 12'700.0;
+  machine::StepRate& moving = reading.rates_in_motion[0];
+  moving.asked = 15'900.0;
   expect(DiagnosticStatus::OK, "pulses in time");
-  reading.rates[0].asked = 13'000.0;
-  expect(DiagnosticStatus::WARN, "little margin: x: asks for 13000 steps/s");
+  moving.asked = 16'100.0;
+  expect(DiagnosticStatus::WARN, "little margin: x: asks for 16100 steps/s");
+  moving.asked = 20'100.0;
+  expect(DiagnosticStatus::ERROR,
+         "too fast a motion: x: asks for 20100 steps/s, and this machine holds 20000");
+}
+
+TEST_F(EngineReport, WarnsOfATopSpeedThatTheMachineDoesNotHoldThoughNothingMoves) {
+  reading.rates_in_motion.clear();
+  reading.rates[0].asked = 15'900.0;
+  expect(DiagnosticStatus::OK, "pulses in time");
   reading.rates[0].asked = 16'100.0;
-  expect(DiagnosticStatus::ERROR, "x: asks for 16100 steps/s, and this machine holds 16000");
+  expect(DiagnosticStatus::WARN, "at top speed x: asks for 16100 steps/s");
 }
 
 TEST_F(EngineReport, HasTheNumbers) {
@@ -167,7 +179,11 @@ TEST_F(EngineReport, HasTheNumbers) {
   EXPECT_EQ(valueOf(status, "pulses in the last second"), "20");
   EXPECT_EQ(valueOf(status, "lateness in the last second p99 [us]"), "2");
   EXPECT_EQ(valueOf(status, "lateness in the last second max [us]"), "4.5");
-  EXPECT_EQ(valueOf(status, "x: margin"), "2");
+  EXPECT_EQ(valueOf(status, "x: steps/s"), "4000");
+  EXPECT_EQ(valueOf(status, "x: margin"), "5");
+  EXPECT_EQ(valueOf(status, "x: margin at top speed"), "2");
+  EXPECT_EQ(valueOf(status, "y: steps/s"), "0");
+  EXPECT_EQ(valueOf(status, "y: margin"), "at rest");
   reading.rates.clear();
   DiagnosticStatusWrapper simulated;
   reportEngine(reading, simulated);

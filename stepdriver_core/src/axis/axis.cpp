@@ -199,6 +199,12 @@ void Axis::setPosition(double position) {
 
 // ---- state ----
 
+double Axis::peakRate() const {
+  const Lock lock(impl_->mutex);
+  const Motion* motion = impl_->underWay();
+  return motion != nullptr ? motion->profile->peakSpeed() : 0.0;
+}
+
 AxisState Axis::state() const {
   const Lock lock(impl_->mutex);
   Impl& axis = *impl_;

@@ -174,6 +174,20 @@ StepRates stepRates(const std::vector<axis::AxisConfig>& axes,
   return rates;
 }
 
+StepRates stepRatesInMotion(const std::vector<axis::AxisConfig>& axes,
+                            const pulse::Capability& capability, const std::vector<double>& rates) {
+  std::vector<axis::AxisConfig> moving;
+  pulse::Capability of_moving = capability;
+  of_moving.channels.clear();
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (rates.at(i) <= 0.0) continue;
+    moving.push_back(axes[i]);
+    moving.back().max_speed = rates[i] / axes[i].steps_per_unit;
+    of_moving.channels.push_back(capability.channels.at(i));
+  }
+  return stepRates(moving, of_moving);
+}
+
 std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
                              const pulse::Capability& capability) {
   std::string why;

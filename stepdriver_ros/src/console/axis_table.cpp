@@ -22,8 +22,9 @@ std::string numberText(const char* format, double number, const std::string& uni
   return text + (" " + unit);
 }
 
-std::string switchText(bool there, bool active) {
+std::string switchText(bool there, bool known, bool active) {
   if (!there) return "-";
+  if (!known) return "?";
   return active ? "PRESSED" : "open";
 }
 
@@ -56,14 +57,15 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
     const std::string unit = config == nullptr ? "?" : unitOf(config->kind);
     const bool chosen = axis.name == session.chosen();
     const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
-    const std::vector<std::string> cells = {
-        (chosen ? "> " : "  ") + axis.name,
-        old(numberText("%.4f", axis.position, unit)),
-        old(numberText("%.2f", axis.velocity, unit + "/s")),
-        old(switchText(config != nullptr && config->endstop_min, axis.min_active)),
-        old(switchText(config != nullptr && config->endstop_max, axis.max_active)),
-        old(motorText(axis)),
-        live ? stateText(axis) : "STALE"};
+    const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,
+                                            old(numberText("%.4f", axis.position, unit)),
+                                            old(numberText("%.2f", axis.velocity, unit + "/s")),
+                                            old(switchText(config != nullptr && config->endstop_min,
+                                                           axis.switches_known, axis.min_active)),
+                                            old(switchText(config != nullptr && config->endstop_max,
+                                                           axis.switches_known, axis.max_active)),
+                                            old(motorText(axis)),
+                                            live ? stateText(axis) : "STALE"};
     for (std::size_t i = 0; i < cells.size(); ++i) {
       all[i].width = std::max(all[i].width, cells[i].size());
       all[i].cells.push_back(cells[i]);

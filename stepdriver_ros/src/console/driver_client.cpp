@@ -117,6 +117,7 @@ void DriverClient::noticeTheDriver() {
   if (live == was_live_) return;
   was_live_ = live;
   if (!live) {
+    session_.driver().forgetEndstops();
     session_.messages().say("no state of " + driver_ + " comes any more");
     return;
   }

@@ -30,9 +30,16 @@ void DriverView::updateEndstops(const std::string& axis, bool min_active, bool m
   for (AxisView& view : axes_) takeSwitches(view);
 }
 
+void DriverView::forgetEndstops() {
+  switches_.clear();
+  for (AxisView& view : axes_) takeSwitches(view);
+}
+
 void DriverView::takeSwitches(AxisView& axis) const {
+  axis.switches_known = false;
   for (const Switches& switches : switches_) {
     if (switches.axis != axis.name) continue;
+    axis.switches_known = true;
     axis.min_active = switches.min_active;
     axis.max_active = switches.max_active;
   }

@@ -23,6 +23,7 @@ struct AxisView {
   double velocity = 0.0;  ///< [mm/s|deg/s]
   std::string fault;      ///< empty: none
   std::string position_note;
+  bool switches_known = false;  ///< no: the two below say nothing
   bool min_active = false;
   bool max_active = false;
 };
@@ -40,6 +41,8 @@ class DriverView {
   void update(std::vector<AxisView> axes, double now);
   /// The switches of one axis, which come by themselves.
   void updateEndstops(const std::string& axis, bool min_active, bool max_active);
+  /// They come on their changes only, so that those of a driver that has gone say nothing.
+  void forgetEndstops();
 
   const std::vector<AxisView>& axes() const { return axes_; }
   /// @return nullptr where there is no such axis.

@@ -32,9 +32,13 @@ inline AxisView axisView(const std::string& name) {
 inline Session sessionWith(const std::vector<AxisView>& axes) {
   Session session("/stepdriver", {});
   std::vector<axis::AxisConfig> configs;
+  configs.reserve(axes.size());
   for (const AxisView& axis : axes) configs.push_back(axisConfig(axis.name));
   session.driver().configure(configs);
   session.update(axes, 0.0);
+  for (const AxisView& axis : axes) {
+    session.driver().updateEndstops(axis.name, axis.min_active, axis.max_active);
+  }
   return session;
 }
 

@@ -170,6 +170,9 @@ class Axis {
   /// What the axis is and does now, whole and from one instant.
   AxisState state() const;
 
+  /// [microsteps/s] The highest rate of the motion under way, as planned; 0 at rest.
+  double peakRate() const;
+
   /// @throw GpioError where a line can't be read.
   EndstopState endstops() const;
 

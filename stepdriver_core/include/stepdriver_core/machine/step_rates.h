@@ -56,6 +56,13 @@ struct StepRates {
 /// left out.
 StepRates stepRates(const std::vector<axis::AxisConfig>& axes, const pulse::Capability& capability);
 
+/// The same of what moves: beside the others that move, and at the rates at which all of them do.
+///
+/// @param rates [steps/s] of each axis; 0: it is at rest, and takes nothing of the time.
+/// @return the axes that move.
+StepRates stepRatesInMotion(const std::vector<axis::AxisConfig>& axes,
+                            const pulse::Capability& capability, const std::vector<double>& rates);
+
 /// Why a machine under MachineOptions::enforce doesn't start; empty: it does.
 std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
                              const pulse::Capability& capability);

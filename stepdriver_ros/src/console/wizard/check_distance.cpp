@@ -1,4 +1,5 @@
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "../../text.h"
@@ -24,42 +25,52 @@ std::string usualCause(double factor) {
          ": look at the microsteps first, at straps and DIP switches against `microsteps`.";
 }
 
-}  // namespace
+struct Measured {
+  double commanded = 0.0;  ///< [mm|deg]
+  double really = 0.0;     ///< [mm|deg]
+};
 
-void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
-                   Findings& findings) {
+/// @return none: a move wasn't made to its end, or its length isn't known.
+std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
+                                const axis::AxisConfig& config) {
   const std::string unit = unitOf(config.kind);
-  HandMove hand_move(dialogue, machine, config);
   SmallMove move = measurableMove(config);
-  const auto wanted =
-      askNumber(dialogue, "How far is it to go to be measured?", unit, move.distance);
-  move.distance = wanted.value_or(move.distance);
   SmallMove play = visibleMove(config);
+  move.distance = *askLength(dialogue, "How far is it to go?", unit, move.distance);
   if (!askYesNo(dialogue, "Is there room for it towards plus, as it is configured?", true)) {
     move.distance = -move.distance;
     play.distance = -play.distance;
   }
   dialogue.say("First a little the same way, to take up the play.");
-  if (hand_move.ask(play) == 0.0) {
-    dialogue.say("Without that nothing is measured.");
-    return;
-  }
-  dialogue.ask("Mark where it stands now, or set the dial to 0. Then press Enter. ");
+  if (hand_move.ask(play) == 0.0) return {};
+  dialogue.ask("Mark where it stands now, or set the dial to 0; then press Enter. ");
   const double moved = std::abs(hand_move.ask(move));
-  if (moved == 0.0) {
-    dialogue.say("It hasn't made its move: nothing is measured.");
-    return;
+  if (moved == 0.0) return {};
+  const auto really = askLength(dialogue, "How far did it really go?", unit);
+  if (!really) return {};
+  return Measured{moved, *really};
+}
+
+}  // namespace
+
+void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+                   Findings& findings) {
+  if (findings.wrong_way) {
+    dialogue.say("Until the driver is started with the new configuration, its plus is your minus.");
   }
-  const auto measured = askNumber(dialogue, "How far did it really go?", unit);
-  if (!measured) {
-    dialogue.say("Nothing is measured.");
-    return;
+  HandMove hand_move(dialogue, machine, config);
+  std::optional<Measured> measured = measure(dialogue, hand_move, config);
+  while (!measured) {
+    if (!askYesNo(dialogue, "Nothing is measured. Try again?", false)) return;
+    measured = measure(dialogue, hand_move, config);
   }
-  const double factor = moved / *measured;
+  const double factor = measured->commanded / measured->really;
   const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
-  dialogue.say("Commanded " + numberText(moved) + " " + unit + ", measured " +
-               numberText(*measured) + " " + unit + ": " + numberText(steps) + " x " +
-               numberText(moved) + " / " + numberText(*measured) + " = " +
+  const std::string unit = unitOf(config.kind);
+  const std::string commanded = numberText(measured->commanded);
+  const std::string really = numberText(measured->really);
+  dialogue.say("Commanded " + commanded + " " + unit + ", measured " + really + " " + unit + ": " +
+               numberText(steps) + " x " + commanded + " / " + really + " = " +
                numberText(steps * factor) + " steps per " + unit + ".");
   if (std::abs(factor - 1.0) < kAsGoodAsRight) {
     dialogue.say("That is as good as right; it stays.");

@@ -4,6 +4,9 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/SetPosition.h>
+
+#include <algorithm>
 
 #include "../../client/ask_service.h"
 #include "stepdriver_core/error.h"
@@ -13,6 +16,8 @@ namespace {
 
 constexpr double kPoll = 0.02;        // [s]
 constexpr double kFirstState = 10.0;  // [s]
+// Longer than the screen waits before it calls a state stale: here it ends everything.
+constexpr double kGone = 2.0;  // [s]
 
 }  // namespace
 
@@ -24,11 +29,20 @@ void DriverAtHand::wait() {
 void DriverAtHand::poll() {
   ros::getGlobalCallbackQueue()->callAvailable();
   client_.poll();
+  if (session_.driver().age(steadyNow()).value_or(0.0) > kGone) {
+    throw Error("no state of " + session_.driverName() + " comes any more");
+  }
+}
+
+bool DriverAtHand::complete() const {
+  const auto& axes = session_.driver().axes();
+  return !axes.empty() && std::all_of(axes.begin(), axes.end(),
+                                      [](const AxisView& axis) { return axis.switches_known; });
 }
 
 void DriverAtHand::awaitState() {
   const double begin = steadyNow();
-  while (states() == 0) {
+  while (!complete()) {
     if (steadyNow() - begin > kFirstState) {
       throw Error("no state of " + session_.driverName() + " comes: is it running?");
     }
@@ -39,9 +53,7 @@ void DriverAtHand::awaitState() {
 AxisView DriverAtHand::state(const std::string& axis) {
   poll();
   const AxisView* const view = session_.driver().axis(axis);
-  if (view == nullptr || !session_.driver().live(steadyNow())) {
-    throw Error("no state of " + session_.driverName() + " comes any more");
-  }
+  if (view == nullptr) throw Error(session_.driverName() + " has no axis " + axis + " any more");
   return *view;
 }
 
@@ -51,19 +63,28 @@ client::Answer DriverAtHand::enable(const std::string& axis, bool on) {
   return client::askService<std_srvs::SetBool>(service(axis, "enable"), request);
 }
 
+client::Answer DriverAtHand::setPosition(const std::string& axis, double position) {
+  SetPosition::Request request;
+  request.position = position / unitsOf(axis);
+  return client::askService<SetPosition>(service(axis, "set_position"), request);
+}
+
 client::Answer DriverAtHand::move(const std::string& axis, double distance, double speed) {
-  const axis::AxisConfig* const config = session_.driver().config(axis);
-  if (config == nullptr) return {false, axis + " has no configuration any more"};
-  const double units = axis::configUnitsPerUnit(config->kind);
   MoveTo::Request request;
-  request.position = distance / units;
+  request.position = distance / unitsOf(axis);
   request.relative = true;
-  request.velocity = speed / units;
+  request.velocity = speed / unitsOf(axis);
   return client::askService<MoveTo>(service(axis, "move_to"), request);
 }
 
 client::Answer DriverAtHand::stop(const std::string& axis) {
   return client::askService<std_srvs::Trigger>(service(axis, "stop"));
+}
+
+double DriverAtHand::unitsOf(const std::string& axis) const {
+  const axis::AxisConfig* const config = session_.driver().config(axis);
+  if (config == nullptr) throw Error(axis + " has no configuration any more");
+  return axis::configUnitsPerUnit(config->kind);
 }
 
 std::string DriverAtHand::service(const std::string& axis, const std::string& name) const {

@@ -19,15 +19,18 @@ class DriverAtHand : public MachineAtHand {
   int states() const override { return session_.driver().updates(); }
   AxisView state(const std::string& axis) override;
   client::Answer enable(const std::string& axis, bool on) override;
+  client::Answer setPosition(const std::string& axis, double position) override;
   client::Answer move(const std::string& axis, double distance, double speed) override;
   client::Answer stop(const std::string& axis) override;
 
-  /// Takes what the driver has said.
+  /// Takes what the driver has said. @throw Error where it says nothing any more.
   void poll();
-  /// Waits for the first state. @throw Error where none comes.
+  /// Waits for the first state of the axes and of their switches. @throw Error where none comes.
   void awaitState();
 
  private:
+  bool complete() const;
+  double unitsOf(const std::string& axis) const;
   std::string service(const std::string& axis, const std::string& name) const;
 
   Session session_;

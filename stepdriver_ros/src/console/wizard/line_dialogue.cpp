@@ -6,22 +6,36 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <sstream>
+
+#include "../wrapped.h"
 
 namespace stepdriver::console {
 namespace {
 
 constexpr int kPoll = 20;  // [ms]
+constexpr int kColumns = 79;
+
+void print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
 
 }  // namespace
 
 void LineDialogue::say(const std::string& text) {
-  std::fputs((text + "\n").c_str(), stdout);
-  std::fflush(stdout);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    for (const std::string& row : wrapped(line, kColumns)) print(row + "\n");
+  }
 }
 
 std::string LineDialogue::ask(const std::string& question) {
-  std::fputs(question.c_str(), stdout);
-  std::fflush(stdout);
+  std::string rows;
+  for (const std::string& row : wrapped(question, kColumns)) {
+    rows += (rows.empty() ? "" : "\n") + row;
+  }
+  print(rows);
   for (;;) {
     if (auto answer = line()) return *answer;
     meanwhile_();

@@ -72,7 +72,7 @@ bool runWizard(const ros::NodeHandle& node, const std::string& driver, const Wiz
   try {
     machine.awaitState();
     dialogue.say("First bring-up of " + driver +
-                 ". Nothing moves before you say so, and then a little and slowly.\n"
+                 ".\nNothing moves before you say so, and then a little and slowly.\n"
                  "Have a hand on the power switch. Enter stops a move; q at any question, or "
                  "Ctrl-C at any time,\nends all of it, and nothing is written.");
     const std::vector<std::string> changes = bringUpAll(dialogue, machine, axes, parameters);

@@ -1,0 +1,228 @@
+#!/usr/bin/env python3
+"""Runs the commands of the project's pages, and looks at what they say.
+
+usage: test/docs/commands_test.py [PAGE...]
+
+In an environment with stepdriver. commands.yaml has for each page what comes of its commands; one
+that isn't there, or not at its place, fails. Each page has a ROS master, a folder and a thread of
+its own. Exit code 0: all is as the pages have it; 1: not.
+"""
+
+import concurrent.futures
+import os
+import pathlib
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+import rosgraph
+import yaml
+
+import pages
+
+BOUND = 120  # [s] for whatever must come; a machine under load takes its time
+TABLE = pages.ROOT / "test/docs/commands.yaml"
+
+
+class Failed(Exception):
+    pass
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Page:
+    """The person who follows a page: terminals, and a folder with what the page supposes."""
+
+    def __init__(self, name, folder):
+        self.name = name
+        self.folder = folder
+        self.started = []
+        port = free_port()
+        self.environment = dict(
+            os.environ,
+            ROS_MASTER_URI=f"http://127.0.0.1:{port}",
+            ROS_HOME=str(folder / "ros"),
+            MPLBACKEND="Agg",
+            STEPDRIVER_SOURCES=str(pages.ROOT),
+        )
+        axis = (pages.ROOT / "config/a4988.yaml").read_text(encoding="utf-8")
+        for file in ("my_axis.yaml", "my_axes.yaml"):
+            (folder / file).write_text(axis + "\ngpio: {backend: simulated}\n", encoding="utf-8")
+
+        self.parameters = rosgraph.Master("/pages", self.environment["ROS_MASTER_URI"])
+        self.master = None
+        self.port = port
+
+    def begin(self):
+        """One master for all that is launched after one another."""
+        self.master = self.open(["rosmaster", "--core", "-p", str(self.port)], "master.log")
+        deadline = time.monotonic() + BOUND
+        while not self.parameters.is_online():
+            if time.monotonic() > deadline:
+                raise Failed("there is no master")
+            time.sleep(0.1)
+
+    def open(self, command, log):
+        with (self.folder / log).open("w") as output:
+            return subprocess.Popen(
+                # What is started ends with this program, however that ends.
+                ["setpriv", "--pdeathsig", "TERM", *command],
+                cwd=self.folder, env=self.environment, start_new_session=True,
+                stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+            )
+
+    def here(self, command):
+        """What the page supposes where it is on this machine."""
+        here = {
+            "build/catkin/devel": os.environ["CMAKE_PREFIX_PATH"].split(":")[0],
+            "/path/to/": f"{self.folder}/",
+            "/tmp/": f"{self.folder}/",
+        }
+        return ["bash", "-c", re.sub("|".join(here), lambda there: here[there[0]], command)]
+
+    def run(self, entry, command):
+        answer = subprocess.run(
+            self.here(" && ".join([command] + entry.get("and", []))),
+            cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=BOUND,
+        )
+        ends = entry.get("ends", 0)
+        if answer.returncode != ends:
+            raise Failed(f"ended with {answer.returncode}, not {ends}:\n{answer.stdout}")
+        for said in entry.get("says", []):
+            if said not in answer.stdout:
+                raise Failed(f"doesn't say \"{said}\":\n{answer.stdout}")
+
+    def start(self, entry, command):
+        if command.startswith("roslaunch ") and not entry.get("beside"):
+            self.end()
+            # As with a master of its own.
+            for name in {f"/{name.split('/')[1]}" for name in self.parameters.getParamNames()}:
+                self.parameters.deleteParam(name)
+            self.parameters.setParam("/stepdriver/simulation/speed", entry.get("speed", 1.0))
+        log = f"{len(os.listdir(self.folder))}.log"
+        self.started.append(self.open(self.here(command), log))
+        self.until(self.started[-1], entry["until"], self.folder / log)
+
+    def until(self, process, check, log):
+        """Waits until a command does what it is to do, or, without one, until this has said it."""
+        deadline = time.monotonic() + BOUND
+        while True:
+            try:
+                return self.run(check, check.get("run", f"cat {log.name}"))
+            except Failed as failed:
+                if process.poll() is not None or time.monotonic() > deadline:
+                    output = log.read_text(errors="replace")
+                    raise Failed(f"{failed}\nIt said:\n{output}") from failed
+            time.sleep(0.2)
+
+    def end(self):
+        """Ctrl-C in each terminal, the newest first."""
+        while self.started:
+            self.end_one(self.started.pop())
+
+    def end_one(self, process):
+        for number, seconds in ((signal.SIGINT, 30), (signal.SIGKILL, 10)):
+            try:
+                os.killpg(process.pid, number)
+                process.wait(seconds)
+            except (ProcessLookupError, subprocess.TimeoutExpired):
+                pass
+
+    def follow(self, entries):
+        """What went wrong, a text for each command."""
+        wrong, ran = [], 0
+        if all("elsewhere" in entry for entry in entries):
+            return wrong, ran
+        try:
+            self.begin()
+            for entry in entries:
+                [(kind, command)] = [
+                    (kind, entry[kind]) for kind in ("run", "start", "elsewhere") if kind in entry
+                ]
+                if kind == "elsewhere":
+                    continue
+                began = time.monotonic()
+                if entry.get("after") == "Ctrl-C":
+                    self.end()
+                try:
+                    getattr(self, kind)(entry, command)
+                except (Failed, subprocess.TimeoutExpired) as failed:
+                    wrong.append(f"{self.name}: {command}\n{failed}")
+                ran += 1
+                print(f"{self.name}: {time.monotonic() - began:4.1f} s  {command}", flush=True)
+        finally:
+            self.end()
+            self.end_one(self.master)
+        return wrong, ran
+
+
+def differences(page, entries):
+    """Where the table isn't what the page says."""
+    on_page = list(pages.commands(pages.text_of(page)))
+    in_table = [
+        entry.get("run") or entry.get("start") or entry["elsewhere"]
+        for entry in entries if not entry.get("unsaid")
+    ]
+    for command in on_page:
+        if command not in in_table:
+            yield f"{page}: nothing runs this command, see {TABLE.name}: {command}"
+    for command in in_table:
+        if command not in on_page:
+            yield f"{page}: {TABLE.name} has a command that isn't there: {command}"
+    if sorted(on_page) == sorted(in_table) and on_page != in_table:
+        yield f"{page}: {TABLE.name} has the commands in another order"
+    if len(on_page) != len(in_table) and set(on_page) == set(in_table):
+        yield f"{page}: {TABLE.name} has a command more or less often"
+
+
+def untested(page, entries):
+    """Commands that are said to be tested elsewhere, and where nothing is."""
+    stages = re.findall(
+        r"^ *(?:.* \|\| )?stage ([\w-]+) ", (pages.ROOT / "scripts/test.sh").read_text(), re.M
+    )
+    for entry in entries:
+        if "elsewhere" not in entry:
+            continue
+        if not entry.get("why"):
+            yield f"{page}: no reason why this isn't run: {entry['elsewhere']}"
+        by = entry.get("by")
+        if by and by not in stages and not (pages.ROOT / by).exists():
+            yield f"{page}: there is no stage or file {by}, for: {entry['elsewhere']}"
+
+
+def follow(page, entries):
+    with tempfile.TemporaryDirectory(prefix="stepdriver-docs-") as folder:
+        return Page(page, pathlib.Path(folder)).follow(entries)
+
+
+def main():
+    table = yaml.safe_load(TABLE.read_text(encoding="utf-8"))
+    wanted = sys.argv[1:] or pages.names()
+    there = pages.names()
+    wrong = [f"{TABLE.name}: there is no page {page}" for page in table if page not in there]
+    for page in wanted:
+        wrong += differences(page, table.get(page, []))
+        wrong += untested(page, table.get(page, []))
+    with concurrent.futures.ThreadPoolExecutor(3) as readers:
+        done = list(readers.map(lambda page: follow(page, table.get(page, [])), wanted))
+    wrong += [text for texts, _ in done for text in texts]
+    for text in wrong:
+        print(f"FAILED: {text}", file=sys.stderr)
+    total = sum(len(table.get(page, [])) for page in wanted)
+    ran = sum(count for _, count in done)
+    print(f"{total} commands on {len(wanted)} pages: {ran} run here, {total - ran} elsewhere, "
+          f"{len(wrong)} failures")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

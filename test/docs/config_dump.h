@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "joystick_config.h"
+#include "node_config.h"
+
+namespace stepdriver::docs {
+
+/// All that a configuration says, for comparison.
+std::string dump(const ros_node::NodeConfig& config);
+std::string dump(const joystick::JoystickConfig& config);
+
+}  // namespace stepdriver::docs

@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""Holds docs/interfaces.md against the nodes that run: two_axes.launch and joystick.launch.
+
+usage: test/docs/interfaces_test.py
+
+Names, types, fields and latching, in both directions. Exit code 0: they agree; 1: not.
+"""
+
+import re
+import sys
+
+import roslib.message
+import rosgraph
+import rosservice
+import rospy
+
+import pages
+
+NODE = "/stepdriver"
+PAGE = "docs/interfaces.md"
+# Of every node, of roscpp and of what else the launch files start.
+OF_ROS = r".*/(get_loggers|set_logger_level)|/rosout(_agg)?|/tf(_static)?"
+
+
+def rows(heading):
+    [table] = [table for under, table in pages.tables(pages.text_of(PAGE)) if under == heading]
+    return table[1:]
+
+
+def full_name(name, axis):
+    name = name.split("`")[1]
+    if name.startswith("/"):
+        return name
+    return f"{NODE}/" + re.sub(r"(^|/)x/", rf"\g<1>{axis}/", name)
+
+
+def on_page(heading, axes=("x", "r")):
+    """The cells of each row by the full names that it is about."""
+    return {full_name(row[0], axis): row for row in rows(heading) for axis in axes}
+
+
+def fields_in(text):
+    return set(re.findall(r"`(\w+)`", text))
+
+
+def compare(what, there, said):
+    for name in sorted(there.keys() - said.keys()):
+        yield f"{what} {name} isn't on the page"
+    for name in sorted(said.keys() - there.keys()):
+        yield f"{what} {name} is on the page and isn't there"
+    for name in sorted(there.keys() & said.keys()):
+        if there[name] != said[name]:
+            yield f"{what} {name} is {there[name]}, and on the page {said[name]}"
+
+
+def services(running):
+    said = on_page("Services")
+    # Of an axis without a homing, and without switches.
+    for name in ("r/home", "rig/r/press_min", "rig/r/press_max"):
+        if f"{NODE}/{name}" not in running:
+            said.pop(f"{NODE}/{name}")
+    types = {name: rosservice.get_service_type(name) for name in running}
+    yield from compare("service", types, {name: row[1] for name, row in said.items()})
+    for name in sorted(types.keys() & said.keys()):
+        service = roslib.message.get_service_class(types[name])
+        asked, _, answered = said[name][2].partition("→")
+        same = answered.strip() == "the same"
+        for where, text, message in (
+            ("asks for", asked, service._request_class),
+            ("answers with", asked if same else answered, service._response_class),
+        ):
+            fields = set(message.__slots__) - {"success", "message"}
+            if fields != fields_in(text):
+                yield f"{name} {where} {sorted(fields)}, and on the page {sorted(fields_in(text))}"
+
+
+def actions(topics):
+    """Their types by their names, and what is wrong; takes their topics away."""
+    there = {}
+    for name, of_type in list(topics.items()):
+        if name.endswith("/goal") and of_type.endswith("ActionGoal"):
+            there[name[: -len("/goal")]] = of_type[: -len("ActionGoal")]
+    for action in there:
+        for part in ("goal", "cancel", "status", "feedback", "result"):
+            topics.pop(f"{action}/{part}")
+    said = on_page("Actions")
+    if f"{NODE}/r/homing" not in there:
+        said.pop(f"{NODE}/r/homing")
+    wrong = list(compare(
+        "action",
+        # Debian has no control_msgs: the node's own action is the same on the wire.
+        {
+            name: of_type.replace("stepdriver/Follow", "control_msgs/Follow")
+            for name, of_type in there.items()
+        },
+        {name: row[1] for name, row in said.items()},
+    ))
+    for name in sorted(there.keys() & said.keys()):
+        goal, _, rest = said[name][2].partition("→")
+        result, _, feedback = rest.partition(";")
+        for part, text in (("Goal", goal), ("Result", result), ("Feedback", feedback)):
+            message = roslib.message.get_message_class(there[name] + part)
+            fields, said_fields = set(message.__slots__) - {"header"}, fields_in(text)
+            if fields != said_fields:
+                wrong.append(
+                    f"{name} {part}: {sorted(fields)}, and on the page {sorted(said_fields)}"
+                )
+    return wrong
+
+
+def latched(name):
+    """Whether a topic's publisher says so when it is connected to."""
+    heard = []
+    subscriber = rospy.Subscriber(name, rospy.AnyMsg, heard.append)
+    while not heard and not rospy.is_shutdown():
+        rospy.sleep(0.05)
+    subscriber.unregister()
+    return heard[0]._connection_header.get("latching") == "1"
+
+
+def topics(types, published):
+    said = on_page("Topics")
+    yield from compare("topic", types, {name: row[1] for name, row in said.items()})
+    for name in sorted(types.keys() & said.keys()):
+        subscribed = "(subscribed)" in said[name][0]
+        if subscribed == (name in published):
+            yield f"topic {name} is {'published' if subscribed else 'subscribed'}"
+        if not subscribed and latched(name) != ("latched" in said[name][3]):
+            yield f"topic {name} is{' not' if 'latched' in said[name][3] else ''} latched"
+        fields = set(roslib.message.get_message_class(types[name]).__slots__)
+        for field in sorted(fields_in(said[name][2]) - fields):
+            yield f"topic {name} has no field {field}"
+
+
+def of_node(state):
+    return {
+        name for name, nodes in state if NODE in nodes and not re.fullmatch(OF_ROS, name)
+    }
+
+
+def main():
+    rospy.init_node("interfaces_test", disable_signals=True)
+    master = rosgraph.Master(rospy.get_name())
+    publishers, subscribers, providers = master.getSystemState()
+    types = dict(master.getTopicTypes())
+    published, subscribed = of_node(publishers), of_node(subscribers)
+    there = {name: types[name] for name in published | subscribed}
+    wrong = actions(there)
+    wrong += services(of_node(providers))
+    wrong += topics(there, published)
+    for text in wrong:
+        print(f"FAILED: {PAGE}: {text}", file=sys.stderr)
+    print(f"{len(of_node(providers))} services, {len(there)} topics: {len(wrong)} differences")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

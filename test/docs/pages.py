@@ -1,0 +1,83 @@
+"""The project's pages, and what they say that can be tried: commands, links, tables."""
+
+import pathlib
+import re
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+# What a command in the midst of a sentence begins with.
+_PROGRAMS = (
+    "apt|apt-get|bash|cmake|ctest|gpioinfo|gtkwave|journalctl|pkill|pulseview|python3|ros[a-z]+|"
+    r"scripts/\w+\.sh|setup_system|sigrok-cli|source|stepdriver_\w+|sudo|systemctl"
+)
+
+
+def names():
+    """The pages, by their paths in the checkout."""
+    return ["README.md", "CONTRIBUTING.md"] + sorted(
+        f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")
+    )
+
+
+def text_of(page):
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def _blocks(text):
+    """Yields (language, lines) of fenced blocks, and (None, lines) of what is between them."""
+    language, lines = None, []
+    for line in text.splitlines():
+        fence = re.match(r"\s*```\s*(\w*)\s*$", line)
+        if not fence:
+            lines.append(line)
+            continue
+        yield language, lines
+        language, lines = (fence[1] if language is None else None), []
+    yield language, lines
+
+
+def _of_block(lines):
+    whole = re.sub(r"\\\n\s*", "", "\n".join(lines))
+    for line in whole.splitlines():
+        command = re.sub(r"(^|\s+)#(\s.*)?$", "", line).strip().removeprefix("$ ")
+        if command:
+            yield command
+
+
+def prose(text):
+    """A page without its fenced blocks."""
+    return "\n".join(
+        line for language, lines in _blocks(text) if language is None for line in lines
+    )
+
+
+def _of_sentences(text):
+    for quoted in re.findall(r"`([^`]+)`", text):
+        command = re.sub(r"\s+", " ", quoted)
+        if re.match(rf"({_PROGRAMS}) (?!->)", command):
+            yield command
+
+
+def commands(text):
+    """All commands of a page, in its order: the lines of blocks that aren't of text or YAML, and
+    whole commands in sentences."""
+    for language, lines in _blocks(text):
+        if language is None:
+            yield from _of_sentences("\n".join(lines))
+        elif language not in ("text", "yaml"):
+            yield from _of_block(lines)
+
+
+def tables(text):
+    """The tables of a page: for each the heading that it stands under, and its rows of cells."""
+    heading, rows = "", []
+    for line in prose(text).splitlines() + [""]:
+        if line.startswith("|"):
+            cells = re.split(r"(?<!\\)\|", line)[1:-1]
+            rows.append([cell.strip().replace(r"\|", "|") for cell in cells])
+            continue
+        if rows:
+            yield heading, [row for row in rows if not all(re.match("-+$", cell) for cell in row)]
+        rows = []
+        if line.startswith("#"):
+            heading = line.strip("# ")

@@ -1,0 +1,304 @@
+// docs/parameters.md against the readers of configurations, in both directions.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <functional>
+#include <optional>
+#include <ostream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config_dump.h"
+#include "page.h"
+#include "yaml_value.h"
+
+namespace stepdriver::docs {
+namespace {
+
+using axis::ConfigValue;
+
+struct Reading {
+  std::string config;
+  std::vector<ConfigIssue> issues;
+};
+
+/// A node whose parameters are on the page, with a configuration that has all of its maps.
+struct Node {
+  const char* name;  ///< for messages
+  bool rotary;
+  std::function<Reading(const ConfigValue&)> read;
+  ConfigValue base;
+};
+
+void PrintTo(const Node& node, std::ostream* out) { *out << node.name; }
+
+Reading readNode(const ConfigValue& tree) {
+  Reading reading;
+  reading.config = dump(ros_node::readNodeConfig(tree, "", reading.issues));
+  return reading;
+}
+Reading readJoystick(const ConfigValue& tree) {
+  Reading reading;
+  reading.config = dump(joystick::readJoystickConfig(tree, "", reading.issues));
+  return reading;
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size())) {
+    text.replace(at, what.size(), by);
+  }
+  return text;
+}
+
+bool isOfLinearAxes(const std::string& key) {
+  return key.find("mm_per_round") != std::string::npos ||
+         key.find("wheel_diameter_mm") != std::string::npos;
+}
+
+/// What a key of a linear axis is called on a rotary one.
+std::string rotaryKey(const std::string& key) {
+  if (isOfLinearAxes(key)) return key;
+  return replaced(replaced(key, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
+}
+
+const std::string kAxisMap = R"(
+    driver: drv8825
+    pins: {step: A, dir: B, enable: C, sleep: D, reset: E, fault: F}
+    invert: {dir: false}
+    microsteps: 16
+    steps_per_mm: 80.0
+    max_speed_mm_s: 100.0
+    acceleration_mm_s2: 500.0
+    endstops: {min: {pin: G, active_level: low}, max: {pin: H, active_level: low}}
+    homing: {switch: min, seek_speed_mm_s: 1.0, latch_speed_mm_s: 0.1, pull_off_mm: 1.0, max_travel_mm: 9.0}
+    timing: {}
+)";
+
+Node driver(bool rotary) {
+  std::string text = R"(
+gpio: {backend: simulated}
+realtime: {}
+emergency_stop: {pin: Z, active_level: high}
+simulation: {axes: {x: {}}}
+axes:
+  x:)" + kAxisMap;
+  if (rotary) text = replaced(replaced(text, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
+  return {rotary ? "rotary" : "linear", rotary, readNode, check::parseYaml(text, "base")};
+}
+
+Node joystickNode() {
+  return {"joystick", false, readJoystick,
+          check::parseYaml("axes: {x: {joystick_axis: 0, max_speed_mm_s: 9.0}}", "base")};
+}
+
+/// A copy with a value at a path; none takes what is there away.
+ConfigValue with(const ConfigValue& tree, const std::string& path, const ConfigValue* value) {
+  ConfigValue::Map map =
+      tree.as<ConfigValue::Map>() ? *tree.as<ConfigValue::Map>() : ConfigValue::Map{};
+  const auto slash = path.find('/');
+  const std::string key = path.substr(0, slash);
+  if (slash != std::string::npos) {
+    map[key] = with(map.count(key) > 0 ? map[key] : ConfigValue(ConfigValue::Map{}),
+                    path.substr(slash + 1), value);
+  } else if (value != nullptr) {
+    map[key] = *value;
+  } else {
+    map.erase(key);
+  }
+  return map;
+}
+
+ConfigValue scaledByRounds(const Node& node) {
+  const ConfigValue steps(200);
+  const ConfigValue travel(40.0);
+  const ConfigValue by_steps = with(node.base, "axes/x/full_steps_per_round", &steps);
+  if (node.rotary) return with(by_steps, "axes/x/steps_per_degree", nullptr);
+  return with(with(by_steps, "axes/x/mm_per_round", &travel), "axes/x/steps_per_mm", nullptr);
+}
+
+/// A row of the page.
+struct Parameter {
+  std::string key;
+  std::string type;  ///< without its unit
+  std::string fallback;
+  std::string range;
+};
+
+std::vector<Parameter> parametersUnder(const std::string& heading, const std::string& prefix) {
+  std::vector<Parameter> parameters;
+  for (const Cells& row : tableRows("docs/parameters.md", heading)) {
+    if (row.size() != 5) throw std::runtime_error("a row without its five cells: " + row[0]);
+    const std::string type = split(row[1], ' ').at(0);
+    for (const std::string& key : expanded(prefix + replaced(row[0], "<name>", "x"))) {
+      if (key != "axes/x/invert/<pin>") {
+        parameters.push_back({key, type, row[2], row[3]});
+        continue;
+      }
+      for (const char* pin :
+           {"step", "dir", "enable", "ms1", "ms2", "ms3", "m0", "m1", "m2", "sleep", "reset"}) {
+        parameters.push_back({"axes/x/invert/" + std::string(pin), type, row[2], row[3]});
+      }
+    }
+  }
+  return parameters;
+}
+
+std::vector<Parameter> parametersOf(const Node& node) {
+  if (std::string(node.name) == "joystick") {
+    return parametersUnder("The joystick's node", "");
+  }
+  std::vector<Parameter> all = parametersUnder("The node", "");
+  for (const auto& [heading, prefix] :
+       {std::pair("An axis", "axes/x/"), std::pair("The simulated rig", "simulation/")}) {
+    for (const Parameter& parameter : parametersUnder(heading, prefix)) {
+      all.push_back(parameter);
+      if (node.rotary) all.back().key = rotaryKey(parameter.key);
+    }
+  }
+  return all;
+}
+
+/// What an issue with this key says; none where there is none.
+std::optional<std::string> issueWith(const Reading& reading, const std::string& key) {
+  for (const ConfigIssue& issue : reading.issues) {
+    if (issue.key == "/" + key) return issue.message;
+  }
+  return {};
+}
+
+/// The keys that a map takes, as the message about an unknown one has them.
+std::set<std::string> knownIn(const Node& node, const std::string& map) {
+  const std::string unknown = map + (map.empty() ? "" : "/") + "qqqqqqqqqqqqqqqqqqqq";
+  const ConfigValue value(1);
+  const auto message = issueWith(node.read(with(node.base, unknown, &value)), unknown);
+  const std::string before = "known here: ";
+  const auto at = message ? message->find(before) : std::string::npos;
+  if (at == std::string::npos) {
+    ADD_FAILURE() << node.name << " says of " << unknown << ": " << message.value_or("nothing");
+    return {};
+  }
+  std::set<std::string> known;
+  const std::string list = replaced(message->substr(at + before.size()), " and ", ", ");
+  for (const std::string& key : split(list, ',')) known.insert(trimmed(key));
+  return known;
+}
+
+/// The keys of each map that the page has, and the maps.
+std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>& parameters) {
+  std::map<std::string, std::set<std::string>> maps;
+  for (const Parameter& parameter : parameters) {
+    std::string map;
+    for (const std::string& key : split(parameter.key, '/')) {
+      if (key != "...") maps[map].insert(key);
+      map += (map.empty() ? "" : "/") + key;
+    }
+  }
+  for (const char* names_of_axes : {"axes", "simulation/axes"}) maps.erase(names_of_axes);
+  return maps;
+}
+
+/// What a reader says that a value must be.
+std::string wantedWords(const Parameter& parameter) {
+  if (parameter.type == "line") return "a line";
+  if (parameter.type == "boolean") return "true or false";
+  std::string range = replaced(parameter.range, "`", "");
+  const bool is_choice = range != parameter.range || parameter.range.find(',') != std::string::npos;
+  if (is_choice) range.replace(range.rfind(", "), 2, " or ");
+  if (parameter.type == "text" || parameter.type == "bias") return is_choice ? range : "a string";
+  std::string noun = parameter.type == "integer" ? "an integer" : "a number";
+  if (range.empty()) return noun;
+  if (is_choice) return noun + ": " + range;
+  const bool is_adverb = range.rfind("above", 0) == 0 || range.rfind("from", 0) == 0;
+  return noun + (is_adverb ? " " : " of ") + range;
+}
+
+/// In the bases: those have a map of each kind, and their axes are scaled by the first of the ways.
+bool isRequired(const Parameter& parameter) {
+  static const std::set<std::string> words = {"required",  "required with it", "no homing",
+                                              "no switch", "no button",        "by the mechanics"};
+  return words.count(parameter.fallback) > 0;
+}
+
+/// The default as a value; none where the page has it in words.
+std::optional<ConfigValue> literal(const Parameter& parameter) {
+  static const std::set<std::string> words = {"none", "as configured", "host, chips, lines",
+                                              "the axis's name"};
+  const std::string& text = parameter.fallback;
+  if (parameter.type == "text" || parameter.type == "bias") {
+    if (words.count(text) > 0) return {};
+    return ConfigValue(text);
+  }
+  const bool is_value = text == "true" || text == "false" ||
+                        text.find_first_not_of("-.0123456789") == std::string::npos;
+  if (!is_value) return {};
+  return check::parseYaml("v: " + text, "default").as<ConfigValue::Map>()->at("v");
+}
+
+class ParametersPage : public testing::TestWithParam<Node> {};
+
+TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
+  const std::vector<Parameter> parameters = parametersOf(GetParam());
+  for (auto& [map, on_page] : mapsOf(parameters)) {
+    std::set<std::string> expected = on_page;
+    if (map == "axes/x") {  // it can be of either kind, and says so where it is given keys of both
+      for (const std::string& key : on_page) expected.insert(rotaryKey(key));
+      for (const Cells& row : tableRows("docs/parameters.md", "An axis")) {
+        if (!GetParam().rotary) break;
+        for (const std::string& key : expanded(row[0])) expected.insert(split(key, '/').at(0));
+      }
+    }
+    EXPECT_EQ(knownIn(GetParam(), map), expected) << "in the map /" << map;
+  }
+}
+
+TEST_P(ParametersPage, HasTheTypesAndRangesOfTheReaders) {
+  const ConfigValue wrong(ConfigValue::List{});
+  for (const Parameter& parameter : parametersOf(GetParam())) {
+    if (parameter.type == "map" || (GetParam().rotary && isOfLinearAxes(parameter.key))) continue;
+    const auto reading = GetParam().read(with(GetParam().base, parameter.key, &wrong));
+    const auto message = issueWith(reading, parameter.key);
+    ASSERT_TRUE(message) << parameter.key << ": nobody minds a list";
+    EXPECT_NE(
+        (*message + "\n")
+            .find("must be " + wantedWords(parameter) + (parameter.type == "line" ? "" : "\n")),
+        std::string::npos)
+        << parameter.key << " " << *message << ", and on the page it is " << wantedWords(parameter);
+  }
+}
+
+TEST_P(ParametersPage, SaysWhatIsRequired) {
+  for (const Parameter& parameter : parametersOf(GetParam())) {
+    if (parameter.key.find("...") != std::string::npos) continue;
+    const auto reading = GetParam().read(with(GetParam().base, parameter.key, nullptr));
+    const auto message = issueWith(reading, parameter.key);
+    const bool missing = message && message->rfind("is missing", 0) == 0;
+    EXPECT_EQ(missing, isRequired(parameter)) << parameter.key << " " << message.value_or("");
+  }
+}
+
+TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
+  int compared = 0;
+  for (const Parameter& parameter : parametersOf(GetParam())) {
+    if (isRequired(parameter) || parameter.type == "line" || parameter.type == "map") continue;
+    const auto value = literal(parameter);
+    if (!value) continue;
+    if (parameter.key.find("invert/m") != std::string::npos) continue;  // not wired in the bases
+    const ConfigValue base =
+        parameter.key == "axes/x/gear_ratio" ? scaledByRounds(GetParam()) : GetParam().base;
+    const auto without = GetParam().read(with(base, parameter.key, nullptr));
+    const auto given = GetParam().read(with(base, parameter.key, &*value));
+    ASSERT_TRUE(given.issues.empty()) << parameter.key << " " << given.issues[0].message;
+    EXPECT_EQ(given.config, without.config) << parameter.key << ": " << parameter.fallback;
+    ++compared;
+  }
+  EXPECT_GT(compared, 5);
+}
+
+std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param.name; }
+
+INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
+                         testing::Values(driver(false), driver(true), joystickNode()), nameOf);
+
+}  // namespace
+}  // namespace stepdriver::docs

@@ -1,0 +1,209 @@
+#include <gtest/gtest.h>
+#include <std_srvs/SetBool.h>
+#include <stepdriver/Endstops.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/program.h"
+#include "support/recorder.h"
+#include "support/says.h"
+#include "support/tmux.h"
+#include "support/wait.h"
+
+namespace stepdriver::node_test {
+namespace {
+
+const std::string kConsole = std::string(STEPDRIVER_PROGRAMS) + "/console";
+
+/// `console --wizard` at a machine that isn't what its configuration says: it goes the wrong way,
+/// has 100 steps/mm, its switches are swapped, and the one at the max end reads the wrong way.
+class WizardTest : public testing::Test {
+ protected:
+  WizardTest() {
+    node.set("simulation/speed", 1.0);
+    node.set("simulation/axes/x/start_mm", 100.0);
+    node.set("simulation/axes/x/wiring/dir_inverted", true);
+    node.set("simulation/axes/x/wiring/steps_per_mm", 100.0);
+    node.set("simulation/axes/x/wiring/min_pin", "x_endstop_max");
+    node.set("simulation/axes/x/wiring/max_pin", "x_endstop_min");
+    node.set("simulation/axes/x/wiring/max_active_level", "low");
+    node.set("axes/x/max_speed_mm_s", 50.0);
+    node.set("axes/x/enable_on_start", false);
+    node.erase("axes/x/min_position_mm");
+    node.erase("axes/x/max_position_mm");
+    node.set("simulation/axes/x/min_switch_mm", -2.0);
+    node.set("simulation/axes/x/max_switch_mm", 202.0);
+  }
+
+  void open(const std::string& more = {}) {
+    node.start();
+    terminal.type(kConsole + " --wizard --driver " + node.name() + " --output " + file.path() +
+                  more + "; echo ended $?");
+    ASSERT_TRUE(terminal.waitFor("switch at the minus end"));
+  }
+  void press(const std::string& end, bool pressed) {
+    std_srvs::SetBool::Request request;
+    request.data = pressed;
+    const auto answer = node.call<std_srvs::SetBool>("rig/x/press_" + end, request);
+    EXPECT_TRUE(answer.success) << answer.message;
+  }
+  void skipSwitches() {
+    terminal.press("Enter");
+    ASSERT_TRUE(terminal.waitFor("Nothing was seen at the minus end"));
+    terminal.press("Enter");
+    ASSERT_TRUE(terminal.waitFor("Give its motor current?"));
+  }
+  void answer(const std::string& question, const std::string& line) {
+    ASSERT_TRUE(terminal.waitFor(question));
+    terminal.type(line);
+  }
+  double carriage() { return node.rig().carriage.at(0); }
+
+  NodeUnderTest node;
+  const Tmux terminal{100, 60};
+  const TemporaryFile file{".yaml"};
+};
+
+TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  press("min", true);
+  ASSERT_TRUE(terminal.waitFor("max has changed; let it go"));
+  press("min", false);
+  ASSERT_TRUE(terminal.waitFor("switch at the plus end by hand"));
+  press("max", true);
+  ASSERT_TRUE(terminal.waitFor("min has changed; let it go"));
+  press("max", false);
+  ASSERT_TRUE(terminal.waitFor("the wrong way round"));
+  EXPECT_EQ(node.pulses(), 0) << "nothing moves while the switches are looked at";
+
+  ASSERT_NO_FATAL_FAILURE(answer("Give its motor current?", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", "50"));
+  // min reads active, and the driver doesn't move towards it.
+  ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("Did it go towards plus", "n"));
+  EXPECT_NEAR(carriage(), 0.1 - 0.0016, 1e-9);
+  ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("Is there room", ""));
+  ASSERT_TRUE(terminal.waitFor("take up the play"));
+  terminal.type("y");
+  ASSERT_TRUE(terminal.waitFor("Mark where it stands"));
+  const double mark = carriage();
+  terminal.press("Enter");
+  ASSERT_NO_FATAL_FAILURE(answer("will move 20 mm", "y"));
+  ASSERT_TRUE(terminal.waitFor("How far did it really go?"));
+  const double measured = 1e3 * std::abs(carriage() - mark);
+  EXPECT_NEAR(measured, 16.0, 1e-6);
+  terminal.type(std::to_string(measured));
+  ASSERT_TRUE(terminal.waitFor("80 x 20 / 16 = 100 steps per mm"));
+  ASSERT_NO_FATAL_FAILURE(answer("Take that?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("Write it to", ""));
+  ASSERT_TRUE(terminal.waitFor("ended 0"));
+
+  // The driver takes it, and the machine is what it says.
+  node.process().signal(SIGTERM);
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+  ros::param::del(node.name());
+  ASSERT_EQ(std::system(("rosparam load " + file.path() + " " + node.name()).c_str()), 0);
+  node.set("axes/x/enable_on_start", true);
+  node.start();
+  const double before = carriage();
+  ASSERT_TRUE(node.moveTo(0.03, true).success);
+  EXPECT_NEAR(carriage() - before, 0.03, 1e-9);
+  const Recorder<Endstops> endstops(node.full("endstops"));
+  const auto read = [&](bool min, bool max) {
+    return endstops.waitForLatest([&](const Endstops& now) {
+      return (now.min.at(0) != 0) == min && (now.max.at(0) != 0) == max;
+    });
+  };
+  EXPECT_TRUE(read(false, false));
+  press("min", true);
+  EXPECT_TRUE(read(true, false));
+  press("min", false);
+  press("max", true);
+  EXPECT_TRUE(read(false, true));
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST_F(WizardTest, StopsAMoveByEnterAndEndsByControlC) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  ASSERT_NO_FATAL_FAILURE(skipSwitches());
+  terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "n"));
+  ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
+  EXPECT_EQ(node.pulses(), 0);
+  ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", "90"));
+  ASSERT_NO_FATAL_FAILURE(answer("Is there room", "y"));
+  ASSERT_TRUE(terminal.waitFor("take up the play"));
+  terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("Mark where it stands", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("will move 90 mm", "y"));
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 200; }));
+  terminal.press("Enter");
+  ASSERT_NO_FATAL_FAILURE(answer("Nothing is measured. Try again?", "y"));
+  EXPECT_TRUE(terminal.waitFor("Stopped: you asked for it"));
+  const std::int64_t stopped = node.pulses();
+  EXPECT_LT(stopped, 7360) << "of 92 mm";
+  terminal.press("C-c");
+  EXPECT_TRUE(terminal.waitFor("Nothing is written: ended by SIGINT"));
+  EXPECT_TRUE(terminal.waitFor("ended 2"));
+  EXPECT_FALSE(file.exists());
+  EXPECT_EQ(node.pulses(), stopped);
+}
+
+TEST_F(WizardTest, ASwitchThatChangesStopsAMove) {
+  ASSERT_NO_FATAL_FAILURE(open());
+  ASSERT_NO_FATAL_FAILURE(skipSwitches());
+  terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
+  ASSERT_TRUE(terminal.waitFor("2 mm towards plus"));
+  terminal.type("n");
+  ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
+  ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", "90"));
+  ASSERT_NO_FATAL_FAILURE(answer("Is there room", "y"));
+  ASSERT_TRUE(terminal.waitFor("take up the play"));
+  terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("Mark where it stands", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("will move 90 mm", "y"));
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 200; }));
+  // Configured as it is the driver doesn't take this one for the switch ahead.
+  press("max", true);
+  EXPECT_TRUE(terminal.waitFor("Stopped: a switch has changed"));
+  EXPECT_LT(node.pulses(), 7360);
+  node.process().signal(SIGKILL);
+  EXPECT_TRUE(terminal.waitFor("comes any more"));
+  EXPECT_TRUE(terminal.waitFor("ended 1"));
+}
+
+TEST_F(WizardTest, ReplacesNoFileWithoutBeingTold) {
+  std::ofstream(file.path()) << "mine\n";
+  node.start();
+  terminal.type(kConsole + " --wizard --driver " + node.name() + " --output " + file.path() +
+                "; echo ended $?");
+  EXPECT_TRUE(terminal.waitFor("is there already: --overwrite replaces it"));
+  EXPECT_TRUE(terminal.waitFor("ended 1"));
+  EXPECT_EQ(file.text(), "mine\n");
+
+  // Without a terminal, by lines from a pipe.
+  terminal.type("clear; printf '\\n\\nn\\n\\n' | " + kConsole + " --wizard --driver " +
+                node.name() + " --overwrite --output " + file.path() + "; echo ended $?");
+  EXPECT_TRUE(terminal.waitFor("ended 0"));
+  EXPECT_EQ(node.pulses(), 0);
+  expectSays(file.text(), "Nothing had to be changed");
+  expectSays(file.text(), "steps_per_mm: 80.0");
+  EXPECT_EQ(runProgram("console", {"--axis", "x"}).code, 64);
+  const ProgramEnd end = runProgram(
+      "console", {"--wizard", "--driver", node.name(), "--axis", "z", "--output", "/tmp/none"});
+  EXPECT_EQ(end.code, 1);
+  expectSays(end.output, "--axis z: there is no such axis, but x");
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
