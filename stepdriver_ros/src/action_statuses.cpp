@@ -10,7 +10,7 @@ constexpr double kDefaultFrequency = 5.0;  // [Hz] that of actionlib
 
 }  // namespace
 
-ActionStatuses::ActionStatuses(ros::NodeHandle node) {
+ActionStatuses::ActionStatuses(const ros::NodeHandle& node) {
   double frequency = kDefaultFrequency;
   std::string name;
   if (node.searchParam("actionlib_status_frequency", name)) node.getParam(name, frequency);

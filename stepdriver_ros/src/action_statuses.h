@@ -15,7 +15,7 @@ class ActionStatuses {
  public:
   /// @param node a handle with the queue that they are published by; above the actions' names
   ///   `actionlib_status_frequency` says how often, 5 Hz where it is missing.
-  explicit ActionStatuses(ros::NodeHandle node);
+  explicit ActionStatuses(const ros::NodeHandle& node);
   ActionStatuses(const ActionStatuses&) = delete;
   ActionStatuses& operator=(const ActionStatuses&) = delete;
 

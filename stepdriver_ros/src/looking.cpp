@@ -4,7 +4,7 @@
 
 namespace stepdriver::ros_node {
 
-Looking::Looking(ros::NodeHandle node, ros::WallDuration period, std::function<bool()> look)
+Looking::Looking(const ros::NodeHandle& node, ros::WallDuration period, std::function<bool()> look)
     : look_(std::move(look)),
       timer_(node.createSteadyTimer(
           period, [this](const ros::SteadyTimerEvent& /*event*/) { call(); }, false, false)) {}

@@ -13,7 +13,7 @@ class Looking {
  public:
   /// @param node a handle with the queue that the looks are called by.
   /// @param look returns whether there is still anything to look at.
-  Looking(ros::NodeHandle node, ros::WallDuration period, std::function<bool()> look);
+  Looking(const ros::NodeHandle& node, ros::WallDuration period, std::function<bool()> look);
   Looking(const Looking&) = delete;
   Looking& operator=(const Looking&) = delete;
 

@@ -116,6 +116,7 @@ TEST(CallPool, LosesNoCall) {
   std::promise<void> last;
   pool.start(1);
   std::vector<std::future<void>> callers;
+  callers.reserve(kCallers);
   for (int caller = 0; caller < kCallers; ++caller) {
     callers.push_back(std::async(std::launch::async, [&] {
       for (int i = 0; i < kCalls; ++i) {
