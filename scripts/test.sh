@@ -237,7 +237,7 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
-  for program in draw plot_motion; do
+  for program in console draw plot_motion; do
     rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
       die "$program --help doesn't work"
   done

@@ -117,10 +117,11 @@ inside=(chroot "$work")
 if unshare --mount --pid --fork --kill-child true 2>/dev/null; then
   # shellcheck disable=SC2016
   inside=(unshare --mount --pid --fork --kill-child bash -c '
-    mount -t proc proc "$1/proc" && mount -t tmpfs tmpfs "$1/dev/shm" || true
+    mount -t proc proc "$1/proc" && mount -t tmpfs tmpfs "$1/dev/shm" &&
+      mount -t devpts -o ptmxmode=0666 devpts "$1/dev/pts" || true
     exec chroot "$@"' in_root "$work")
 else
-  say "No namespaces here: going on without /proc and /dev/shm"
+  say "No namespaces here: going on without /proc, /dev/shm and /dev/pts"
 fi
 
 in_root() {

@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 #include <ros/console.h>
+#include <sys/prctl.h>
 
 #include <algorithm>
 #include <system_error>
@@ -51,6 +52,8 @@ void CallPool::makeReady(PooledQueue& queue) {
 void CallPool::startThread() {
   threads_.emplace_back([this] {
     pthread_setname_np(pthread_self(), "calls");
+    // Calls wait for the pulse thread in naps that are shorter than the default slack, 50 us.
+    prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
     serve();
   });
   ++free_;

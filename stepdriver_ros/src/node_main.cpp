@@ -53,7 +53,8 @@ lines.
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~home
               ~move_line  ~hold  ~resume
-              ~rig/report  ~rig/emergency_stop (on the simulated rig)
+              ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
+              (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  /diagnostics  ~jog, ~command (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop

@@ -66,6 +66,11 @@ class Machine : public MachineAtHand {
     view.enabled = on;
     return {true, ""};
   }
+  client::Answer setPosition(const std::string& /*axis*/, double position) override {
+    view.position = position;
+    view.position_valid = true;
+    return {true, "x: stands there"};
+  }
   client::Answer move(const std::string& /*axis*/, double distance, double speed) override {
     moves.push_back(distance);
     speeds.push_back(speed);
@@ -284,8 +289,9 @@ TEST(WizardDistance, LeavesWhatIsAsGoodAsRight) {
 
 TEST(WizardAnswers, AreAskedAgainUntilTheyAreUnderstood) {
   Person person({"maybe", "-3", "3 inch", "12.5"});
-  EXPECT_EQ(askNumber(person, "How far?", "mm"), 12.5);
-  EXPECT_TRUE(person.heardOf("\"-3\" isn't understood: it must be a number above 0, in mm"));
+  EXPECT_EQ(askLength(person, "How far?", "mm"), 12.5);
+  EXPECT_TRUE(person.heardOf("\"maybe\" isn't understood: it must be a number, in mm"));
+  EXPECT_TRUE(person.heardOf("It must be above 0"));
 }
 
 TEST(WizardAxis, HasCurrentAfterwardsOnlyWhereItHadItBefore) {
@@ -299,9 +305,10 @@ TEST(WizardAxis, HasCurrentAfterwardsOnlyWhereItHadItBefore) {
   EXPECT_FALSE(machine.view.enabled);
   EXPECT_TRUE(machine.moves.empty());
 
-  Person yes({"y", "y"});  // and leaves at the next question
+  Person yes({"y", "-7.5", "y"});  // and leaves at the next question
   EXPECT_THROW(bringUp(yes, machine, config), Ended);
   EXPECT_EQ(machine.moves.size(), 1U);
+  EXPECT_EQ(machine.view.position, -5.5);
   EXPECT_FALSE(machine.view.enabled);
 }
 

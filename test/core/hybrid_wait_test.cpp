@@ -94,6 +94,10 @@ class FakeThread : public Clock {
     System system{*this};
     wait_.waitUntil(system, time);
   }
+  void sleepUntil(Nanoseconds time) override {
+    System system{*this};
+    wait_.waitUntil(system, time, false);
+  }
   Nanoseconds guard() const override { return wait_.guard(); }
   void pass(Nanoseconds time) { processor.waitUntil(now() + time); }
 
@@ -114,6 +118,7 @@ class FakeThread : public Clock {
   }
 
   std::function<Nanoseconds()> oversleeps = [] { return 40 * kMicrosecond; };
+  Nanoseconds woken_at = kNever;
   struct Sleep {
     Nanoseconds begin;
     Nanoseconds end;
@@ -140,10 +145,10 @@ class FakeThread : public Clock {
       thread.pass(kLook);
       return thread.now();
     }
-    static bool woken() { return false; }
+    bool woken() const { return thread.now() >= thread.woken_at; }
     void sleepUntil(Nanoseconds time) const {
       const Nanoseconds begin = thread.now();
-      thread.processor.waitUntil(time + thread.oversleeps());
+      thread.processor.waitUntil(std::min(time + thread.oversleeps(), thread.woken_at));
       const Nanoseconds before =
           thread.sleeps.empty()
               ? 0
@@ -193,6 +198,33 @@ TEST(HybridWait, SpinsForLessThanTheRealtimeThrottleAllowsWhateverTheIntervals) 
     EXPECT_LT(thread.mostRunningIn(kSecond), 0.91);
     EXPECT_LT(thread.shareOf(0, 2 * kSecond), 0.85);
   }
+}
+
+TEST(HybridWait, OnlySleepsWhereItIsAskedTo) {
+  FakeThread thread;
+  const Nanoseconds time = thread.now() + kMillisecond;
+  thread.sleepUntil(time);
+  EXPECT_GE(thread.now(), time + 40 * kMicrosecond);
+  const Nanoseconds next = thread.now() + kMillisecond;
+  thread.waitUntil(next);
+  EXPECT_LT(thread.now(), next + kMicrosecond);
+}
+
+TEST(HybridWait, LearnsNothingFromASleepThatWasEndedByAWake) {
+  FakeThread thread;
+  thread.woken_at = kMillisecond;
+  thread.waitUntil(10 * kMillisecond);
+  EXPECT_LT(thread.now(), kMillisecond + kMicrosecond);
+  EXPECT_EQ(thread.guard(), GuardLearner::kFirst);
+}
+
+TEST(HybridWait, SleepsUpToItsGuardThoughItIsToRestForLess) {
+  FakeThread thread;
+  thread.waitUntil(0);
+  thread.pass(95 * kMillisecond);
+  const Nanoseconds begin = thread.now();
+  thread.waitUntil(begin + 10 * kMillisecond);
+  EXPECT_LT(thread.shareOf(begin, thread.now()), 0.05) << "it spins on after the rest";
 }
 
 TEST(HybridWait, RestsShortlyAfterAStall) {

@@ -190,6 +190,8 @@ TEST_F(ConsoleTest, SaysWhatItNeedsToStart) {
   terminal.type("ROS_MASTER_URI=http://127.0.0.1:1 " + kConsole + "; echo ended $?");
   EXPECT_TRUE(terminal.waitFor("there is no ROS master at http://127.0.0.1:1"));
   EXPECT_TRUE(terminal.waitFor("ended 1"));
+  terminal.type("clear; TERM=dumb " + kConsole + " --driver " + node.name());
+  EXPECT_TRUE(terminal.waitFor("can't show a screen: TERM is dumb"));
   EXPECT_EQ(runProgram("console", {"--hlep"}).code, 64);
   expectSays(runProgram("console", {"--slow", "101"}).output, "--slow 101: it must be a number");
 }

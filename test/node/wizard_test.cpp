@@ -84,6 +84,7 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
   EXPECT_EQ(node.pulses(), 0) << "nothing moves while the switches are looked at";
 
   ASSERT_NO_FATAL_FAILURE(answer("Give its motor current?", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", "50"));
   // min reads active, and the driver doesn't move towards it.
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
   ASSERT_NO_FATAL_FAILURE(answer("Did it go towards plus", "n"));
@@ -134,6 +135,7 @@ TEST_F(WizardTest, StopsAMoveByEnterAndEndsByControlC) {
   ASSERT_NO_FATAL_FAILURE(open());
   ASSERT_NO_FATAL_FAILURE(skipSwitches());
   terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "n"));
   ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
   EXPECT_EQ(node.pulses(), 0);
@@ -160,6 +162,7 @@ TEST_F(WizardTest, ASwitchThatChangesStopsAMove) {
   ASSERT_NO_FATAL_FAILURE(open());
   ASSERT_NO_FATAL_FAILURE(skipSwitches());
   terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
   ASSERT_TRUE(terminal.waitFor("2 mm towards plus"));
   terminal.type("n");
   ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));

@@ -8,6 +8,15 @@
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::pulse {
+namespace {
+
+// Of a thread that waits for the pulse thread.
+constexpr std::chrono::microseconds kSpin{50};
+constexpr std::chrono::microseconds kShortestNap{20};
+constexpr std::chrono::microseconds kNapGrowth{2};
+constexpr std::chrono::microseconds kLongestNap{1000};
+
+}  // namespace
 
 PulseDriver::PulseDriver(PulseEngine& engine, Clock& clock, bool threaded,
                          const std::string& latency_device)
@@ -43,13 +52,15 @@ void PulseDriver::run() {
 
 void PulseDriver::waitFor(const std::function<bool()>& ready) {
   if (thread_.joinable()) {
-    // Most waits are over within a few microseconds; one for a move may last.
-    for (int i = 0; !ready(); ++i) {
-      if (i < 50) {
-        std::this_thread::yield();
-      } else {
-        std::this_thread::sleep_for(std::chrono::microseconds(std::min(2 * i, 1000)));
-      }
+    // Most waits are over when the pulse thread has woken; one for a move may last. Without a
+    // yield: on a busy machine that gives milliseconds away, and who sleeps has its turn when it
+    // wakes.
+    const auto spun = std::chrono::steady_clock::now() + kSpin;
+    while (std::chrono::steady_clock::now() < spun) {
+      if (ready()) return;
+    }
+    for (auto nap = kShortestNap; !ready(); nap = std::min(nap + kNapGrowth, kLongestNap)) {
+      std::this_thread::sleep_for(nap);
     }
     return;
   }

@@ -26,6 +26,13 @@ Key keyOf(int code) {
   return found == keys.end() ? code : found->second;
 }
 
+/// Of the terminal that curses has now.
+bool movesItsCursor() {
+  char name[] = "cup";
+  const char* const capability = tigetstr(name);
+  return capability != nullptr && capability != reinterpret_cast<const char*>(-1);
+}
+
 }  // namespace
 
 Terminal::Terminal() {
@@ -35,11 +42,15 @@ Terminal::Terminal() {
   auto output = std::make_unique<CaughtOutput>();
   tty_ = fdopen(dup(output->realOutput()), "w");
   SCREEN* const curses = tty_ == nullptr ? nullptr : newterm(nullptr, tty_, stdin);
-  if (curses == nullptr) {
+  if (curses == nullptr || !movesItsCursor()) {
+    if (curses != nullptr) {
+      endwin();
+      delscreen(curses);
+    }
     if (tty_ != nullptr) std::fclose(tty_);
     const char* const type = std::getenv("TERM");
     throw Error(std::string("this terminal can't show a screen: TERM is ") +
-                (type == nullptr ? "not set" : type));
+                (type == nullptr ? "not set" : type) + "; --wizard does without");
   }
   output_ = std::move(output);
   screen_ = curses;

@@ -32,6 +32,7 @@ inline AxisView axisView(const std::string& name) {
 inline Session sessionWith(const std::vector<AxisView>& axes) {
   Session session("/stepdriver", {});
   std::vector<axis::AxisConfig> configs;
+  configs.reserve(axes.size());
   for (const AxisView& axis : axes) configs.push_back(axisConfig(axis.name));
   session.driver().configure(configs);
   session.update(axes, 0.0);

@@ -32,6 +32,20 @@ class Current {
   bool given_ = false;
 };
 
+/// Soft limits count from where the axis was switched on, until somebody knows better: it might
+/// move nowhere.
+void askPosition(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config) {
+  if (machine.state(config.name).position_valid) return;
+  const auto position = askNumber(
+      dialogue,
+      "Its position isn't known, and soft limits count from where it was switched on. Where "
+      "does it stand, about? (Enter: leave it)",
+      unitOf(config.kind));
+  if (!position) return;
+  const client::Answer answer = machine.setPosition(config.name, *position);
+  dialogue.say((answer.success ? "" : "The driver refuses: ") + answer.message);
+}
+
 }  // namespace
 
 Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config) {
@@ -48,6 +62,7 @@ Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisCon
     dialogue.say("Without current neither the direction nor the distance is looked at.");
     return findings;
   }
+  askPosition(dialogue, machine, config);
   checkDirection(dialogue, machine, config, findings);
   dialogue.say("\n-- 3. Is the distance right?");
   checkDistance(dialogue, machine, config, findings);

@@ -36,7 +36,7 @@ std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
   const std::string unit = unitOf(config.kind);
   SmallMove move = measurableMove(config);
   SmallMove play = visibleMove(config);
-  move.distance = *askNumber(dialogue, "How far is it to go?", unit, move.distance);
+  move.distance = *askLength(dialogue, "How far is it to go?", unit, move.distance);
   if (!askYesNo(dialogue, "Is there room for it towards plus, as it is configured?", true)) {
     move.distance = -move.distance;
     play.distance = -play.distance;
@@ -46,7 +46,7 @@ std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
   dialogue.ask("Mark where it stands now, or set the dial to 0; then press Enter. ");
   const double moved = std::abs(hand_move.ask(move));
   if (moved == 0.0) return {};
-  const auto really = askNumber(dialogue, "How far did it really go?", unit);
+  const auto really = askLength(dialogue, "How far did it really go?", unit);
   if (!really) return {};
   return Measured{moved, *really};
 }

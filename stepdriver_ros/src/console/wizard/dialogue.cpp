@@ -31,21 +31,28 @@ bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_defau
 }
 
 std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
-                                const std::string& unit, std::optional<double> fallback) {
-  const std::string shown =
-      fallback ? " [" + ros_node::numberText(*fallback) + " " + unit + "] " : " [" + unit + "] ";
+                                const std::string& unit) {
   for (;;) {
-    const std::string answer = trimmed(dialogue.ask(question + shown));
-    if (answer.empty()) return fallback;
+    const std::string answer = trimmed(dialogue.ask(question + " [" + unit + "] "));
+    if (answer.empty()) return {};
     char* end = nullptr;
     const double number = std::strtod(answer.c_str(), &end);
     const std::string rest = trimmed(end);
-    if (end != answer.c_str() && (rest.empty() || rest == unit) && std::isfinite(number) &&
-        number > 0.0) {
-      return number;
-    }
-    dialogue.say("\"" + answer + "\" isn't understood: it must be a number above 0, in " + unit +
-                 ".");
+    const bool whole = end != answer.c_str() && (rest.empty() || rest == unit);
+    if (whole && std::isfinite(number)) return number;
+    dialogue.say("\"" + answer + "\" isn't understood: it must be a number, in " + unit + ".");
+  }
+}
+
+std::optional<double> askLength(Dialogue& dialogue, const std::string& question,
+                                const std::string& unit, std::optional<double> fallback) {
+  const std::string shown =
+      question + (fallback ? " (Enter: " + ros_node::numberText(*fallback) + ")" : "");
+  for (;;) {
+    const auto length = askNumber(dialogue, shown, unit);
+    if (!length) return fallback;
+    if (*length > 0.0) return length;
+    dialogue.say("It must be above 0.");
   }
 }
 

@@ -33,8 +33,14 @@ class Dialogue {
 bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_default);
 
 /// @param unit for the question; the answer may have it too.
-/// @return above 0; none: an empty line, where there is no default.
+/// @return none: an empty line.
 std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
+                                const std::string& unit);
+
+/// The same of a length above 0.
+///
+/// @param fallback what an empty line means.
+std::optional<double> askLength(Dialogue& dialogue, const std::string& question,
                                 const std::string& unit, std::optional<double> fallback = {});
 
 }  // namespace stepdriver::console

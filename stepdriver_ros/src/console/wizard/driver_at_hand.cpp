@@ -4,6 +4,7 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/SetPosition.h>
 
 #include <algorithm>
 
@@ -62,19 +63,28 @@ client::Answer DriverAtHand::enable(const std::string& axis, bool on) {
   return client::askService<std_srvs::SetBool>(service(axis, "enable"), request);
 }
 
+client::Answer DriverAtHand::setPosition(const std::string& axis, double position) {
+  SetPosition::Request request;
+  request.position = position / unitsOf(axis);
+  return client::askService<SetPosition>(service(axis, "set_position"), request);
+}
+
 client::Answer DriverAtHand::move(const std::string& axis, double distance, double speed) {
-  const axis::AxisConfig* const config = session_.driver().config(axis);
-  if (config == nullptr) return {false, axis + " has no configuration any more"};
-  const double units = axis::configUnitsPerUnit(config->kind);
   MoveTo::Request request;
-  request.position = distance / units;
+  request.position = distance / unitsOf(axis);
   request.relative = true;
-  request.velocity = speed / units;
+  request.velocity = speed / unitsOf(axis);
   return client::askService<MoveTo>(service(axis, "move_to"), request);
 }
 
 client::Answer DriverAtHand::stop(const std::string& axis) {
   return client::askService<std_srvs::Trigger>(service(axis, "stop"));
+}
+
+double DriverAtHand::unitsOf(const std::string& axis) const {
+  const axis::AxisConfig* const config = session_.driver().config(axis);
+  if (config == nullptr) throw Error(axis + " has no configuration any more");
+  return axis::configUnitsPerUnit(config->kind);
 }
 
 std::string DriverAtHand::service(const std::string& axis, const std::string& name) const {

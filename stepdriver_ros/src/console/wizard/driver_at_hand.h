@@ -19,6 +19,7 @@ class DriverAtHand : public MachineAtHand {
   int states() const override { return session_.driver().updates(); }
   AxisView state(const std::string& axis) override;
   client::Answer enable(const std::string& axis, bool on) override;
+  client::Answer setPosition(const std::string& axis, double position) override;
   client::Answer move(const std::string& axis, double distance, double speed) override;
   client::Answer stop(const std::string& axis) override;
 
@@ -29,6 +30,7 @@ class DriverAtHand : public MachineAtHand {
 
  private:
   bool complete() const;
+  double unitsOf(const std::string& axis) const;
   std::string service(const std::string& axis, const std::string& name) const;
 
   Session session_;

@@ -19,6 +19,8 @@ class MachineAtHand {
   /// @throw Error where the state isn't live.
   virtual AxisView state(const std::string& axis) = 0;
   virtual client::Answer enable(const std::string& axis, bool on) = 0;
+  /// Declares where the axis stands. @param position [mm|deg]
+  virtual client::Answer setPosition(const std::string& axis, double position) = 0;
   /// Begins a move by this distance, and doesn't wait for its end.
   ///
   /// @param speed [mm/s|deg/s]
