@@ -32,15 +32,17 @@ bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_defau
 
 std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
                                 const std::string& unit) {
+  const std::string shown = question + " [" + unit + "] ";
+  const std::string wanted = "\" isn't understood: it must be a number, in " + unit + ".";
   for (;;) {
-    const std::string answer = trimmed(dialogue.ask(question + " [" + unit + "] "));
+    const std::string answer = trimmed(dialogue.ask(shown));
     if (answer.empty()) return {};
     char* end = nullptr;
     const double number = std::strtod(answer.c_str(), &end);
     const std::string rest = trimmed(end);
     const bool whole = end != answer.c_str() && (rest.empty() || rest == unit);
     if (whole && std::isfinite(number)) return number;
-    dialogue.say("\"" + answer + "\" isn't understood: it must be a number, in " + unit + ".");
+    dialogue.say("\"" + answer + wanted);
   }
 }
 
