@@ -25,7 +25,7 @@ catkin=${STEPDRIVER_CATKIN:-$build/bench/catkin}
 build_node() {
   configure "$src" "$catkin" -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCMAKE_BUILD_TYPE=Release \
     -DCATKIN_DEVEL_PREFIX="$catkin/devel" -DSTEPDRIVER_BENCH=ON &&
-    cmake --build "$catkin" -j "$jobs" --target stepdriver_node node_bench
+    cmake --build "$catkin" -j "$jobs" --target stepdriver_node node_bench listener
 }
 [[ -n ${STEPDRIVER_CATKIN:-} ]] || quietly node-bench-build build_node
 use_ros "$catkin/devel"

@@ -26,11 +26,12 @@ choose_build_folder
 install_packages core ros bench
 catkin=${STEPDRIVER_CATKIN:-$build/bench/catkin}
 node=$catkin/devel/lib/stepdriver/stepdriver_node
-[[ -x $node ]] || die "$node isn't there: run scripts/node_bench.sh first"
+[[ -x $node && -x $catkin/devel/lib/stepdriver/node_listener ]] || die "$node isn't there: run scripts/node_bench.sh first"
 configuration=$build/bench/node_6.yaml
 [[ -f $configuration ]] || die "$configuration isn't there: run scripts/node_bench.sh first"
 use_ros "$catkin/devel"
 nodes=4
+seconds=8
 
 host_a=stepdriver-a-$$ host_b=stepdriver-b-$$
 address_a=10.213.77.1 address_b=10.213.77.2
@@ -72,20 +73,46 @@ for ((i = 0; i < 300; i++)); do
 done
 say "The master is reached from the other host"
 
-for ((i = 0; i < nodes; i++)); do on_a rosparam load "$configuration" "/n$i/stepdriver"; done
+# Processor time of all nodes on host a, in ticks, and their number.
+node_ticks() {
+  local pid
+  for pid in $(ip netns pids "$host_a"); do
+    [[ $(cat "/proc/$pid/comm" 2>/dev/null) == stepdriver_node ]] || continue
+    sed 's/.*) //' "/proc/$pid/stat" | cut -d' ' -f12,13
+  done | awk '{ ticks += $1 + $2; nodes++ } END { print ticks + 0, nodes + 0 }'
+}
+
+topics=()
+for ((i = 0; i < nodes; i++)); do
+  on_a rosparam load "$configuration" "/n$i/stepdriver"
+  topics+=("/n$i/joint_states")
+done
+heard=$build/log/two-hosts-heard.log
+set -m
+on_b "$catkin/devel/lib/stepdriver/node_listener" "$seconds" "${topics[@]}" >"$heard" 2>&1 </dev/null &
+listener=$!
+set +m
+jobs_started=("$listener" "${jobs_started[@]}")
+for ((i = 0; i < 300; i++)); do
+  ! grep -q listening "$heard" || break
+  sleep 0.1
+done
 begin=$(date +%s%N)
 for ((i = 0; i < nodes; i++)); do
   start_on_a "two-hosts-$i" "$node" "__ns:=/n$i" __name:=stepdriver
 done
-for ((i = 0; i < nodes; i++)); do
-  on_b timeout 60 rostopic echo -n 1 "/n$i/joint_states" >/dev/null || die "node n$i isn't heard"
-  say "node n$i is heard on the other host after $((($(date +%s%N) - begin) / 1000000)) ms"
-done
-for ((i = 0; i < nodes; i++)); do
-  rate=$(on_b timeout -s INT 8 rostopic hz "/n$i/joint_states" 2>/dev/null |
-    sed -n 's/^average rate: //p' | tail -n 1) || true
-  say "node n$i: joint_states at $rate Hz on the other host"
-done
+sleep 3
+read -r ticks running <<<"$(node_ticks)"
+((running == nodes)) || die "$running of $nodes nodes run; their output is in $build/log/two-hosts-*.log"
+sleep "$seconds"
+read -r more running <<<"$(node_ticks)"
+wait "$listener" || die "not all nodes are heard on the other host: $(tail -n "$nodes" "$heard")"
+while read -r topic first rate; do
+  say "$topic is heard on the other host after $(((first - begin) / 1000000)) ms, at $rate Hz"
+done < <(grep '^/' "$heard")
+say "$running nodes on one host use at rest, each on average: $(awk -v ticks="$((more - ticks))" \
+  -v per_second="$(getconf CLK_TCK)" -v nodes="$nodes" -v seconds="$seconds" \
+  'BEGIN { printf "%.2f", 100 * ticks / per_second / seconds / nodes }') % of a core"
 
 on_b rosparam load "$configuration" /stepdriver
 on_b "$catkin/devel/lib/stepdriver/node_bench" "$node" 6 "$build/bench/two_hosts.json" \
