@@ -40,7 +40,7 @@ constexpr std::chrono::milliseconds kPoll{1000};
 constexpr std::chrono::milliseconds kLastAnswers{500};
 
 // Where memory is locked, each thread's stack is in memory as a whole, by default 8 MB.
-constexpr std::size_t kThreadStack = 1024 * 1024;
+constexpr std::size_t kThreadStack = std::size_t{1} << 20;
 
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 

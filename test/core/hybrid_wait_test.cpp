@@ -227,6 +227,18 @@ TEST(HybridWait, SleepsUpToItsGuardThoughItIsToRestForLess) {
   EXPECT_LT(thread.shareOf(begin, thread.now()), 0.05) << "it spins on after the rest";
 }
 
+TEST(HybridWait, NeverRestsWhereItSleepsATenthOfTheTimeAnyway) {
+  FakeThread thread(60 * kMicrosecond);
+  for (int i = 0; i < 400; ++i) {
+    thread.pass(8'900 * kMicrosecond);
+    const Nanoseconds due = thread.now();
+    thread.waitUntil(due);
+    ASSERT_LT(thread.now(), due + kMicrosecond) << i;
+    thread.waitUntil(due + 1'060 * kMicrosecond);
+  }
+  EXPECT_GT(thread.shareOf(0, thread.now()), 0.89);
+}
+
 TEST(HybridWait, RestsShortlyAfterAStall) {
   FakeThread thread;
   thread.pass(kMillisecond);

@@ -238,9 +238,9 @@ TEST(ReadMotion, KeepsTheSpeedWithinWhatTheChipCanCount) {
   EXPECT_EQ(
       issuesOfX(rotary),
       Lines{
-          "/axes/x/max_speed_deg_s: is 30000.0, but must be at most 26315.7: it is 300000 steps/s "
-          "(at 10 steps per degree), and the DRV8825 takes at most 263157 steps/s (1.9 us high, "
-          "1.9 us low)"});
+          "/axes/x/max_speed_deg_s: is 30000.0, but must be at most 25000: it is 300000 steps/s "
+          "(at 10 steps per degree), and the DRV8825 takes at most 250000 steps/s (1.9 us high, "
+          "2.1 us low)"});
 }
 
 TEST(ReadMotion, AcceptsTheSpeedThatItsMessageNames) {

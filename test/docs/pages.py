@@ -39,7 +39,7 @@ def _blocks(text):
 def _of_block(lines):
     whole = re.sub(r"\\\n\s*", "", "\n".join(lines))
     for line in whole.splitlines():
-        command = re.sub(r"(^|\s+)#(\s.*)?$", "", line).strip().removeprefix("$ ")
+        command = re.sub(r"^\$ ", "", re.sub(r"(^|\s+)#(\s.*)?$", "", line).strip())
         if command:
             yield command
 

@@ -31,7 +31,7 @@ struct Node {
   ConfigValue base;
 };
 
-void PrintTo(const Node& node, std::ostream* out) { *out << node.name; }
+std::ostream& operator<<(std::ostream& out, const Node& node) { return out << node.name; }
 
 Reading readNode(const ConfigValue& tree) {
   Reading reading;

@@ -112,8 +112,8 @@ TEST(Waveform, SeesThroughTheInversionOfEachPin) {
                             .at(10'000, kStep, false)
                             .at(12'000, kStep, true)
                             .at(13'000, kDir, false)
-                            .at(14'000, kStep, false)
-                            .at(15'900, kStep, true)
+                            .at(14'100, kStep, false)
+                            .at(16'000, kStep, true)
                             .read(axis);
   EXPECT_EQ(seen.forward(), 1);
   EXPECT_EQ(seen.backward(), 1);
@@ -135,8 +135,8 @@ TEST(Waveform, FindsThatAGapIsTooShort) {
   const auto gap = [](std::int64_t time) {
     return brokenIn(Hand().request().pulse(10'000, 12'000).pulse(12'000 + time, 20'000));
   };
-  EXPECT_EQ(gap(1'900), Broken{});
-  EXPECT_EQ(gap(1'899), (Broken{{Rule::kStepLow, 1}}));
+  EXPECT_EQ(gap(2'100), Broken{});
+  EXPECT_EQ(gap(2'099), (Broken{{Rule::kStepLow, 1}}));
 }
 
 TEST(Waveform, FindsThatDirChangedTooCloseBeforeAStep) {

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <stepdriver/AxisStates.h>
 
 #include <csignal>
 #include <cstdint>
@@ -7,6 +8,7 @@
 
 #include "support/node_under_test.h"
 #include "support/program.h"
+#include "support/recorder.h"
 #include "support/says.h"
 #include "support/tmux.h"
 #include "support/wait.h"
@@ -54,6 +56,15 @@ class ConsoleTest : public testing::Test {
     });
   }
 
+  /// Waits for a state that is read from now on, with the axis at rest.
+  static bool rests(const Recorder<AxisStates>& states) {
+    const std::size_t before = states.count();
+    return waitUntil([&] {
+      const auto all = states.messages();
+      return all.size() > before + 1 && all.back().moving.at(0) == 0;
+    });
+  }
+
   NodeUnderTest node;
   const Tmux terminal{80, 24};
   const TemporaryFile before{"_before"};
@@ -64,6 +75,7 @@ class ConsoleTest : public testing::Test {
 TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
   node.set("axes/x/enable_on_start", false);
   node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
   ASSERT_NO_FATAL_FAILURE(open());
   EXPECT_TRUE(terminal.waitFor("off    rest unverified"));
   terminal.press("Right");
@@ -82,11 +94,11 @@ TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
   EXPECT_EQ(node.rig().pulses_backward.at(0), 1);
 
   EXPECT_TRUE(holdUntil("Right", [this] { return node.pulses() > 500; }));
-  EXPECT_TRUE(terminal.waitFor("rest unverified")) << "without repeats it comes to rest";
-  const std::int64_t rested = node.pulses();
-  EXPECT_TRUE(holdUntil("<", [&] { return node.pulses() > rested + 100; }));
-  EXPECT_TRUE(terminal.waitFor("rest unverified"));
-  EXPECT_GT(node.rig().pulses_backward.at(0), 100);
+  EXPECT_TRUE(rests(states)) << "without repeats it comes to rest";
+  EXPECT_TRUE(holdUntil("<", [this] { return node.rig().pulses_backward.at(0) > 100; }));
+  terminal.press("s");  // comes after all keys that are on their way
+  EXPECT_TRUE(terminal.waitFor("all axes stop"));
+  EXPECT_TRUE(rests(states));
 
   terminal.press("h");
   EXPECT_TRUE(terminal.waitFor("rest homed"));

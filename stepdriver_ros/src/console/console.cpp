@@ -27,10 +27,11 @@ void runScreen(Session& session, DriverClient& client, ros_node::EndRequests& en
   while (!session.ended() && end_requests.waitFor(std::chrono::milliseconds(0)).empty()) {
     const auto keys = terminal.keys(kPoll);
     if (!keys) return;
+    // First, so that no key is held against a state that is older than it need be.
+    ros::getGlobalCallbackQueue()->callAvailable();
     const double now = steadyNow();
     if (!keys->empty()) client.carryOut(session.press(*keys, now));
     client.carryOut(session.tick(now));
-    ros::getGlobalCallbackQueue()->callAvailable();
     client.poll();
     for (const std::string& line : terminal.printed()) session.messages().say(line);
     if (keys->empty() && now - drawn < kDrawPeriod) continue;

@@ -29,8 +29,7 @@ Key keyOf(int code) {
 /// Of the terminal that curses has now.
 bool movesItsCursor() {
   char name[] = "cup";
-  const char* const capability = tigetstr(name);
-  return capability != nullptr && capability != reinterpret_cast<const char*>(-1);
+  return tigetstr(name) != nullptr;
 }
 
 }  // namespace

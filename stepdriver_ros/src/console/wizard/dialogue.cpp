@@ -17,6 +17,10 @@ std::string trimmed(const std::string& text) {
   return begin < end ? std::string(begin, end) : std::string();
 }
 
+void sayNotUnderstood(Dialogue& dialogue, const std::string& answer, const std::string& wanted) {
+  dialogue.say("\"" + answer + "\" isn't understood: " + wanted + ".");
+}
+
 }  // namespace
 
 bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_default) {
@@ -26,21 +30,22 @@ bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_defau
     if (answer.empty()) return yes_by_default;
     if (answer == "y" || answer == "Y" || answer == "yes") return true;
     if (answer == "n" || answer == "N" || answer == "no") return false;
-    dialogue.say("\"" + answer + "\" isn't understood: y, n, or q to end all of it.");
+    sayNotUnderstood(dialogue, answer, "y, n, or q to end all of it");
   }
 }
 
 std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
                                 const std::string& unit) {
+  const std::string shown = question + " [" + unit + "] ";
   for (;;) {
-    const std::string answer = trimmed(dialogue.ask(question + " [" + unit + "] "));
+    const std::string answer = trimmed(dialogue.ask(shown));
     if (answer.empty()) return {};
     char* end = nullptr;
     const double number = std::strtod(answer.c_str(), &end);
     const std::string rest = trimmed(end);
     const bool whole = end != answer.c_str() && (rest.empty() || rest == unit);
     if (whole && std::isfinite(number)) return number;
-    dialogue.say("\"" + answer + "\" isn't understood: it must be a number, in " + unit + ".");
+    sayNotUnderstood(dialogue, answer, "it must be a number, in " + unit);
   }
 }
 
