@@ -131,7 +131,7 @@ TEST(CallPool, LosesNoCall) {
   for (const auto& queue : queues) EXPECT_TRUE(queue->isEmpty());
 }
 
-TEST(CallPool, HasNoMoreThreadsThanCallsAtOnce) {
+TEST(CallPool, UsesItsThreadsAgain) {
   CallPool pool;
   PooledQueue queue(pool, 4);
   std::set<std::thread::id> threads;
@@ -145,8 +145,8 @@ TEST(CallPool, HasNoMoreThreadsThanCallsAtOnce) {
     ASSERT_TRUE(comes(called));
   }
   pool.stop();
-  // The next call may come before the thread of the last one is free again.
-  EXPECT_LE(threads.size(), 2U);
+  // The next call may come before the threads of the last ones are free again.
+  EXPECT_LE(threads.size(), 4U);
 }
 
 TEST(CallPool, CallsAgainWhatCannotBeCalledYet) {
