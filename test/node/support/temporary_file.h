@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -15,8 +16,7 @@ class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& ending)
       : path_(std::filesystem::temp_directory_path() /
-              (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
-               std::to_string(getpid()) + ending)) {
+              (testName() + "_" + std::to_string(getpid()) + ending)) {
     std::filesystem::remove(path_);
   }
   ~TemporaryFile() { std::filesystem::remove(path_); }
@@ -31,6 +31,13 @@ class TemporaryFile {
   }
 
  private:
+  /// Without the slash before the parameter of one that has any.
+  static std::string testName() {
+    std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::replace(name.begin(), name.end(), '/', '_');
+    return name;
+  }
+
   std::filesystem::path path_;
 };
 
