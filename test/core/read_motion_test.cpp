@@ -237,10 +237,9 @@ TEST(ReadMotion, KeepsTheSpeedWithinWhatTheChipCanCount) {
   put(rotary, "max_speed_deg_s", 30000.0);
   EXPECT_EQ(
       issuesOfX(rotary),
-      Lines{
-          "/axes/x/max_speed_deg_s: is 30000.0, but must be at most 25000: it is 300000 steps/s "
-          "(at 10 steps per degree), and the DRV8825 takes at most 250000 steps/s (1.9 us high, "
-          "2.1 us low)"});
+      Lines{"/axes/x/max_speed_deg_s: is 30000.0, but must be at most 25000: it is 300000 steps/s "
+            "(at 10 steps per degree), and the DRV8825 takes at most 250000 steps/s (1.9 us high, "
+            "2.1 us low)"});
 }
 
 TEST(ReadMotion, AcceptsTheSpeedThatItsMessageNames) {
