@@ -25,9 +25,9 @@ esac
 doxygen_warnings() {
   {
     cat "$root/Doxyfile"
-    printf '%s\n' "OUTPUT_DIRECTORY=\"$build/doxygen\"" "STRIP_FROM_PATH=\"$root\"" "$@"
+    printf '%s\n' "OUTPUT_DIRECTORY=\"$build/doxygen\"" "STRIP_FROM_PATH=\"$src\"" "$@"
   } >"$build/doxygen/Doxyfile"
-  (cd "$root" && doxygen "$build/doxygen/Doxyfile" 2>&1) || true
+  SRC=$src doxygen "$build/doxygen/Doxyfile" 2>&1 || true
 }
 
 # The names in comments, as Machine::stop(), that nothing has.
