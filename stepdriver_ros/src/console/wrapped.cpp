@@ -24,7 +24,7 @@ std::vector<std::string> wrapped(const std::string& text, int columns) {
     lines.push_back(rest.substr(0, end));
     const std::size_t next = rest.find_first_not_of(' ', end);
     if (next == std::string::npos) return lines;
-    rest = indent + rest.substr(next);
+    rest.replace(0, next, indent);
   }
   lines.push_back(rest);
   return lines;
