@@ -38,6 +38,19 @@ def free_port():
         return probe.getsockname()[1]
 
 
+def lives(group):
+    """Whether any process of a group runs: rosbag ends before what it has started, and that writes the
+    bag."""
+    for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, pgrp = stat.read_text(encoding="utf-8").rpartition(")")[2].split()[:3]
+        except OSError:
+            continue  # it has just ended
+        if int(pgrp) == group and state not in "ZX":
+            return True
+    return False
+
+
 class Page:
     """The person who follows a page: terminals, and a folder with what the page supposes."""
 
@@ -131,11 +144,12 @@ class Page:
 
     def end_one(self, process):
         for number, seconds in ((signal.SIGINT, 30), (signal.SIGKILL, 10)):
-            try:
+            if lives(process.pid):
                 os.killpg(process.pid, number)
-                process.wait(seconds)
-            except (ProcessLookupError, subprocess.TimeoutExpired):
-                pass
+            deadline = time.monotonic() + seconds
+            while lives(process.pid) and time.monotonic() < deadline:
+                time.sleep(0.05)
+        process.wait()
 
     def follow(self, entries):
         """What went wrong, a text for each command."""
@@ -205,6 +219,9 @@ def follow(page, entries):
 
 
 def main():
+    # As in a terminal: where this is run in the background the signal may be ignored, and programs
+    # inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     table = yaml.safe_load(TABLE.read_text(encoding="utf-8"))
     wanted = sys.argv[1:] or pages.names()
     there = pages.names()
