@@ -1,6 +1,8 @@
 #include "support/tmux.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #include <array>
@@ -17,16 +19,28 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
+bool Tmux::possible() {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  if (terminal < 0) return false;
+  const char* name = ptsname(terminal);
+  const bool there = name != nullptr && access(name, F_OK) == 0;
+  close(terminal);
+  return there;
+}
+
 // tmux starts in a UTF-8 locale only. The shell ends by itself where a test that crashed can't end
 // it.
 Tmux::Tmux(int columns, int rows)
     : command_("LC_ALL=C.UTF-8 tmux -L stepdriver_" + std::to_string(getpid()) + " -f /dev/null ") {
+  if (!there_) return;  // the test is skipped
   run("new-session -d -x " + std::to_string(columns) + " -y " + std::to_string(rows) +
       " 'timeout --foreground 300 env PS1=\"shell> \" sh'");
   waitFor("shell>");
 }
 
-Tmux::~Tmux() { run("kill-server"); }
+Tmux::~Tmux() {
+  if (there_) run("kill-server");
+}
 
 void Tmux::press(const std::string& key) const { run("send-keys -- " + quoted(key)); }
 

@@ -14,6 +14,9 @@ class Tmux {
   Tmux(const Tmux&) = delete;
   Tmux& operator=(const Tmux&) = delete;
 
+  /// Whether this machine has terminals: a root without /dev/pts has none.
+  static bool possible();
+
   /// @param key a character, or what tmux calls a key: `Space`, `Enter`, `S-Right`.
   void press(const std::string& key) const;
   /// Types a line, with Enter at its end.
@@ -30,6 +33,7 @@ class Tmux {
  private:
   std::string run(const std::string& arguments) const;
 
+  const bool there_ = possible();
   std::string command_;
 };
 
