@@ -70,6 +70,23 @@ class WizardTest : public testing::Test {
   }
   double carriage() { return node.rig().carriage.at(0); }
 
+  /// Refuses the small move, and lets it go 90 mm; it is on its way then.
+  void beginALongMove() {
+    ASSERT_NO_FATAL_FAILURE(skipSwitches());
+    terminal.type("y");
+    ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
+    ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "n"));
+    ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
+    EXPECT_EQ(node.pulses(), 0);
+    ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", "90"));
+    ASSERT_NO_FATAL_FAILURE(answer("Is there room", "y"));
+    ASSERT_TRUE(terminal.waitFor("take up the play"));
+    terminal.type("y");
+    ASSERT_NO_FATAL_FAILURE(answer("Mark where it stands", ""));
+    ASSERT_NO_FATAL_FAILURE(answer("will move 90 mm", "y"));
+    ASSERT_TRUE(waitUntil([this] { return node.pulses() > 200; }));
+  }
+
   NodeUnderTest node;
   const Tmux terminal{100, 60};
   const TemporaryFile file{".yaml"};
@@ -137,19 +154,7 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
 
 TEST_F(WizardTest, StopsAMoveByEnterAndEndsByControlC) {
   ASSERT_NO_FATAL_FAILURE(open());
-  ASSERT_NO_FATAL_FAILURE(skipSwitches());
-  terminal.type("y");
-  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "n"));
-  ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
-  EXPECT_EQ(node.pulses(), 0);
-  ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", "90"));
-  ASSERT_NO_FATAL_FAILURE(answer("Is there room", "y"));
-  ASSERT_TRUE(terminal.waitFor("take up the play"));
-  terminal.type("y");
-  ASSERT_NO_FATAL_FAILURE(answer("Mark where it stands", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("will move 90 mm", "y"));
-  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 200; }));
+  ASSERT_NO_FATAL_FAILURE(beginALongMove());
   terminal.press("Enter");
   ASSERT_NO_FATAL_FAILURE(answer("Nothing is measured. Try again?", "y"));
   EXPECT_TRUE(terminal.waitFor("Stopped: you asked for it"));
@@ -164,19 +169,7 @@ TEST_F(WizardTest, StopsAMoveByEnterAndEndsByControlC) {
 
 TEST_F(WizardTest, ASwitchThatChangesStopsAMove) {
   ASSERT_NO_FATAL_FAILURE(open());
-  ASSERT_NO_FATAL_FAILURE(skipSwitches());
-  terminal.type("y");
-  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
-  ASSERT_TRUE(terminal.waitFor("2 mm towards plus"));
-  terminal.type("n");
-  ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
-  ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", "90"));
-  ASSERT_NO_FATAL_FAILURE(answer("Is there room", "y"));
-  ASSERT_TRUE(terminal.waitFor("take up the play"));
-  terminal.type("y");
-  ASSERT_NO_FATAL_FAILURE(answer("Mark where it stands", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("will move 90 mm", "y"));
-  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 200; }));
+  ASSERT_NO_FATAL_FAILURE(beginALongMove());
   // Configured as it is the driver doesn't take this one for the switch ahead.
   press("max", true);
   EXPECT_TRUE(terminal.waitFor("Stopped: a switch has changed"));
