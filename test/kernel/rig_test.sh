@@ -104,6 +104,25 @@ inside_toggles() {
   set_once rig 1=0
 }
 
+# A real-time thread that is awake for some microseconds around each of 300 ticks of 10 ms.
+inside_ticks() {
+  python3 - <<'END_OF_PROGRAM'
+import os, sys, time
+
+TICK, AROUND = 10_000_000, 5_000
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
+due, worst = (time.monotonic_ns() // TICK + 2) * TICK, 0
+for _ in range(300):
+    time.sleep(max(0, due - AROUND - time.monotonic_ns()) / 1e9)
+    while time.monotonic_ns() < due + AROUND:
+        pass
+    worst = max(worst, time.monotonic_ns() - due - AROUND)
+    due += TICK
+if worst > AROUND:
+    sys.exit(f"FAILED: {worst} ns late")
+END_OF_PROGRAM
+}
+
 # ---- outside ----
 
 chips=(--chip 'motors:rig:16:1=X_STEP,2=X_DIR' --chip 'switches:ends:8:2=X_MIN')
@@ -180,6 +199,9 @@ virtual_time_is_exact_and_repeats() {
   ((step >= 100000000000 && step < 100010000000)) || fail "100 s of sleep took $step ns"
 }
 
+# The steps of a motion may fall on the ticks, each of them.
+virtual_time_never_throttles() { rig --time-travel --timeout 60 -- bash "$this" --inside ticks; }
+
 # ---- all of it ----
 
 case "${1:-}" in
@@ -200,4 +222,4 @@ trap 'rm -rf "$scratch"' EXIT
 
 run_tests passes_the_exit_status passes_the_output_unchanged passes_environment_and_arguments \
   ends_a_command_that_hangs says_that_the_kernel_died drives_and_reads_lines_of_two_chips \
-  takes_a_chip_away virtual_time_is_exact_and_repeats
+  takes_a_chip_away virtual_time_is_exact_and_repeats virtual_time_never_throttles

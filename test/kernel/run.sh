@@ -133,6 +133,9 @@ GPIO_SIM=$work/gpio_sim.sh /usr/bin/env -0 >"$work/environment"
   for chip in "${chips[@]}"; do printf 'bash %s/gpio_sim.sh create %q\n' "$work" "$chip"; done
   # Virtual time begins at the boot, and until the first ticks the timers are as coarse as those.
   [[ -z $mode ]] || echo 'sleep 0.1'
+  # This kernel counts the time of a thread in ticks. On virtual time each step of a regular motion can
+  # meet one, and the real-time throttle would stop a thread that runs for microseconds.
+  [[ -z $mode ]] || echo 'echo -1 >/proc/sys/kernel/sched_rt_runtime_us'
   [[ -z $trace ]] || printf 'bash %s/gpio_trace.sh start\n' "$work"
 } >"$work/before"
 {
