@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
@@ -55,8 +56,8 @@ namespace {
 
 constexpr int kChannels = 3;
 
-/// What a pulse thread must not do, done in a write: does the test see it?
-enum class Misdeed { kNone, kAllocation, kLock, kSystemCall };
+/// What a pulse thread must not do, done in a write: does the test see it? Deep calls it may.
+enum class Misdeed { kNone, kAllocation, kLock, kSystemCall, kNewMemory, kDeepCall };
 
 /// Lines whose calls are an ioctl each, as those of a GPIO chip are. The first write has its thread
 /// watched from then on.
@@ -68,11 +69,16 @@ class WatchingLines : public gpio::Lines {
     if (!is_watched) {
       allocate();  // what it does the first time has system calls in it
       test::watchThisThread();
+    } else if (misdeed_ == Misdeed::kDeepCall) {
+      callDeeply();
     }
     ioctl(-1, 0);
     if (misdeed_ == Misdeed::kAllocation) allocate();
     if (misdeed_ == Misdeed::kLock) const std::lock_guard<std::mutex> lock(mutex_);
     if (misdeed_ == Misdeed::kSystemCall) syscall(SYS_getppid);
+    if (misdeed_ == Misdeed::kNewMemory) {
+      new_memory_[(kPage * ++pages_) % kNewMemory] = 1;
+    }
     return 0;
   }
   int read(int /*input*/) noexcept override {
@@ -85,9 +91,19 @@ class WatchingLines : public gpio::Lines {
   const std::string& inputName(int /*input*/) const override { return name_; }
 
  private:
+  static constexpr std::size_t kPage = 4096;
+  static constexpr std::size_t kNewMemory = 16 << 20;
+
   static void allocate() { delete new int(7); }
+  [[gnu::noinline]] static void callDeeply() {
+    std::array<volatile char, 10 * kPage> stack;
+    for (std::size_t i = 0; i < stack.size(); i += kPage) stack[i] = 1;
+  }
 
   const Misdeed misdeed_;
+  char* const new_memory_ = static_cast<char*>(
+      mmap(nullptr, kNewMemory, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+  std::size_t pages_ = 0;
   std::mutex mutex_;
   const std::string name_ = "a line";
 };
@@ -113,6 +129,8 @@ class Retargeting {
     pins.pins.add(20, true, 1'000'000);
     driver_.post(pins);
     while (engine_.channel(0).pins_done != attempts_) pause();
+    test::notePageFaults();
+    thread_calls->memory_error = driver_.rights().memory_error;
   }
 
  private:
@@ -206,6 +224,14 @@ TEST_F(PulseThreadCalls, AreTheWaitAndTheLinesAlone) {
       << "the last one has the number " << thread_calls->last_system_call;
 }
 
+TEST_F(PulseThreadCalls, TouchNoMemoryThatIsMissing) {
+  ASSERT_NO_FATAL_FAILURE(run(Misdeed::kDeepCall));
+  if (thread_calls->memory_error != 0) {
+    GTEST_SKIP() << "memory can't be locked here: " << std::strerror(thread_calls->memory_error);
+  }
+  EXPECT_EQ(thread_calls->page_faults, 0);
+}
+
 TEST_F(PulseThreadCalls, WouldBeSeen) {
   ASSERT_NO_FATAL_FAILURE(run(Misdeed::kAllocation));
   EXPECT_GT(thread_calls->allocations, 100U);
@@ -218,6 +244,8 @@ TEST_F(PulseThreadCalls, WouldBeSeen) {
     EXPECT_GT(thread_calls->system_calls, 100U);
     EXPECT_EQ(thread_calls->last_system_call, SYS_getppid);
   }
+  ASSERT_NO_FATAL_FAILURE(run(Misdeed::kNewMemory));
+  EXPECT_GT(thread_calls->page_faults, 100);
 }
 
 }  // namespace

@@ -46,7 +46,10 @@ void PulseDriver::post(const Command& command) {
 
 void PulseDriver::run() {
   pthread_setname_np(pthread_self(), "pulse");
-  if (clock_.realtime()) scheduler_error_ = askForScheduler();
+  if (clock_.realtime()) {
+    scheduler_error_ = askForScheduler();
+    touchStack();
+  }
   while (!stopping_) clock_.waitUntil(engine_.serve());
 }
 

@@ -4,6 +4,7 @@
 #include <linux/futex.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -12,7 +13,10 @@
 #include <csignal>
 #include <cstddef>
 #include <cstdint>
+#include <fstream>
 #include <iterator>
+#include <limits>
+#include <string>
 
 namespace stepdriver::test {
 
@@ -25,6 +29,10 @@ struct ThreadCalls {
   std::atomic<std::uint64_t> system_calls{0};  ///< other than the allowed ones
   std::atomic<int> last_system_call{-1};
   std::atomic<int> filter_error{-1};  ///< errno of the request for the filter; 0: it is there
+  std::atomic<std::int64_t> page_faults{0};  ///< as far as notePageFaults() was called
+  std::atomic<std::int64_t> page_faults_before{0};
+  std::atomic<pid_t> thread{0};
+  std::atomic<int> memory_error{-1};  ///< errno of the request to lock the memory
 };
 
 /// Where the process counts; set before a thread is watched.
@@ -36,6 +44,20 @@ inline void noteSystemCall(int /*signal*/, siginfo_t* info, void* /*context*/) {
   thread_calls->last_system_call = info->si_syscall;
 }
 
+/// Counts the page faults of the watched thread since watchThisThread(). For another thread to
+/// call.
+inline void notePageFaults() {
+  std::ifstream stat("/proc/self/task/" + std::to_string(thread_calls->thread) + "/stat");
+  stat.ignore(std::numeric_limits<std::streamsize>::max(), ')');  // the name may have blanks
+  std::string skipped;
+  for (int field = 3; field < 10; ++field) stat >> skipped;
+  std::int64_t minor = 0;
+  std::int64_t of_children = 0;
+  std::int64_t major = 0;
+  stat >> minor >> of_children >> major;
+  thread_calls->page_faults = stat ? minor + major - thread_calls->page_faults_before : -1;
+}
+
 /// From here on the calling thread has no system calls but ioctl(), waiting for a futex as a clock
 /// does (a contended lock does it otherwise), and the end of the process. Others are counted, and
 /// don't happen. clock_gettime() is allowed: where the kernel gives programs no clock to read (no
@@ -43,6 +65,10 @@ inline void noteSystemCall(int /*signal*/, siginfo_t* info, void* /*context*/) {
 ///
 /// There is no way back: for threads that live as long as their process.
 inline void watchThisThread() {
+  thread_calls->thread = gettid();
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  thread_calls->page_faults_before = usage.ru_minflt + usage.ru_majflt;
   struct sigaction action {};
   action.sa_sigaction = noteSystemCall;
   action.sa_flags = SA_SIGINFO;

@@ -96,6 +96,13 @@ TEST_F(TwoChips, MoveAtTheSameTimeAndEndSafelyOnSigtermInMidMove) {
   EXPECT_GT(changesTogether(trace, x_lines.step, y_lines.step), 0) << "of two axes on one chip";
 }
 
+TEST_F(TwoChips, HaveANodeWithLockedMemoryThatTakesLittle) {
+  node->start();
+  EXPECT_TRUE(node->move("x", 0.002, true).success);
+  EXPECT_GT(node->process().kilobytes("VmLck"), 5'000U);
+  EXPECT_LT(node->process().kilobytes("VmRSS"), 40'000U);
+}
+
 TEST_F(TwoChips, StopAnAxisWhoseDriverReportsAFaultAndResetItToRecover) {
   node->start();
   const Recorder<AxisStates> states(node->full("axis_states"));

@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <fstream>
 #include <stdexcept>
 
 #include "support/wait.h"
@@ -55,6 +56,15 @@ NodeProcess::~NodeProcess() {
 
 void NodeProcess::signal(int number) const {
   if (!exit_code_) kill(pid_, number);
+}
+
+std::size_t NodeProcess::kilobytes(const std::string& field) const {
+  std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
+  for (std::string name; status >> name; std::getline(status, name)) {
+    std::size_t value = 0;
+    if (name == field + ":" && status >> value) return value;
+  }
+  throw std::runtime_error("no " + field + " in the process's status");
 }
 
 std::optional<int> NodeProcess::waitForExit(std::chrono::duration<double> bound) {

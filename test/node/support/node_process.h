@@ -3,6 +3,7 @@
 #include <sys/types.h>
 
 #include <chrono>
+#include <cstddef>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -29,6 +30,9 @@ class NodeProcess {
   /// @return the exit code, 128 + the signal's number where a signal ended it; none where it still
   ///   runs after this time.
   std::optional<int> waitForExit(std::chrono::duration<double> bound);
+
+  /// A size in its /proc/PID/status, as `VmRSS` [kB]. @throw std::runtime_error where it has none.
+  std::size_t kilobytes(const std::string& field) const;
 
   /// Both of its streams; complete after waitForExit().
   std::string output();
