@@ -23,11 +23,31 @@ TEST(Options, WhatCannotBeUnderstoodIsRefused) {
                                                     {"--fast", "101"},
                                                     {"--fast", "nan"},
                                                     {"--slow"},
+                                                    {"--slow", "1", "--slow", "2"},
+                                                    {"--slow", "1%"},
+                                                    {"--wiz"},
+                                                    {"--driver=a", "x"},
                                                     {"--axis", "x"},
                                                     {"--overwrite"},
                                                     {"x"}}) {
     EXPECT_THROW(parseOptions(arguments), Error) << arguments[0];
   }
+}
+
+std::string complaintOf(const std::vector<std::string>& arguments) {
+  try {
+    parseOptions(arguments);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(Options, AComplaintNamesWhatIsWrong) {
+  EXPECT_EQ(complaintOf({"--slow=0"}), "--slow 0: it must be a number above 0, and 100 at most");
+  EXPECT_EQ(complaintOf({"--driver", "a", "x"}), "x isn't known");
+  EXPECT_EQ(complaintOf({"--hlep"}), "unrecognised option '--hlep'");
+  EXPECT_EQ(complaintOf({"--slow"}), "the required argument for option '--slow' is missing");
 }
 
 TEST(Options, OfTheWizard) {

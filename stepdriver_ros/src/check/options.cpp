@@ -1,26 +1,20 @@
 #include "options.h"
 
+#include <boost/program_options/value_semantic.hpp>
 #include <cmath>
-#include <cstdlib>
 
+#include "command_line.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::check {
 namespace {
 
+namespace po = boost::program_options;
+
 BackendChoice backendOf(const std::string& name) {
   if (name == "simulated") return BackendChoice::kSimulated;
   if (name == "libgpiod") return BackendChoice::kLibgpiod;
   throw Error("--backend " + name + ": it must be simulated or libgpiod");
-}
-
-double distanceOf(const std::string& text) {
-  char* end = nullptr;
-  const double distance = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !std::isfinite(distance) || distance == 0.0) {
-    throw Error("--distance " + text + ": it must be a number, and not 0");
-  }
-  return distance;
 }
 
 }  // namespace
@@ -48,30 +42,22 @@ interrupted, 64 wrong usage. Of several the lowest.
 
 Options parseOptions(const std::vector<std::string>& arguments) {
   Options options;
-  for (std::size_t i = 0; i < arguments.size(); ++i) {
-    const std::string& name = arguments[i];
-    const auto value = [&] {
-      if (i + 1 == arguments.size()) throw Error(name + " needs a value");
-      return arguments[++i];
-    };
-    if (name == "--help" || name == "-h") {
-      options.help = true;
-      return options;
-    }
-    if (name == "--config") {
-      options.config = value();
-    } else if (name == "--backend") {
-      options.backend = backendOf(value());
-    } else if (name == "--move") {
-      options.move = true;
-    } else if (name == "--axis") {
-      options.axis = value();
-    } else if (name == "--distance") {
-      options.distance = distanceOf(value());
-    } else {
-      throw Error(name + " isn't known");
-    }
+  po::options_description known;
+  auto add = known.add_options();
+  add("help,h", po::bool_switch(&options.help));
+  add("config", po::value(&options.config));
+  add("backend", po::value<std::string>());
+  add("move", po::bool_switch(&options.move));
+  add("axis", po::value(&options.axis));
+  add("distance", po::value<std::string>());
+  const po::variables_map values = readCommandLine(known, arguments);
+  if (options.help) return options;
+  if (values.count("backend") > 0) {
+    options.backend = backendOf(values["backend"].as<std::string>());
   }
+  options.distance = findNumber(
+      values, "distance", [](double number) { return std::isfinite(number) && number != 0.0; },
+      "a number, and not 0");
   if (options.config.empty()) throw Error("--config FILE is missing");
   if (!options.move && (!options.axis.empty() || options.distance)) {
     throw Error("--axis and --distance go with --move");

@@ -1,20 +1,20 @@
 #include "options.h"
 
-#include <cmath>
-#include <cstdlib>
+#include <boost/program_options/value_semantic.hpp>
 
+#include "../command_line.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::console {
 namespace {
 
-double partOf(const std::string& option, const std::string& text) {
-  char* end = nullptr;
-  const double percent = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !(percent > 0.0 && percent <= 100.0)) {
-    throw Error(option + " " + text + ": it must be a number above 0, and 100 at most");
-  }
-  return percent / 100.0;
+namespace po = boost::program_options;
+
+void readPart(const po::variables_map& values, const std::string& name, double& part) {
+  const auto percent = findNumber(
+      values, name, [](double number) { return number > 0.0 && number <= 100.0; },
+      "a number above 0, and 100 at most");
+  if (percent) part = *percent / 100.0;
 }
 
 }  // namespace
@@ -58,37 +58,23 @@ Exit codes: 0 ended as asked, 1 no master, no driver, no terminal, or a file tha
 
 Options parseOptions(const std::vector<std::string>& arguments) {
   Options options;
-  std::string for_wizard;
-  for (std::size_t i = 0; i < arguments.size(); ++i) {
-    const std::string& name = arguments[i];
-    const auto value = [&] {
-      if (i + 1 == arguments.size()) throw Error(name + " needs a value");
-      return arguments[++i];
-    };
-    if (name == "--help" || name == "-h") {
-      options.help = true;
-      return options;
-    }
-    if (name == "--driver") {
-      options.driver = value();
-    } else if (name == "--slow") {
-      options.speeds.slow = partOf(name, value());
-    } else if (name == "--fast") {
-      options.speeds.fast = partOf(name, value());
-    } else if (name == "--wizard") {
-      options.wizard = true;
-    } else if (name == "--axis") {
-      options.wizard_options.axis = for_wizard = value();
-    } else if (name == "--output") {
-      options.wizard_options.output = for_wizard = value();
-    } else if (name == "--overwrite") {
-      options.wizard_options.overwrite = true;
-      for_wizard = name;
-    } else {
-      throw Error(name + " isn't known");
-    }
-  }
-  if (!options.wizard && !for_wizard.empty()) {
+  WizardOptions& wizard = options.wizard_options;
+  po::options_description known;
+  auto add = known.add_options();
+  add("help,h", po::bool_switch(&options.help));
+  add("driver", po::value(&options.driver));
+  add("slow", po::value<std::string>());
+  add("fast", po::value<std::string>());
+  add("wizard", po::bool_switch(&options.wizard));
+  add("axis", po::value(&wizard.axis));
+  add("output", po::value(&wizard.output));
+  add("overwrite", po::bool_switch(&wizard.overwrite));
+  const po::variables_map values = readCommandLine(known, arguments);
+  if (options.help) return options;
+  readPart(values, "slow", options.speeds.slow);
+  readPart(values, "fast", options.speeds.fast);
+  const bool for_wizard = values.count("axis") + values.count("output") > 0 || wizard.overwrite;
+  if (for_wizard && !options.wizard) {
     throw Error("--axis, --output and --overwrite go with --wizard");
   }
   return options;
