@@ -187,6 +187,9 @@ build_catkin() {
   configure_catkin &&
     cmake --build "$build/catkin" -j "$jobs"
 }
+# What is there to be used. The devel space is for the tests: below the sources as it is, roslaunch
+# finds the launch files twice there, and rosrun no program.
+install_catkin() { cmake --install "$build/catkin"; }
 
 # ---- ROS ----
 

@@ -8,11 +8,12 @@ usage() {
   cat <<'END'
 usage: scripts/demo.sh [--installed]
 
-Installs what is missing, builds the package, launches one axis on the simulated rig, enables it,
-moves it 1000 steps forward and back by rosservice call, and shows what was commanded, what the
-pins did and where the axis is. Writes the pin trace to a file. Exit code 0: all of that agrees.
+Installs what is missing, builds the package into build/install, launches one axis on the simulated
+rig, enables it, moves it 1000 steps forward and back by rosservice call, and shows what was
+commanded, what the pins did and where the axis is. Writes the pin trace to a file. Exit code 0: all
+of that agrees.
 
-  --installed  builds nothing: runs the package that scripts/test.sh has installed
+  --installed  builds nothing: runs what is in build/install
 END
 }
 
@@ -77,14 +78,13 @@ move() {
 
 choose_build_folder
 install_packages core ros trace
-setup=$build/install
 if [[ -z $installed ]]; then
-  setup=$build/catkin/devel
   rm -rf "$ROS_HOME/log"
   say "Building (a minute or two the first time)"
   quietly build build_catkin
+  quietly install install_catkin
 fi
-use_ros "$setup"
+use_ros "$build/install"
 
 trace=$build/demo/axis.vcd
 log=$build/demo/roslaunch.log
@@ -142,4 +142,4 @@ else
 fi
 
 ((problems == 0)) || die "$problems thing(s) above went wrong"
-say "" "All of it agrees. To go on by hand, in each terminal first:" "    source $setup/setup.bash"
+say "" "All of it agrees. To go on by hand, in each terminal first:" "    source $build/install/setup.bash"

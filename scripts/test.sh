@@ -228,7 +228,7 @@ test_check_in_kernel() {
 check_install() {
   local share=$build/install/share/stepdriver launch_file program
   rm -rf "$build/install"
-  quietly install cmake --install "$build/catkin"
+  quietly install install_catkin
   use_ros "$build/install"
   [[ $(rospack find stepdriver) == "$share" ]] || die "rospack doesn't find $share"
   for launch_file in "$share"/launch/*.launch "$share"/launch/examples/*.launch; do
@@ -256,9 +256,9 @@ check_operations() {
   bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
-# The commands of the pages, with what was built.
+# The commands of the pages, with what was installed.
 check_docs() {
-  use_ros "$build/catkin/devel"
+  use_ros "$build/install"
   /usr/bin/python3 -B "$root/test/docs/commands_test.py"
 }
 
@@ -304,7 +304,7 @@ if wants ros; then
   stage install check_install node-build
   stage operations check_operations install
   stage trace check_trace install
-  stage docs check_docs node-build
+  stage docs check_docs install
 fi
 
 say "" "$summary"

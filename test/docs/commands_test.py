@@ -95,7 +95,7 @@ class Page:
     def here(self, command):
         """What the page supposes where it is on this machine."""
         here = {
-            "build/catkin/devel": os.environ["CMAKE_PREFIX_PATH"].split(":")[0],
+            "build/install": os.environ["CMAKE_PREFIX_PATH"].split(":")[0],
             "/path/to/": f"{self.folder}/",
             "/tmp/": f"{self.folder}/",
         }
