@@ -6,25 +6,27 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test_in_root.sh bookworm|trixie|focal [--keep]
+usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--keep]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
-copies the checkout into a folder of it whose path has a space, and runs scripts/demo.sh and
-scripts/test.sh there as root, without a terminal; on Ubuntu without the parts that need Debian's
-kernel source and clang: --core and --ros. Prints both exit codes, and is 0 where both are 0. Needs
-root.
+copies the checkout into a folder of it, and runs scripts/demo.sh, scripts/test.sh and the demo again
+there as root, without a terminal; on Ubuntu without the parts that need Debian's kernel source and
+clang: --core and --ros. Prints their exit codes, and is 0 where all are 0. Needs root.
 
 The base root is kept in ~/.cache/stepdriver/roots (STEPDRIVER_ROOTS names another folder) for
 the next time; the copy that is worked in is removed at the end.
 
-  --keep  doesn't remove it, and says where it is
+  --blank  into a folder whose path has a blank: catkin can't build there, and the build goes
+           elsewhere
+  --keep   doesn't remove it, and says where it is
 END
 }
 
-suite='' keep=
+suite='' keep='' checkout=/home/user/stepdriver
 for argument; do
   case $argument in
     bookworm | trixie | focal) suite=$argument ;;
+    --blank) checkout="/home/new user/step driver" ;;
     --keep) keep=1 ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
@@ -98,7 +100,6 @@ deb $mirror $suite-updates ${components/,/ }
 deb $security_suite ${components/,/ }
 END
 
-checkout="/home/new user/step driver"
 mkdir -p "$work$checkout"
 if git -C "$root" rev-parse --is-inside-work-tree >/dev/null 2>&1; then
   (cd "$root" && git ls-files -z --cached --others --exclude-standard) |
@@ -133,7 +134,7 @@ in_root() {
 
 exit_codes=''
 worst=0
-for command in demo.sh "test.sh ${parts[*]}"; do
+for command in demo.sh "test.sh ${parts[*]}" demo.sh; do
   say "" "######## $suite: scripts/$command"
   start=$SECONDS
   # shellcheck disable=SC2086
