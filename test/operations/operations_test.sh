@@ -29,7 +29,11 @@ scratch=$(mktemp -d)
 jobs_started=()
 finish() {
   local status=$? job
-  for job in "${jobs_started[@]}"; do kill -KILL "$job" 2>/dev/null || true; done
+  # Where it is killed, a roscore leaves its master behind.
+  kill -TERM "${jobs_started[@]}" 2>/dev/null || true
+  for job in "${jobs_started[@]}"; do
+    timeout 15 tail --pid="$job" -f /dev/null || kill -KILL "$job" 2>/dev/null || true
+  done
   rm -rf "$scratch"
   exit "$status"
 }
