@@ -56,22 +56,24 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
 
   void publishResult(const actionlib_msgs::GoalStatus& status, const Result& result) override {
     const Lock lock(this->lock_);
-    ActionResult message;
-    message.header.stamp = ros::Time::now();
-    message.status = status;
-    message.result = result;
-    result_publisher_.publish(message);
+    send(result_publisher_, status, &ActionResult::result, result);
     publishStatus();
   }
 
   void publishFeedback(const actionlib_msgs::GoalStatus& status,
                        const Feedback& feedback) override {
     const Lock lock(this->lock_);
-    ActionFeedback message;
+    send(feedback_publisher_, status, &ActionFeedback::feedback, feedback);
+  }
+
+  template <typename Message, typename Content>
+  static void send(const ros::Publisher& publisher, const actionlib_msgs::GoalStatus& status,
+                   Content Message::*place, const Content& content) {
+    Message message;
     message.header.stamp = ros::Time::now();
     message.status = status;
-    message.feedback = feedback;
-    feedback_publisher_.publish(message);
+    message.*place = content;
+    publisher.publish(message);
   }
 
   void publishStatus() override {
