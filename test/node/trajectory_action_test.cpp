@@ -234,6 +234,25 @@ TEST_F(TrajectoryActionTest, GoalsOfOtherJointsRunSideBySide) {
   EXPECT_EQ(node.pulses(), 2400 + 800);
 }
 
+TEST_F(TrajectoryActionTest, ACancelLeavesTheGoalsOfOtherJointsAlone) {
+  start(1.0);
+  TrajectoryClient other(node.full("follow_joint_trajectory"), false);
+  ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  Goal of_x = goalOf({{4.0, {0.15}, {0.0}}});
+  of_x.trajectory.joint_names = {"x_joint"};
+  Goal of_y = goalOf({{4.0, {0.08}, {0.0}}});
+  of_y.trajectory.joint_names = {"y_joint"};
+  send(of_x);
+  other.sendGoal(of_y);
+  ASSERT_TRUE(states.waitFor(
+      [](const AxisStates& s) { return s.position.at(0) > 0.001 && s.position.at(1) > 0.001; }));
+  other.cancelGoal();
+  EXPECT_EQ(await(), State::SUCCEEDED) << said();
+  ASSERT_TRUE(other.waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(other.getState(), State::PREEMPTED) << other.getResult()->error_string;
+}
+
 TEST_F(TrajectoryActionTest, EndsAbortedWhereAMoveTakesOver) {
   start(1.0);
   send(there(0.15, 4.0));

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <regex>
+#include <stdexcept>
 #include <utility>
 
 #include "stepdriver_core/gpio/libgpiod_lines.h"
