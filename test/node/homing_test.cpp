@@ -1,4 +1,5 @@
 #include <actionlib/client/simple_action_client.h>
+#include <actionlib_msgs/GoalStatus.h>
 #include <gtest/gtest.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
@@ -244,6 +245,27 @@ TEST_F(HomingAction, IsReplacedByANewerGoal) {
   EXPECT_EQ(newer.getState(), actionlib::SimpleClientGoalState::SUCCEEDED)
       << newer.getResult()->message;
   expectStandsHomed(newer.getResult()->position);
+}
+
+TEST_F(HomingAction, IsNotReplacedByAnOlderGoalThatComesLater) {
+  node.set("simulation/speed", 4.0);
+  start();
+  const Recorder<HomeActionResult> results(node.full("x/homing/result"));
+  auto goals = ros::NodeHandle().advertise<HomeActionGoal>(node.full("x/homing/goal"), 1);
+  ASSERT_TRUE(waitUntil([&] { return goals.getNumSubscribers() > 0 && results.connected(); }));
+  send();
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 100 && told("seeking"); }));
+  HomeActionGoal older;
+  older.goal_id.id = "older";
+  older.goal_id.stamp = ros::Time::now() - ros::Duration(60.0);
+  goals.publish(older);
+  EXPECT_TRUE(results.waitFor([](const HomeActionResult& result) {
+    return result.status.goal_id.id == "older" &&
+           result.status.status == actionlib_msgs::GoalStatus::RECALLED;
+  }));
+  ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::SUCCEEDED)
+      << client->getResult()->message;
 }
 
 }  // namespace

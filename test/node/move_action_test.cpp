@@ -1,4 +1,5 @@
 #include <actionlib/client/simple_action_client.h>
+#include <actionlib_msgs/GoalStatusArray.h>
 #include <gtest/gtest.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
@@ -210,6 +211,17 @@ TEST_F(MoveActionTest, EveryClientSeesTheSameState) {
   EXPECT_EQ(await(*client), State::SUCCEEDED);
   EXPECT_TRUE(states.waitForLatest(
       [](const AxisStates& s) { return s.moving.at(0) == 0 && s.position.at(0) == 0.1; }));
+}
+
+TEST_F(MoveActionTest, AGoalIsInTheStatusUntilFiveSecondsAfterItsEnd) {
+  start();
+  const Recorder<actionlib_msgs::GoalStatusArray> statuses(node.full("x/move/status"));
+  EXPECT_EQ(run(goalTo(0.01)), State::SUCCEEDED);
+  EXPECT_TRUE(statuses.waitForLatest([](const auto& now) {
+    return now.status_list.size() == 1 &&
+           now.status_list[0].status == actionlib_msgs::GoalStatus::SUCCEEDED;
+  }));
+  EXPECT_TRUE(statuses.waitForLatest([](const auto& now) { return now.status_list.empty(); }));
 }
 
 TEST_F(MoveActionTest, EndsAbortedByAStopAnEndstopOrAnEmergencyStop) {
