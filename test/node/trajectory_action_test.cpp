@@ -49,6 +49,13 @@ Goal goalOf(const std::vector<Point>& points) {
   return goal;
 }
 
+/// Of one joint alone, to rest there.
+Goal ofOne(const std::string& joint, double position, double duration) {
+  Goal goal = goalOf({{duration, {position}, {0.0}}});
+  goal.trajectory.joint_names = {joint};
+  return goal;
+}
+
 /// From rest at 0 to rest there, with x at twice the speed of y.
 Goal there(double x, double duration) {
   return goalOf({{0.0, {0.0, 0.0}, {0.0, 0.0}}, {duration, {x, 0.5 * x}, {0.0, 0.0}}});
@@ -222,12 +229,8 @@ TEST_F(TrajectoryActionTest, GoalsOfOtherJointsRunSideBySide) {
   start(1.0);
   TrajectoryClient other(node.full("follow_joint_trajectory"), false);
   ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
-  Goal of_x = goalOf({{1.0, {0.03}, {0.0}}});
-  of_x.trajectory.joint_names = {"x_joint"};
-  Goal of_y = goalOf({{0.5, {0.01}, {0.0}}});
-  of_y.trajectory.joint_names = {"y_joint"};
-  send(of_x);
-  other.sendGoal(of_y);
+  send(ofOne("x_joint", 0.03, 1.0));
+  other.sendGoal(ofOne("y_joint", 0.01, 0.5));
   EXPECT_EQ(await(), State::SUCCEEDED) << said();
   ASSERT_TRUE(other.waitForResult(ros::Duration(kBound.count())));
   EXPECT_EQ(other.getState(), State::SUCCEEDED) << other.getResult()->error_string;
@@ -239,12 +242,8 @@ TEST_F(TrajectoryActionTest, ACancelLeavesTheGoalsOfOtherJointsAlone) {
   TrajectoryClient other(node.full("follow_joint_trajectory"), false);
   ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
   const Recorder<AxisStates> states(node.full("axis_states"));
-  Goal of_x = goalOf({{4.0, {0.15}, {0.0}}});
-  of_x.trajectory.joint_names = {"x_joint"};
-  Goal of_y = goalOf({{4.0, {0.08}, {0.0}}});
-  of_y.trajectory.joint_names = {"y_joint"};
-  send(of_x);
-  other.sendGoal(of_y);
+  send(ofOne("x_joint", 0.15, 4.0));
+  other.sendGoal(ofOne("y_joint", 0.08, 4.0));
   ASSERT_TRUE(states.waitFor(
       [](const AxisStates& s) { return s.position.at(0) > 0.001 && s.position.at(1) > 0.001; }));
   other.cancelGoal();
