@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stepdriver_core/motion/along.h"
+#include "stepdriver_core/motion/compose.h"
 #include "stepdriver_core/motion/spline.h"
 #include "stepdriver_core/motion/step_finder.h"
 #include "support/exact_steps.h"

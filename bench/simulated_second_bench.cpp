@@ -15,8 +15,8 @@ namespace {
 constexpr double kStepsPerUnit = 16'000.0;
 constexpr double kSpeed = 1.0;  // 16,000 steps/s
 
-axis::AxisConfig fastAxis(std::int64_t index) {
-  axis::AxisConfig config = test::linearAxis("a" + std::to_string(index));
+config::AxisConfig fastAxis(std::int64_t index) {
+  config::AxisConfig config = test::linearAxis("a" + std::to_string(index));
   config.steps_per_unit = kStepsPerUnit;
   config.max_speed = kSpeed;
   config.acceleration = 10.0;
@@ -28,7 +28,7 @@ axis::AxisConfig fastAxis(std::int64_t index) {
 
 /// Each axis goes there and back; items are simulated seconds.
 void simulatedSeconds(benchmark::State& state) {
-  std::vector<axis::AxisConfig> axes;
+  std::vector<config::AxisConfig> axes;
   for (std::int64_t i = 0; i < state.range(0); ++i) axes.push_back(fastAxis(i));
   pulse::VirtualClock clock;
   sim::Rig rig(test::Bench::rigAxes(axes));
@@ -47,7 +47,7 @@ void simulatedSeconds(benchmark::State& state) {
     for (std::size_t i = 0; i < moves.size(); ++i) machine.axes()[i]->wait(moves[i]);
   }
   state.SetItemsProcessed((clock.now() - begin) / 1'000'000'000);
-  for (const axis::AxisConfig& config : axes) {
+  for (const config::AxisConfig& config : axes) {
     const sim::RigAxisReport seen = rig.report(config.name);
     const auto steps = static_cast<std::int64_t>(target * kStepsPerUnit);
     if (seen.pulses_forward - seen.pulses_backward != steps) state.SkipWithError("missing pulses");

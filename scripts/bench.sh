@@ -19,10 +19,10 @@ held, and no pulse was shorter, no step closer than allowed.
 END
 }
 
-repetitions=15 seconds=0.05 paced=(--seconds 1)
+repetitions=15 seconds=0.05 paced=(--seconds 1) latency=()
 case ${1:-} in
   '') ;;
-  --quick) repetitions=1 seconds=0.01 paced=(--quick --seconds 0.1) ;;
+  --quick) repetitions=1 seconds=0.01 paced=(--quick --seconds 0.1) latency=(--calls 20 --seconds 1 --points 3000) ;;
   -h | --help) usage && exit ;;
   *) usage >&2 && exit 2 ;;
 esac
@@ -51,6 +51,9 @@ for program in "$bench"/core/bench/*_bench; do
   say "Running ${program##*/}"
   quietly "${program##*/}" run_bench "$program"
 done
+
+say "Running stop_latency"
+quietly stop_latency "$bench/core/bench/stop_latency" "${latency[@]}" --json "$bench/stop_latency_bench.json"
 
 # Only where it is on this machine: the core's figures need no ROS.
 if [[ -x /usr/bin/roscore || -x /usr/bin/catkin_make ]]; then

@@ -8,7 +8,7 @@ usage() {
   cat <<'END'
 usage: scripts/motion_pictures.sh [--check]
 
-Builds the core's test motion_pictures_test, runs it for its traces, and draws docs/pictures from
+Builds the core's machine_tests, runs MotionPictures of them for its traces, and draws docs/pictures from
 them. Installs what is missing for that.
 
   --check  draws them elsewhere, and looks whether docs/motion.md shows each of them and no other.
@@ -34,8 +34,9 @@ rm -rf "$traces" "$build/pictures"
 mkdir -p "$traces" "$pictures"
 
 quietly pictures-configure configure_core
-quietly pictures-build cmake --build "$build/core" -j "$jobs" --target motion_pictures_test
-STEPDRIVER_TRACES=$traces quietly pictures-traces "$build/core/test/core/motion_pictures_test"
+quietly pictures-build cmake --build "$build/core" -j "$jobs" --target machine_tests
+STEPDRIVER_TRACES=$traces quietly pictures-traces "$build/core/test/core/machine_tests" \
+  --gtest_filter='MotionPictures.*'
 /usr/bin/python3 "$root/scripts/motion_pictures.py" "$traces" "$pictures"
 [[ -n $check ]] || exit 0
 

@@ -10,8 +10,10 @@ usage: scripts/node_bench.sh [AXES...]
 
 For each number of axes (default: 6 32) starts a node with that many on the simulated rig and writes to
 build/bench/node_AXES_bench.json how long it took to start, the processor time and the memory that it
-uses at rest, and how long its move_to takes next to an empty service. STEPDRIVER_CATKIN names a build of
-the package to take; without, it is built.
+uses at rest, and how long its move_to takes next to an empty service. Then, to
+build/bench/node_preparing_bench.json, how long stop and emergency_stop take while two clients have a node
+with three axes prepare trajectories of 300,000 points. STEPDRIVER_CATKIN names a build of the package to
+take; without, it is built.
 END
 }
 
@@ -52,10 +54,15 @@ for ((i = 0; i < 300; i++)); do
   sleep 0.1
 done
 
-for axes; do
-  configuration "$axes" >"$build/bench/node_$axes.yaml"
+bench=$catkin/devel/lib/stepdriver/node_bench node=$catkin/devel/lib/stepdriver/stepdriver_node
+set_parameters() {
+  configuration "$1" >"$build/bench/node_$1.yaml"
   rosparam delete /stepdriver >/dev/null 2>&1 || true
-  rosparam load "$build/bench/node_$axes.yaml" /stepdriver
-  quietly "node-bench-$axes" "$catkin/devel/lib/stepdriver/node_bench" \
-    "$catkin/devel/lib/stepdriver/stepdriver_node" "$axes" "$build/bench/node_${axes}_bench.json"
+  rosparam load "$build/bench/node_$1.yaml" /stepdriver
+}
+for axes; do
+  set_parameters "$axes"
+  quietly "node-bench-$axes" "$bench" "$node" "$axes" "$build/bench/node_${axes}_bench.json"
 done
+set_parameters 3
+quietly node-bench-preparing "$bench" --preparing "$node" "$build/bench/node_preparing_bench.json"

@@ -12,12 +12,13 @@ Installs what is missing, builds, and runs the parts that are named; all of them
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files; doxygen over the
           public headers; links of the pages, and the files that they name
-  --core  stepdriver_core and its tests, built alone, as on a machine without ROS; what of its
-          benchmarks is exact; the pictures of docs/motion.md from what that build does
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that find
+          it installed; what of its benchmarks is exact; the pictures of docs/motion.md from what that
+          build does
   --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
           (test/kernel), with each libgpiod that this Debian has; takes --core in
   --ros   the catkin package, its rostests, its install space with all its commands and its service,
-          and the trace of a move from there, read by sigrok-cli; the commands of the pages; with
+          and a package that depends on it, and the trace of a move from there, read by sigrok-cli; the commands of the pages; with
           --kernel also the whole node on that kernel's GPIO chips
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
@@ -93,7 +94,8 @@ check_format() {
 }
 
 check_shell() {
-  (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/operations/*.sh .ci/run)
+  (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/library/*.sh \
+    test/operations/*.sh .ci/run)
 }
 
 check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
@@ -105,9 +107,9 @@ check_tidy() {
   local status=0
   quietly tidy-configure configure_tidy
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | compiled_by "$build/core" |
-    tidy "$build/core" || status=1
+    tidy core || status=1
   own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/' |
-    tidy "$build/catkin" || status=1
+    tidy catkin || status=1
   return "$status"
 }
 compiled_by() {
@@ -120,8 +122,12 @@ configure_tidy() {
   configure_core -DSTEPDRIVER_BENCH=ON && configure_catkin &&
     cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
 }
+# clang can't read the headers that gcc has precompiled.
 tidy() {
-  sed "s|^|$src/|" | xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$1" \
+  mkdir -p "$build/tidy/$1"
+  sed -E 's| -Winvalid-pch||; s| -include [^ ]*/cmake_pch[.]hxx||' "$build/$1/compile_commands.json" \
+    >"$build/tidy/$1/compile_commands.json"
+  sed "s|^|$src/|" | xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$build/tidy/$1" \
     --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
 
@@ -153,10 +159,8 @@ test_kernel() {
   test_waveform_in_kernel "$build/core"
 }
 test_lines_in_kernel() {
-  local test
-  for test in lines_conformance_test libgpiod_lines_test; do
-    STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 -- "$1/test/core/$test"
-  done
+  STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 -- "$1/test/core/gpio_tests" \
+    --gtest_filter='*LinesConformance.*:Libgpiod*'
 }
 
 # Whole machines there, held against what the kernel's own trace says of their pulses.
@@ -191,8 +195,8 @@ test_kernel_gpiod2() {
 build_gpiod2() {
   cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DSTEPDRIVER_GPIOD=2 \
     -DSTEPDRIVER_GPIOD_ROOT="$1" &&
-    cmake --build "$build/gpiod2" -j "$jobs" --target lines_conformance_test libgpiod_lines_test \
-      machine_waveform_test step_times_test write_cost
+    cmake --build "$build/gpiod2" -j "$jobs" --target gpio_tests machine_waveform_test \
+      step_times_test write_cost
 }
 
 build_node() {
@@ -256,6 +260,12 @@ check_operations() {
   bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
+# A catkin package that depends on what was installed.
+check_dependent() {
+  use_ros "$build/install"
+  bash "$src/test/library/catkin_test.sh" "$build/install"
+}
+
 # The commands of the pages, with what was installed.
 check_docs() {
   use_ros "$build/install"
@@ -302,6 +312,7 @@ if wants ros; then
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
   stage install check_install node-build
+  stage dependent check_dependent install
   stage operations check_operations install
   stage trace check_trace install
   stage docs check_docs install

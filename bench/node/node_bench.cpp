@@ -1,6 +1,7 @@
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
 #include <signal.h>
+#include <std_srvs/Trigger.h>
 #include <stepdriver/MoveTo.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -17,12 +19,25 @@
 #include <thread>
 #include <vector>
 
+#ifdef STEPDRIVER_HAS_CONTROL_MSGS
+#include <control_msgs/FollowJointTrajectoryAction.h>
+namespace trajectory_messages = control_msgs;
+#else
+#include <stepdriver/FollowJointTrajectoryAction.h>
+namespace trajectory_messages = stepdriver;
+#endif
+
 // What the node costs: how long its start and a service call take, and what it uses at rest.
 // scripts/node_bench.sh starts a master, sets the node's parameters and calls it:
 //
 //   node_bench stepdriver_node AXES OUT.JSON
 //   node_bench --serve AXES                    a node of roscpp's that does nothing else: an empty
 //                                              service, and joint_states of as many axes at 50 Hz
+//   node_bench --preparing stepdriver_node OUT.JSON [SECONDS POINTS]
+//                                              how long a stop and an emergency stop take of a node
+//                                              with three axes while it prepares trajectories
+//   node_bench --send NUMBER POINTS            a client that sends it trajectories, one after
+//   another
 
 namespace {
 
@@ -181,6 +196,116 @@ Idle measureIdle(pid_t node, pid_t empty, const std::atomic<int>& states) {
           100.0 * (processorTime(empty) - empty_before) / idle, (states - states_before) / idle};
 }
 
+/// A slow wave of three axes, a point each 10 ms, that begins and ends at rest.
+trajectory_messages::FollowJointTrajectoryActionGoal longGoal(int points) {
+  constexpr double kPeriod = 0.01;     // [s]
+  constexpr double kAmplitude = 0.01;  // [m]
+  constexpr double kRate = 0.5;        // [rad/s]
+  const double duration = kPeriod * points;
+  const auto positionAt = [duration](double time) {
+    const double begun = std::clamp(time, 0.0, 1.0);
+    const double left = std::clamp(duration - time, 0.0, 1.0);
+    return kAmplitude * begun * begun * left * left * std::sin(kRate * time);
+  };
+  trajectory_messages::FollowJointTrajectoryActionGoal goal;
+  goal.goal.trajectory.joint_names = {"a0_joint", "a1_joint", "a2_joint"};
+  goal.goal.trajectory.points.resize(static_cast<std::size_t>(points));
+  for (int i = 1; i <= points; ++i) {
+    const double time = kPeriod * i;
+    const double velocity = (positionAt(time + 1e-4) - positionAt(time - 1e-4)) / 2e-4;
+    auto& point = goal.goal.trajectory.points[static_cast<std::size_t>(i - 1)];
+    point.time_from_start = ros::Duration(time);
+    point.positions.assign(3, positionAt(time));
+    point.velocities.assign(3, i < points ? velocity : 0.0);
+  }
+  return goal;
+}
+
+/// The next goal goes out when the last one has its result.
+int sendTrajectories(int argc, char** argv, const std::string& number, int points) {
+  ros::init(argc, argv, "sender_" + number);
+  ros::NodeHandle handle("/stepdriver/follow_joint_trajectory");
+  auto goal = longGoal(points);
+  int sent = 0;
+  auto publisher =
+      handle.advertise<trajectory_messages::FollowJointTrajectoryActionGoal>("goal", 1);
+  const auto sendNext = [&] {
+    goal.goal_id.id = number + "_" + std::to_string(++sent);
+    publisher.publish(goal);
+  };
+  const auto subscriber = handle.subscribe<trajectory_messages::FollowJointTrajectoryActionResult>(
+      "result", 100,
+      [&](const trajectory_messages::FollowJointTrajectoryActionResult::ConstPtr& result) {
+        if (result->status.goal_id.id == goal.goal_id.id) sendNext();
+      });
+  while (ros::ok() && (publisher.getNumSubscribers() == 0 || subscriber.getNumPublishers() == 0)) {
+    ros::WallDuration(0.01).sleep();
+  }
+  sendNext();
+  ros::spin();
+  return 0;
+}
+
+/// [ms] Of calls of a service with no request, for as long as it takes to make enough of them.
+std::vector<double> triggerTimes(ros::NodeHandle& handle, const std::string& service,
+                                 const std::string& after, double seconds) {
+  constexpr std::size_t kCalls = 1000;
+  auto client = handle.serviceClient<std_srvs::Trigger>("/stepdriver/" + service, true);
+  auto client_after = handle.serviceClient<std_srvs::Trigger>("/stepdriver/" + after, true);
+  std::vector<double> times;
+  const auto begin = SteadyTime::now();
+  while (times.size() < kCalls && (times.empty() || secondsSince(begin) < seconds)) {
+    ros::WallDuration(0.005 + 0.001 * static_cast<double>(times.size() % 7)).sleep();
+    std_srvs::Trigger call;
+    const auto called = SteadyTime::now();
+    if (!client.call(call)) throw std::runtime_error(service + " doesn't answer");
+    times.push_back(secondsSince(called) * 1e3);
+    if (!after.empty() && !client_after.call(call)) {
+      throw std::runtime_error(after + " doesn't answer");
+    }
+  }
+  return times;
+}
+
+double percentile99(std::vector<double> samples) {
+  std::sort(samples.begin(), samples.end());
+  return samples[std::min(samples.size() - 1, samples.size() * 99 / 100)];
+}
+
+int measurePreparing(const std::string& self, const std::string& program, const std::string& out,
+                     double seconds, const std::string& points) {
+  ros::NodeHandle handle;
+  const Child node({program, "__name:=stepdriver"});
+  if (!ros::service::waitForService("/stepdriver/emergency_stop", 60000)) {
+    throw std::runtime_error("the node doesn't come up");
+  }
+  std::atomic<int> results{0};
+  const auto subscriber = handle.subscribe<trajectory_messages::FollowJointTrajectoryActionResult>(
+      "/stepdriver/follow_joint_trajectory/result", 100,
+      [&](const trajectory_messages::FollowJointTrajectoryActionResult::ConstPtr&) { ++results; });
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  const Child first({self, "--send", "1", points});
+  const Child second({self, "--send", "2", points});
+  // One of them is under way when a stop ends it.
+  const auto begin = SteadyTime::now();
+  auto stop = handle.serviceClient<std_srvs::Trigger>("/stepdriver/stop", true);
+  for (std_srvs::Trigger call; results == 0; ros::WallDuration(0.1).sleep()) {
+    if (!stop.call(call)) throw std::runtime_error("stop doesn't answer");
+    if (secondsSince(begin) > 120.0) throw std::runtime_error("no trajectory has come to an end");
+  }
+  const std::vector<double> stops = triggerTimes(handle, "stop", "", seconds);
+  const std::vector<double> emergency_stops =
+      triggerTimes(handle, "emergency_stop", "recover", seconds);
+  std::ofstream(out) << "{\"benchmarks\": [{\"name\": \"Node/preparing\""
+                     << ", \"stop_p99_ms\": " << percentile99(stops)
+                     << ", \"stop_calls\": " << stops.size()
+                     << ", \"emergency_stop_p99_ms\": " << percentile99(emergency_stops)
+                     << ", \"emergency_stop_calls\": " << emergency_stops.size()
+                     << ", \"results\": " << results << "}]}\n";
+  return 0;
+}
+
 int measure(const std::string& self, const std::string& program, int axes, const std::string& out) {
   ros::NodeHandle handle;
   std::atomic<int> states{0};
@@ -238,12 +363,20 @@ int main(int argc, char** argv) {
   if (argc == 3 && std::string(argv[1]) == "--serve") {
     return serve(argc, argv, std::stoul(argv[2]));
   }
-  if (argc != 4) {
+  if (argc == 4 && std::string(argv[1]) == "--send") {
+    return sendTrajectories(argc, argv, argv[2], std::atoi(argv[3]));
+  }
+  const bool preparing = argc >= 4 && std::string(argv[1]) == "--preparing";
+  if (preparing ? argc != 4 && argc != 6 : argc != 4) {
     std::fprintf(stderr, "usage: node_bench stepdriver_node AXES OUT.JSON\n");
     return 2;
   }
   ros::init(argc, argv, "node_bench", ros::init_options::NoSigintHandler);
   try {
+    if (preparing) {
+      return measurePreparing(argv[0], argv[2], argv[3], argc == 6 ? std::atof(argv[4]) : 60.0,
+                              argc == 6 ? argv[5] : "300000");
+    }
     return measure(argv[0], argv[1], std::atoi(argv[2]), argv[3]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "node_bench: %s\n", error.what());

@@ -12,6 +12,9 @@ struct Allocations {
 
 Allocations allocations();
 
+/// [bytes] That are in use.
+std::int64_t allocatedNow();
+
 inline Allocations operator-(const Allocations& a, const Allocations& b) {
   return {a.count - b.count, a.bytes - b.bytes};
 }

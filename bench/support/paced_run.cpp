@@ -17,8 +17,8 @@
 #include "stepdriver_core/motion/profile.h"
 #include "stepdriver_core/motion/step_finder.h"
 #include "stepdriver_core/pulse/cpu_latency.h"
-#include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
+#include "stepdriver_core/pulse/pulse_thread.h"
 #include "stepdriver_core/pulse/realtime.h"
 #include "support/free_hardware.h"
 
@@ -103,10 +103,10 @@ Plan planned(Nanoseconds begin, int axes, double rate, double seconds) {
 }
 
 // Where the machine stalls for so long that the engine has the order too late, it is made again.
-Plan start(pulse::PulseDriver& driver, int axes, double rate, double seconds) {
+Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rate, double seconds) {
   Nanoseconds ahead = kBegin;
   for (std::uint64_t serial = 1;; ++serial, ahead *= 2) {
-    Plan plan = planned(driver.motionNow() + ahead, axes, rate, seconds);
+    Plan plan = planned(clock.now() - engine.state().slipped + ahead, axes, rate, seconds);
     std::vector<pulse::Follow> follows(plan.profiles.size());
     for (std::size_t i = 0; i < follows.size(); ++i) {
       follows[i].channel = static_cast<int>(i);
@@ -116,10 +116,12 @@ Plan start(pulse::PulseDriver& driver, int axes, double rate, double seconds) {
     pulse::Command command;
     command.follows = follows.data();
     command.follow_count = follows.size();
-    driver.post(command);
+    while (!engine.post(command)) std::this_thread::yield();
     // Of the channels of an order the first one is told last.
-    driver.waitFor([&] { return driver.engine().channel(0).taken == serial; });
-    if (driver.engine().channel(0).refused != serial) return plan;
+    while (engine.channel(0).taken != serial) {
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    }
+    if (engine.channel(0).accepted == serial) return plan;
   }
 }
 
@@ -163,21 +165,21 @@ PacedFigures runPaced(int axes, double rate, double seconds) {
   PacedLines lines(axes, 2 * steps + 2);
   pulse::PulseEngine engine(lines, clock, channelsOf(axes), kMaxLateness);
   lines.serve(engine);
-  pulse::PulseDriver driver(engine, clock, true);
+  pulse::PulseThread thread(engine, clock);
 
-  const Plan plan = start(driver, axes, rate, seconds);
+  const Plan plan = start(engine, clock, axes, rate, seconds);
   const double used = processSeconds();
   for (int i = 0; i < axes; ++i) {
     while (engine.channel(i).following != 0) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   }
-  const double elapsed = static_cast<double>(driver.clock().now() - plan.begin) * 1e-9;
+  const double elapsed = static_cast<double>(clock.now() - plan.begin) * 1e-9;
 
   PacedFigures figures;
   figures.cpu = (processSeconds() - used) / elapsed;
-  figures.scheduler_error = driver.rights().scheduler_error;
-  driver.stop();
+  figures.scheduler_error = thread.rights().scheduler_error;
+  thread.stop();
   for (int i = 0; i < axes; ++i) {
     take(figures, lines.edgesOf(static_cast<std::size_t>(i)),
          *plan.profiles[static_cast<std::size_t>(i)]);

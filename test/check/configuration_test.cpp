@@ -16,7 +16,7 @@
 namespace stepdriver::check {
 namespace {
 
-using ros_node::GpioBackend;
+using setup::GpioBackend;
 
 class Configuration : public testing::Test {
  protected:
@@ -104,9 +104,9 @@ TEST_F(Configuration, HasTheRealtimePolicyByItselfOrInAMap) {
   EXPECT_TRUE(map.enforce_realtime);
   EXPECT_DOUBLE_EQ(map.max_lateness, 0.002);
   EXPECT_FALSE(policy("realtime: {max_lateness_ms: 2}\n").enforce_realtime);
-  EXPECT_EQ(latencyDevice(policy("realtime: enforce\n")), "/dev/cpu_dma_latency");
-  EXPECT_EQ(latencyDevice(map), "/dev/cpu_dma_latency");
-  EXPECT_EQ(latencyDevice(policy("realtime: {keep_cpus_awake: false}\n")), "");
+  EXPECT_EQ(policy("realtime: enforce\n").options().latency_device, "/dev/cpu_dma_latency");
+  EXPECT_EQ(map.options().latency_device, "/dev/cpu_dma_latency");
+  EXPECT_EQ(policy("realtime: {keep_cpus_awake: false}\n").options().latency_device, "");
 }
 
 }  // namespace

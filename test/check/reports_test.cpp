@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/text.h"
 #include "lines_report.h"
 #include "move.h"
 #include "options.h"
@@ -11,7 +12,6 @@
 #include "stepdriver_core/error.h"
 #include "system_report.h"
 #include "table.h"
-#include "text.h"
 
 namespace stepdriver::check {
 namespace {
@@ -25,13 +25,13 @@ TEST(Table, HasColumnsAsWideAsTheirWidestWord) {
 }
 
 TEST(NumberText, HasSixDigitsAndAnExponentOnlyWhereNobodyWouldReadTheZeros) {
-  using ros_node::numberText;
-  EXPECT_EQ(numberText(0.5), "0.5");
-  EXPECT_EQ(numberText(-1.0 / 3.0), "-0.333333");
-  EXPECT_EQ(numberText(99999.96), "100000");
-  EXPECT_EQ(numberText(1234567.8), "1234568");
-  EXPECT_EQ(numberText(-9e15), "-9000000000000000");
-  EXPECT_EQ(numberText(1e300), "1e+300");
+  using ros_node::roundedText;
+  EXPECT_EQ(roundedText(0.5), "0.5");
+  EXPECT_EQ(roundedText(-1.0 / 3.0), "-0.333333");
+  EXPECT_EQ(roundedText(99999.96), "100000");
+  EXPECT_EQ(roundedText(1234567.8), "1234568");
+  EXPECT_EQ(roundedText(-9e15), "-9000000000000000");
+  EXPECT_EQ(roundedText(1e300), "1e+300");
 }
 
 std::vector<gpio::ChipInfo> twoChips() {
@@ -92,22 +92,22 @@ TEST(ChipsText, TellsWhyAChipCannotBeOpened) {
 }
 
 TEST(LinesOf, AnAxisAreAllThatAreWired) {
-  axis::AxisConfig config;
+  config::AxisConfig config;
   config.name = "x";
-  config.driver = chip::Model::kDrv8825;
+  config.driver = driver::Model::kDrv8825;
   config.pins.step.line = "S";
   config.pins.ms1.line = "M";
-  config.endstop_min = axis::Endstop{"E", true, gpio::Bias::kAsIs};
-  config.fault = axis::FaultPin{"F", gpio::Bias::kAsIs};
+  config.endstop_min = config::Endstop{"E", true, Bias::kAsIs};
+  config.fault = config::FaultPin{"F", Bias::kAsIs};
   std::string pins;
   for (const NamedLine& line : linesOf({config})) pins += line.pin + "=" + line.line + " ";
   EXPECT_EQ(pins, "x/step=S x/m0=M x/endstops/min=E x/fault=F ");
-  axis::AxisConfig other = config;
+  config::AxisConfig other = config;
   other.name = "y";
   config.pins.enable.line = other.pins.enable.line = "N";
   const auto shared = linesOf({config, other});
   EXPECT_EQ(shared[1].pin + "=" + shared[1].line, "x/enable, y/enable=N");
-  const auto with_stop = linesOf({config}, axis::InputSwitch{"T", true, gpio::Bias::kAsIs});
+  const auto with_stop = linesOf({config}, config::InputSwitch{"T", true, Bias::kAsIs});
   EXPECT_EQ(with_stop.back().pin + "=" + with_stop.back().line, "emergency_stop=T");
 }
 
@@ -178,7 +178,7 @@ TEST(RatesText, TellsAskedAndHeldRatesAndTheReason) {
 TEST(MeasurementsText, IsInMicrosecondsAndDoesWithoutCalls) {
   pulse::Capability capability;
   capability.lateness = {1500, 2000, 3000, 4000, 300};
-  axis::AxisConfig x;
+  config::AxisConfig x;
   x.name = "x";
   EXPECT_TRUE(
       has(measurementsText({x}, capability), "with spinning  1.50    2.00  3.00  4.00  300"));
@@ -212,7 +212,7 @@ TEST(Options, AreReadAndRefused) {
 }
 
 TEST(StartFor, AStrokeKeepsItWithinTheSoftLimits) {
-  axis::AxisConfig config;
+  config::AxisConfig config;
   EXPECT_EQ(startFor(config, 1.0), 0.0);
   config.min_position = 0.0;
   config.max_position = 10.0;

@@ -1,26 +1,30 @@
-#include <gtest/gtest.h>
+#include "stepdriver_core/yaml.h"
 
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <string>
 #include <vector>
 
-#include "configuration.h"
 #include "stepdriver_core/error.h"
-#include "yaml_value.h"
 
 namespace stepdriver::check {
 namespace {
 
-using axis::ConfigValue;
+using config::ConfigValue;
 
 ConfigValue valueOf(const std::string& scalar) {
-  const ConfigValue tree = parseYaml("a: " + scalar + "\n", "text");
+  const ConfigValue tree = yaml::parse("a: " + scalar + "\n", "text");
   return tree.as<ConfigValue::Map>()->at("a");
 }
 
 std::string errorOf(const std::string& text) {
   try {
-    parseYaml(text, "axis.yaml");
+    yaml::parse(text, "axis.yaml");
   } catch (const Error& error) {
     return error.what();
   }
@@ -97,7 +101,7 @@ TEST(Yaml, LeavesEverythingElseAString) {
 }
 
 TEST(Yaml, ResolvesAliasesAndMergeKeys) {
-  const ConfigValue tree = parseYaml(
+  const ConfigValue tree = yaml::parse(
       "pins: &pins {step: A, dir: B}\n"
       "x: {<<: *pins, dir: C}\n"
       "y: *pins\n"
@@ -135,7 +139,7 @@ TEST(Yaml, SaysWhereItIsWrong) {
 TEST(Yaml, SaysWhichFileCannotBeRead) {
   for (const std::string path : {"/nowhere/at/all.yaml", "/"}) {
     try {
-      loadYaml(path);
+      yaml::load(path);
       FAIL();
     } catch (const Error& error) {
       EXPECT_EQ(std::string(error.what()).rfind(path + ": ", 0), 0U) << error.what();
@@ -145,10 +149,63 @@ TEST(Yaml, SaysWhichFileCannotBeRead) {
 
 TEST(Yaml, OfAnEmptyFileIsAnEmptyMap) {
   for (const char* text : {"", "# nothing\n", "---\n"}) {
-    const ConfigValue tree = parseYaml(text, "text");
+    const ConfigValue tree = yaml::parse(text, "text");
     ASSERT_NE(tree.as<ConfigValue::Map>(), nullptr) << text;
     EXPECT_TRUE(tree.as<ConfigValue::Map>()->empty());
   }
+}
+
+class ConfigurationFile : public testing::Test {
+ protected:
+  void TearDown() override { std::remove(path_.c_str()); }
+
+  const std::string& file(const std::string& text) {
+    std::ofstream(path_) << text;
+    return path_;
+  }
+
+  static constexpr const char* kAxis =
+      "axes: {x: {driver: a4988, pins: {step: S, dir: D}, microsteps: 16, steps_per_mm: 80.0,\n"
+      "  max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0,\n"
+      "  endstops: {min: {pin: A, active_level: low}, max: {pin: B, active_level: low}}}}\n";
+
+  const std::string path_ =
+      testing::TempDir() + "stepdriver_yaml_" + std::to_string(getpid()) + ".yaml";
+};
+
+TEST_F(ConfigurationFile, GivesAMachineWhateverOfTheNodeIsInIt) {
+  const setup::MachineConfig config = yaml::readFile(
+      file(std::string(kAxis) + "gpio: {backend: simulated}\n"
+                                "realtime: {policy: enforce, max_lateness_ms: 2.0}\n"
+                                "joint_state_rate: 10.0\njog_timeout: 1.0\nhardware_id: h\n"
+                                "simulation: {speed: 0.0}\n"));
+  EXPECT_EQ(config.backend, setup::GpioBackend::kSimulated);
+  ASSERT_EQ(config.axes.size(), 1U);
+  EXPECT_EQ(config.axes[0].name, "x");
+  EXPECT_EQ(config.simulation.speed, 0.0);
+  EXPECT_TRUE(config.options().enforce);
+  EXPECT_DOUBLE_EQ(config.options().max_lateness, 0.002);
+}
+
+TEST_F(ConfigurationFile, ListsEveryMistakeOfAMachine) {
+  try {
+    yaml::readFile(file(
+        "gpio: {backend: gpio}\nstate_file: relative\nspeed: 1\naxes: {x: {driver: a4989}}\n"));
+    FAIL();
+  } catch (const ConfigError& error) {
+    std::vector<std::string> keys;
+    for (const ConfigIssue& issue : error.issues()) keys.push_back(issue.key);
+    for (const char* key : {"gpio/backend", "state_file", "speed", "axes/x/driver"}) {
+      EXPECT_NE(std::find(keys.begin(), keys.end(), key), keys.end()) << key << "\n"
+                                                                      << error.what();
+    }
+  }
+}
+
+TEST_F(ConfigurationFile, IsRefusedIfItsRigCannotBeBuilt) {
+  const std::string crossed = "simulation: {axes: {x: {min_switch_mm: 9.0, max_switch_mm: 1.0}}}\n";
+  EXPECT_THROW(yaml::readFile(file(kAxis + crossed), setup::BackendChoice::kSimulated),
+               ConfigError);
 }
 
 }  // namespace

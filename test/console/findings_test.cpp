@@ -9,19 +9,19 @@
 #include <string>
 #include <vector>
 
-#include "../../stepdriver_ros/src/check/yaml_value.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/yaml.h"
 #include "support/axes.h"
 #include "wizard/configuration_file.h"
 
 namespace stepdriver::console {
 namespace {
 
-using axis::ConfigValue;
+using config::ConfigValue;
 
 std::string text(const ConfigValue& value) { return configurationText(value, {}); }
 
-ConfigValue yaml(const std::string& source) { return check::parseYaml(source, "test"); }
+ConfigValue valueOf(const std::string& source) { return yaml::parse(source, "test"); }
 
 constexpr const char* kAxis = R"(axes:
   x:
@@ -42,13 +42,13 @@ Findings of(const std::string& axis) {
 }
 
 TEST(Findings, WithoutAnyTheConfigurationStaysTheSame) {
-  EXPECT_EQ(text(corrected(yaml(kAxis), of("x"))), text(yaml(kAxis)));
+  EXPECT_EQ(text(corrected(valueOf(kAxis), of("x"))), text(valueOf(kAxis)));
 }
 
 TEST(Findings, TurnTheDirectionRound) {
   Findings findings = of("x");
   findings.wrong_way = true;
-  ConfigValue once = corrected(yaml(kAxis), findings);
+  ConfigValue once = corrected(valueOf(kAxis), findings);
   EXPECT_NE(text(once).find("invert:\n      dir: true"), std::string::npos) << text(once);
   EXPECT_NE(text(corrected(once, findings)).find("dir: false"), std::string::npos);
 }
@@ -68,23 +68,23 @@ TEST(Findings, InvertASwitchBeforeTheyAreSwapped) {
   w: {wheel_diameter_mm: 65}
   r: {full_steps_per_round: 200}
 )";
-  EXPECT_EQ(text(corrected(yaml(kAxis), findings)), text(yaml(wanted)));
+  EXPECT_EQ(text(corrected(valueOf(kAxis), findings)), text(valueOf(wanted)));
 }
 
 TEST(Findings, MoveASingleSwitchToTheOtherEnd) {
   Findings findings = of("x");
   findings.switches_swapped = true;
-  const ConfigValue after =
-      corrected(yaml("axes: {x: {endstops: {min: {pin: GPIO23, active_level: high}}}}"), findings);
+  const ConfigValue after = corrected(
+      valueOf("axes: {x: {endstops: {min: {pin: GPIO23, active_level: high}}}}"), findings);
   EXPECT_EQ(text(after),
-            text(yaml("axes: {x: {endstops: {max: {pin: GPIO23, active_level: high}}}}")));
+            text(valueOf("axes: {x: {endstops: {max: {pin: GPIO23, active_level: high}}}}")));
 }
 
 TEST(Findings, ScaleTheAxisInItsOwnKey) {
   const auto scaled = [](const std::string& axis, double factor) {
     Findings findings = of(axis);
     findings.scale = factor;
-    return text(corrected(yaml(kAxis), findings));
+    return text(corrected(valueOf(kAxis), findings));
   };
   EXPECT_NE(scaled("x", 0.8).find("steps_per_mm: 64.0"), std::string::npos) << scaled("x", 0.8);
   EXPECT_NE(scaled("y", 0.8).find("mm_per_round: 50.0"), std::string::npos) << scaled("y", 0.8);
@@ -100,7 +100,7 @@ TEST(Findings, AreSaidInTheUnitOfTheAxis) {
 }
 
 TEST(ConfigurationText, IsReadAsTheSameAgain) {
-  const ConfigValue all = yaml(R"(
+  const ConfigValue all = valueOf(R"(
 a: {yes_word: "yes", number: "017", empty: "", line: "gpiochip0:17", tabbed: "a\tb", hash: "a #b"}
 "on": 3
 b: [1, 2.5, [true, "off"], {c: d}]
@@ -112,7 +112,7 @@ none: null
 )");
   const std::string written = configurationText(all, {"one", "", "two"});
   EXPECT_EQ(written.rfind("# one\n#\n# two\n", 0), 0U);
-  const ConfigValue again = yaml(written);
+  const ConfigValue again = valueOf(written);
   EXPECT_EQ(text(again), text(all));
   const auto& map = *again.as<ConfigValue::Map>();
   EXPECT_NE(map.at("whole").as<double>(), nullptr) << "a double stays one";

@@ -138,8 +138,8 @@ TEST(Screen, ShowsFaultsAndRefusalsInTheirWords) {
 
 TEST(Screen, ARotaryAxisIsInDegrees) {
   Session session = sessionWith({axisView("x")});
-  axis::AxisConfig config = axisConfig("x");
-  config.kind = axis::Kind::kRotary;
+  config::AxisConfig config = axisConfig("x");
+  config.kind = config::Kind::kRotary;
   session.driver().configure({config});
   EXPECT_TRUE(shows(screenText(session, 24, 80), "0.0000 deg"));
 }

@@ -192,7 +192,7 @@ TEST(WizardMoves, AreSmallAndSlow) {
   checkDirection(person, machine, axisConfig("x"), findings);
   EXPECT_EQ(machine.moves, std::vector<double>{2.0});
   EXPECT_EQ(machine.speeds, std::vector<double>{5.0});
-  axis::AxisConfig slow = axisConfig("x");
+  config::AxisConfig slow = axisConfig("x");
   slow.max_speed = 0.004;
   EXPECT_EQ(visibleMove(slow).speed, 2.0) << "half of its highest";
 }
@@ -222,7 +222,7 @@ TEST(WizardMoves, AreStoppedByEnterAndByASwitch) {
   machine.endless = true;
   Person hand({"y"});
   hand.stops_moves = true;
-  const axis::AxisConfig config = axisConfig("x");
+  const config::AxisConfig config = axisConfig("x");
   EXPECT_EQ(HandMove(hand, machine, config).ask({2.0, 5.0}), 0.0);
   EXPECT_EQ(machine.stops, 1);
 
@@ -238,7 +238,7 @@ TEST(WizardMoves, AStopIsSentWhereTheDialogueEndsOrTheDriverGoes) {
   machine.endless = true;
   machine.on_wait = [&] { machine.gone = true; };
   Person person({"y"});
-  const axis::AxisConfig config = axisConfig("x");
+  const config::AxisConfig config = axisConfig("x");
   EXPECT_THROW(HandMove(person, machine, config).ask({2.0, 5.0}), Error);
   EXPECT_EQ(machine.stops, 1);
 }
@@ -295,7 +295,7 @@ TEST(WizardAnswers, AreAskedAgainUntilTheyAreUnderstood) {
 }
 
 TEST(WizardAxis, HasCurrentAfterwardsOnlyWhereItHadItBefore) {
-  axis::AxisConfig config = axisConfig("x");
+  config::AxisConfig config = axisConfig("x");
   config.endstop_min.reset();
   config.endstop_max.reset();
   Machine machine;

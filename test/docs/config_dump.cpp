@@ -20,23 +20,23 @@ class Dump {
       text_ << "none ";
     }
   }
-  void add(gpio::Bias bias) { add(static_cast<int>(bias)); }
-  void add(const axis::Pin& pin) { all(pin.line, pin.inverted); }
-  void add(const axis::InputSwitch& input) { all(input.line, input.active_level, input.bias); }
-  void add(const axis::FaultPin& fault) { all(fault.line, fault.bias); }
-  void add(const axis::HomingConfig& homing) {
+  void add(Bias bias) { add(static_cast<int>(bias)); }
+  void add(const config::Pin& pin) { all(pin.line, pin.inverted); }
+  void add(const config::InputSwitch& input) { all(input.line, input.active_level, input.bias); }
+  void add(const config::FaultPin& fault) { all(fault.line, fault.bias); }
+  void add(const config::HomingConfig& homing) {
     all(homing.at_max, homing.seek_speed, homing.latch_speed, homing.pull_off, homing.offset,
         homing.max_travel, homing.timeout, homing.debounce, homing.order);
   }
-  void add(const chip::Timing& timing) {
+  void add(const driver::Timing& timing) {
     all(timing.step_high_ns, timing.step_low_ns, timing.dir_setup_ns, timing.dir_hold_ns,
         timing.mode_setup_ns, timing.mode_hold_ns, timing.enable_ns, timing.wake_ns,
         timing.reset_low_ns, timing.reset_wait_ns);
   }
-  void add(const axis::Pins& pins) {
+  void add(const config::Pins& pins) {
     all(pins.step, pins.dir, pins.enable, pins.ms1, pins.ms2, pins.ms3, pins.sleep, pins.reset);
   }
-  void add(const axis::AxisConfig& axis) {
+  void add(const config::AxisConfig& axis) {
     all(axis.name, axis.joint, static_cast<int>(axis.kind), static_cast<int>(axis.driver),
         axis.timing, axis.pins, axis.microsteps, axis.steps_per_unit, axis.steps_per_round);
     all(axis.max_speed, axis.start_speed, axis.acceleration, axis.deceleration,
@@ -45,7 +45,7 @@ class Dump {
         axis.enable_on_start, axis.disable_on_shutdown, axis.align_on_microstep_change,
         axis.idle_timeout, static_cast<int>(axis.idle_action), axis.holds_position_unpowered);
   }
-  void add(const ros_node::SimulatedAxis& rig) {
+  void add(const setup::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
         rig.max_switch, rig.fail_step_write_after);
     all(rig.wiring.dir_inverted, rig.wiring.steps_per_unit, rig.wiring.min_pin, rig.wiring.max_pin,
@@ -74,8 +74,8 @@ class Dump {
 std::string dump(const ros_node::NodeConfig& config) {
   Dump dump;
   dump.all(static_cast<int>(config.backend), config.joint_state_rate, config.jog_timeout,
-           config.max_lateness, config.enforce_realtime, config.keep_cpus_awake,
-           config.emergency_stop, config.state_file, config.hardware_id);
+           config.max_lateness, config.write_timeout, config.enforce_realtime,
+           config.keep_cpus_awake, config.emergency_stop, config.state_file, config.hardware_id);
   for (const auto& axis : config.axes) dump.add(axis);
   dump.all(config.simulation.speed, config.simulation.trace, config.simulation.emergency_stop);
   for (const auto& rig : config.simulation.axes) dump.add(rig.second);

@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "common/node_config.h"
 #include "joystick_config.h"
-#include "node_config.h"
 
 namespace stepdriver::docs {
 

@@ -59,12 +59,12 @@ def _of_sentences(text):
 
 
 def commands(text):
-    """All commands of a page, in its order: the lines of blocks that aren't of text or YAML, and
+    """All commands of a page, in its order: the lines of blocks that aren't of text, YAML or CMake, and
     whole commands in sentences."""
     for language, lines in _blocks(text):
         if language is None:
             yield from _of_sentences("\n".join(lines))
-        elif language not in ("text", "yaml"):
+        elif language not in ("text", "yaml", "cmake"):
             yield from _of_block(lines)
 
 

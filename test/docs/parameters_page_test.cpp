@@ -12,12 +12,12 @@
 
 #include "config_dump.h"
 #include "page.h"
-#include "yaml_value.h"
+#include "stepdriver_core/yaml.h"
 
 namespace stepdriver::docs {
 namespace {
 
-using axis::ConfigValue;
+using config::ConfigValue;
 
 struct Reading {
   std::string config;
@@ -85,12 +85,12 @@ simulation: {axes: {x: {}}}
 axes:
   x:)" + kAxisMap;
   if (rotary) text = replaced(replaced(text, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
-  return {rotary ? "rotary" : "linear", rotary, readNode, check::parseYaml(text, "base")};
+  return {rotary ? "rotary" : "linear", rotary, readNode, yaml::parse(text, "base")};
 }
 
 Node joystickNode() {
   return {"joystick", false, readJoystick,
-          check::parseYaml("axes: {x: {joystick_axis: 0, max_speed_mm_s: 9.0}}", "base")};
+          yaml::parse("axes: {x: {joystick_axis: 0, max_speed_mm_s: 9.0}}", "base")};
 }
 
 /// A copy with a value at a path; none takes what is there away.
@@ -233,7 +233,7 @@ std::optional<ConfigValue> literal(const Parameter& parameter) {
   const bool is_value = text == "true" || text == "false" ||
                         text.find_first_not_of("-.0123456789") == std::string::npos;
   if (!is_value) return {};
-  return check::parseYaml("v: " + text, "default").as<ConfigValue::Map>()->at("v");
+  return yaml::parse("v: " + text, "default").as<ConfigValue::Map>()->at("v");
 }
 
 class ParametersPage : public testing::TestWithParam<Node> {};

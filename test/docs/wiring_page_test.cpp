@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "page.h"
-#include "stepdriver_core/chip/chip.h"
-#include "yaml_value.h"
+#include "stepdriver_core/driver/driver_chip.h"
+#include "stepdriver_core/yaml.h"
 
 namespace stepdriver::docs {
 namespace {
 
-using axis::ConfigValue;
+using config::ConfigValue;
 
 /// A table's column by the first cell of each row, from the rows that have so many.
 std::map<std::string, std::string> column(const std::string& heading, std::size_t index,
@@ -41,7 +41,7 @@ TEST(WiringPage, HasTheLinesOfTheShippedConfigurations) {
   int compared = 0;
   for (const char* name : {"a4988", "drv8825", "tb6600", "wheel", "rotary_axis"}) {
     const ConfigValue config =
-        check::loadYaml(std::string(STEPDRIVER_SOURCES "/config/") + name + ".yaml");
+        yaml::load(std::string(STEPDRIVER_SOURCES "/config/") + name + ".yaml");
     for (const auto& [signal, line] : lines) {
       std::vector<std::string> keys = {"pins/" + signal};
       if (signal == "endstop min") keys = {"endstops/min/pin"};
@@ -71,9 +71,9 @@ std::int64_t firstTime(const std::string& cell) {
 
 class WiringPageOfAChip : public testing::TestWithParam<std::string> {
  protected:
-  const chip::Chip& chip() const { return *chip::findChip(GetParam()); }
+  const driver::DriverChip& chip() const { return *driver::findDriverChip(GetParam()); }
   std::map<std::string, std::string> facts() const {
-    const auto names = chip::chipNames();
+    const auto names = driver::driverChipNames();
     const auto found = std::find(names.begin(), names.end(), GetParam());
     return column("The chips", 1 + static_cast<std::size_t>(found - names.begin()),
                   1 + names.size());
@@ -82,7 +82,7 @@ class WiringPageOfAChip : public testing::TestWithParam<std::string> {
 
 TEST_P(WiringPageOfAChip, HasTheTimesThatAreKept) {
   auto facts = this->facts();
-  const chip::Timing& timing = chip().timing;
+  const driver::Timing& timing = chip().timing;
   EXPECT_EQ(firstTime(facts["STEP high at least"]), timing.step_high_ns);
   EXPECT_EQ(firstTime(facts["STEP low at least"]), timing.step_low_ns);
   EXPECT_EQ(firstTime(facts["DIR setup and hold"]), timing.dir_setup_ns);
@@ -103,7 +103,7 @@ TEST_P(WiringPageOfAChip, HasTheModesAndTheirCodes) {
   std::string codes;
   for (const int mode : chip().microsteps) {
     microsteps += (microsteps.empty() ? "" : ", ") + std::to_string(mode);
-    const auto code = chip::codeOf(chip(), mode);
+    const auto code = driver::codeOf(chip(), mode);
     if (!code) continue;
     codes += codes.empty() ? "" : ", ";
     for (const bool level : *code) codes += level ? 'H' : 'L';
@@ -114,7 +114,7 @@ TEST_P(WiringPageOfAChip, HasTheModesAndTheirCodes) {
   EXPECT_EQ(shown, codes.empty() ? "switches" : codes);
 }
 
-INSTANTIATE_TEST_SUITE_P(Chips, WiringPageOfAChip, testing::ValuesIn(chip::chipNames()));
+INSTANTIATE_TEST_SUITE_P(Chips, WiringPageOfAChip, testing::ValuesIn(driver::driverChipNames()));
 
 }  // namespace
 }  // namespace stepdriver::docs

@@ -11,11 +11,11 @@
 namespace stepdriver::joystick {
 namespace {
 
-using axis::ConfigValue;
-using axis::drop;
-using axis::linesOf;
-using axis::mapOf;
-using axis::put;
+using config::ConfigValue;
+using config::drop;
+using config::linesOf;
+using config::mapOf;
+using config::put;
 
 using Lines = std::vector<std::string>;
 

@@ -13,7 +13,7 @@
 namespace {
 
 using stepdriver::Error;
-namespace chip = stepdriver::chip;
+namespace driver = stepdriver::driver;
 namespace kernel = stepdriver::kernel;
 
 constexpr const char kUsage[] =
@@ -98,10 +98,11 @@ std::vector<Asked> askedFor(const std::vector<std::string>& arguments) {
 }
 
 kernel::WiredAxis wiredAxis(const Asked& asked, const kernel::KernelTrace& trace) {
-  const chip::Chip* const driver = chip::findChip(asked.driver);
+  const driver::DriverChip* const driver = driver::findDriverChip(asked.driver);
   if (driver == nullptr) {
     std::string known;
-    for (const std::string& name : chip::chipNames()) known += (known.empty() ? "" : ", ") + name;
+    for (const std::string& name : driver::driverChipNames())
+      known += (known.empty() ? "" : ", ") + name;
     throw Error("Axis " + asked.name + ": --driver is \"" + asked.driver + "\"; there are " +
                 known + ".");
   }

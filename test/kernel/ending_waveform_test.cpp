@@ -29,8 +29,8 @@ std::size_t pulsesBefore(const Waveform& seen, std::int64_t time_ns) {
 }
 
 TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
-  const std::vector<axis::AxisConfig> axes = {
-      axisAt("x", chip::Model::kA4988, placeAt("board-0", 0))};
+  const std::vector<config::AxisConfig> axes = {
+      axisAt("x", driver::Model::kA4988, placeAt("board-0", 0))};
   KernelBench bench(axes);
   const axis::Move move = bench.start("x", kFar);
   bench.awaitCount("x", kAbout);
@@ -59,9 +59,9 @@ TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
 }
 
 TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
-  auto config = axisAt("x", chip::Model::kDrv8825, placeAt("board-0", 0));
-  config.endstop_max = axis::Endstop{"board-1:3", true};
-  const std::vector<axis::AxisConfig> axes = {config};
+  auto config = axisAt("x", driver::Model::kDrv8825, placeAt("board-0", 0));
+  config.endstop_max = config::Endstop{"board-1:3", true};
+  const std::vector<config::AxisConfig> axes = {config};
   KernelBench bench(axes);
   const axis::Move move = bench.start("x", kFar);
   bench.awaitCount("x", kAbout);
@@ -93,10 +93,10 @@ TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
 }
 
 TEST_F(Ending, ByAnEmergencyStopFinishesThePulse) {
-  auto config_x = axisAt("x", chip::Model::kTb6600, placeAt("board-0", 0, true));
+  auto config_x = axisAt("x", driver::Model::kTb6600, placeAt("board-0", 0, true));
   config_x.timing.step_high_ns = 300'000;  // so long that most stops come while a pulse is out
-  const std::vector<axis::AxisConfig> axes = {
-      config_x, axisAt("y", chip::Model::kA4988, placeAt("board-1", 0))};
+  const std::vector<config::AxisConfig> axes = {
+      config_x, axisAt("y", driver::Model::kA4988, placeAt("board-1", 0))};
   KernelBench bench(axes);
   std::vector<std::int64_t> ends_x = {0};
   std::vector<std::int64_t> ends_y = {0};
@@ -116,7 +116,7 @@ TEST_F(Ending, ByAnEmergencyStopFinishesThePulse) {
   const auto seen = read(bench, axes);
   for (std::size_t i = 1; i < ends_x.size(); ++i) {
     SCOPED_TRACE("stop " + std::to_string(i));
-    const auto hold = [&](const axis::AxisConfig& config, std::int64_t from, std::int64_t to,
+    const auto hold = [&](const config::AxisConfig& config, std::int64_t from, std::int64_t to,
                           std::int64_t far) {
       expectAsPlanned(seen.at(config.name).pulses, static_cast<std::size_t>(std::abs(from)),
                       plannedSteps(from, from + far, limitsOf(config)),

@@ -45,12 +45,12 @@ KernelTrace Recording::stop(const std::string& name) {
   return trace;
 }
 
-axis::AxisConfig axisAt(const std::string& name, chip::Model model, const Place& place) {
-  axis::AxisConfig config;
+config::AxisConfig axisAt(const std::string& name, driver::Model model, const Place& place) {
+  config::AxisConfig config;
   config.name = name;
   config.joint = name;
   config.driver = model;
-  config.timing = chip::chipOf(model).timing;
+  config.timing = driver::driverChipOf(model).timing;
   config.pins.step = place.step;
   config.pins.dir = place.dir;
   config.pins.enable = place.enable;
@@ -63,7 +63,7 @@ axis::AxisConfig axisAt(const std::string& name, chip::Model model, const Place&
   return config;
 }
 
-KernelBench::KernelBench(const std::vector<axis::AxisConfig>& axes, pulse::Nanoseconds guard)
+KernelBench::KernelBench(const std::vector<config::AxisConfig>& axes, pulse::Nanoseconds guard)
     : clock_(guard),
       backend_(gpio::makeLibgpiodBackend()),
       machine_(std::make_unique<machine::Machine>(axes, *backend_, clock_, patient())) {}
@@ -98,7 +98,7 @@ KernelTrace KernelBench::finish(const std::string& name) {
   return recording_.stop(name);
 }
 
-motion::MotionLimits limitsOf(const axis::AxisConfig& config) {
+motion::MotionLimits limitsOf(const config::AxisConfig& config) {
   const double scale = config.steps_per_unit;
   return {config.start_speed * scale, config.max_speed * scale, config.acceleration * scale,
           config.deceleration * scale, config.jerk * scale};

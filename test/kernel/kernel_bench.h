@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "kernel_trace.h"
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/motion/planner.h"
@@ -34,19 +34,19 @@ class Recording {
 
 /// Where an axis is: lines as label:offset, whose level the wiring may invert.
 struct Place {
-  axis::Pin step, dir, enable;
+  config::Pin step, dir, enable;
 };
 
 /// A linear axis of 80 microsteps/mm with 2000 microsteps/s and 10,000 microsteps/s^2, enabled on
 /// start, and without switches.
-axis::AxisConfig axisAt(const std::string& name, chip::Model model, const Place& place);
+config::AxisConfig axisAt(const std::string& name, driver::Model model, const Place& place);
 
 /// A machine with a thread for its pulses, on the lines of two chips of the kernel's gpio-sim,
 /// board-0 and board-1. A pulse that is late, on a machine that stalls, is never a fault.
 class KernelBench {
  public:
   /// @param guard of the clock (pulse::SteadyClock).
-  explicit KernelBench(const std::vector<axis::AxisConfig>& axes,
+  explicit KernelBench(const std::vector<config::AxisConfig>& axes,
                        pulse::Nanoseconds guard = 60'000);
 
   axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
@@ -81,7 +81,7 @@ class KernelBench {
 };
 
 /// What axisAt() is planned with, in microsteps.
-motion::MotionLimits limitsOf(const axis::AxisConfig& config);
+motion::MotionLimits limitsOf(const config::AxisConfig& config);
 
 /// The steps of a move, in nanoseconds after its start.
 std::vector<motion::Step> plannedSteps(std::int64_t from, std::int64_t to,

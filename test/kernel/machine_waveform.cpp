@@ -51,7 +51,7 @@ std::int64_t closest(std::int64_t planned_interval) {
 
 Place placeAt(const std::string& chip, unsigned first, bool inverted) {
   const auto pin = [&](unsigned offset) {
-    return axis::Pin{chip + ":" + std::to_string(first + offset), inverted};
+    return config::Pin{chip + ":" + std::to_string(first + offset), inverted};
   };
   return {pin(0), pin(1), pin(2)};
 }
@@ -62,15 +62,15 @@ void MachineWaveform::SetUp() {
 }
 
 std::map<std::string, Waveform> MachineWaveform::read(KernelBench& bench,
-                                                      const std::vector<axis::AxisConfig>& axes) {
+                                                      const std::vector<config::AxisConfig>& axes) {
   std::map<std::string, std::int64_t> counts;
-  for (const axis::AxisConfig& config : axes) counts[config.name] = bench.count(config.name);
+  for (const config::AxisConfig& config : axes) counts[config.name] = bench.count(config.name);
   const machine::EngineFigures figures = bench.figures();
   trace = std::make_unique<KernelTrace>(bench.finish(nameOfTest()));
 
   std::map<std::string, Waveform> waveforms;
   std::size_t pulses = 0;
-  for (const axis::AxisConfig& config : axes) {
+  for (const config::AxisConfig& config : axes) {
     WiredAxis wired = wiredAxis(config, *trace);
     wired.shortest_interval_ns =
         closest(static_cast<std::int64_t>(1e9 / (config.max_speed * config.steps_per_unit)));
@@ -103,7 +103,7 @@ void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
   }
 }
 
-void expectAsPlanned(const Waveform& seen, const Moves& moves, const axis::AxisConfig& config) {
+void expectAsPlanned(const Waveform& seen, const Moves& moves, const config::AxisConfig& config) {
   std::int64_t position = 0;
   std::size_t first = 0;
   for (const std::int64_t move : moves) {

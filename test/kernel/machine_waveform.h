@@ -10,7 +10,7 @@
 
 #include "kernel_bench.h"
 #include "kernel_trace.h"
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/motion/step_finder.h"
 #include "waveform.h"
 
@@ -34,7 +34,7 @@ class MachineWaveform : public testing::Test {
   /// all tests have read is printed at the end.
   /// @param axes those of the machine, at the speed of axisAt().
   std::map<std::string, Waveform> read(KernelBench& bench,
-                                       const std::vector<axis::AxisConfig>& axes);
+                                       const std::vector<config::AxisConfig>& axes);
 
   std::unique_ptr<KernelTrace> trace;  ///< after read()
 };
@@ -51,6 +51,6 @@ void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
 using Moves = std::vector<std::int64_t>;
 
 /// Holds all pulses of an axis against what was planned for its moves.
-void expectAsPlanned(const Waveform& seen, const Moves& moves, const axis::AxisConfig& config);
+void expectAsPlanned(const Waveform& seen, const Moves& moves, const config::AxisConfig& config);
 
 }  // namespace stepdriver::kernel

@@ -20,14 +20,14 @@ using axis::MoveEnd;
 
 struct Wiring {
   const char* name;
-  chip::Model driver;
+  driver::Model driver;
   Place place;
-  std::optional<chip::Timing> timing = {};  // none: the driver's own
+  std::optional<driver::Timing> timing = {};  // none: the driver's own
 };
 
 /// So slow that every time that it needs is longer than what comes by itself.
-chip::Timing slowOptos() {
-  chip::Timing timing = chip::chipOf(chip::Model::kTb6600).timing;
+driver::Timing slowOptos() {
+  driver::Timing timing = driver::driverChipOf(driver::Model::kTb6600).timing;
   timing.step_high_ns = 150'000;
   timing.step_low_ns = 330'000;
   timing.dir_setup_ns = timing.dir_hold_ns = 40'000'000;
@@ -43,7 +43,7 @@ class OneAxis : public MachineWaveform, public testing::WithParamInterface<Wirin
 TEST_P(OneAxis, MovesBackAndForthAsPlanned) {
   auto config = axisAt("x", GetParam().driver, GetParam().place);
   config.timing = GetParam().timing.value_or(config.timing);
-  const std::vector<axis::AxisConfig> axes = {config};
+  const std::vector<config::AxisConfig> axes = {config};
   KernelBench bench(axes);
   const Moves moves = {600, -1'000, 1, -1, 500, -100};
   for (const std::int64_t move : moves) {
@@ -56,27 +56,27 @@ TEST_P(OneAxis, MovesBackAndForthAsPlanned) {
 
 INSTANTIATE_TEST_SUITE_P(
     On, OneAxis,
-    testing::Values(Wiring{"A4988", chip::Model::kA4988, placeAt("board-0", 0)},
-                    Wiring{"Drv8825", chip::Model::kDrv8825, placeAt("board-1", 4)},
-                    Wiring{"Tb6600WithSlowOptos", chip::Model::kTb6600, placeAt("board-0", 0),
-                           slowOptos()},
-                    Wiring{"Tb6600CommonAnode", chip::Model::kTb6600, placeAt("board-0", 1, true)},
-                    Wiring{"A4988DirInverted",
-                           chip::Model::kA4988,
-                           {{"board-0:3", false}, {"board-0:2", true}, {"board-0:1", false}}},
-                    Wiring{"Drv8825StepInvertedDirOnTheOtherChip",
-                           chip::Model::kDrv8825,
-                           {{"board-1:0", true}, {"board-0:0", false}, {"board-0:1", true}}},
-                    Wiring{"A4988EnableOnTheOtherChip",
-                           chip::Model::kA4988,
-                           {{"board-0:0", false}, {"board-0:1", false}, {"board-1:1", false}}}),
+    testing::Values(
+        Wiring{"A4988", driver::Model::kA4988, placeAt("board-0", 0)},
+        Wiring{"Drv8825", driver::Model::kDrv8825, placeAt("board-1", 4)},
+        Wiring{"Tb6600WithSlowOptos", driver::Model::kTb6600, placeAt("board-0", 0), slowOptos()},
+        Wiring{"Tb6600CommonAnode", driver::Model::kTb6600, placeAt("board-0", 1, true)},
+        Wiring{"A4988DirInverted",
+               driver::Model::kA4988,
+               {{"board-0:3", false}, {"board-0:2", true}, {"board-0:1", false}}},
+        Wiring{"Drv8825StepInvertedDirOnTheOtherChip",
+               driver::Model::kDrv8825,
+               {{"board-1:0", true}, {"board-0:0", false}, {"board-0:1", true}}},
+        Wiring{"A4988EnableOnTheOtherChip",
+               driver::Model::kA4988,
+               {{"board-0:0", false}, {"board-0:1", false}, {"board-1:1", false}}}),
     [](const auto& kind) { return kind.param.name; });
 
 // ---- two axes ----
 
 class TwoAxes : public MachineWaveform {
  protected:
-  void moveBoth(const std::vector<axis::AxisConfig>& axes) {
+  void moveBoth(const std::vector<config::AxisConfig>& axes) {
     KernelBench bench(axes);
     const Moves moves_x = {800, -800, 300};
     const Moves moves_y = {-500, 900, -400};
@@ -93,19 +93,19 @@ class TwoAxes : public MachineWaveform {
 };
 
 TEST_F(TwoAxes, MoveAtOnceOnOneChip) {
-  moveBoth({axisAt("x", chip::Model::kA4988, placeAt("board-0", 0)),
-            axisAt("y", chip::Model::kTb6600, placeAt("board-0", 4, true))});
+  moveBoth({axisAt("x", driver::Model::kA4988, placeAt("board-0", 0)),
+            axisAt("y", driver::Model::kTb6600, placeAt("board-0", 4, true))});
 }
 
 TEST_F(TwoAxes, MoveAtOnceOnTwoChips) {
-  moveBoth({axisAt("x", chip::Model::kDrv8825, placeAt("board-0", 0)),
-            axisAt("y", chip::Model::kA4988, placeAt("board-1", 0))});
+  moveBoth({axisAt("x", driver::Model::kDrv8825, placeAt("board-0", 0)),
+            axisAt("y", driver::Model::kA4988, placeAt("board-1", 0))});
 }
 
 TEST_F(TwoAxes, MoveAtOnceWithTheirPinsSpreadOverBothChips) {
-  moveBoth({axisAt("x", chip::Model::kTb6600,
+  moveBoth({axisAt("x", driver::Model::kTb6600,
                    {{"board-0:0", false}, {"board-1:0", true}, {"board-1:1", false}}),
-            axisAt("y", chip::Model::kDrv8825,
+            axisAt("y", driver::Model::kDrv8825,
                    {{"board-1:4", true}, {"board-0:4", false}, {"board-0:5", false}})});
 }
 

@@ -45,7 +45,7 @@ double dueTime(std::int64_t k, std::int64_t n, double speed, double acceleration
 
 struct Speed {
   const char* name;
-  chip::Model driver;
+  driver::Model driver;
   double steps_s;
   double steps_s2;
 };
@@ -56,7 +56,7 @@ void PrintTo(const Speed& speed, std::ostream* out) {  // NOLINT: GoogleTest's n
 
 using Moves = std::vector<std::int64_t>;
 
-axis::AxisConfig configOf(const std::string& name, const Place& place, const Speed& speed) {
+config::AxisConfig configOf(const std::string& name, const Place& place, const Speed& speed) {
   auto config = axisAt(name, speed.driver, place);
   config.max_speed = speed.steps_s / config.steps_per_unit;
   config.acceleration = config.deceleration = speed.steps_s2 / config.steps_per_unit;
@@ -128,10 +128,10 @@ TEST_P(StepTimes, AreThoseOfTheClosedFormToAMicrosecond) {
 }
 
 INSTANTIATE_TEST_SUITE_P(At, StepTimes,
-                         testing::Values(Speed{"1kHz", chip::Model::kTb6600, 1e3, 5e3},
-                                         Speed{"8kHz", chip::Model::kDrv8825, 8e3, 8e4},
-                                         Speed{"20kHz", chip::Model::kA4988, 2e4, 4e5},
-                                         Speed{"50kHz", chip::Model::kA4988, 5e4, 2e6}),
+                         testing::Values(Speed{"1kHz", driver::Model::kTb6600, 1e3, 5e3},
+                                         Speed{"8kHz", driver::Model::kDrv8825, 8e3, 8e4},
+                                         Speed{"20kHz", driver::Model::kA4988, 2e4, 4e5},
+                                         Speed{"50kHz", driver::Model::kA4988, 5e4, 2e6}),
                          [](const auto& kind) { return "UpTo" + std::string(kind.param.name); });
 
 class StepTimesOfTwoAxes : public testing::Test {
@@ -142,9 +142,9 @@ class StepTimesOfTwoAxes : public testing::Test {
 };
 
 TEST_F(StepTimesOfTwoAxes, AreLaterOnlyByTheWritesOfTheOther) {
-  const Speed speed_x{"x", chip::Model::kDrv8825, 8e3, 8e4};
-  const Speed speed_y{"y", chip::Model::kTb6600, 5e3, 3e4};
-  const std::vector<axis::AxisConfig> configs = {
+  const Speed speed_x{"x", driver::Model::kDrv8825, 8e3, 8e4};
+  const Speed speed_y{"y", driver::Model::kTb6600, 5e3, 3e4};
+  const std::vector<config::AxisConfig> configs = {
       configOf("x", {{"board-0:0"}, {"board-0:1"}, {"board-0:2"}}, speed_x),
       configOf("y", {{"board-1:0"}, {"board-0:5", true}, {"board-1:2"}}, speed_y)};
   KernelBench bench(configs, kGuard);

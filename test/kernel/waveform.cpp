@@ -16,7 +16,7 @@ void keepShortest(std::optional<std::int64_t>& shortest, std::int64_t time) {
 /// Follows the lines of one axis from event to event.
 class Reader {
  public:
-  explicit Reader(const WiredAxis& axis) : axis_(axis), chip_(chip::chipOf(axis.driver)) {}
+  explicit Reader(const WiredAxis& axis) : axis_(axis), chip_(driver::driverChipOf(axis.driver)) {}
 
   void take(const LineEvent& event) {
     if (event.read) return;
@@ -118,7 +118,7 @@ class Reader {
   }
 
   const WiredAxis& axis_;
-  const chip::Chip& chip_;
+  const driver::DriverChip& chip_;
   Waveform waveform_;
   // Levels are none before the line was requested.
   std::optional<bool> active_;
@@ -156,8 +156,8 @@ std::string textOf(const Violation& violation) {
 
 }  // namespace
 
-WiredAxis wiredAxis(const axis::AxisConfig& config, const KernelTrace& trace) {
-  const auto wired = [&trace](const axis::Pin& pin) {
+WiredAxis wiredAxis(const config::AxisConfig& config, const KernelTrace& trace) {
+  const auto wired = [&trace](const config::Pin& pin) {
     return WiredPin{trace.line(pin.line), pin.inverted};
   };
   WiredAxis axis;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "kernel_trace.h"
-#include "stepdriver_core/axis/config.h"
-#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/driver/driver_chip.h"
 
 /// The waveform of an axis as the kernel put it out, held against what the driver chip needs.
 ///
@@ -25,8 +25,8 @@ struct WiredPin {
 
 /// An axis as it is wired, and what it must keep.
 struct WiredAxis {
-  chip::Model driver = chip::Model::kA4988;
-  chip::Timing timing{};
+  driver::Model driver = driver::Model::kA4988;
+  driver::Timing timing{};
   WiredPin step;
   WiredPin dir;
   std::optional<WiredPin> enable;  ///< none: not wired, the motor is always energized
@@ -41,7 +41,7 @@ struct WiredAxis {
 
 /// The wiring that an axis is configured with.
 /// @throw Error where the trace doesn't know a line's chip: its pins must be named label:offset.
-WiredAxis wiredAxis(const axis::AxisConfig& config, const KernelTrace& trace);
+WiredAxis wiredAxis(const config::AxisConfig& config, const KernelTrace& trace);
 
 enum class Rule {
   kStepHigh,

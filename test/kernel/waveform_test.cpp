@@ -53,8 +53,8 @@ class Hand {
 /// 600 ns from one write to the next.
 WiredAxis wired() {
   WiredAxis axis;
-  axis.driver = chip::Model::kDrv8825;
-  axis.timing = chip::chipOf(axis.driver).timing;
+  axis.driver = driver::Model::kDrv8825;
+  axis.timing = driver::driverChipOf(axis.driver).timing;
   axis.step.line = kStep;
   axis.dir.line = kDir;
   axis.enable = WiredPin{kEnable, false};

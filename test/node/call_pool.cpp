@@ -1,8 +1,9 @@
-#include "call_pool.h"
+#include "node/calls/call_pool.h"
 
 #include <gtest/gtest.h>
 #include <ros/callback_queue_interface.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <functional>
@@ -14,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "node/calls/call_queues.h"
 #include "support/wait.h"
 
 namespace stepdriver::ros_node {
@@ -32,7 +34,7 @@ class Call : public ros::CallbackInterface {
   std::function<Result()> action_;
 };
 
-void add(PooledQueue& queue, const std::function<void()>& action) {
+void add(ros::CallbackQueue& queue, const std::function<void()>& action) {
   queue.addCallback(boost::make_shared<Call>([action] {
                       action();
                       return Result::Success;
@@ -183,6 +185,38 @@ TEST(CallPool, StopWaitsForTheCallThatIsUnderWay) {
   });
   gate.open();
   EXPECT_TRUE(stopping.get());
+}
+
+TEST(CallQueues, LetNothingThatStopsWaitBehindCallsThatWait) {
+  constexpr int kMany = 10;
+  CallQueues queues(1);
+  Gate gate;
+  queues.start();
+  for (ros::CallbackQueue* queue :
+       {&queues.control(), &queues.ofAxis(0), &queues.lines(), &queues.trajectories()}) {
+    for (int i = 0; i < kMany; ++i) add(*queue, [&gate] { gate.wait(); });
+  }
+  ASSERT_TRUE(gate.awaitWaiting(2 + CallQueues::kThreadsPerAxis));
+  for (ros::CallbackQueue* queue : {&queues.stops(), &queues.power(0), &queues.emergency()}) {
+    std::promise<void> called;
+    add(*queue, [&called] { called.set_value(); });
+    ASSERT_TRUE(comes(called));
+  }
+  gate.open();
+  queues.finish(kBound);
+}
+
+TEST(CallQueues, TakeStopsAndHoldsInTheirOrder) {
+  CallQueues queues(1);
+  std::vector<int> order;
+  std::promise<void> last;
+  queues.start();
+  for (int i = 0; i < 1000; ++i) add(queues.stops(), [&order, i] { order.push_back(i); });
+  add(queues.stops(), [&last] { last.set_value(); });
+  ASSERT_TRUE(comes(last));
+  EXPECT_TRUE(std::is_sorted(order.begin(), order.end()));
+  EXPECT_EQ(order.size(), 1000U);
+  queues.finish(kBound);
 }
 
 }  // namespace

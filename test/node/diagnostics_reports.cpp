@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "axis_diagnostics.h"
-#include "engine_diagnostics.h"
+#include "node/diagnostics/axis_diagnostics.h"
+#include "node/diagnostics/engine_diagnostics.h"
 #include "support/says.h"
 
 // Each level is reached by one thing alone, and left where that is over.
@@ -43,7 +43,7 @@ class AxisReport : public testing::Test {
     expectSays(status.message, words);
   }
 
-  axis::AxisConfig config;
+  config::AxisConfig config;
   AxisReading reading;
 };
 

@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
+#include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Jog.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <thread>
@@ -80,6 +82,27 @@ TEST_F(JogTest, TakesOverFromAMove) {
   EXPECT_TRUE(node.moveTo(0.2, false).success);
   ASSERT_TRUE(
       jogUntil(-0.05, [&] { return node.pulses() > 0 && node.rig().pulses_backward.at(0) > 0; }));
+}
+
+TEST_F(JogTest, OfAStreamThatGoesOnIsRefusedAfterAStopUntilItPauses) {
+  node.set("simulation/speed", 1.0);
+  node.set("jog_timeout", 2.0);
+  start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  ASSERT_TRUE(jogUntil(0.005, [&] { return node.pulses() > 80; }));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
+  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
+  const std::int64_t pulses = node.pulses();
+  ASSERT_TRUE(jogUntil(0.005, [&] {
+    return node.process().output().find("the jog was stopped") != std::string::npos;
+  }));
+  for (int i = 0; i < 20; ++i) jog({"x"}, {0.005});
+  EXPECT_EQ(node.pulses(), pulses) << "the stream has not paused";
+  ASSERT_TRUE(waitUntil([&] {
+    jog({"x"}, {0.0});
+    jog({"x"}, {0.005});
+    return node.pulses() > pulses;
+  })) << "it has sent 0";
 }
 
 TEST_F(JogTest, MovesNothingByAMessageThatItCannotUnderstand) {

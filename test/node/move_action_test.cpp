@@ -265,6 +265,7 @@ TEST_F(MoveActionTest, WaitsOverAHoldAndCanBeCancelledInIt) {
   client->cancelGoal();
   EXPECT_EQ(await(*client), State::PREEMPTED);
   expectEnd(MoveResult::STOPPED, "it was stopped");
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("resume").success);
   EXPECT_EQ(run(goalTo(0.1)), State::SUCCEEDED) << "what was held is given up";
 }
 

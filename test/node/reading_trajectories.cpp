@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "follow_joint_trajectory.h"
+#include "node/actions/follow_joint_trajectory.h"
+#include "node/actions/trajectory_tolerances.h"
+#include "node/topics/trajectory_message.h"
 #include "support/says.h"
-#include "trajectory_message.h"
-#include "trajectory_tolerances.h"
 
 // What the node makes of a trajectory's messages, without a node.
 

@@ -3,13 +3,13 @@
 
 #include <string>
 
-#include "action_statuses.h"
-#include "call_queues.h"
 #include "core/support/bench.h"
+#include "node/actions/action_statuses.h"
+#include "node/actions/trajectory_action.h"
+#include "node/calls/call_queues.h"
 #include "support/control_msgs_client.h"
 #include "support/says.h"
 #include "support/wait.h"
-#include "trajectory_action.h"
 
 // What a node does at its end with a goal under way, where its threads serve nothing any more.
 

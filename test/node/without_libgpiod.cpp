@@ -4,13 +4,13 @@
 #include <utility>
 #include <vector>
 
-#include "node_config.h"
+#include "common/node_config.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 
 namespace stepdriver::ros_node {
 namespace {
 
-using axis::ConfigValue;
+using config::ConfigValue;
 
 std::vector<ConfigIssue> issuesOfBackend(const std::string& backend) {
   const ConfigValue tree(ConfigValue::Map{{"gpio", ConfigValue::Map{{"backend", backend}}}});

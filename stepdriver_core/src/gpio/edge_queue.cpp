@@ -10,7 +10,7 @@ int EdgeQueue::take(std::int64_t timeout_ns, EdgeEvent* events, std::size_t capa
   const auto come = [this] { return interrupted_ || size_ > 0; };
   if (timeout_ns < 0) {
     changed_.wait(lock, come);
-  } else {
+  } else if (timeout_ns > 0) {
     changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns), come);
   }
   if (interrupted_) {

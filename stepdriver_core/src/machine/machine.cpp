@@ -2,49 +2,39 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
-#include "home_in_order.h"
+#include "controller.h"
+#include "machine_axis.h"
+#include "nanoseconds.h"
+#include "shell.h"
 #include "state_keeper.h"
-#include "stepdriver_core/axis/coordination.h"
-#include "stepdriver_core/axis/edge_log.h"
+#include "stepdriver_core/axis/disposer.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/machine/step_rates.h"
-#include "stepdriver_core/pulse/pulse_driver.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 #include "wiring.h"
 
 namespace stepdriver::machine {
 namespace {
 
-constexpr std::int64_t kInputPeriodNs = 100'000'000;
 constexpr double kLeastOverride = 0.01;
 constexpr double kMostOverride = 2.0;
-
-pulse::Nanoseconds nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
-
-bool anyGoesIdle(const std::vector<axis::AxisConfig>& axes) {
-  return std::any_of(axes.begin(), axes.end(),
-                     [](const axis::AxisConfig& axis) { return axis.idle_timeout > 0.0; });
-}
+constexpr int kMostPreparations = 8;
 
 }  // namespace
 
 class Machine::Impl {
  public:
-  Impl(const std::vector<axis::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
-       const MachineOptions& options) {
+  Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
+       const MachineOptions& options)
+      : disposer_(options.threaded) {
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options.emergency_stop);
-    emergency_stop_ = wiring.emergency_stop;
     lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
       capability_ =
@@ -52,20 +42,28 @@ class Machine::Impl {
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
       if (!why.empty()) throw Refused(why);
     }
+    for (std::size_t i = 0; i < wiring.outputs.size(); ++i) {
+      names_.outputs.push_back(lines_->outputName(static_cast<int>(i)));
+    }
+    for (std::size_t i = 0; i < wiring.inputs.size(); ++i) {
+      names_.inputs.push_back(lines_->inputName(static_cast<int>(i)));
+    }
     engine_ = std::make_unique<pulse::PulseEngine>(
         *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
-    driver_ = std::make_unique<pulse::PulseDriver>(*engine_, clock, options.threaded,
-                                                   options.latency_device);
-    edges_ = std::make_unique<axis::EdgeLog>(*lines_, options.threaded);
+    controller_ =
+        std::make_unique<Controller>(configs, wiring.motor_lines, names_, wiring.emergency_stop);
+    shell_ =
+        std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring.inputs.size(),
+                                Shell::Options{options.threaded, nanoseconds(options.write_timeout),
+                                               options.latency_device});
     for (std::size_t i = 0; i < configs.size(); ++i) {
-      axes_.push_back(std::make_unique<axis::Axis>(configs[i], static_cast<int>(i),
-                                                   wiring.axis_lines[i], *lines_, *edges_, *driver_,
-                                                   planning_));
+      auto axis = std::make_unique<MachineAxis>(configs[i], i, wiring.motor_lines[i], *shell_,
+                                                *lines_, names_);
+      own_axes_.push_back(axis.get());
+      axes_.push_back(std::move(axis));
     }
-    for (const auto& axis : axes_) axis->bringUp();
-    if (keeper_) keeper_->start(axes_, options.threaded);
-    if (options.threaded && (!wiring.inputs.empty() || anyGoesIdle(configs)))
-      watcher_ = std::thread([this] { watchInputs(); });
+    ask(*shell_, BringUp{});
+    if (keeper_) startKeeping(options.threaded);
   }
 
   ~Impl() {
@@ -73,13 +71,12 @@ class Machine::Impl {
       shutdown();
     } catch (const Error&) {  // NOLINT(bugprone-empty-catch): told to whoever calls shutdown()
     }
-    stopWatching();
-    driver_->stop();
+    shell_->stop();
   }
 
-  axis::Axis& axis(const std::string& name) const {
+  MachineAxis& axis(const std::string& name) const {
     std::string names;
-    for (const auto& axis : axes_) {
+    for (MachineAxis* axis : own_axes_) {
       if (axis->config().name == name) return *axis;
       names += (names.empty() ? "" : ", ") + axis->config().name;
     }
@@ -87,23 +84,43 @@ class Machine::Impl {
   }
 
   CoordinatedMove moveLine(const LineRequest& request) {
-    const std::vector<axis::Axis*> axes = axesOf(request.names);
+    const std::vector<AxisId> axes = idsOf(axesOf(request.names));
     if (request.positions.size() != axes.size()) {
       throw Refused("there are " + std::to_string(axes.size()) + " names, but " +
                     std::to_string(request.positions.size()) + " positions");
     }
-    return moveOf(request.names,
-                  axis::Coordination::moveLine(axes, request.positions, request.relative,
-                                               request.velocity, request.duration));
+    return moveOf(request.names, ask(*shell_, MoveLine{axes, request.positions, request.relative,
+                                                       request.velocity, request.duration}));
   }
 
   CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
-    return moveOf(request.names, axis::Coordination::follow(axesOf(request.names), request.points));
+    const std::vector<AxisId> axes = idsOf(axesOf(request.names));
+    const auto begun = shell_->snapshot();
+    FollowTrajectory wanted{axes, nullptr, {}};
+    wanted.stops.reserve(axes.size());
+    for (const AxisId axis : axes) wanted.stops.push_back(begun->axes.at(axis).state.stops);
+    for (int i = 0;; ++i) {
+      wanted.prepared = disposer_.keep(
+          std::make_shared<const axis::PreparedTrajectory>(factsOf(axes), request.points));
+      const activity::Reply reply = shell_->call(wanted);
+      const bool outdated =
+          reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
+      if (outdated && i < kMostPreparations) continue;
+      return moveOf(request.names, valueOf(reply));
+    }
   }
 
-  std::vector<axis::Axis*> axesOf(const std::vector<std::string>& names) const {
+  std::vector<axis::PathAxis> factsOf(const std::vector<AxisId>& axes) const {
+    const auto snapshot = shell_->snapshot();
+    std::vector<axis::PathAxis> facts;
+    facts.reserve(axes.size());
+    for (const AxisId axis : axes) facts.push_back(snapshot->axes.at(axis).path_axis);
+    return facts;
+  }
+
+  std::vector<MachineAxis*> axesOf(const std::vector<std::string>& names) const {
     if (names.empty()) throw Refused("no axis is named");
-    std::vector<axis::Axis*> axes;
+    std::vector<MachineAxis*> axes;
     for (const std::string& name : names) {
       axes.push_back(&axis(name));
       if (std::find(axes.begin(), axes.end() - 1, axes.back()) != axes.end() - 1) {
@@ -113,18 +130,26 @@ class Machine::Impl {
     return axes;
   }
 
-  std::vector<axis::Axis*> axesToHome(const std::vector<std::string>& names) const {
+  std::vector<MachineAxis*> axesToHome(const std::vector<std::string>& names) const {
     if (!names.empty()) return axesOf(names);
-    std::vector<axis::Axis*> axes;
-    for (const auto& axis : axes_) {
-      if (axis->config().homing) axes.push_back(axis.get());
+    std::vector<MachineAxis*> axes;
+    for (MachineAxis* axis : own_axes_) {
+      if (axis->config().homing) axes.push_back(axis);
     }
     if (axes.empty()) throw Refused("no axis has a homing");
     return axes;
   }
 
+  static std::vector<AxisId> idsOf(const std::vector<MachineAxis*>& axes) {
+    std::vector<AxisId> ids;
+    ids.reserve(axes.size());
+    for (const MachineAxis* axis : axes) ids.push_back(axis->id());
+    return ids;
+  }
+
   static CoordinatedMove moveOf(const std::vector<std::string>& names,
-                                const std::vector<axis::Move>& moves) {
+                                const activity::Reply& reply) {
+    const auto& moves = std::get<std::vector<axis::Move>>(reply.value);
     CoordinatedMove move;
     for (std::size_t i = 0; i < names.size(); ++i) {
       move.members.push_back({names[i], moves[i]});
@@ -156,89 +181,54 @@ class Machine::Impl {
 
   void shutdown() {
     if (shut_.exchange(true)) return;
-    for (const auto& axis : axes_) axis->close("the machine was shut down");
-    // With its current a motor may lose the trust in its position. That is known of it, and what
-    // the next start makes of it is decided there.
-    driver_->waitFor([this] {
-      return std::none_of(axes_.begin(), axes_.end(),
-                          [](const auto& axis) { return axis->state().moving; });
-    });
-    if (keeper_) keeper_->close();
-    forAll([](axis::Axis& axis) { axis.shutDown(); });
+    ask(*shell_, Close{"the machine was shut down"});
+    ask(*shell_, AwaitRest{});
+    // Disabling a motor may invalidate its position. The state is saved first: the next start
+    // decides whether to trust it.
+    if (keeper_) keeper_->close(memories());
+    ask(*shell_, PowerDown{});
     if (keeper_ && !keeper_->error().empty()) throw Error(keeper_->error());
   }
 
-  // An edge is only a wake-up: the engine reads the levels. One that was lost, or a chip that was
-  // waking when it came, is made good by asking again after a while.
-  void watchInputs() {
-    while (!watching_ended_) {
-      const int count = edges_->watch(kInputPeriodNs);
-      // Where waiting fails, reading will fail too, and say so.
-      if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
-      engine_->inputsChanged();
-      supervise();
-    }
-  }
-
-  // What falls due by time alone. @return the clock time at which it wants to be called again.
-  pulse::Nanoseconds supervise() {
-    pulse::Nanoseconds due = pulse::kNever;
-    for (const auto& axis : axes_) due = std::min(due, axis->supervise());
-    return due;
-  }
-
-  void stopWatching() {
-    if (!watcher_.joinable()) return;
-    watching_ended_ = true;
-    lines_->interrupt();
-    watcher_.join();
-  }
-
-  void refuseWhileEmergencyStopInput() const {
-    if (!emergency_stop_) return;
-    const int level = lines_->read(emergency_stop_->line);
-    const std::string input =
-        "the emergency stop input " + lines_->inputName(emergency_stop_->line);
-    if (level < 0) throw Refused(input + " can't be read: " + gpio::errorText(-level));
-    if ((level != 0) == emergency_stop_->active) throw Refused(input + " is active; release it");
-  }
-
-  // Does it for each axis, whatever happens to the others, and then tells all that went wrong.
-  void forAll(const std::function<void(axis::Axis&)>& action) {
-    std::string errors;
-    for (const auto& axis : axes_) {
-      try {
-        action(*axis);
-      } catch (const Error& error) {
-        errors += (errors.empty() ? "" : "; ") + std::string(error.what());
+  StateKeeper::Memories memories() const {
+    StateKeeper::Memories memories;
+    const auto snapshot = shell_->snapshot();
+    for (const MachineAxis* axis : own_axes_) {
+      if (const auto& memory = snapshot->axes.at(axis->id()).memory) {
+        memories.emplace(axis->config().name, *memory);
       }
     }
-    if (!errors.empty()) throw Error(errors);
+    return memories;
   }
 
-  // What is wrong with a motion of several axes is said once.
-  void forEachMotion(const std::function<void(axis::Axis&)>& action) {
-    forAll([&action](axis::Axis& axis) {
-      if (axis::Coordination::leads(axis)) action(axis);
-    });
+  void startKeeping(bool threaded) {
+    const StateKeeper::Loaded loaded = keeper_->load();
+    for (const MachineAxis* axis : own_axes_) {
+      const auto found = loaded.state.axes.find(axis->config().name);
+      if (found != loaded.state.axes.end()) {
+        ask(*shell_, RestorePosition{axis->id(), found->second, loaded.state.clean});
+      } else {
+        ask(*shell_, NotePosition{axis->id(), loaded.why_none});
+      }
+    }
+    keeper_->start([this] { return memories(); }, threaded);
   }
 
-  // In the order in which they must go: axes, driver, engine, lines.
-  std::unique_ptr<gpio::Lines> lines_;
-  std::optional<pulse::Signal> emergency_stop_;
-  std::unique_ptr<axis::EdgeLog> edges_;
+  // In the order in which they must go: axes, shell, controller, engine, lines.
+  axis::Disposer disposer_;
+  std::shared_ptr<gpio::Lines> lines_;
+  axis::LineNames names_;
   std::optional<pulse::Capability> capability_;
   std::unique_ptr<pulse::PulseEngine> engine_;
-  std::unique_ptr<pulse::PulseDriver> driver_;
-  std::mutex planning_;  // of all axes
+  std::unique_ptr<Controller> controller_;
+  std::unique_ptr<Shell> shell_;
+  std::vector<MachineAxis*> own_axes_;
   std::vector<std::unique_ptr<axis::Axis>> axes_;
   std::unique_ptr<StateKeeper> keeper_;
   std::atomic<bool> shut_{false};
-  std::atomic<bool> watching_ended_{false};
-  std::thread watcher_;
 };
 
-Machine::Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
+Machine::Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                  pulse::Clock& clock, const MachineOptions& options)
     : impl_(std::make_unique<Impl>(axes, backend, clock, options)) {}
 
@@ -250,26 +240,20 @@ axis::Axis& Machine::axis(const std::string& name) const { return impl_->axis(na
 
 const std::optional<pulse::Capability>& Machine::capability() const { return impl_->capability_; }
 
-void Machine::stop() {
-  impl_->forAll([](axis::Axis& axis) { axis.stop(); });
-}
+void Machine::stop() { ask(*impl_->shell_, StopAll{}); }
 
-void Machine::hold() {
-  impl_->forEachMotion([](axis::Axis& axis) { axis.hold(); });
-}
+void Machine::hold() { ask(*impl_->shell_, Hold{}); }
 
-void Machine::resume() {
-  impl_->forEachMotion([](axis::Axis& axis) { axis.resume(); });
-}
+void Machine::resume() { ask(*impl_->shell_, Resume{}); }
 
 std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
                                               const std::function<bool()>& cancelled) {
   checkHoming(names);
-  return homeInOrder(impl_->axesToHome(names), cancelled);
+  return homeInOrder(*impl_->shell_, impl_->axesToHome(names), cancelled);
 }
 
 void Machine::checkHoming(const std::vector<std::string>& names) const {
-  for (const axis::Axis* axis : impl_->axesToHome(names)) axis->checkHoming();
+  ask(*impl_->shell_, Home{Impl::idsOf(impl_->axesToHome(names)), true});
 }
 
 void Machine::setSpeedOverride(double factor) {
@@ -279,7 +263,7 @@ void Machine::setSpeedOverride(double factor) {
                   factor, kLeastOverride, kMostOverride);
     throw Refused(text);
   }
-  impl_->forAll([factor](axis::Axis& axis) { axis.setSpeedOverride(factor); });
+  ask(*impl_->shell_, SetSpeedOverride{factor});
 }
 
 CoordinatedMove Machine::moveLine(const LineRequest& request) { return impl_->moveLine(request); }
@@ -294,7 +278,7 @@ std::optional<CoordinatedResult> Machine::result(const CoordinatedMove& move) co
 
 CoordinatedResult Machine::wait(const CoordinatedMove& move) const {
   std::optional<CoordinatedResult> result;
-  impl_->driver_->waitFor([&] {
+  impl_->shell_->wait([&] {
     result = impl_->result(move);
     return result.has_value();
   });
@@ -302,18 +286,13 @@ CoordinatedResult Machine::wait(const CoordinatedMove& move) const {
 }
 
 void Machine::emergencyStop() {
-  impl_->engine_->emergencyStop();
-  impl_->forAll([](axis::Axis& axis) { axis.noteEmergencyStop(); });
+  const std::uint64_t asked = impl_->engine_->emergencyStop();
+  impl_->shell_->wait([this, asked] { return impl_->shell_->snapshot()->stops_handled >= asked; });
 }
 
 bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped(); }
 
-void Machine::recover() {
-  impl_->refuseWhileEmergencyStopInput();
-  impl_->engine_->clearEmergencyStop();
-  impl_->engine_->inputsChanged();
-  impl_->forAll([](axis::Axis& axis) { axis.recover(); });
-}
+void Machine::recover() { ask(*impl_->shell_, Recover{}); }
 
 void Machine::shutdown() { impl_->shutdown(); }
 
@@ -327,7 +306,7 @@ EngineFigures Machine::figures() const {
   figures.worst_lateness = static_cast<double>(state.worst_lateness) * 1e-9;
   figures.lateness = impl_->engine_->lateness();
   figures.lateness_last_second = impl_->engine_->latenessLastSecond();
-  figures.realtime = impl_->driver_->rights().text();
+  figures.realtime = impl_->shell_->rights().text();
   return figures;
 }
 
@@ -336,15 +315,7 @@ std::string Machine::stateFileError() const {
 }
 
 void Machine::advance(double seconds) {
-  impl_->engine_->inputsChanged();  // nobody watches them
-  pulse::Clock& clock = impl_->driver_->clock();
-  const pulse::Nanoseconds end = clock.now() + nanoseconds(seconds);
-  for (;;) {
-    const pulse::Nanoseconds due = std::min(end, impl_->supervise());
-    impl_->driver_->advance(due - clock.now());
-    if (clock.now() >= end) break;
-  }
-  impl_->supervise();
+  impl_->shell_->advance(nanoseconds(seconds));
   if (impl_->keeper_) impl_->keeper_->keep();
 }
 

@@ -33,7 +33,7 @@ std::string textOf(const KeptState& state) {
   text.precision(17);
   text << kTitle << '\n' << (state.clean ? kClean : kRunning) << '\n' << kColumns << '\n';
   for (const auto& [name, axis] : state.axes) {
-    text << name << ' ' << (axis.kind == axis::Kind::kLinear ? "linear" : "rotary") << ' '
+    text << name << ' ' << (axis.kind == config::Kind::kLinear ? "linear" : "rotary") << ' '
          << axis.steps_per_unit << ' ' << axis.position << ' ' << axis.slack << ' ' << axis.valid
          << ' ' << axis.homed << ' ' << axis.at_home << '\n';
   }
@@ -82,7 +82,7 @@ axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
   line.imbue(std::locale::classic());
   line >> name >> kind >> axis.steps_per_unit >> axis.position >> axis.slack >> axis.valid >>
       axis.homed >> axis.at_home;
-  axis.kind = kind == "rotary" ? axis::Kind::kRotary : axis::Kind::kLinear;
+  axis.kind = kind == "rotary" ? config::Kind::kRotary : config::Kind::kLinear;
   const bool whole = !line.fail() && !(line >> rest) && (kind == "linear" || kind == "rotary");
   const bool finite = std::isfinite(axis.position) && std::isfinite(axis.slack);
   if (!whole || !finite || !(axis.steps_per_unit > 0.0)) name.clear();

@@ -1,6 +1,7 @@
 #include "state_keeper.h"
 
 #include <chrono>
+#include <utility>
 
 #include "stepdriver_core/error.h"
 
@@ -20,25 +21,23 @@ StateKeeper::~StateKeeper() {
   if (thread_.joinable()) thread_.join();
 }
 
-void StateKeeper::start(const Axes& axes, bool threaded) {
-  std::optional<KeptState> kept;
-  std::string why;
+StateKeeper::Loaded StateKeeper::load() {
+  Loaded loaded;
   try {
-    kept = file_.load();
-    if (!kept) why = "the state file " + file_.path() + " wasn't there yet";
-  } catch (const Error& error) {
-    why = error.what();
-  }
-  for (const auto& axis : axes) {
-    const auto found = kept ? kept->axes.find(axis->config().name)
-                            : std::map<std::string, axis::AxisMemory>::iterator{};
-    if (kept && found != kept->axes.end()) {
-      axis->restore(found->second, kept->clean);
+    if (auto kept = file_.load()) {
+      loaded.state = *std::move(kept);
+      loaded.why_none = "the state file " + file_.path() + " doesn't know this axis";
     } else {
-      axis->notePosition(kept ? "the state file " + file_.path() + " doesn't know this axis" : why);
+      loaded.why_none = "the state file " + file_.path() + " wasn't there yet";
     }
+  } catch (const Error& error) {
+    loaded.why_none = error.what();
   }
-  axes_ = &axes;
+  return loaded;
+}
+
+void StateKeeper::start(std::function<Memories()> read, bool threaded) {
+  read_ = std::move(read);
   keep();
   if (const std::string wrong = error(); !wrong.empty()) throw Error(wrong);
   if (threaded) thread_ = std::thread([this] { run(); });
@@ -53,24 +52,27 @@ void StateKeeper::run() {
   }
 }
 
-void StateKeeper::keep() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (axes_ == nullptr || ended_) return;
+bool StateKeeper::take(const Memories& memories) {
   bool changed = !saved_;
-  for (const auto& axis : *axes_) {
-    const auto memory = axis->memory();
-    if (!memory) continue;  // it moves
-    axis::AxisMemory& known = state_.axes[axis->config().name];
-    changed = changed || !(known == *memory);
-    known = *memory;
+  for (const auto& [name, memory] : memories) {
+    axis::AxisMemory& known = state_.axes[name];
+    changed = changed || !(known == memory);
+    known = memory;
   }
-  if (changed) save();
+  return changed;
 }
 
-void StateKeeper::close() {
-  keep();
+void StateKeeper::keep() {
+  if (!read_) return;
+  const Memories memories = read_();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!ended_ && take(memories)) save();
+}
+
+void StateKeeper::close(const Memories& last) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (ended_) return;
+  take(last);
   ended_ = true;
   state_.clean = true;
   save();

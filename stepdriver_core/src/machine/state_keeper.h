@@ -1,13 +1,12 @@
 #pragma once
 
 #include <condition_variable>
-#include <memory>
+#include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
-#include <vector>
 
-#include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/machine/state_file.h"
 
 namespace stepdriver::machine {
@@ -17,33 +16,44 @@ namespace stepdriver::machine {
 /// runs: what a crash leaves is known for that. Disks are slow, so it has a thread of its own.
 class StateKeeper {
  public:
-  using Axes = std::vector<std::unique_ptr<axis::Axis>>;
+  /// Of the axes at rest, by name.
+  using Memories = std::map<std::string, axis::AxisMemory>;
 
-  /// @throw Error where the file can't be had.
+  /// What an earlier run has kept.
+  struct Loaded {
+    KeptState state;       ///< empty if there is none
+    std::string why_none;  ///< why an axis has no position in it
+  };
+
+  /// @throw Error if the file can't be had.
   explicit StateKeeper(const std::string& path) : file_(path) {}
   ~StateKeeper();
   StateKeeper(const StateKeeper&) = delete;
   StateKeeper& operator=(const StateKeeper&) = delete;
 
-  /// Gives the axes back what the file has, and takes it as one of a machine that runs.
+  Loaded load();
+
+  /// Takes the file as one of a machine that runs.
+  /// @param read what there is to keep; called from any thread.
   /// @param threaded else keep() is for whoever has the machine. @throw Error
-  void start(const Axes& axes, bool threaded);
+  void start(std::function<Memories()> read, bool threaded);
 
   /// Writes what has changed, of axes at rest.
   void keep();
 
   /// The machine is at rest, and stays so.
-  void close();
+  void close(const Memories& last);
 
   /// Why the last writing failed; empty: it didn't.
   std::string error() const;
 
  private:
   void run();
+  bool take(const Memories& memories);
   void save();
 
   StateFile file_;
-  const Axes* axes_ = nullptr;
+  std::function<Memories()> read_;
   mutable std::mutex mutex_;
   KeptState state_;
   bool saved_ = false;

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/hybrid_wait.h"
 #include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::machine {
@@ -26,7 +26,7 @@ struct Load {
   double interval;  // of the steps at top speed
 };
 
-Load loadOf(const axis::AxisConfig& axis, const pulse::CallCosts& cost,
+Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
             const pulse::Capability& capability) {
   const auto write = static_cast<double>(cost.write.p99);
   const auto read = static_cast<double>(cost.read.p99);
@@ -42,7 +42,7 @@ Load loadOf(const axis::AxisConfig& axis, const pulse::CallCosts& cost,
       load.spinning - std::min(guard, static_cast<double>(capability.sleep_lateness.median));
   if (guard > 0.0) {
     load.alone =
-        std::max(guard + high + load.calls, after_sleep / pulse::SteadyClock::kMostSpinning);
+        std::max(guard + high + load.calls, after_sleep / pulse::HybridWait::kMostSpinning);
   }
   load.interval = 1e9 / (axis.max_speed * axis.steps_per_unit);
   return load;
@@ -72,7 +72,7 @@ struct Interval {
 /// may: the edges of the axes come at random to each other.
 double shortestSpinning(const Load& load, const Others& others) {
   if (others.not_spinning == 1.0) return load.alone;
-  const double room = 1.0 - (1.0 - pulse::SteadyClock::kMostSpinning) / others.not_spinning;
+  const double room = 1.0 - (1.0 - pulse::HybridWait::kMostSpinning) / others.not_spinning;
   return room > 0.0 ? std::max(load.alone, load.spinning / room) : kEndless;
 }
 
@@ -120,7 +120,7 @@ std::string reasonOf(const Interval& interval, const Load& load, const Others& o
   }
   std::string text = "before an edge the pulse thread spins for " +
                      inMicroseconds(static_cast<double>(guard)) + ", which it may for " +
-                     percentText(pulse::SteadyClock::kMostSpinning) + " of the time";
+                     percentText(pulse::HybridWait::kMostSpinning) + " of the time";
   if (others.not_spinning < 1.0) {
     text += "; the other axes take " + percentText(1.0 - others.not_spinning);
   }
@@ -154,7 +154,7 @@ std::vector<std::string> StepRates::complaints() const {
   return complaints;
 }
 
-StepRates stepRates(const std::vector<axis::AxisConfig>& axes,
+StepRates stepRates(const std::vector<config::AxisConfig>& axes,
                     const pulse::Capability& capability) {
   std::vector<Load> loads;
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -174,9 +174,9 @@ StepRates stepRates(const std::vector<axis::AxisConfig>& axes,
   return rates;
 }
 
-StepRates stepRatesInMotion(const std::vector<axis::AxisConfig>& axes,
+StepRates stepRatesInMotion(const std::vector<config::AxisConfig>& axes,
                             const pulse::Capability& capability, const std::vector<double>& rates) {
-  std::vector<axis::AxisConfig> moving;
+  std::vector<config::AxisConfig> moving;
   pulse::Capability of_moving = capability;
   of_moving.channels.clear();
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -188,7 +188,7 @@ StepRates stepRatesInMotion(const std::vector<axis::AxisConfig>& axes,
   return stepRates(moving, of_moving);
 }
 
-std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
+std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability) {
   std::string why;
   if (!capability.rights.granted()) why = capability.rights.text();

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "course.h"
+#include "motion_builder.h"
 #include "velocity_change.h"
 
 namespace stepdriver::motion {
@@ -36,8 +36,8 @@ double speedWithinMicrostep(const MotionLimits& limits) {
 }
 
 // The limits of a stop: as fast as it is, but no slower than a crawl.
-MotionLimits stopping(const Course& course, const MotionLimits& limits) {
-  const double level = std::abs(levelVelocity({course.v(), course.a()}, limits).value());
+MotionLimits stopping(const MotionBuilder& motion, const MotionLimits& limits) {
+  const double level = std::abs(levelVelocity({motion.v(), motion.a()}, limits).value());
   const double crawl = std::max(speedWithinMicrostep(limits), limits.start_speed);
   MotionLimits slower = limits;
   slower.max_speed = std::min(limits.max_speed, std::max(level, crawl));
@@ -45,23 +45,23 @@ MotionLimits stopping(const Course& course, const MotionLimits& limits) {
 }
 
 // With a start speed a motion in the wrong direction comes to rest first.
-void restBeforeTurn(Course& course, double sign, const MotionLimits& limits) {
-  if (startSpeed(limits) == 0.0 || !(sign * course.v().hi < 0.0)) return;
-  course.moveTo(course.nextRest(limits), stopping(course, limits));
+void restBeforeTurn(MotionBuilder& motion, double sign, const MotionLimits& limits) {
+  if (startSpeed(limits) == 0.0 || !(sign * motion.v().hi < 0.0)) return;
+  motion.moveTo(motion.nextRest(limits), stopping(motion, limits));
 }
 
 // The fastest motion to rest on the target, which it may pass.
 Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
                  const MotionLimits& limits) {
   const DoubleDouble end = fromInteger(target);
-  Course course(from, limits);
-  const Stop stop = stopFrom(course.v(), course.a(), limits);
-  const double beyond = (end - course.position() - stop.length).hi;
+  MotionBuilder motion(from, limits);
+  const Stop stop = stopFrom(motion.v(), motion.a(), limits);
+  const double beyond = (end - motion.position() - stop.length).hi;
   if (std::abs(beyond) > stop.doubt) {
-    restBeforeTurn(course, std::copysign(1.0, beyond), limits);
+    restBeforeTurn(motion, std::copysign(1.0, beyond), limits);
   }
-  course.moveTo(target, limits);
-  Plan plan{course.profile(start_ns)};
+  motion.moveTo(target, limits);
+  Plan plan{motion.profile(start_ns)};
   const double farthest = farthestBeyond(plan.profile, from, end);
   if (farthest > 2.0 * stop.doubt) plan.overshoot = farthest;
   return plan;
@@ -76,10 +76,10 @@ Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t targe
   const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && way != 0.0;
   if (!fastest.overshoots() || !may_turn) return fastest;
   // The fastest motion eases its deceleration before it turns. Without that it may turn in time.
-  Course course(from, limits);
-  if (!course.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return fastest;
-  course.moveTo(target, limits);
-  return {course.profile(start_ns)};
+  MotionBuilder motion(from, limits);
+  if (!motion.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return fastest;
+  motion.moveTo(target, limits);
+  return {motion.profile(start_ns)};
 }
 
 Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocity,
@@ -89,18 +89,18 @@ Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocit
   bounded.max_speed = std::min(limits.max_speed, std::abs(velocity));
   if (stand_at) return planMove(start_ns, from, *stand_at, bounded);
   const double sign = std::copysign(1.0, velocity);
-  Course course(from, bounded);
-  restBeforeTurn(course, sign, bounded);
-  course.moveOn(sign, bounded);
-  return {course.profile(start_ns)};
+  MotionBuilder motion(from, bounded);
+  restBeforeTurn(motion, sign, bounded);
+  motion.moveOn(sign, bounded);
+  return {motion.profile(start_ns)};
 }
 
 Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
                  std::optional<std::int64_t> not_beyond) {
-  const Course course(state, limits);
-  const MotionLimits slower = stopping(course, limits);
-  const std::int64_t rest = course.nextRest(limits);
-  const bool forwards = course.heading(limits) > 0.0;
+  const MotionBuilder motion(state, limits);
+  const MotionLimits slower = stopping(motion, limits);
+  const std::int64_t rest = motion.nextRest(limits);
+  const bool forwards = motion.heading(limits) > 0.0;
   if (not_beyond && (forwards ? *not_beyond < rest : *not_beyond > rest)) {
     return planMove(at_ns, state, *not_beyond, slower).profile;
   }

@@ -13,10 +13,14 @@ DoubleDouble startOf(const Profile& profile) {
   return profile.pieces().empty() ? profile.endPosition() : profile.pieces().front().p0;
 }
 
-// Goes through a profile from its start on.
+// Goes through a profile from a time after its start on.
 class Walk {
  public:
-  explicit Walk(const Profile& profile) : profile_(profile) {}
+  explicit Walk(const Profile& profile, DoubleDouble from = {}) : profile_(profile), time_(from) {
+    const std::size_t count = profile.pieces().size();
+    index_ = count > 0 ? profile.pieceAt(from) : 0;
+    while (index_ < count && !(left().hi > kNoTime)) ++index_;
+  }
 
   /// How long the polynomial of now goes on; none where the motion is over.
   bool moves() const { return index_ < profile_.pieces().size(); }
@@ -25,11 +29,8 @@ class Walk {
   /// The next of it.
   Piece take(DoubleDouble duration) {
     if (!moves()) return {duration, profile_.endPosition()};
-    const Piece& piece = profile_.pieces()[index_];
     const DoubleDouble t = time_ - profile_.pieceStart(index_);
-    const DoubleDouble v = piece.velocityAt(t);
-    const DoubleDouble a = piece.accelerationAt(t);
-    const Piece taken{duration, piece.positionAt(t), v.hi, a.hi, piece.j, v.lo, a.lo};
+    const Piece taken = partOf(profile_.pieces()[index_], t, duration);
     const bool whole = !((left() - duration).hi > kNoTime);
     time_ = whole ? profile_.pieceStart(index_ + 1) : time_ + duration;
     if (whole) ++index_;
@@ -50,16 +51,20 @@ Piece sumOf(const Piece& a, const Piece& b) {
 
 }  // namespace
 
+Piece partOf(const Piece& piece, DoubleDouble from, DoubleDouble duration) {
+  const DoubleDouble v = piece.velocityAt(from);
+  const DoubleDouble a = piece.accelerationAt(from);
+  return {duration, piece.positionAt(from), v.hi, a.hi, piece.j, v.lo, a.lo};
+}
+
 Profile part(const Profile& profile, DoubleDouble from, DoubleDouble to) {
-  Walk walk(profile);
+  Walk walk(profile, from);
   std::vector<Piece> pieces;
-  DoubleDouble time;
+  DoubleDouble time = from;
   while ((to - time).hi > kNoTime) {
-    const DoubleDouble until = time < from ? from : to;
-    const DoubleDouble left = until - time;
+    const DoubleDouble left = to - time;
     const DoubleDouble duration = walk.moves() ? std::min(walk.left(), left) : left;
-    const Piece piece = walk.take(duration);
-    if (!(time < from)) pieces.push_back(piece);
+    pieces.push_back(walk.take(duration));
     time = time + duration;
   }
   if (pieces.empty()) return {profile.startNs(), startOf(profile)};

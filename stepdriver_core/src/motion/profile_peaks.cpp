@@ -52,7 +52,7 @@ void takePiece(ProfilePeaks& peaks, const Piece& piece, double start) {
 
 }  // namespace
 
-ProfilePeaks profilePeaks(const Profile& profile, double velocity_before) {
+ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double velocity_after) {
   const double first = profile.pieces().empty() ? profile.endPosition().value()
                                                 : profile.pieces().front().p0.value();
   ProfilePeaks peaks;
@@ -60,13 +60,24 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before) {
   peaks.highest.value = first;
   double velocity = velocity_before;
   for (std::size_t index = 0; index < profile.pieces().size(); ++index) {
-    const Piece& piece = profile.pieces()[index];
+    const Piece piece = profile.piece(index);
     const double start = profile.pieceStart(index).value();
     takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
     takePiece(peaks, piece, start);
     velocity = piece.velocityAt(piece.duration).value();
   }
-  takeFurthest(peaks.velocity_jump, -velocity, profile.duration().value());
+  takeFurthest(peaks.velocity_jump, velocity_after - velocity, profile.duration().value());
+  return peaks;
+}
+
+ProfilePeaks joinPeaks(const ProfilePeaks& before, const ProfilePeaks& part, double time_s) {
+  ProfilePeaks peaks = before;
+  for (const Peak& peak : {part.lowest, part.highest}) {
+    takePosition(peaks, peak.value, time_s + peak.time_s);
+  }
+  takeFurthest(peaks.velocity, part.velocity.value, time_s + part.velocity.time_s);
+  takeFurthest(peaks.acceleration, part.acceleration.value, time_s + part.acceleration.time_s);
+  takeFurthest(peaks.velocity_jump, part.velocity_jump.value, time_s + part.velocity_jump.time_s);
   return peaks;
 }
 

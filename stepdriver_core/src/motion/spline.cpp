@@ -90,35 +90,96 @@ Ends takeJerk(SplineJerk& worst, const Segment& segment) {
   return {*segment.begin.acceleration, *segment.end.acceleration};
 }
 
+// Takes in what one segment after the other asks for.
+class JerkMeter {
+ public:
+  explicit JerkMeter(double acceleration_before) : before_(acceleration_before) {}
+
+  void take(const Segment& segment) {
+    const Ends ends = takeJerk(worst_, segment);
+    jumpTo(ends.begin, segment.begin.time_ns);
+    before_ = ends.end;
+  }
+  void jumpTo(double acceleration, std::int64_t time_ns) {
+    const double change = acceleration - before_;
+    if (std::abs(change) > std::abs(worst_.acceleration_jump.value)) {
+      worst_.acceleration_jump = {change, static_cast<double>(time_ns) * 1e-9};
+    }
+  }
+  const SplineJerk& worst() const { return worst_; }
+
+ private:
+  SplineJerk worst_;
+  double before_;
+};
+
+double accelerationAtBegin(const Segment& segment) {
+  SplineJerk ignored;
+  return takeJerk(ignored, segment).begin;
+}
+
 }  // namespace
 
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
                    const std::vector<Waypoint>& waypoints) {
   requirePlannable(from, waypoints);
+  const Segments segments(waypoints);
   std::vector<Piece> pieces;
   pieces.reserve(waypoints.size());
-  for (const Segment& segment : segmentsOf(from, waypoints)) append(pieces, segment);
+  append(pieces, segments.first(from));
+  for (std::size_t i = 1; i < segments.size(); ++i) append(pieces, segments.at(i));
   return {start_ns, std::move(pieces)};
 }
 
 SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& waypoints) {
   requirePlannable(from, waypoints);
-  SplineJerk worst;
-  const auto jump = [&](double change, double time_s) {
-    if (std::abs(change) > std::abs(worst.acceleration_jump.value)) {
-      worst.acceleration_jump = {change, time_s};
-    }
-  };
-  double before = from.acceleration;
-  double time_s = 0.0;
-  for (const Segment& segment : segmentsOf(from, waypoints)) {
-    const Ends ends = takeJerk(worst, segment);
-    jump(ends.begin - before, time_s);
-    before = ends.end;
-    time_s = static_cast<double>(segment.end.time_ns) * 1e-9;
+  const Segments segments(waypoints);
+  JerkMeter meter(from.acceleration);
+  meter.take(segments.first(from));
+  for (std::size_t i = 1; i < segments.size(); ++i) meter.take(segments.at(i));
+  meter.jumpTo(0.0, waypoints.back().time_ns);
+  return meter.worst();
+}
+
+SplineTail::SplineTail(const std::vector<Waypoint>& waypoints) {
+  requireWaypoints(waypoints);
+  const Segments segments(waypoints);
+  const Segment first = segments.first({});
+  first_index_ = first.index;
+  first_ = waypoints[first.index];
+  first_.position = first.end.position.value();
+  if (segments.size() == 1) return;
+  std::vector<Piece> pieces;
+  pieces.reserve(waypoints.size());
+  begin_acceleration_ = accelerationAtBegin(segments.at(1));
+  JerkMeter meter(begin_acceleration_);
+  for (std::size_t i = 1; i < segments.size(); ++i) {
+    append(pieces, segments.at(i));
+    meter.take(segments.at(i));
   }
-  jump(-before, time_s);
-  return worst;
+  meter.jumpTo(0.0, waypoints.back().time_ns);
+  profile_.emplace(0, std::move(pieces));
+  jerk_ = meter.worst();
+  jerk_.jerk.time_s -= beginS();
+  jerk_.acceleration_jump.time_s -= beginS();
+}
+
+std::vector<Piece> SplineTail::head(const MotionState& from) const {
+  requireStart(from);
+  std::vector<Piece> pieces;
+  append(pieces, {{0, from.position, from.velocity, from.acceleration},
+                  {first_.time_ns, first_.position, first_.velocity, first_.acceleration},
+                  first_index_});
+  return pieces;
+}
+
+SplineJerk SplineTail::headJerk(const MotionState& from) const {
+  JerkMeter meter(from.acceleration);
+  meter.take({{0, from.position, from.velocity, from.acceleration},
+              {first_.time_ns, first_.position, first_.velocity, first_.acceleration},
+              first_index_});
+  meter.jumpTo(begin_acceleration_, first_.time_ns);
+  return meter.worst();
 }
 
 }  // namespace stepdriver::motion

@@ -57,11 +57,19 @@ void requireTime(const std::vector<Waypoint>& waypoints, std::size_t index) {
 }  // namespace
 
 void requirePlannable(const MotionState& from, const std::vector<Waypoint>& waypoints) {
+  requireStart(from);
+  requireWaypoints(waypoints);
+}
+
+void requireStart(const MotionState& from) {
   const std::string start = "the motion's start";
   requireFinite(start, "position", from.position.value());
   requireNear(start, from.position.value());
   requireFinite(start, "velocity", from.velocity);
   requireFinite(start, "acceleration", from.acceleration);
+}
+
+void requireWaypoints(const std::vector<Waypoint>& waypoints) {
   if (waypoints.empty()) refuse("The trajectory has 0 waypoints; it needs at least 1.");
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
     const Waypoint& waypoint = waypoints[index];

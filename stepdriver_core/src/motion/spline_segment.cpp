@@ -54,20 +54,23 @@ Quintic Segment::quintic() const {
           times(6.0, way) - times(3.0, v0) - times(3.0, v1) - a0 + a1};
 }
 
-std::vector<Segment> segmentsOf(const MotionState& from, const std::vector<Waypoint>& waypoints) {
-  std::vector<Segment> segments;
-  segments.reserve(waypoints.size());
-  Knot begin{0, from.position, from.velocity, from.acceleration};
-  for (std::size_t index = waypoints.front().time_ns == 0 ? 1 : 0; index < waypoints.size();
-       ++index) {
-    const Waypoint& waypoint = waypoints[index];
-    const bool last = index + 1 == waypoints.size();
-    const double position = last ? std::nearbyint(waypoint.position) : waypoint.position;
-    const Knot end{waypoint.time_ns, position, waypoint.velocity, waypoint.acceleration};
-    segments.push_back({begin, end, index});
-    begin = end;
-  }
-  return segments;
+Segments::Segments(const std::vector<Waypoint>& waypoints)
+    : waypoints_(waypoints), skipped_(waypoints.front().time_ns == 0 ? 1 : 0) {}
+
+Segment Segments::first(const MotionState& from) const {
+  return {{0, from.position, from.velocity, from.acceleration}, knot(skipped_), skipped_};
+}
+
+Segment Segments::at(std::size_t index) const {
+  const std::size_t to = skipped_ + index;
+  return {knot(to - 1), knot(to), to};
+}
+
+Knot Segments::knot(std::size_t index) const {
+  const Waypoint& waypoint = waypoints_[index];
+  const bool last = index + 1 == waypoints_.size();
+  const double position = last ? std::nearbyint(waypoint.position) : waypoint.position;
+  return {waypoint.time_ns, position, waypoint.velocity, waypoint.acceleration};
 }
 
 }  // namespace stepdriver::motion

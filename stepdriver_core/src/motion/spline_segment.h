@@ -44,9 +44,23 @@ struct Segment {
   Quintic quintic() const;
 };
 
-/// The segments of a trajectory, one after the other.
-///
-/// @pre requirePlannable()
-std::vector<Segment> segmentsOf(const MotionState& from, const std::vector<Waypoint>& waypoints);
+/// The segments of a trajectory, each made when it is asked for. The first one begins where the
+/// motion is at its start, each other one at a waypoint.
+class Segments {
+ public:
+  /// @param waypoints outlive this. @pre requirePlannable()
+  explicit Segments(const std::vector<Waypoint>& waypoints);
+
+  std::size_t size() const { return waypoints_.size() - skipped_; }
+  Segment first(const MotionState& from) const;
+  /// @pre index > 0
+  Segment at(std::size_t index) const;
+
+ private:
+  Knot knot(std::size_t waypoint) const;
+
+  const std::vector<Waypoint>& waypoints_;
+  std::size_t skipped_;  // waypoints: one at time 0 is over when the motion starts
+};
 
 }  // namespace stepdriver::motion

@@ -108,8 +108,8 @@ bool StepFinder::nextOfOther(Step& step, double way) {
 }
 
 bool StepFinder::enterNext() {
-  if (profile_ == nullptr || piece_ >= profile_->pieces().size()) return false;
-  const Piece& piece = profile_->pieces()[piece_];
+  if (profile_ == nullptr || piece_ >= profile_->pieceCount()) return false;
+  const Piece piece = profile_->piece(piece_);
   const double cut = firstCut(piece, done_);
   const bool last = !(cut < piece.duration.value());
   enter(piece, done_, last ? piece.duration : DoubleDouble(cut), profile_->pieceStart(piece_));

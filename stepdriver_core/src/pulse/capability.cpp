@@ -10,6 +10,8 @@
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
+#include "stepdriver_core/pulse/channel.h"
+#include "stepdriver_core/pulse/realtime.h"
 
 namespace stepdriver::pulse {
 namespace {

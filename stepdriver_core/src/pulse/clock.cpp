@@ -9,6 +9,8 @@
 #include <cmath>
 #include <ctime>
 
+#include "stepdriver_core/pulse/hybrid_wait.h"
+
 namespace stepdriver::pulse {
 namespace {
 
@@ -40,7 +42,12 @@ struct WakeableThread {
 }  // namespace
 
 SteadyClock::SteadyClock(std::optional<Nanoseconds> guard)
-    : wait_(guard ? std::clamp<Nanoseconds>(*guard, 0, GuardLearner::kLongest) : guard) {}
+    : wait_(std::make_unique<HybridWait>(
+          guard ? std::clamp<Nanoseconds>(*guard, 0, GuardLearner::kLongest) : guard)) {}
+
+SteadyClock::~SteadyClock() = default;
+
+Nanoseconds SteadyClock::guard() const { return wait_->guard(); }
 
 Nanoseconds SteadyClock::now() { return steadyNow(); }
 
@@ -50,7 +57,7 @@ void SteadyClock::sleepUntil(Nanoseconds time) { wait(time, false); }
 
 void SteadyClock::wait(Nanoseconds time, bool may_spin) {
   WakeableThread thread{wakes_, seen_};
-  wait_.waitUntil(thread, time, may_spin);
+  wait_->waitUntil(thread, time, may_spin);
   seen_ = wakes_.load(std::memory_order_acquire);
 }
 

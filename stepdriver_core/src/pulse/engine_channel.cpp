@@ -30,31 +30,30 @@ void EngineChannel::follow(const Follow& order) {
   }
 }
 
-bool EngineChannel::startPins(const Command& command, Nanoseconds now) {
-  if (profile != nullptr || pin_run.serial != 0) return false;
-  const bool stepped = state.pulses != 0;
-  pin_run = {command.pins, 0, command.serial, command.scale,
-             stepped ? std::max(now, rose + config.mode_hold) : now};
+bool EngineChannel::reserve() {
+  if (profile != nullptr || reserved) return false;
+  reserved = true;
   faulty = false;  // to be read anew when the pins have done what they do
   return true;
 }
 
-void EngineChannel::finishPins(Nanoseconds then_wait, Nanoseconds now) {
-  state.ready = std::max(state.ready, now + then_wait);
-  if (const auto& scale = pin_run.scale) {
+void EngineChannel::release(const Command& command) {
+  reserved = false;
+  unchecked = config.fault.has_value();
+  state.ready = std::max(state.ready, command.ready);
+  if (const auto& scale = command.scale) {
     state.count = scale->count;
     state.slack = scale->slack;
     config.backlash = scale->backlash;
+    ++state.epoch;
   }
-  state.pins_done = pin_run.serial;
-  pin_run.serial = 0;
-  publish();
 }
 
 void EngineChannel::countStep() {
   state.count += direction;
   state.slack = std::clamp<std::int64_t>(state.slack + direction, 0, config.backlash);
   ++state.pulses;
+  state.rose = rose;
   running = true;
   last_planned = next->time_ns;
   late = 0;

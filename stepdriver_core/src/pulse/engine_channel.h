@@ -12,23 +12,13 @@
 
 namespace stepdriver::pulse {
 
-/// A sequence of pins under way.
-struct PinRun {
-  PinSequence pins;
-  std::size_t next = 0;      // of the writes
-  std::uint64_t serial = 0;  // of the command; 0: none is under way
-  std::optional<Command::Scale> scale;
-  Nanoseconds due = 0;
-};
-
 /// What the pulse thread knows of one channel: the motion that it follows, and its last edges.
 struct EngineChannel {
   /// What it does when it is due.
-  enum class Action { kNothing, kFall, kPin, kTurn, kRise, kFinish };
+  enum class Action { kNothing, kFall, kTurn, kRise, kFinish };
 
   Action action() const {
     if (high) return Action::kFall;
-    if (pin_run.serial != 0) return Action::kPin;
     if (next) return next->direction == direction ? Action::kRise : Action::kTurn;
     return profile != nullptr ? Action::kFinish : Action::kNothing;
   }
@@ -54,19 +44,21 @@ struct EngineChannel {
   void pullNext();
   void adopt(const motion::Profile& followed, std::uint64_t serial);
   void follow(const Follow& order);
-  /// @return whether it can: it is at rest, and no other sequence is under way.
-  bool startPins(const Command& command, Nanoseconds now);
-  void finishPins(Nanoseconds then_wait, Nanoseconds now);
+  /// @return whether it can: it is at rest, and nobody has reserved it.
+  bool reserve();
+  void release(const Command& command);
   /// A pulse has gone out.
   void countStep();
   void endMotion(EndReason reason, Nanoseconds motion_now);
 
   std::size_t index = 0;
-  bool high = false;     // the pulse is out
-  bool running = false;  // the motion under way has made a step
-  bool changed = false;  // it is to be scheduled
-  bool faulty = false;   // as the fault line read last
-  int direction = -1;    // as the DIR line has it
+  bool high = false;       // the pulse is out
+  bool running = false;    // the motion under way has made a step
+  bool changed = false;    // it is to be scheduled
+  bool faulty = false;     // as the fault line read last
+  bool unchecked = false;  // its fault line is to be read before the next step
+  bool reserved = false;   // somebody writes the chip's other pins
+  int direction = -1;      // as the DIR line has it
   std::optional<motion::Step> next;
   Nanoseconds last_planned = 0;  // motion time of the step before, or of the profile's start
   Nanoseconds late = 0;          // of the next step, as far as it is by now
@@ -84,7 +76,6 @@ struct EngineChannel {
   motion::StepFinder finder;
   ChannelConfig config;
   Successors successors;
-  PinRun pin_run;
 };
 
 }  // namespace stepdriver::pulse

@@ -118,9 +118,6 @@ void PulseEngine::writeOthers(Nanoseconds now) {
       case Action::kTurn:
         turn(channel, now);
         break;
-      case Action::kPin:
-        writePin(channel, now);
-        break;
       case Action::kFinish:
         end(channel, EndReason::kDone, now);
         break;
@@ -143,26 +140,6 @@ void PulseEngine::turn(Channel& channel, Nanoseconds now) {
   changed(channel);
 }
 
-void PulseEngine::writePin(Channel& channel, Nanoseconds now) {
-  changed(channel);
-  PinRun& run = channel.pin_run;
-  if (run.next == run.pins.size) {
-    channel.finishPins(0, now);
-    return;
-  }
-  const PinSequence::Write& pin = run.pins.writes[run.next++];
-  const gpio::LineWrite write{pin.line, pin.level};
-  if (const int error = lines_.write(&write, 1)) {
-    channel.state.pins_failed = run.serial;
-    run.serial = 0;
-    fail(channel, {error, write.output}, now);
-    return;
-  }
-  const Nanoseconds done = clock_.now();
-  run.due = done + pin.then_wait;
-  if (run.next == run.pins.size) channel.finishPins(pin.then_wait, done);
-}
-
 void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds now) {
   channel.state.failure = failure;
   ++channel.state.line_errors;
@@ -183,6 +160,7 @@ void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
 
 void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
   channel.endMotion(reason, now - state_.slipped);
+  news_ = true;
   changed(channel);
 }
 

@@ -3,12 +3,27 @@
 
 namespace stepdriver::pulse {
 
-void PulseEngine::emergencyStop() {
-  emergency_.store(true, std::memory_order_release);
+std::uint64_t PulseEngine::emergencyStop() {
+  const std::uint64_t asked = asked_.fetch_add(1, std::memory_order_acq_rel) + 1;
   clock_.wake();
+  return asked;
 }
 
-void PulseEngine::clearEmergencyStop() { emergency_.store(false, std::memory_order_release); }
+void PulseEngine::clearEmergencyStop(std::uint64_t served) {
+  cleared_.store(served, std::memory_order_release);
+}
+
+// Every motion of a stop that was asked for before this pass has ended by now; the pulses that were
+// out then may still be high.
+void PulseEngine::serveStops() {
+  const std::uint64_t asked = stopsAsked();
+  if (asked == served_.load(std::memory_order_relaxed)) return;
+  for (const Channel& channel : channels_) {
+    if (channel.high || channel.profile != nullptr) return;
+  }
+  served_.store(asked, std::memory_order_release);
+  news_ = true;
+}
 
 void PulseEngine::inputsChanged() {
   inputs_changed_.store(true, std::memory_order_release);
@@ -21,8 +36,8 @@ void PulseEngine::readEmergencyStop() {
   const bool active = level < 0 || (level != 0) == emergency_input_->active;
   // Active still after a clear: that is a stop of its own.
   if (active && !(emergency_input_active_ && emergencyStopped())) {
-    emergency_.store(true, std::memory_order_release);
     input_stops_.fetch_add(1, std::memory_order_release);
+    asked_.fetch_add(1, std::memory_order_acq_rel);
   }
   emergency_input_active_ = active;
 }
@@ -44,7 +59,7 @@ void PulseEngine::readInputs(Nanoseconds now) {
 
 void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
   // While its pins change, and while it wakes, a chip's fault line means nothing.
-  if (channel.pin_run.serial != 0 || now < channel.state.ready) return;
+  if (channel.reserved || now < channel.state.ready) return;
   const int level = lines_.read(channel.config.fault->line);
   const bool faulty = level < 0 || (level != 0) == channel.config.fault->active;
   if (faulty && !channel.faulty) {
@@ -59,6 +74,12 @@ void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
 }
 
 bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
+  // A chip may wake with a fault that it had before: its line doesn't change then.
+  if (channel.unchecked && now >= channel.state.ready) {
+    channel.unchecked = false;
+    readFault(channel, now);
+    if (!channel.next) return false;
+  }
   const bool forward = channel.next->direction > 0;
   const auto& endstop = forward ? channel.config.endstop_max : channel.config.endstop_min;
   if (!endstop) return true;

@@ -52,9 +52,6 @@ bool PulseEngine::schedule(Channel& channel) {
       slid = channel.next && !channel.isSucceeded() &&
              slideUpTo(closestRise(channel), channel.next->time_ns + state_.slipped);
       break;
-    case Action::kPin:
-      due = channel.pin_run.due;
-      break;
     case Action::kTurn:
       due = channel.state.pulses != 0 ? channel.rose + channel.config.dir_hold : 0;
       break;

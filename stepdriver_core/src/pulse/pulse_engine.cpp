@@ -49,7 +49,15 @@ Nanoseconds PulseEngine::serve() {
   collectDue(now);
   writeOthers(now);
   scheduleChanged();
+  serveStops();
+  tell();
   return dues_.earliest();
+}
+
+void PulseEngine::tell() {
+  if (!news_) return;
+  news_ = false;
+  if (listener_ != nullptr) listener_->onNews();
 }
 
 // ---- orders ----
@@ -62,19 +70,26 @@ bool PulseEngine::post(const Command& command) {
 
 void PulseEngine::takeMail(Nanoseconds now) {
   while (const Command* command = mail_.front()) {
-    if (command->kind == Command::Kind::kFollow) {
-      followAll(*command, now);
-    } else {
-      Channel& channel = channels_[static_cast<std::size_t>(command->channel)];
-      if (!channel.startPins(*command, now)) channel.state.refused = command->serial;
-      channel.state.taken = command->serial;
-      channel.publish();
-      changed(channel);
-    }
+    takeCommand(*command, now);
     mail_.pop();
   }
+  news_ = true;
   // An order may slide the timeline, and then no step may go out by its old time.
   scheduleChanged();
+}
+
+void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
+  if (command.kind == Command::Kind::kFollow) return followAll(command, now);
+  Channel& channel = channels_[static_cast<std::size_t>(command.channel)];
+  if (command.kind == Command::Kind::kRelease) {
+    channel.release(command);
+    channel.state.accepted = command.serial;
+  } else if (channel.reserve()) {
+    channel.state.accepted = command.serial;
+  }
+  channel.state.taken = command.serial;
+  channel.publish();
+  changed(channel);
 }
 
 void PulseEngine::followAll(const Command& command, Nanoseconds now) {
@@ -87,9 +102,8 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
     Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
     if (may) {
       channel.follow(order);
+      channel.state.accepted = order.serial;
       changed(channel);
-    } else {
-      channel.state.refused = order.serial;
     }
   }
   // What they wait for is there for all at once: `follows` is not read any more.
@@ -106,8 +120,8 @@ bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const Nanoseconds start = order.profile->startNs();
   const bool late =
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
-  return !late && channel.pin_run.serial == 0 && order.continues == channel.latest() &&
-         channel.successors.hasRoom(start);
+  return !late && !channel.reserved && order.continues == channel.latest() &&
+         channel.successors.hasRoom(start) && order.stops == stopsAsked() && !emergencyStopped();
 }
 
 }  // namespace stepdriver::pulse

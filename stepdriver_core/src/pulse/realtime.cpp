@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstring>
 
+#include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/cpu_latency.h"
 
 namespace stepdriver::pulse {

@@ -25,12 +25,13 @@ const Wire& wireOf(const RigAxisSpec& spec, Pin pin) {
 }
 
 ChipModel::ChipModel(const RigAxisSpec& spec)
-    : chip_(chip::chipOf(spec.model)),
+    : chip_(driver::driverChipOf(spec.model)),
       timing_(spec.timing),
       finest_(*std::max_element(chip_.microsteps.begin(), chip_.microsteps.end())),
       declared_microsteps_(spec.microsteps),
       microsteps_(spec.microsteps) {
-  const chip::ModeCode straps = chip::codeOf(chip_, spec.microsteps).value_or(chip::ModeCode{});
+  const driver::ModeCode straps =
+      driver::codeOf(chip_, spec.microsteps).value_or(driver::ModeCode{});
   for (std::size_t i = 0; i < kPinCount; ++i) {
     const Pin pin = static_cast<Pin>(i);
     const Wire& wire = wireOf(spec, pin);
@@ -40,7 +41,7 @@ ChipModel::ChipModel(const RigAxisSpec& spec)
   decode();
 }
 
-bool ChipModel::idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const {
+bool ChipModel::idleLevel(Pin pin, bool wired, const driver::ModeCode& straps) const {
   switch (pin) {
     case Pin::kStep:
       return !chip_.step_active;
@@ -157,7 +158,8 @@ void ChipModel::onMode(std::int64_t time_ns) {
 
 std::optional<int> ChipModel::decodedMicrosteps() const {
   if (chip_.modes.empty()) return declared_microsteps_;
-  return chip::microstepsOf(chip_, {at(Pin::kMs1).level, at(Pin::kMs2).level, at(Pin::kMs3).level});
+  return driver::microstepsOf(chip_,
+                              {at(Pin::kMs1).level, at(Pin::kMs2).level, at(Pin::kMs3).level});
 }
 
 std::int64_t ChipModel::advance(bool forward) {

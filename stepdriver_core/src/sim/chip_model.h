@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "sim_time.h"
-#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::sim {
@@ -44,7 +44,7 @@ class ChipModel {
   std::int64_t translator() const { return translator_; }
   int microsteps() const { return microsteps_; }
   int finest() const { return finest_; }
-  std::int64_t cycle() const { return std::int64_t{chip::kFullStepsPerCycle} * finest_; }
+  std::int64_t cycle() const { return std::int64_t{driver::kFullStepsPerCycle} * finest_; }
   const std::map<Violation, std::int64_t>& violations() const { return violations_; }
   void count(Violation violation) { ++violations_[violation]; }
 
@@ -61,7 +61,7 @@ class ChipModel {
   bool enabled() const { return at(Pin::kEnable).level == chip_.enable_on; }
   bool awake() const { return !chip_.has_sleep || at(Pin::kSleep).level != chip_.sleep_asleep; }
 
-  bool idleLevel(Pin pin, bool wired, const chip::ModeCode& straps) const;
+  bool idleLevel(Pin pin, bool wired, const driver::ModeCode& straps) const;
   std::optional<int> decodedMicrosteps() const;
   void decode() { decoded_ = decodedMicrosteps(); }
   void checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int64_t limit_ns,
@@ -73,8 +73,8 @@ class ChipModel {
   std::int64_t advance(bool forward);
   void goHomeIfHeld();
 
-  const chip::Chip& chip_;
-  const chip::Timing timing_;
+  const driver::DriverChip& chip_;
+  const driver::Timing timing_;
   const int finest_;
   const int declared_microsteps_;
   std::array<PinState, kPinCount> pins_;

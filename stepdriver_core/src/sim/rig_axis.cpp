@@ -11,7 +11,7 @@ namespace stepdriver::sim {
 namespace {
 
 const RigAxisSpec& checked(const RigAxisSpec& spec) {
-  const chip::Chip& chip = chip::chipOf(spec.model);
+  const driver::DriverChip& chip = driver::driverChipOf(spec.model);
   const std::vector<int>& known = chip.microsteps;
   if (std::find(known.begin(), known.end(), spec.microsteps) == known.end()) {
     throw std::invalid_argument("Axis " + spec.name + " of the rig: a " + chip.title +

@@ -46,7 +46,7 @@ class Check {
   Check(Options options, ros_node::NodeConfig config)
       : options_(std::move(options)),
         config_(std::move(config)),
-        real_(config_.backend == ros_node::GpioBackend::kLibgpiod) {}
+        real_(config_.backend == setup::GpioBackend::kLibgpiod) {}
 
   int run() {
     section("Configuration: " + options_.config, configurationText(config_));
@@ -93,13 +93,14 @@ class Check {
     if (real_ && exit_code_ == kExitGood) {
       try {
         const auto backend = gpio::makeLibgpiodBackend();
-        capability_ = machine::measure(config_.axes, *backend, clock_, latencyDevice(config_));
+        capability_ =
+            machine::measure(config_.axes, *backend, clock_, config_.options().latency_device);
         return;
       } catch (const GpioError& error) {
         note(kExitLines, error.what());
       }
     }
-    capability_ = pulse::measureWakeUps(clock_, latencyDevice(config_));
+    capability_ = pulse::measureWakeUps(clock_, config_.options().latency_device);
   }
 
   void reportRates() {
@@ -127,8 +128,9 @@ class Check {
     bool back = false;
     try {
       if (InterruptWatch::comesWithin(kWarning)) throw Error("interrupted");
-      const MoveOrder order{config_.axes,         options_.axis,          options_.distance,
-                            config_.max_lateness, config_.emergency_stop, latencyDevice(config_)};
+      const MoveOrder order{config_.axes,           options_.axis,
+                            options_.distance,      config_.max_lateness,
+                            config_.emergency_stop, config_.options().latency_device};
       const auto backend = gpio::makeLibgpiodBackend();
       back = moveForthAndBack(order, *backend, clock_,
                               [](const std::string& line) { print(line + "\n"); });
@@ -148,9 +150,9 @@ class Check {
   std::string verdict_ = "every line can be had, and every axis's top speed can be held.";
 };
 
-bool hasAxis(const std::vector<axis::AxisConfig>& axes, const std::string& name) {
+bool hasAxis(const std::vector<config::AxisConfig>& axes, const std::string& name) {
   return std::any_of(axes.begin(), axes.end(),
-                     [&](const axis::AxisConfig& axis) { return axis.name == name; });
+                     [&](const config::AxisConfig& axis) { return axis.name == name; });
 }
 
 int run(const std::vector<std::string>& arguments) {

@@ -1,50 +1,25 @@
 #include "configuration.h"
 
+#include <utility>
 #include <vector>
 
-#include "../text.h"
-#include "stepdriver_core/chip/chip.h"
+#include "common/text.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/yaml.h"
 #include "table.h"
-#include "yaml_value.h"
 
 namespace stepdriver::check {
 namespace {
 
-using axis::ConfigValue;
-using ros_node::numberText;
+using ros_node::roundedText;
 
-ConfigValue* childOf(ConfigValue& tree, const std::string& key) {
-  auto* map = tree.as<ConfigValue::Map>();
-  if (map == nullptr || map->count(key) == 0) return nullptr;
-  return &map->at(key);
+std::string speedText(const config::AxisConfig& axis) {
+  return roundedText(axis.max_speed * config::configUnitsPerUnit(axis.kind)) +
+         (axis.kind == config::Kind::kLinear ? " mm/s" : " deg/s");
 }
 
-/// Writes the backend that is meant into the tree. What else is wrong there stays.
-void choose(ConfigValue& tree, BackendChoice choice) {
-  auto* map = tree.as<ConfigValue::Map>();
-  if (map == nullptr) return;
-  auto* gpio = map->emplace("gpio", ConfigValue::Map{}).first->second.as<ConfigValue::Map>();
-  if (gpio == nullptr) return;
-  if (choice == BackendChoice::kAsInTheFile) {
-    gpio->emplace("backend", "libgpiod");
-    return;
-  }
-  const bool simulated = choice == BackendChoice::kSimulated;
-  (*gpio)["backend"] = simulated ? "simulated" : "libgpiod";
-  // Real lines have no trace, and the node says so: here nobody asked for both.
-  ConfigValue* simulation = simulated ? nullptr : childOf(tree, "simulation");
-  if (simulation != nullptr && simulation->as<ConfigValue::Map>() != nullptr) {
-    simulation->as<ConfigValue::Map>()->erase("trace");
-  }
-}
-
-std::string speedText(const axis::AxisConfig& axis) {
-  return numberText(axis.max_speed * axis::configUnitsPerUnit(axis.kind)) +
-         (axis.kind == axis::Kind::kLinear ? " mm/s" : " deg/s");
-}
-
-std::string endstopsText(const axis::AxisConfig& axis) {
+std::string endstopsText(const config::AxisConfig& axis) {
   if (axis.endstop_min && axis.endstop_max) return "min and max";
   if (axis.endstop_min) return "min";
   return axis.endstop_max ? "max" : "none";
@@ -53,24 +28,22 @@ std::string endstopsText(const axis::AxisConfig& axis) {
 }  // namespace
 
 ros_node::NodeConfig readConfiguration(const std::string& path, BackendChoice choice) {
-  ConfigValue tree = loadYaml(path);
-  choose(tree, choice);
+  config::ConfigValue tree = yaml::load(path);
+  setup::chooseBackend(tree, choice);
   std::vector<ConfigIssue> issues;
   ros_node::NodeConfig config = ros_node::readNodeConfig(tree, "", issues);
-  if (issues.empty()) return config;
-  // Names of parameters begin below the node.
-  for (ConfigIssue& issue : issues) issue.key.erase(0, issue.key.find_first_not_of('/'));
-  throw ConfigError(issues);
+  setup::throwIssues(std::move(issues));
+  return config;
 }
 
 std::string configurationText(const ros_node::NodeConfig& config) {
   std::vector<std::vector<std::string>> rows = {
       {"axis", "driver", "kind", "microsteps", "top speed", "steps/s", "endstops"}};
-  for (const axis::AxisConfig& axis : config.axes) {
-    rows.push_back({axis.name, chip::chipOf(axis.driver).title,
-                    axis.kind == axis::Kind::kLinear ? "linear" : "rotary",
+  for (const config::AxisConfig& axis : config.axes) {
+    rows.push_back({axis.name, driver::driverChipOf(axis.driver).title,
+                    axis.kind == config::Kind::kLinear ? "linear" : "rotary",
                     std::to_string(axis.microsteps), speedText(axis),
-                    numberText(axis.max_speed * axis.steps_per_unit), endstopsText(axis)});
+                    roundedText(axis.max_speed * axis.steps_per_unit), endstopsText(axis)});
   }
   return table(rows);
 }

@@ -2,12 +2,12 @@
 
 #include <string>
 
-#include "node_config.h"
+#include "common/node_config.h"
+#include "stepdriver_core/setup/machine_config.h"
 
 namespace stepdriver::check {
 
-/// Where a file is to be checked with other lines than it asks for.
-enum class BackendChoice { kAsInTheFile, kSimulated, kLibgpiod };
+using setup::BackendChoice;
 
 /// Reads a file as the node reads its parameters. A file that names no backend, as the launch files
 /// have it, is taken to mean libgpiod.

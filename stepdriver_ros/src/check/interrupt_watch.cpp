@@ -7,7 +7,7 @@
 #include <ctime>
 #include <utility>
 
-#include "../end_signals.h"
+#include "common/end_signals.h"
 
 namespace stepdriver::check {
 namespace {

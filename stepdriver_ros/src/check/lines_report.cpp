@@ -55,15 +55,15 @@ std::string holderOf(const gpio::LineInfo& info) {
 
 }  // namespace
 
-std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes,
-                               const std::optional<axis::InputSwitch>& emergency_stop) {
+std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
+                               const std::optional<config::InputSwitch>& emergency_stop) {
   std::vector<NamedLine> lines;
   std::vector<std::size_t> enables;  // those of `lines` that axes may share
-  for (const axis::AxisConfig& axis : axes) {
+  for (const config::AxisConfig& axis : axes) {
     const auto add = [&](const char* pin, const std::string& line) {
       if (!line.empty()) lines.push_back({axis.name + "/" + pin, line});
     };
-    const axis::Pins& pins = axis.pins;
+    const config::Pins& pins = axis.pins;
     add("step", pins.step.line);
     add("dir", pins.dir.line);
     const auto shared = std::find_if(enables.begin(), enables.end(), [&](std::size_t i) {
@@ -75,7 +75,7 @@ std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes,
       enables.push_back(lines.size());
       add("enable", pins.enable.line);
     }
-    const bool numbered_from_0 = axis.driver == chip::Model::kDrv8825;
+    const bool numbered_from_0 = axis.driver == driver::Model::kDrv8825;
     add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
     add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
     add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::check {
@@ -15,8 +15,8 @@ struct NamedLine {
   std::string line;  ///< as the file names it
 };
 
-std::vector<NamedLine> linesOf(const std::vector<axis::AxisConfig>& axes,
-                               const std::optional<axis::InputSwitch>& emergency_stop = {});
+std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
+                               const std::optional<config::InputSwitch>& emergency_stop = {});
 
 /// What there is, and what of it the file asks for.
 struct LinesReport {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "../text.h"
+#include "common/text.h"
 #include "interrupt_watch.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
@@ -13,22 +13,22 @@ namespace {
 constexpr double kShortStroke = 1.0;  // [mm]
 constexpr double kShortTurn = 10.0;   // [deg]
 
-using ros_node::numberText;
+using ros_node::roundedText;
 using Say = std::function<void(const std::string&)>;
 
-std::string lengthText(const axis::AxisConfig& axis, double length) {
-  return numberText(length * axis::configUnitsPerUnit(axis.kind)) +
-         (axis.kind == axis::Kind::kLinear ? " mm" : " degrees");
+std::string lengthText(const config::AxisConfig& axis, double length) {
+  return roundedText(length * config::configUnitsPerUnit(axis.kind)) +
+         (axis.kind == config::Kind::kLinear ? " mm" : " degrees");
 }
 
-double strokeOf(const axis::AxisConfig& axis, const std::optional<double>& distance) {
-  const double usual = axis.kind == axis::Kind::kLinear ? kShortStroke : kShortTurn;
-  return distance.value_or(usual) / axis::configUnitsPerUnit(axis.kind);
+double strokeOf(const config::AxisConfig& axis, const std::optional<double>& distance) {
+  const double usual = axis.kind == config::Kind::kLinear ? kShortStroke : kShortTurn;
+  return distance.value_or(usual) / config::configUnitsPerUnit(axis.kind);
 }
 
 /// Moves one axis. @return whether it is back where it was.
 bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const Say& say) {
-  const axis::AxisConfig& config = axis.config();
+  const config::AxisConfig& config = axis.config();
   const machine::EngineFigures before = machine.figures();
   axis.setPosition(startFor(config, stroke));
   if (config.pins.enable.wired()) axis.enable(true);
@@ -47,7 +47,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   const machine::EngineFigures after = machine.figures();
   say("  " + config.name + ": " + std::to_string(after.pulses - before.pulses) + " pulses, " +
       std::to_string(after.slips - before.slips) + " slips, worst lateness so far " +
-      numberText(after.worst_lateness * 1e6) + " us; " +
+      roundedText(after.worst_lateness * 1e6) + " us; " +
       (off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
   if (config.pins.enable.wired()) axis.enable(false);
   return reached && off == 0.0;
@@ -55,7 +55,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
 
 }  // namespace
 
-double startFor(const axis::AxisConfig& axis, double stroke) {
+double startFor(const config::AxisConfig& axis, double stroke) {
   double start = 0.0;
   if (axis.max_position) start = std::min(start, *axis.max_position - std::max(stroke, 0.0));
   if (axis.min_position) start = std::max(start, *axis.min_position - std::min(stroke, 0.0));
@@ -64,8 +64,8 @@ double startFor(const axis::AxisConfig& axis, double stroke) {
 
 bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clock& clock,
                       const Say& say) {
-  std::vector<axis::AxisConfig> axes = order.axes;
-  for (axis::AxisConfig& axis : axes) {
+  std::vector<config::AxisConfig> axes = order.axes;
+  for (config::AxisConfig& axis : axes) {
     axis.enable_on_start = false;
     axis.disable_on_shutdown = true;
   }

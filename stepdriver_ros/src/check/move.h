@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -13,17 +13,17 @@ namespace stepdriver::check {
 
 /// What is to be moved.
 struct MoveOrder {
-  std::vector<axis::AxisConfig> axes;  ///< all of them: their lines are held
-  std::string only;                    ///< name of an axis; empty: all, one after the other
-  std::optional<double> distance;      ///< [mm|deg] 1 mm or 10 degrees by default
-  double max_lateness = 0.005;         ///< [s] see machine::MachineOptions
-  std::optional<axis::InputSwitch> emergency_stop{};
+  std::vector<config::AxisConfig> axes;  ///< all of them: their lines are held
+  std::string only;                      ///< name of an axis; empty: all, one after the other
+  std::optional<double> distance;        ///< [mm|deg] 1 mm or 10 degrees by default
+  double max_lateness = 0.005;           ///< [s] see machine::MachineOptions
+  std::optional<config::InputSwitch> emergency_stop{};
   std::string latency_device{};  ///< the same
 };
 
 /// Where an axis is declared to stand before a stroke of this length, both in its unit, so that the
 /// stroke is within the soft limits; 0 where that is.
-double startFor(const axis::AxisConfig& axis, double stroke);
+double startFor(const config::AxisConfig& axis, double stroke);
 
 /// Drives axes forth and back at their top speeds; each is disabled again when it is done.
 ///

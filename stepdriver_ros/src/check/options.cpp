@@ -3,7 +3,7 @@
 #include <boost/program_options/value_semantic.hpp>
 #include <cmath>
 
-#include "command_line.h"
+#include "common/command_line.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::check {

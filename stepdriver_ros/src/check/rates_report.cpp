@@ -3,13 +3,13 @@
 #include <cmath>
 #include <cstdio>
 
-#include "../text.h"
+#include "common/text.h"
 #include "table.h"
 
 namespace stepdriver::check {
 namespace {
 
-using ros_node::numberText;
+using ros_node::roundedText;
 
 std::string inMicroseconds(pulse::Nanoseconds time) {
   char text[32];
@@ -27,11 +27,11 @@ std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spr
 }
 
 /// Downwards: whoever writes what is named here must not be told that it is too much.
-std::string rateText(double rate) { return numberText(std::floor(rate)); }
+std::string rateText(double rate) { return roundedText(std::floor(rate)); }
 
 }  // namespace
 
-std::string measurementsText(const std::vector<axis::AxisConfig>& axes,
+std::string measurementsText(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability) {
   std::vector<std::vector<std::string>> rows = {{"[us]", "median", "p90", "p99", "max", "samples"}};
   for (std::size_t i = 0; i < capability.channels.size(); ++i) {
@@ -49,7 +49,7 @@ std::string ratesText(const machine::StepRates& rates) {
       {"axis", "asks for", "held alone", "held with all", "[steps/s]"}};
   std::string reasons;
   for (const machine::StepRate& rate : rates.axes) {
-    rows.push_back({rate.axis, numberText(rate.asked), rateText(rate.alone), rateText(rate.held),
+    rows.push_back({rate.axis, roundedText(rate.asked), rateText(rate.alone), rateText(rate.held),
                     rate.holds() ? "ok" : "TOO FAST"});
     reasons += "  " + rate.axis + ": " + rate.limited + "\n";
   }

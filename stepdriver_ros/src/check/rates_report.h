@@ -3,14 +3,14 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/capability.h"
 
 namespace stepdriver::check {
 
 /// The times that were measured; without channels, those of the wake-ups alone.
-std::string measurementsText(const std::vector<axis::AxisConfig>& axes,
+std::string measurementsText(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability);
 
 /// Asked and held step rates, axis by axis.

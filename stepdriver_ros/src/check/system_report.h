@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/pulse/realtime.h"
+#include "stepdriver_core/pulse/capability.h"
 
 namespace stepdriver::check {
 

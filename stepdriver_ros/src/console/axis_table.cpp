@@ -16,7 +16,7 @@ struct Column {
   std::vector<std::string> cells;
 };
 
-std::string numberText(const char* format, double number, const std::string& unit) {
+std::string roundedText(const char* format, double number, const std::string& unit) {
   char text[64];
   std::snprintf(text, sizeof text, format, number);
   return text + (" " + unit);
@@ -53,13 +53,13 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
                              {"max end", 4, 7, false, {}}, {"motor", 3, 6, false, {}},
                              {"state", 2, 12, false, {}}};
   for (const AxisView& axis : session.driver().axes()) {
-    const axis::AxisConfig* config = session.driver().config(axis.name);
+    const config::AxisConfig* config = session.driver().config(axis.name);
     const std::string unit = config == nullptr ? "?" : unitOf(config->kind);
     const bool chosen = axis.name == session.chosen();
     const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
     const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,
-                                            old(numberText("%.4f", axis.position, unit)),
-                                            old(numberText("%.2f", axis.velocity, unit + "/s")),
+                                            old(roundedText("%.4f", axis.position, unit)),
+                                            old(roundedText("%.2f", axis.velocity, unit + "/s")),
                                             old(switchText(config != nullptr && config->endstop_min,
                                                            axis.switches_known, axis.min_active)),
                                             old(switchText(config != nullptr && config->endstop_max,

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "../end_requests.h"
-#include "../node_start.h"
+#include "common/end_requests.h"
+#include "common/node_start.h"
 #include "console.h"
 #include "driver_parameters.h"
 #include "options.h"

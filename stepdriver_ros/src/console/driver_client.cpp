@@ -12,7 +12,7 @@
 #include <chrono>
 #include <exception>
 
-#include "../client/ask_service.h"
+#include "common/ask_service.h"
 
 namespace stepdriver::console {
 namespace {
@@ -144,8 +144,8 @@ void DriverClient::configure(const DriverParameters& parameters) {
 }
 
 double DriverClient::unitsOf(const std::string& axis) const {
-  const axis::AxisConfig* config = session_.driver().config(axis);
-  return config == nullptr ? 1.0 : axis::configUnitsPerUnit(config->kind);
+  const config::AxisConfig* config = session_.driver().config(axis);
+  return config == nullptr ? 1.0 : config::configUnitsPerUnit(config->kind);
 }
 
 void DriverClient::take(const AxisStates& states) {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "../client/background_call.h"
+#include "common/background_call.h"
 #include "driver_parameters.h"
 #include "emergency_stop_client.h"
 #include "session.h"

@@ -7,8 +7,8 @@
 
 #include <algorithm>
 
-#include "../node_config.h"
-#include "../node_start.h"
+#include "common/node_config.h"
+#include "common/node_start.h"
 
 namespace stepdriver::console {
 

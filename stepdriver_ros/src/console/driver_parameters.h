@@ -3,13 +3,13 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::console {
 
 /// The driver's parameters, as it reads them itself.
 struct DriverParameters {
-  std::vector<axis::AxisConfig> axes;
+  std::vector<config::AxisConfig> axes;
   double jog_timeout = 0.5;  ///< [s]
 };
 

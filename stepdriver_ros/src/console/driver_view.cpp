@@ -47,7 +47,7 @@ void DriverView::takeSwitches(AxisView& axis) const {
 
 const AxisView* DriverView::axis(const std::string& name) const { return find(axes_, name); }
 
-const axis::AxisConfig* DriverView::config(const std::string& name) const {
+const config::AxisConfig* DriverView::config(const std::string& name) const {
   return find(configs_, name);
 }
 
@@ -73,8 +73,8 @@ bool DriverView::anyMoving() const {
   return std::any_of(axes_.begin(), axes_.end(), [](const AxisView& axis) { return axis.moving; });
 }
 
-double stepOf(const axis::AxisConfig& config, const AxisView& axis) {
-  const double steps_per_unit = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
+double stepOf(const config::AxisConfig& config, const AxisView& axis) {
+  const double steps_per_unit = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
   return config.microsteps / (steps_per_unit * axis.microsteps);
 }
 

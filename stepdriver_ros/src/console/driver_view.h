@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::console {
 
@@ -36,7 +36,7 @@ class DriverView {
   static constexpr double kStaleAfter = 1.0;  // [s]
 
   /// @param configs of all axes, as the driver reads them.
-  void configure(std::vector<axis::AxisConfig> configs) { configs_ = std::move(configs); }
+  void configure(std::vector<config::AxisConfig> configs) { configs_ = std::move(configs); }
   /// @param axes all that the driver has.
   void update(std::vector<AxisView> axes, double now);
   /// The switches of one axis, which come by themselves.
@@ -47,7 +47,7 @@ class DriverView {
   const std::vector<AxisView>& axes() const { return axes_; }
   /// @return nullptr where there is no such axis.
   const AxisView* axis(const std::string& name) const;
-  const axis::AxisConfig* config(const std::string& name) const;
+  const config::AxisConfig* config(const std::string& name) const;
   /// Whether each axis has a configuration, and each configuration its axis.
   bool configured() const;
 
@@ -67,7 +67,7 @@ class DriverView {
   };
   void takeSwitches(AxisView& axis) const;
 
-  std::vector<axis::AxisConfig> configs_;
+  std::vector<config::AxisConfig> configs_;
   std::vector<AxisView> axes_;
   std::vector<Switches> switches_;
   std::optional<double> updated_;
@@ -75,9 +75,11 @@ class DriverView {
 };
 
 /// [mm|deg] that one step of the axis moves it, in the microstep mode of now.
-double stepOf(const axis::AxisConfig& config, const AxisView& axis);
+double stepOf(const config::AxisConfig& config, const AxisView& axis);
 
 /// `mm` or `deg`.
-inline const char* unitOf(axis::Kind kind) { return kind == axis::Kind::kLinear ? "mm" : "deg"; }
+inline const char* unitOf(config::Kind kind) {
+  return kind == config::Kind::kLinear ? "mm" : "deg";
+}
 
 }  // namespace stepdriver::console

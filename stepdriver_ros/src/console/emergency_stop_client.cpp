@@ -7,7 +7,7 @@
 #include <chrono>
 #include <utility>
 
-#include "../client/ask_service.h"
+#include "common/ask_service.h"
 
 namespace stepdriver::console {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "../client/background_call.h"
+#include "common/background_call.h"
 
 namespace stepdriver::console {
 

@@ -2,7 +2,7 @@
 
 #include <boost/program_options/value_semantic.hpp>
 
-#include "../command_line.h"
+#include "common/command_line.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::console {

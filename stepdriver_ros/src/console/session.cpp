@@ -151,9 +151,9 @@ void Session::jogBy(const Command& command, double now, Orders& orders) {
     return;
   }
   if (jog_.active() && jog_.axis() != chosen_) endJog(orders);
-  const axis::AxisConfig& config = *driver_.config(chosen_);
+  const config::AxisConfig& config = *driver_.config(chosen_);
   const double part = command.speed == JogSpeed::kSlow ? speeds_.slow : speeds_.fast;
-  const double speed = config.max_speed * axis::configUnitsPerUnit(config.kind) * part;
+  const double speed = config.max_speed * config::configUnitsPerUnit(config.kind) * part;
   jog_.press(chosen_, command.direction * speed, now);
 }
 
@@ -163,10 +163,10 @@ void Session::stepBy(int direction, double now, Orders& orders) {
     messages_.say(why);
     return;
   }
-  const axis::AxisConfig& config = *driver_.config(chosen_);
+  const config::AxisConfig& config = *driver_.config(chosen_);
   const double step = stepOf(config, *driver_.axis(chosen_));
-  call({Call::What::kStep, chosen_, direction * step / axis::configUnitsPerUnit(config.kind)}, now,
-       orders);
+  call({Call::What::kStep, chosen_, direction * step / config::configUnitsPerUnit(config.kind)},
+       now, orders);
 }
 
 void Session::endJog(Orders& orders) {

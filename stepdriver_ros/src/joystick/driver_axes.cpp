@@ -5,7 +5,7 @@
 namespace stepdriver::joystick {
 namespace {
 
-using axis::ConfigValue;
+using config::ConfigValue;
 
 std::optional<double> numberAt(const ConfigValue::Map& map, const std::string& key) {
   const auto found = map.find(key);
@@ -38,8 +38,8 @@ void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
     const auto* own = found->second.as<ConfigValue::Map>();
     if (own == nullptr) continue;
     const char* const wanted = speedKey(axis.kind);
-    const char* const other =
-        speedKey(axis.kind == axis::Kind::kLinear ? axis::Kind::kRotary : axis::Kind::kLinear);
+    const char* const other = speedKey(axis.kind == config::Kind::kLinear ? config::Kind::kRotary
+                                                                          : config::Kind::kLinear);
     const std::string theirs = driver + "/axes/" + axis.name + "/";
     const auto most = numberAt(*own, wanted);
     if (!most && numberAt(*own, other)) {

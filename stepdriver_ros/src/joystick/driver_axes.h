@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "joystick_config.h"
-#include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/config/config_value.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::joystick {
@@ -17,7 +17,7 @@ namespace stepdriver::joystick {
 /// @param driver full name of the driver.
 /// @param issues everything that doesn't fit is added here.
 void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
-                     const axis::ConfigValue& driver_axes, const std::string& driver,
+                     const config::ConfigValue& driver_axes, const std::string& driver,
                      std::vector<ConfigIssue>& issues);
 
 }  // namespace stepdriver::joystick

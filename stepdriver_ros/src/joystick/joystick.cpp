@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "../client/ask_service.h"
+#include "common/ask_service.h"
 
 namespace stepdriver::joystick {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../client/background_call.h"
+#include "common/background_call.h"
 #include "jog_sequence.h"
 #include "joystick_config.h"
 

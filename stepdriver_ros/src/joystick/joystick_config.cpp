@@ -1,15 +1,15 @@
 #include "joystick_config.h"
 
-#include "stepdriver_core/axis/config_reader.h"
+#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::joystick {
 namespace {
 
-using axis::ConfigReader;
-using axis::ConfigValue;
-using axis::Kind;
-using axis::Presence;
-using axis::Range;
+using config::ConfigReader;
+using config::ConfigValue;
+using config::Kind;
+using config::Presence;
+using config::Range;
 
 constexpr Range kRates{1.0, 1000.0};
 constexpr Range kTimeouts{0.02, 60.0};
@@ -32,11 +32,11 @@ void readMaxSpeed(ConfigReader& reader, JogAxis& axis) {
   }
   axis.kind = rotary ? Kind::kRotary : Kind::kLinear;
   axis.max_speed = linear.value_or(rotary.value_or(0.0));
-  axis.stick.max_speed = axis.max_speed / axis::configUnitsPerUnit(axis.kind);
+  axis.stick.max_speed = axis.max_speed / config::configUnitsPerUnit(axis.kind);
 }
 
 JogAxis readAxis(const std::string& name, ConfigReader reader) {
-  axis::checkAxisName(name, reader);
+  config::checkAxisName(name, reader);
   JogAxis axis;
   axis.name = name;
   axis.joystick_axis = reader.integer("joystick_axis", 0, kLastIndex);

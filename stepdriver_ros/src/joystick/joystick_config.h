@@ -3,21 +3,21 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
-#include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/config_value.h"
 #include "stepdriver_core/error.h"
 #include "stick.h"
 
 namespace stepdriver::joystick {
 
 /// The key of the highest speed of an axis of this kind, here and in the driver's configuration.
-const char* speedKey(axis::Kind kind);
+const char* speedKey(config::Kind kind);
 
 /// One axis of the driver, and the stick that jogs it.
 struct JogAxis {
   std::string name;
   int joystick_axis = 0;  ///< index in sensor_msgs/Joy's axes
-  axis::Kind kind = axis::Kind::kLinear;
+  config::Kind kind = config::Kind::kLinear;
   double max_speed = 0.0;  ///< [mm/s|deg/s] as it was given
   Stick stick;
   bool disable_in_dead_band = false;
@@ -55,7 +55,7 @@ struct JoystickConfig {
 /// @param name the node's full name.
 /// @param issues everything that is wrong is added here.
 /// @return to be used only where no issue was added.
-JoystickConfig readJoystickConfig(const axis::ConfigValue& tree, const std::string& name,
+JoystickConfig readJoystickConfig(const config::ConfigValue& tree, const std::string& name,
                                   std::vector<ConfigIssue>& issues);
 
 }  // namespace stepdriver::joystick

@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "../end_requests.h"
-#include "../node_start.h"
-#include "../xmlrpc_value.h"
+#include "common/end_requests.h"
+#include "common/node_start.h"
+#include "common/xmlrpc_value.h"
 #include "driver_axes.h"
 #include "joystick.h"
 #include "joystick_config.h"
@@ -112,7 +112,7 @@ int main(int argc, char** argv) {
   namespace joystick = stepdriver::joystick;
   namespace ros_node = stepdriver::ros_node;
   ros_node::EndRequests end_requests;
-  if (const auto code = ros_node::answerArguments(argc, argv, joystick::kUsage)) return *code;
+  if (const auto code = ros_node::handleArguments(argc, argv, joystick::kUsage)) return *code;
   ros::init(argc, argv, "joystick", ros::init_options::NoSigintHandler);
   if (!ros_node::waitForMaster(end_requests)) return ros_node::kExitOk;
   return joystick::run(end_requests);

@@ -8,14 +8,14 @@
 namespace stepdriver::console {
 
 /// A linear axis of 80 steps/mm at 16 microsteps and 100 mm/s, with both endstops.
-inline axis::AxisConfig axisConfig(const std::string& name) {
-  axis::AxisConfig config;
+inline config::AxisConfig axisConfig(const std::string& name) {
+  config::AxisConfig config;
   config.name = name;
   config.microsteps = 16;
   config.steps_per_unit = 80000.0;
   config.max_speed = 0.1;
-  config.endstop_min = axis::Endstop{name + "_min", true};
-  config.endstop_max = axis::Endstop{name + "_max", true};
+  config.endstop_min = config::Endstop{name + "_min", true};
+  config.endstop_max = config::Endstop{name + "_max", true};
   return config;
 }
 
@@ -31,7 +31,7 @@ inline AxisView axisView(const std::string& name) {
 /// A session with such axes, whose states came at 0 s.
 inline Session sessionWith(const std::vector<AxisView>& axes) {
   Session session("/stepdriver", {});
-  std::vector<axis::AxisConfig> configs;
+  std::vector<config::AxisConfig> configs;
   configs.reserve(axes.size());
   for (const AxisView& axis : axes) configs.push_back(axisConfig(axis.name));
   session.driver().configure(configs);

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/axis/config_reader.h"
+#include "stepdriver_core/config/config_reader.h"
 #include "support/config_map.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::config {
 
 using Lines = std::vector<std::string>;
 
@@ -40,7 +40,7 @@ inline ConfigValue tb6600Axis() {
 
 inline Lines issuesOf(const ConfigValue& axes) {
   std::vector<ConfigIssue> issues;
-  readAxes(axes, "/axes", issues);
+  config::readAxes(axes, "/axes", issues);
   return linesOf(issues);
 }
 
@@ -49,7 +49,7 @@ inline Lines issuesOfX(const ConfigValue& axis) { return issuesOf(mapOf({{"x", a
 /// Reads an axis that must be right.
 inline AxisConfig readX(const ConfigValue& axis) {
   std::vector<ConfigIssue> issues;
-  const auto configs = readAxes(mapOf({{"x", axis}}), "/axes", issues);
+  const auto configs = config::readAxes(mapOf({{"x", axis}}), "/axes", issues);
   EXPECT_EQ(linesOf(issues), Lines{});
   return configs.empty() ? AxisConfig{} : configs.front();
 }
@@ -86,4 +86,4 @@ inline void expectMissing(const ConfigValue& good,
   }
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::config

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -14,17 +14,17 @@ namespace stepdriver::test {
 
 /// A linear axis with every pin wired, two endstops, 1/16 microsteps, 80 microsteps/mm, 100 mm/s,
 /// 1000 mm/s^2, enabled on start.
-inline axis::AxisConfig linearAxis(const std::string& name,
-                                   chip::Model model = chip::Model::kA4988) {
-  axis::AxisConfig config;
+inline config::AxisConfig linearAxis(const std::string& name,
+                                     driver::Model model = driver::Model::kA4988) {
+  config::AxisConfig config;
   config.name = name;
   config.joint = name;
   config.driver = model;
-  config.timing = chip::chipOf(model).timing;
+  config.timing = driver::driverChipOf(model).timing;
   config.pins.step.line = name + ".step";
   config.pins.dir.line = name + ".dir";
   config.pins.enable.line = name + ".enable";
-  if (model != chip::Model::kTb6600) {
+  if (model != driver::Model::kTb6600) {
     config.pins.ms1.line = name + ".ms1";
     config.pins.ms2.line = name + ".ms2";
     config.pins.ms3.line = name + ".ms3";
@@ -37,16 +37,16 @@ inline axis::AxisConfig linearAxis(const std::string& name,
   config.max_speed = 0.1;
   config.acceleration = 1.0;
   config.deceleration = 1.0;
-  config.endstop_min = axis::Endstop{name + ".min", false};
-  config.endstop_max = axis::Endstop{name + ".max", false};
+  config.endstop_min = config::Endstop{name + ".min", false};
+  config.endstop_max = config::Endstop{name + ".max", false};
   config.enable_on_start = true;
   return config;
 }
 
 /// The same at another scale [steps/unit], speed and acceleration.
-inline axis::AxisConfig linearAxis(const std::string& name, double scale, double speed,
-                                   double acceleration) {
-  axis::AxisConfig config = linearAxis(name);
+inline config::AxisConfig linearAxis(const std::string& name, double scale, double speed,
+                                     double acceleration) {
+  config::AxisConfig config = linearAxis(name);
   config.steps_per_unit = scale;
   config.max_speed = speed;
   config.acceleration = config.deceleration = acceleration;
@@ -54,8 +54,8 @@ inline axis::AxisConfig linearAxis(const std::string& name, double scale, double
 }
 
 /// The rig's side of an axis: switches at -100 mm and 100 mm, the carriage at 0.
-inline sim::RigAxisSpec rigAxis(const axis::AxisConfig& config) {
-  const auto wire = [](const axis::Pin& pin) { return sim::Wire{pin.line, pin.inverted}; };
+inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
+  const auto wire = [](const config::Pin& pin) { return sim::Wire{pin.line, pin.inverted}; };
   sim::RigAxisSpec spec;
   spec.name = config.name;
   spec.model = config.driver;
@@ -70,7 +70,7 @@ inline sim::RigAxisSpec rigAxis(const axis::AxisConfig& config) {
   spec.reset = wire(config.pins.reset);
   spec.microsteps = config.microsteps;
   spec.full_step_travel = 1000.0 * config.microsteps / config.steps_per_unit;
-  const auto endstop = [](const std::optional<axis::Endstop>& wanted, double position) {
+  const auto endstop = [](const std::optional<config::Endstop>& wanted, double position) {
     std::optional<sim::SwitchSpec> spec_of;
     if (!wanted) return spec_of;
     spec_of.emplace();
@@ -89,11 +89,11 @@ inline sim::RigAxisSpec rigAxis(const axis::AxisConfig& config) {
 /// A machine on the simulated rig, on a virtual clock that whoever waits drives.
 class Bench {
  public:
-  explicit Bench(const std::vector<axis::AxisConfig>& axes, bool threaded = false,
+  explicit Bench(const std::vector<config::AxisConfig>& axes, bool threaded = false,
                  double speed = 0.0)
       : Bench(axes, rigAxes(axes), threaded, speed) {}
 
-  Bench(const std::vector<axis::AxisConfig>& axes, const std::vector<sim::RigAxisSpec>& rig_axes,
+  Bench(const std::vector<config::AxisConfig>& axes, const std::vector<sim::RigAxisSpec>& rig_axes,
         bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
@@ -103,10 +103,10 @@ class Bench {
     machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
   }
 
-  static std::vector<sim::RigAxisSpec> rigAxes(const std::vector<axis::AxisConfig>& axes) {
+  static std::vector<sim::RigAxisSpec> rigAxes(const std::vector<config::AxisConfig>& axes) {
     std::vector<sim::RigAxisSpec> specs;
     specs.reserve(axes.size());
-    for (const axis::AxisConfig& config : axes) specs.push_back(rigAxis(config));
+    for (const config::AxisConfig& config : axes) specs.push_back(rigAxis(config));
     return specs;
   }
 

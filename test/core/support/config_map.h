@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/config/config_value.h"
 #include "stepdriver_core/error.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::config {
 
 inline ConfigValue::Map mapOf(std::initializer_list<ConfigValue::Map::value_type> entries) {
   return ConfigValue::Map(entries);
@@ -46,4 +46,4 @@ inline std::vector<std::string> linesOf(const std::vector<ConfigIssue>& issues) 
   return lines;
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::config

@@ -6,15 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/sim/pin_trace.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::test {
 
 /// An axis `x` with every pin that its chip has wired plainly, 0.2 mm a full step, no switches.
-inline sim::RigAxisSpec plainAxis(chip::Model model, const std::string& name = "x") {
-  const chip::Chip& chip = chip::chipOf(model);
+inline sim::RigAxisSpec plainAxis(driver::Model model, const std::string& name = "x") {
+  const driver::DriverChip& chip = driver::driverChipOf(model);
   sim::RigAxisSpec spec;
   spec.name = name;
   spec.model = model;
@@ -49,7 +49,7 @@ struct HandRig {
   explicit HandRig(const std::vector<sim::RigAxisSpec>& specs)
       : trace(std::make_shared<sim::MemoryTrace>()), rig(specs, trace) {}
   explicit HandRig(const sim::RigAxisSpec& spec) : HandRig(std::vector<sim::RigAxisSpec>{spec}) {}
-  explicit HandRig(chip::Model model) : HandRig(plainAxis(model)) {}
+  explicit HandRig(driver::Model model) : HandRig(plainAxis(model)) {}
 
   /// Requests all lines of an axis so that it may step in full steps, and waits until it can.
   HandRig& ready(const std::string& axis = "x") {

@@ -16,9 +16,9 @@ inline constexpr double kStep = 1.0 / 80'000.0;  // [m]
 
 /// On the rig with its switches at -100 mm and 100 mm. Towards min at 50 mm/s, latched at 5 mm/s, 2
 /// mm off the trigger point, which is at -0.1 m.
-inline axis::AxisConfig homingAxis(const std::string& name = "x") {
-  axis::AxisConfig config = linearAxis(name);
-  axis::HomingConfig homing;
+inline config::AxisConfig homingAxis(const std::string& name = "x") {
+  config::AxisConfig config = linearAxis(name);
+  config::HomingConfig homing;
   homing.seek_speed = 0.05;
   homing.latch_speed = 0.005;
   homing.pull_off = 0.002;
@@ -30,11 +30,11 @@ inline axis::AxisConfig homingAxis(const std::string& name = "x") {
 
 class HomingTest : public testing::Test {
  protected:
-  void build(const axis::AxisConfig& config,
+  void build(const config::AxisConfig& config,
              const std::function<void(sim::RigAxisSpec&)>& change = {}) {
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
     if (change) change(specs[0]);
-    bench = std::make_unique<Bench>(std::vector<axis::AxisConfig>{config}, specs);
+    bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config}, specs);
   }
   void SetUp() override { build(homingAxis()); }
 

@@ -31,7 +31,6 @@ class PulseEngineTest : public testing::Test {
     config.step_low = 2'100;
     config.dir_setup = 650;
     config.dir_hold = 700;
-    config.mode_hold = 800;
     return config;
   }
 
@@ -42,7 +41,8 @@ class PulseEngineTest : public testing::Test {
   /// @param continues serial of the profile that this one goes on from.
   std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
     profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
-    follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval});
+    follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval, 0,
+                       engine->stopsServed()});
     postFollows(1);
     return serial;
   }

@@ -16,8 +16,8 @@
 namespace stepdriver::test {
 
 /// 1000 steps/m, 2 m/s, 10 m/s^2, from -5 m on, without a min endstop.
-inline axis::AxisConfig trajectoryAxis(const std::string& name) {
-  axis::AxisConfig config = linearAxis(name, 1000.0, 2.0, 10.0);
+inline config::AxisConfig trajectoryAxis(const std::string& name) {
+  config::AxisConfig config = linearAxis(name, 1000.0, 2.0, 10.0);
   config.endstop_min.reset();
   config.min_position = -5.0;
   return config;
@@ -27,7 +27,7 @@ inline axis::AxisConfig trajectoryAxis(const std::string& name) {
 class TrajectoryBench : public testing::Test {
  protected:
   void SetUp() override { build({trajectoryAxis("x"), trajectoryAxis("y")}); }
-  void build(const std::vector<axis::AxisConfig>& axes) {
+  void build(const std::vector<config::AxisConfig>& axes) {
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
     for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
     bench = std::make_unique<Bench>(axes, specs);
@@ -60,7 +60,7 @@ class TrajectoryBench : public testing::Test {
   void expectClean() {
     for (const std::string name : {"x", "y"}) {
       EXPECT_EQ(violationsOf(bench->report(name)), "") << name;
-      const double slack = bench->axis(name).memory().value().slack;
+      const double slack = bench->axis(name).state().slack;
       const double motor = static_cast<double>(bench->pulses(name)) / 1000.0;
       EXPECT_NEAR(state(name).position, motor - slack, 1e-12);
     }

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
 #include "stepdriver_core/axis/homing.h"
+#include "stepdriver_core/axis/outcome.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::axis {
 
@@ -16,7 +18,7 @@ struct AxisState {
   bool asleep = false;
   bool idle = false;  ///< disabled or asleep since it stood for long; the next motion ends that
   bool moving = false;
-  bool held = false;  ///< by a feed hold: it will go on when it is told to
+  bool held = false;  ///< the machine is on hold: this axis too, moving or not
   bool homed = false;
   HomingPhase homing = HomingPhase::kNone;  ///< what a homing under way does
   bool position_valid = false;              ///< the position can be trusted
@@ -27,12 +29,16 @@ struct AxisState {
   /// went through meanwhile.
   double planned = 0.0;
   double velocity = 0.0;  ///< [unit/s] of the plan
+  double slack = 0.0;     ///< [unit] of the backlash, what is taken up towards max
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
   double target = 0.0;
   /// [s] Until the motion under way ends, as planned; 0 at rest and in a jog without an end.
   double time_left = 0.0;
   std::string fault;   ///< in words; empty: none
   std::string remedy;  ///< what ends the fault, in words; empty where there is none
+  /// How many times something has stopped the axis, moving or not (a stop, a hold, a disable, a
+  /// sleep, a fault, an emergency stop), or ended that (a resume, an enable, a wake, a recover).
+  std::uint64_t stops = 0;
   /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
   /// none.
   std::string position_note;
@@ -40,7 +46,7 @@ struct AxisState {
 
 /// What of an axis outlasts the program; see machine::StateFile.
 struct AxisMemory {
-  Kind kind = Kind::kLinear;
+  config::Kind kind = config::Kind::kLinear;
   double steps_per_unit = 0.0;  ///< [steps/unit] as configured
   double position = 0.0;        ///< [unit] at rest
   double slack = 0.0;           ///< [unit] what is taken up of the backlash
@@ -61,32 +67,6 @@ struct EndstopState {
   std::optional<bool> max;
 };
 
-/// A motion that was accepted.
-struct Move {
-  std::uint64_t id = 0;   ///< never the same twice on one axis
-  double target = 0.0;    ///< [unit]
-  double duration = 0.0;  ///< [s] as planned
-  double overshoot =
-      0.0;  ///< [unit] how far it passes its target first, as it can't stop before it
-};
-
-/// A cubic piece of position over time: position + velocity t + acceleration t^2/2 + jerk t^3/6.
-struct MovePiece {
-  double duration = 0.0;      ///< [s]
-  double position = 0.0;      ///< [unit] where it begins, as the three below
-  double velocity = 0.0;      ///< [unit/s]
-  double acceleration = 0.0;  ///< [unit/s^2]
-  double jerk = 0.0;          ///< [unit/s^3] all through it
-};
-
-/// What a move would be, piece after piece. Positions are those of the motor: with a backlash they
-/// are off the joint's by what of it is taken up.
-struct MovePlan {
-  Move move;                      ///< its id is 0
-  double steps_per_unit = 0.0;    ///< [microsteps/unit] in the microstep mode of now
-  std::vector<MovePiece> pieces;  ///< none where nothing would move
-};
-
 /// How a move ended.
 enum class MoveEnd {
   kReached,
@@ -105,6 +85,34 @@ struct MoveResult {
   std::string message;    ///< a sentence that says how and where
   double position = 0.0;  ///< [unit] where the axis stands
   double duration = 0.0;  ///< [s] that the motion took
+};
+
+/// A motion that was accepted.
+struct Move {
+  std::uint64_t id = 0;   ///< never the same twice on one axis
+  double target = 0.0;    ///< [unit]
+  double duration = 0.0;  ///< [s] as planned
+  double overshoot =
+      0.0;  ///< [unit] how far it overshoots its target first, as it can't stop before it
+  /// Where its result appears, for as long as this is kept.
+  std::shared_ptr<const Outcome<MoveResult>> outcome;
+};
+
+/// A cubic piece of position over time: position + velocity t + acceleration t^2/2 + jerk t^3/6.
+struct MovePiece {
+  double duration = 0.0;      ///< [s]
+  double position = 0.0;      ///< [unit] where it begins, as the three below
+  double velocity = 0.0;      ///< [unit/s]
+  double acceleration = 0.0;  ///< [unit/s^2]
+  double jerk = 0.0;          ///< [unit/s^3] all through it
+};
+
+/// What a move would be, piece after piece. Positions are those of the motor: with a backlash they
+/// are off the joint's by what of it is taken up.
+struct MovePlan {
+  Move move;                      ///< its id is 0
+  double steps_per_unit = 0.0;    ///< [microsteps/unit] in the microstep mode of now
+  std::vector<MovePiece> pieces;  ///< none where nothing would move
 };
 
 }  // namespace stepdriver::axis

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/bias.h"
+
 /// Lines in, lines out. Levels here are physical: true is high. Polarity belongs to who knows the
-/// wiring (see axis/config.h); nothing below this interface inverts anything.
+/// wiring (see config/axis_config.h); nothing below this interface inverts anything.
 namespace stepdriver::gpio {
 
 /// A line that is driven.
@@ -16,9 +18,6 @@ struct OutputRequest {
   bool safe_level;       ///< driven from the request on, without a glitch, and again before release
   bool keep_on_release;  ///< leave the last level instead of driving the safe one before release
 };
-
-/// What the chip pulls an input to while nothing drives it.
-enum class Bias { kAsIs, kPullUp, kPullDown, kDisabled };
 
 /// A line that is read.
 struct InputRequest {
@@ -81,6 +80,10 @@ class Lines {
   /// A line as messages name it, with the chip that it is on, by its index in the request.
   virtual const std::string& outputName(int output) const = 0;
   virtual const std::string& inputName(int input) const = 0;
+
+  /// The chip that an output is on, as a number that is the same for outputs of one chip: a chip
+  /// that hangs must not delay what is written to others.
+  virtual std::size_t outputChip(int /*output*/) const { return 0; }
 };
 
 /// Where lines come from.

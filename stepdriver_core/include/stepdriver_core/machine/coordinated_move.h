@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/axis/coordination.h"
+#include "stepdriver_core/axis/course_point.h"
 
 namespace stepdriver::machine {
 

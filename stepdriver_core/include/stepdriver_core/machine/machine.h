@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
@@ -29,9 +29,12 @@ struct MachineOptions {
   bool measure = false;
   /// And where that is less than the axes ask for, or real-time rights are refused, don't start.
   bool enforce = false;
+  /// A line other than STEP and DIR that can't be written in this time is a fault of its axis,
+  /// which names it.
+  double write_timeout = 0.5;  ///< [s]
   /// An input that does what Machine::emergencyStop() does, where it becomes active or can't be
   /// read.
-  std::optional<axis::InputSwitch> emergency_stop{};
+  std::optional<config::InputSwitch> emergency_stop{};
   /// Absolute path of the file that keeps positions over a restart; empty: none. See
   /// machine::StateFile.
   std::string state_file{};
@@ -62,7 +65,7 @@ class Machine {
   /// @param backend, clock outlive the machine.
   /// @throw GpioError where a line can't be had; then none is held.
   /// @throw Refused with MachineOptions::enforce, naming what can't be done; no line is held then.
-  Machine(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
+  Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 
   /// shutdown(), where that wasn't called; then drives every line to its safe level and releases
@@ -77,18 +80,27 @@ class Machine {
   /// @throw Refused naming the axes that there are.
   axis::Axis& axis(const std::string& name) const;
 
-  /// Decelerates every axis to rest.
+  /// Decelerates every axis to rest, and ends a hold.
   void stop();
 
   /// A straight line of several axes: all begin and end together, each within its own limits. Axes
-  /// that move come to rest first. What ends one of them ends all, a stop or a hold of one slows
-  /// all of them down along the line.
+  /// that move come to rest first; relative positions count from where their motions were to end.
+  /// What ends one of them ends all, a stop of one slows all of them down along the line.
   ///
   /// @throw Refused as Axis::moveTo(), and where the request isn't one; then nothing moves.
   CoordinatedMove moveLine(const LineRequest& request);
 
-  /// Several axes through the points of a trajectory, from whatever they do, which it replaces.
-  /// axis::Coordination::follow() says what it keeps to. Else as moveLine().
+  /// Several axes through the points of a trajectory, from whatever they do, which it replaces. The
+  /// points' time is the trajectory's: a hold or a speed override below 1 runs through it more
+  /// slowly, one above 1 does nothing. A backlash is taken up in addition to the joint's own
+  /// motion, which may last longer than the points. A long one is planned in the calling thread and
+  /// delays no other call.
+  ///
+  /// @throw Refused as moveTo(), and if a position is beyond a soft limit, a velocity by more than
+  ///   axis::kTrajectoryTolerance beyond the maximum, an acceleration beyond the larger of
+  ///   acceleration and deceleration, if a velocity jumps by more than the start speed, if with a
+  ///   jerk limit the jerk is beyond it or the acceleration jumps, if there is no room for the
+  ///   backlash, or if one of the axes was stopped while this was planned.
   CoordinatedMove followTrajectory(const TrajectoryRequest& request);
 
   /// How a motion of several axes ended; none where it hasn't.
@@ -96,10 +108,12 @@ class Machine {
   /// Returns when it has ended.
   CoordinatedResult wait(const CoordinatedMove& move) const;
 
-  /// Feed hold: every axis decelerates to rest along its path, and keeps its goal.
+  /// Feed hold: every axis decelerates to rest along its path, and keeps its goal; a jog ends. It
+  /// lasts until resume() or stop(), also if nothing moves; new motions are refused until then, and
+  /// a line that waits for its axes begins after resume().
   void hold();
 
-  /// Goes on with what is held.
+  /// Ends the hold: held motions continue.
   void resume();
 
   /// Homes several axes, by HomingConfig::order: the lowest first, those with the same at once.

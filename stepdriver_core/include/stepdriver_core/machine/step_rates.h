@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/capability.h"
 
@@ -44,7 +44,7 @@ struct StepRates {
 ///   T >= 2 l + r + 2 w + h + d + sum(r + 2 w)  the pulse itself, both of its wake-ups late
 ///   T >= g + h + r + 2 w                      where the clock spins for a guard g before an edge,
 ///   T >= (g + min(g, h) - s) / 0.8            less what a sleep is late by (s, a median): it may
-///                                             for so much of the time (SteadyClock::kMostSpinning)
+///                                             for so much of the time
 ///   1 - product(1 - (g + min(g, h)) / T) <= 0.8, over all axes: the same for several
 ///
 /// or where the first two hold with the lateness of waits that don't spin. Faster, more than about
@@ -54,17 +54,18 @@ struct StepRates {
 /// Steps of several axes that fall due at once are one call for each chip; that counts as one for
 /// each axis here. Changes of DIR, and what the engine calculates, about a microsecond a step, are
 /// left out.
-StepRates stepRates(const std::vector<axis::AxisConfig>& axes, const pulse::Capability& capability);
+StepRates stepRates(const std::vector<config::AxisConfig>& axes,
+                    const pulse::Capability& capability);
 
 /// The same of what moves: beside the others that move, and at the rates at which all of them do.
 ///
 /// @param rates [steps/s] of each axis; 0: it is at rest, and takes nothing of the time.
 /// @return the axes that move.
-StepRates stepRatesInMotion(const std::vector<axis::AxisConfig>& axes,
+StepRates stepRatesInMotion(const std::vector<config::AxisConfig>& axes,
                             const pulse::Capability& capability, const std::vector<double>& rates);
 
 /// Why a machine under MachineOptions::enforce doesn't start; empty: it does.
-std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
+std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability);
 
 /// Takes the lines of the axes as a Machine does, measures, and releases them. Nothing moves, and
@@ -72,7 +73,7 @@ std::string whyNotInRealtime(const std::vector<axis::AxisConfig>& axes,
 ///
 /// @param latency_device see MachineOptions.
 /// @throw GpioError where a line can't be had, written or read; none is held then.
-pulse::Capability measure(const std::vector<axis::AxisConfig>& axes, gpio::Backend& backend,
+pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                           pulse::Clock& clock,
                           const std::string& latency_device = pulse::CpuLatencyHold::kDevice);
 

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <memory>
+#include <variant>
 #include <vector>
 
 #include "stepdriver_core/motion/double_double.h"
@@ -34,8 +38,37 @@ struct MotionState {
   double acceleration = 0.0;  ///< [microsteps/s^2]
 };
 
+class Profile;
+
+/// A part of a profile that others share, run through at a constant rate: the pieces from `from` to
+/// `to`, each `rate` times as fast. It costs the same memory however long it is; its pieces are
+/// computed when they are asked for.
+struct Excerpt {
+  std::shared_ptr<const Profile> of;  ///< moves
+  DoubleDouble from;                  ///< [s] after its start, before its end
+  DoubleDouble to;                    ///< [s] later; its end, but for rounding, or earlier
+  DoubleDouble rate = 1.0;            ///< above 0
+  DoubleDouble shift = {};            ///< [microsteps] added to its positions
+};
+
+/// What a motion consists of, in the order of time: pieces and excerpts.
+class Sections {
+ public:
+  void add(const Piece& piece) { add(std::vector<Piece>{piece}); }
+  void add(const std::vector<Piece>& pieces);
+  void add(Excerpt excerpt);
+  bool empty() const { return sections_.empty(); }
+
+ private:
+  friend class Profile;
+  std::vector<std::variant<std::vector<Piece>, Excerpt>> sections_;
+};
+
 /// A motion: pieces in a row from a start time on, at rest before and after. Times are motion time,
-/// in nanoseconds. Never changed once made, so any thread may read it.
+/// in nanoseconds. Never changed once made, so any thread may read it; reading allocates nothing.
+///
+/// Of an excerpt, a profile keeps the place and the rate only. Finding a piece by its number or by
+/// its time takes O(log n) then as well.
 class Profile {
  public:
   /// No motion: rest at `position`.
@@ -45,33 +78,111 @@ class Profile {
   /// @throw std::range_error where the motion takes longer than kLongest.
   Profile(std::int64_t start_ns, std::vector<Piece> pieces);
 
+  /// @param sections not empty; each begins where the one before it ends.
+  /// @throw std::range_error if the motion takes longer than kLongest.
+  Profile(std::int64_t start_ns, Sections sections);
+
   static constexpr double kLongest = 4.0e9;  ///< [s] a good 126 years; nanoseconds stay in int64
 
   /// Motion time at which the first piece begins.
   std::int64_t startNs() const { return start_ns_; }
   /// When the motion is over, to the nearest nanosecond; no step is later.
   std::int64_t endNs() const { return end_ns_; }
-  DoubleDouble duration() const { return starts_.back(); }  ///< [s]
+  DoubleDouble duration() const { return duration_; }  ///< [s]
   /// Where it rests in the end [microsteps].
   DoubleDouble endPosition() const { return end_position_; }
-  /// Highest speed on the way [microsteps/s].
-  double peakSpeed() const;
+  /// Highest speed on the way [microsteps/s]. An excerpt counts with the highest speed of the whole
+  /// profile that it is of.
+  double peakSpeed() const { return peak_speed_; }
 
   /// At rest before the start and after the end.
   MotionState stateAt(std::int64_t time_ns) const;
 
-  /// In the order of time; none where nothing moves.
-  const std::vector<Piece>& pieces() const { return pieces_; }
+  std::size_t pieceCount() const { return piece_count_; }
+  Piece piece(std::size_t index) const;
   /// When a piece begins, counted from the start [s]; one more than there are pieces: the end.
-  DoubleDouble pieceStart(std::size_t index) const { return starts_[index]; }
+  DoubleDouble pieceStart(std::size_t index) const;
+  /// The piece that is under way at a time after the start [s]; before that the first, after the
+  /// end the last. @pre there are pieces.
+  std::size_t pieceAt(DoubleDouble time) const;
+
+  class Pieces;
+  /// In the order of time; none where nothing moves. Not to be used when the profile is gone.
+  Pieces pieces() const;
 
  private:
+  // What makes the pieces from `first` on: `of`, or where that is none, pieces_ from `own` on.
+  struct Section {
+    std::size_t first = 0;
+    DoubleDouble start;  // s
+    std::size_t own = 0;
+    std::shared_ptr<const Profile> of;
+    DoubleDouble from;
+    DoubleDouble to;
+    DoubleDouble rate;
+    DoubleDouble shift;
+    std::size_t of_first = 0;  // piece of it
+    std::size_t of_last = 0;
+  };
+
+  void add(std::vector<Piece> pieces);
+  void add(const Excerpt& excerpt);
+  void finish();
+  const Section* sectionOf(std::size_t piece) const;
+  static Piece excerptPiece(const Section& section, std::size_t index);
+
   std::int64_t start_ns_;
   std::int64_t end_ns_;
   DoubleDouble start_position_;
   DoubleDouble end_position_;
+  DoubleDouble duration_;
+  double peak_speed_ = 0.0;
+  std::size_t piece_count_ = 0;
   std::vector<Piece> pieces_;
-  std::vector<DoubleDouble> starts_;
+  std::vector<DoubleDouble> starts_;  // of pieces_
+  std::vector<Section> sections_;     // none: pieces_ are all
 };
+
+/// The pieces of a profile as a container shows its elements, which are made when they are asked
+/// for.
+class Profile::Pieces {
+ public:
+  /// Goes from piece to piece.
+  class Iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using value_type = Piece;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const Piece*;
+    using reference = Piece;
+
+    Iterator(const Profile& profile, std::size_t index) : profile_(&profile), index_(index) {}
+    Piece operator*() const { return profile_->piece(index_); }
+    Iterator& operator++() {
+      ++index_;
+      return *this;
+    }
+    bool operator==(const Iterator& other) const { return index_ == other.index_; }
+    bool operator!=(const Iterator& other) const { return index_ != other.index_; }
+
+   private:
+    const Profile* profile_;
+    std::size_t index_;
+  };
+
+  explicit Pieces(const Profile& profile) : profile_(profile) {}
+  std::size_t size() const { return profile_.pieceCount(); }
+  bool empty() const { return size() == 0; }
+  Piece operator[](std::size_t index) const { return profile_.piece(index); }
+  Piece front() const { return profile_.piece(0); }
+  Piece back() const { return profile_.piece(size() - 1); }
+  Iterator begin() const { return {profile_, 0}; }
+  Iterator end() const { return {profile_, size()}; }
+
+ private:
+  const Profile& profile_;
+};
+
+inline Profile::Pieces Profile::pieces() const { return Pieces(*this); }
 
 }  // namespace stepdriver::motion

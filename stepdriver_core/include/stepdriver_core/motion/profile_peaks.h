@@ -25,6 +25,12 @@ struct ProfilePeaks {
 /// are none.
 ///
 /// @param velocity_before what the profile takes over from [microsteps/s].
-ProfilePeaks profilePeaks(const Profile& profile, double velocity_before = 0.0);
+/// @param velocity_after what follows it [microsteps/s].
+ProfilePeaks profilePeaks(const Profile& profile, double velocity_before = 0.0,
+                          double velocity_after = 0.0);
+
+/// Those of a motion of which one profile is a part from `time_s` on [s], and the other ones are
+/// the peaks of what comes before it.
+ProfilePeaks joinPeaks(const ProfilePeaks& before, const ProfilePeaks& part, double time_s);
 
 }  // namespace stepdriver::motion

@@ -12,9 +12,9 @@ struct RateLimits {
   double jerk = 0.0;   ///< [1/s^2] of the slope; 0: none, the slope may jump
 };
 
-/// How a course is run through from now on, s(t) in seconds of the course, as along() takes it: at
-/// the rate of now for a time, then with the fastest change that the limits allow to another rate,
-/// and on at that to the course's end; at a rate of 0 to rest.
+/// How a course is run through from now on, s(t) in seconds of the course, as composeAlong() takes
+/// it: at the rate of now for a time, then with the fastest change that the limits allow to another
+/// rate, and on at that to the course's end; at a rate of 0 to rest.
 ///
 /// The rate stays from 0 to 1: where there is a jerk limit, a slope of now that it could not end
 /// before is ended by as much more as that takes, first of all.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -70,5 +71,35 @@ struct SplineJerk {
 ///
 /// @throw as planSpline().
 SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& waypoints);
+
+/// A trajectory's way from its first segment's end on, which doesn't depend on where the motion is
+/// when it begins: so it can be made beforehand, and joining a motion to it takes the same time
+/// however long it is. Never changed once made.
+class SplineTail {
+ public:
+  /// @throw as planSpline().
+  explicit SplineTail(const std::vector<Waypoint>& waypoints);
+
+  /// Where the tail begins [s], after the trajectory's start. Where there is only one segment, that
+  /// ends here.
+  double beginS() const { return static_cast<double>(first_.time_ns) * 1e-9; }
+  /// What the tail does, from its own beginning on; none if there is only one segment.
+  const Profile* profile() const { return profile_ ? &*profile_ : nullptr; }
+  /// What it asks of a motor that has a jerk limit, at times after its own beginning. Its end
+  /// counts, its beginning doesn't.
+  const SplineJerk& jerk() const { return jerk_; }
+
+  /// The first segment. @throw std::invalid_argument as planSpline().
+  std::vector<Piece> head(const MotionState& from) const;
+  /// What it asks of such a motor, at its beginning and at its end too.
+  SplineJerk headJerk(const MotionState& from) const;
+
+ private:
+  Waypoint first_;                   // the one that the first segment leads to
+  std::size_t first_index_ = 0;      // of it
+  double begin_acceleration_ = 0.0;  // of the tail [microsteps/s^2]
+  std::optional<Profile> profile_;
+  SplineJerk jerk_;
+};
 
 }  // namespace stepdriver::motion

@@ -7,10 +7,10 @@
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/pulse/cpu_latency.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
-#include "stepdriver_core/pulse/realtime.h"
 
 namespace stepdriver::pulse {
+
+struct ChannelConfig;
 
 /// How measured times are spread: half of them are at most the median, and so on.
 struct Spread {
@@ -28,6 +28,21 @@ Spread spreadOf(std::vector<Nanoseconds> samples);
 struct CallCosts {
   Spread write;  ///< of its STEP line
   Spread read;   ///< of the slower of its endstops; all 0 where it has none
+};
+
+/// What the kernel gave a process and a thread that asked for real-time rights.
+struct RealtimeRights {
+  int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not asked for
+  int memory_error = -1;     ///< of the request to lock the memory
+  int latency_error = -1;    ///< of that to keep the processors awake, see CpuLatencyHold
+
+  /// Without them pulses may be late by any time. What sleeping processors cost is measured with
+  /// the wake-ups, and some machines have no such states.
+  bool granted() const { return scheduler_error == 0 && memory_error == 0; }
+  bool anyRefused() const { return scheduler_error > 0 || memory_error > 0 || latency_error > 0; }
+
+  /// In a sentence, with the remedy where something was refused.
+  std::string text() const;
 };
 
 /// What a machine and its lines can do, as measured there and then.

@@ -24,7 +24,6 @@ struct ChannelConfig {
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
-  Nanoseconds mode_hold = 0;
   std::int64_t backlash =
       0;  ///< microsteps that the motor makes at a reversal before the joint moves
 };
@@ -55,7 +54,7 @@ struct ChannelState {
   std::int64_t slack = 0;
   std::uint64_t pulses = 0;     ///< active STEP edges
   std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
-  std::uint64_t refused = 0;    ///< serial of the last command that came too late or found it busy
+  std::uint64_t accepted = 0;   ///< serial of the last command that was not refused
   std::uint64_t following = 0;  ///< serial of the profile under way; 0: at rest
   std::uint64_t ended = 0;      ///< serial of the last profile that ended
   EndReason end = EndReason::kDone;
@@ -63,8 +62,8 @@ struct ChannelState {
   Nanoseconds end_time = 0;       ///< motion time at which it ended
   bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
   Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
-  std::uint64_t pins_done = 0;    ///< serial of the last kPins that was carried out
-  std::uint64_t pins_failed = 0;  ///< serial of the last one that failed, with `failure`
+  std::uint64_t epoch = 0;        ///< times that the scale of `count` has changed
+  Nanoseconds rose = 0;           ///< clock time by which the last active STEP edge had happened
   std::uint64_t chip_faults = 0;  ///< times that the fault line became active
   std::uint64_t line_errors = 0;  ///< failed writes and reads
   Nanoseconds ready = 0;          ///< clock time before which no step goes out

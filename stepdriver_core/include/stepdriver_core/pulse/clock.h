@@ -3,13 +3,19 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <limits>
+#include <memory>
 #include <mutex>
 #include <optional>
 
-#include "stepdriver_core/pulse/clock_time.h"
-#include "stepdriver_core/pulse/hybrid_wait.h"
-
 namespace stepdriver::pulse {
+
+class HybridWait;
+
+/// Nanoseconds on a Clock. Its zero means nothing; the steady clock's is CLOCK_MONOTONIC's.
+using Nanoseconds = std::int64_t;
+
+constexpr Nanoseconds kNever = std::numeric_limits<Nanoseconds>::max();
 
 /// The time that pulses are put out by. now() and wake() may be called from any thread; waitUntil()
 /// only by the one that serves the pulses.
@@ -53,27 +59,27 @@ class ClockHold {
   Clock& clock_;
 };
 
-/// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins (see HybridWait).
+/// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins, for at most four fifths of
+/// the time.
 class SteadyClock : public Clock {
  public:
-  static constexpr double kMostSpinning = HybridWait::kMostSpinning;
-
-  /// @param guard how long before the time the sleep ends, at most GuardLearner::kLongest; none: it
-  ///   is learned from the sleeps.
+  /// @param guard how long before the time the sleep ends, at most 200 us. By default the clock
+  ///   learns it from its sleeps.
   explicit SteadyClock(std::optional<Nanoseconds> guard = {});
+  ~SteadyClock() override;
 
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
   void sleepUntil(Nanoseconds time) override;
   /// As it is now. Not while another thread waits.
-  Nanoseconds guard() const override { return wait_.guard(); }
+  Nanoseconds guard() const override;
   void wake() override;
   bool realtime() const override { return true; }
 
  private:
   void wait(Nanoseconds time, bool may_spin);
 
-  HybridWait wait_;
+  std::unique_ptr<HybridWait> wait_;
   std::atomic<std::uint32_t> wakes_{0};
   std::uint32_t seen_ = 0;
 };

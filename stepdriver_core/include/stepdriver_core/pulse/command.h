@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,33 +9,14 @@
 
 namespace stepdriver::pulse {
 
-/// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
-/// before what comes next: the next write, or the first step.
-struct PinSequence {
-  /// One write of a pin, and how long nothing else of the channel goes out after it.
-  struct Write {
-    int line;
-    bool level;
-    Nanoseconds then_wait;
-  };
-
-  static constexpr std::size_t kCapacity = 8;
-  std::array<Write, kCapacity> writes{};
-  std::size_t size = 0;
-
-  /// @throw std::out_of_range beyond kCapacity.
-  void add(int line, bool level, Nanoseconds then_wait) {
-    writes.at(size++) = {line, level, then_wait};
-  }
-};
-
-/// A profile that a channel is to follow from its start time on, instead of the one before it.
+/// A profile that a channel is to follow from its start time on, instead of the one before it. The
+/// engine refuses it if what it was planned from is no longer so.
 struct Follow {
   int channel = 0;
   std::uint64_t serial = 0;
   const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
-  /// Serial of the profile that this one was planned to go on from, the last one that was ordered;
-  /// 0: from rest. Where the channel has ended that, it can't be taken.
+  /// Serial of the profile that this one was planned to continue, the last one that was ordered;
+  /// 0: from rest. If the channel has ended that one, this one is refused.
   std::uint64_t continues = 0;
   /// Steps planned closer than this are at a speed that the motor can't start from or stop at
   /// without a ramp.
@@ -44,29 +24,33 @@ struct Follow {
   /// Channels of one group that isn't 0 end together: what ends one of them before its time ends
   /// all others at once.
   std::uint64_t group = 0;
+  /// PulseEngine::stopsServed() as it was known when this was planned. If an emergency stop has
+  /// been asked for since, this one is refused.
+  std::uint64_t stops = 0;
 };
 
 /// An order to the pulse thread. Serials rise by one on each channel.
 struct Command {
   /// What it orders.
   enum class Kind {
-    kFollow,  ///< follow the profiles, all of them, or where one can't be taken none
-    kPins,    ///< write the pins, at rest; then, where a scale is given, take that
+    kFollow,   ///< follow the profiles: all of them, or none if one can't be taken
+    kReserve,  ///< somebody writes the chip's other pins: no step, no look at its fault line
+    kRelease,  ///< that is over
   };
 
   Kind kind = Kind::kFollow;
   const Follow* follows = nullptr;  ///< of kFollow; live until the channels have taken the order
   std::size_t follow_count = 0;
-  int channel = 0;  ///< of kPins, as all below
+  int channel = 0;  ///< of kReserve and kRelease, as all below
   std::uint64_t serial = 0;
-  PinSequence pins;
-  /// Where the motor stands then, in the microsteps of a new mode.
+  Nanoseconds ready = 0;  ///< of kRelease: clock time before which no step goes out
+  /// Where the motor stands, in the microsteps of a new mode.
   struct Scale {
     std::int64_t count = 0;
     std::int64_t slack = 0;
     std::int64_t backlash = 0;
   };
-  std::optional<Scale> scale;
+  std::optional<Scale> scale;  ///< of kRelease
 };
 
 }  // namespace stepdriver::pulse

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "stepdriver_core/pulse/clock_time.h"
+#include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/pulse/guard_learner.h"
 #include "stepdriver_core/pulse/running_share.h"
 

@@ -11,7 +11,7 @@
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/pulse/command.h"
 #include "stepdriver_core/pulse/due_tree.h"
-#include "stepdriver_core/pulse/lateness.h"
+#include "stepdriver_core/pulse/lateness_record.h"
 #include "stepdriver_core/pulse/mailbox.h"
 #include "stepdriver_core/pulse/snapshot.h"
 
@@ -26,6 +26,17 @@ struct EngineState {
 };
 
 struct EngineChannel;
+
+/// Is told that the engine has something new for whoever gives it orders: an order was taken or
+/// refused, a motion has ended, a chip has reported a fault, an emergency stop was served.
+class NewsListener {
+ public:
+  virtual ~NewsListener() = default;
+
+  /// From the thread that serves the engine, after the pass, once for all that came in it. What is
+  /// new is read from channel() and stopsServed(). It must not throw, wait or allocate.
+  virtual void onNews() noexcept = 0;
+};
 
 /// Turns profiles into edges on lines, for all axes.
 ///
@@ -67,14 +78,31 @@ class PulseEngine {
   /// often; what it isn't told of it sees before the next step, where that depends on it.
   void inputsChanged();
 
-  /// Lets the pulse that is out finish and sends no other, on any channel, until
-  /// clearEmergencyStop().
-  void emergencyStop();
-  void clearEmergencyStop();
-  bool emergencyStopped() const { return emergency_.load(std::memory_order_acquire); }
+  /// @name Emergency stops
+  /// Three counts: of the stops that were asked for, by anyone; of those that were served, when
+  /// the pulse that was out has fallen and every motion has ended; and of those that were cleared.
+  /// No motion is followed while more were asked for than cleared: a stop that comes while an
+  /// earlier one is cleared is never lost.
+  /// @{
 
-  /// Times that the emergency-stop input stopped all channels.
+  /// Lets the pulse that is out finish and sends no other, on any channel, until it is cleared.
+  ///
+  /// @return the count of stops asked for, with this one.
+  std::uint64_t emergencyStop();
+  std::uint64_t stopsAsked() const { return asked_.load(std::memory_order_acquire); }
+  std::uint64_t stopsServed() const { return served_.load(std::memory_order_acquire); }
+  /// @param served a count that stopsServed() has given: all up to that are over.
+  void clearEmergencyStop(std::uint64_t served);
+  bool emergencyStopped() const {
+    return asked_.load(std::memory_order_acquire) != cleared_.load(std::memory_order_acquire);
+  }
+
+  /// Times that the emergency-stop input asked for a stop.
   std::uint64_t inputStops() const { return input_stops_.load(std::memory_order_acquire); }
+  /// @}
+
+  /// @param listener outlives the engine; set before the first serve().
+  void listen(NewsListener& listener) { listener_ = &listener; }
 
   /// What a channel does, whole and from one instant.
   ChannelState channel(int index) const;
@@ -110,7 +138,6 @@ class PulseEngine {
   void written(Channel& channel, Nanoseconds now);
   void writeOthers(Nanoseconds now);
   void turn(Channel& channel, Nanoseconds now);
-  void writePin(Channel& channel, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
   void endOne(Channel& channel, EndReason reason, Nanoseconds now);
@@ -140,8 +167,16 @@ class PulseEngine {
   std::vector<int> errors_;
   bool slid_ = false;
   Mailbox<Command, 64> mail_;
-  std::atomic<bool> emergency_{false};
+  void takeCommand(const Command& command, Nanoseconds now);
+  void serveStops();
+  void tell();
+
+  std::atomic<std::uint64_t> asked_{0};
+  std::atomic<std::uint64_t> served_{0};
+  std::atomic<std::uint64_t> cleared_{0};
   std::atomic<std::uint64_t> input_stops_{0};
+  NewsListener* listener_ = nullptr;
+  bool news_ = false;  // of this pass
   std::atomic<bool> inputs_changed_{false};
   EngineState state_;
   LatenessRecord lateness_;

@@ -1,23 +1,6 @@
 #pragma once
 
-#include <string>
-
 namespace stepdriver::pulse {
-
-/// What the kernel gave a process and a thread that asked for real-time rights.
-struct RealtimeRights {
-  int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not asked for
-  int memory_error = -1;     ///< of the request to lock the memory
-  int latency_error = -1;    ///< of that to keep the processors awake, see CpuLatencyHold
-
-  /// Without them pulses may be late by any time. What sleeping processors cost is measured with
-  /// the wake-ups, and some machines have no such states.
-  bool granted() const { return scheduler_error == 0 && memory_error == 0; }
-  bool anyRefused() const { return scheduler_error > 0 || memory_error > 0 || latency_error > 0; }
-
-  /// In a sentence, with the remedy where something was refused.
-  std::string text() const;
-};
 
 /// The priority that askForScheduler() asks for.
 constexpr int kRealtimePriority = 50;

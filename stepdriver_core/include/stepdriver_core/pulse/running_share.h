@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stepdriver_core/pulse/clock_time.h"
+#include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
 

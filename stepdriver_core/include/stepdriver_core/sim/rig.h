@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/chip/chip.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/sim/pin_trace.h"
 
@@ -39,8 +39,8 @@ struct SwitchSpec {
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
-  chip::Model model = chip::Model::kA4988;
-  chip::Timing timing{};  ///< what counts as a violation
+  driver::Model model = driver::Model::kA4988;
+  driver::Timing timing{};  ///< what counts as a violation
   Wire step, dir, enable, ms1, ms2, ms3, sleep, reset;
   int microsteps = 1;             ///< the DIP switches, or how unwired microstep pins are strapped
   double full_step_travel = 0.0;  ///< [mm|deg] that the carriage moves for a full step; above 0

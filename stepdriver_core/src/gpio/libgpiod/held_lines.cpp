@@ -156,4 +156,8 @@ const std::string& HeldLines::inputName(int input) const {
   return parts_.input_names.at(static_cast<std::size_t>(input));
 }
 
+std::size_t HeldLines::outputChip(int output) const {
+  return parts_.outputs.at(static_cast<std::size_t>(output)).seat.group;
+}
+
 }  // namespace stepdriver::gpio::gpiod

@@ -65,6 +65,7 @@ class HeldLines : public Lines {
   void interrupt() noexcept override;
   const std::string& outputName(int output) const override;
   const std::string& inputName(int input) const override;
+  std::size_t outputChip(int output) const override;
 
  private:
   struct EdgeSource {

@@ -1,7 +1,7 @@
 #include "axis_bring_up.h"
 
-#include "../../text.h"
 #include "bring_up_checks.h"
+#include "common/text.h"
 
 namespace stepdriver::console {
 namespace {
@@ -34,7 +34,7 @@ class Current {
 
 /// Soft limits count from where the axis was switched on, until somebody knows better: it might
 /// move nowhere.
-void askPosition(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config) {
+void askPosition(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config) {
   if (machine.state(config.name).position_valid) return;
   const auto position = askNumber(
       dialogue,
@@ -48,11 +48,11 @@ void askPosition(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisCon
 
 }  // namespace
 
-Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config) {
+Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config) {
   Findings findings;
   findings.axis = config.name;
-  const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
-  dialogue.say("\n==== Axis " + config.name + ": " + ros_node::numberText(steps) + " steps per " +
+  const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
+  dialogue.say("\n==== Axis " + config.name + ": " + ros_node::roundedText(steps) + " steps per " +
                unitOf(config.kind) + " at " + std::to_string(config.microsteps) + " microsteps");
   dialogue.say("\n-- 1. Do the switches read right?");
   checkSwitches(dialogue, machine, config, findings);

@@ -3,7 +3,7 @@
 #include "dialogue.h"
 #include "findings.h"
 #include "machine_at_hand.h"
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::console {
 
@@ -11,6 +11,6 @@ namespace stepdriver::console {
 /// before, it has none afterwards, however this ends.
 ///
 /// @throw Ended, and Error where the driver goes away.
-Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config);
+Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config);
 
 }  // namespace stepdriver::console

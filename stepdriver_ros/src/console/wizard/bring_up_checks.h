@@ -3,7 +3,7 @@
 #include "dialogue.h"
 #include "findings.h"
 #include "machine_at_hand.h"
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::console {
 
@@ -12,15 +12,15 @@ namespace stepdriver::console {
 
 /// Do the switches read right? Each is pressed by hand; nothing moves. It comes first: nobody
 /// should move an axis whose switches may be dead.
-void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings);
 
 /// Which way is plus?
-void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                     Findings& findings);
 
 /// Is the distance right? By the play's taking up, a move and a rule.
-void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings);
 
 }  // namespace stepdriver::console

@@ -3,7 +3,7 @@
 
 namespace stepdriver::console {
 
-void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                     Findings& findings) {
   HandMove hand_move(dialogue, machine, config);
   SmallMove move = visibleMove(config);

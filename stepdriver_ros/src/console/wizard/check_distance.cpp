@@ -2,14 +2,14 @@
 #include <optional>
 #include <string>
 
-#include "../../text.h"
 #include "bring_up_checks.h"
+#include "common/text.h"
 #include "hand_move.h"
 
 namespace stepdriver::console {
 namespace {
 
-using ros_node::numberText;
+using ros_node::roundedText;
 
 // Nearer than this a rule and an eye don't tell.
 constexpr double kAsGoodAsRight = 0.002;
@@ -21,7 +21,7 @@ std::string usualCause(double factor) {
   const double power = std::log2(factor);
   const double whole = std::round(power);
   if (whole == 0.0 || std::abs(power - whole) > kNearPower) return {};
-  return "That is near a factor of " + numberText(std::exp2(std::abs(whole))) +
+  return "That is near a factor of " + roundedText(std::exp2(std::abs(whole))) +
          ": look at the microsteps first, at straps and DIP switches against `microsteps`.";
 }
 
@@ -32,7 +32,7 @@ struct Measured {
 
 /// @return none: a move wasn't made to its end, or its length isn't known.
 std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
-                                const axis::AxisConfig& config) {
+                                const config::AxisConfig& config) {
   const std::string unit = unitOf(config.kind);
   SmallMove move = measurableMove(config);
   SmallMove play = visibleMove(config);
@@ -53,7 +53,7 @@ std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
 
 }  // namespace
 
-void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings) {
   if (findings.wrong_way) {
     dialogue.say("Until the driver is started with the new configuration, its plus is your minus.");
@@ -65,13 +65,13 @@ void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisC
     measured = measure(dialogue, hand_move, config);
   }
   const double factor = measured->commanded / measured->really;
-  const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
+  const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
   const std::string unit = unitOf(config.kind);
-  const std::string commanded = numberText(measured->commanded);
-  const std::string really = numberText(measured->really);
+  const std::string commanded = roundedText(measured->commanded);
+  const std::string really = roundedText(measured->really);
   dialogue.say("Commanded " + commanded + " " + unit + ", measured " + really + " " + unit + ": " +
-               numberText(steps) + " x " + commanded + " / " + really + " = " +
-               numberText(steps * factor) + " steps per " + unit + ".");
+               roundedText(steps) + " x " + commanded + " / " + really + " = " +
+               roundedText(steps * factor) + " steps per " + unit + ".");
   if (std::abs(factor - 1.0) < kAsGoodAsRight) {
     dialogue.say("That is as good as right; it stays.");
     return;

@@ -35,7 +35,7 @@ std::optional<Press> awaitPress(Dialogue& dialogue, MachineAtHand& machine,
 }
 
 std::optional<Press> checkEnd(Dialogue& dialogue, MachineAtHand& machine,
-                              const axis::AxisConfig& config, const std::string& end) {
+                              const config::AxisConfig& config, const std::string& end) {
   dialogue.say("Press the switch at the " + end + " end by hand, and let it go." +
                " (Enter: there is none, or nothing happens)");
   const auto press = awaitPress(dialogue, machine, config.name);
@@ -57,7 +57,7 @@ void sayDead(Dialogue& dialogue, const std::string& name) {
 
 }  // namespace
 
-void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config,
+void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings) {
   if (!config.endstop_min && !config.endstop_max) {
     dialogue.say("No endstops are configured.");

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/config/config_value.h"
 
 namespace stepdriver::console {
 
@@ -11,7 +11,7 @@ namespace stepdriver::console {
 ///
 /// @param parameters a map.
 /// @param comment lines that stand before it.
-std::string configurationText(const axis::ConfigValue& parameters,
+std::string configurationText(const config::ConfigValue& parameters,
                               const std::vector<std::string>& comment);
 
 /// @throw Error where a file is there and isn't to be replaced.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "../../text.h"
+#include "common/text.h"
 
 namespace stepdriver::console {
 namespace {
@@ -52,7 +52,7 @@ std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
 std::optional<double> askLength(Dialogue& dialogue, const std::string& question,
                                 const std::string& unit, std::optional<double> fallback) {
   const std::string shown =
-      question + (fallback ? " (Enter: " + ros_node::numberText(*fallback) + ")" : "");
+      question + (fallback ? " (Enter: " + ros_node::roundedText(*fallback) + ")" : "");
   for (;;) {
     const auto length = askNumber(dialogue, shown, unit);
     if (!length) return fallback;

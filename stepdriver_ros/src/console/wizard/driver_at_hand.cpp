@@ -8,7 +8,7 @@
 
 #include <algorithm>
 
-#include "../../client/ask_service.h"
+#include "common/ask_service.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::console {
@@ -82,9 +82,9 @@ client::Answer DriverAtHand::stop(const std::string& axis) {
 }
 
 double DriverAtHand::unitsOf(const std::string& axis) const {
-  const axis::AxisConfig* const config = session_.driver().config(axis);
+  const config::AxisConfig* const config = session_.driver().config(axis);
   if (config == nullptr) throw Error(axis + " has no configuration any more");
-  return axis::configUnitsPerUnit(config->kind);
+  return config::configUnitsPerUnit(config->kind);
 }
 
 std::string DriverAtHand::service(const std::string& axis, const std::string& name) const {

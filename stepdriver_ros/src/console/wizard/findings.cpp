@@ -4,15 +4,15 @@
 #include <cstdlib>
 #include <utility>
 
-#include "../../text.h"
 #include "../driver_view.h"
+#include "common/text.h"
 
 namespace stepdriver::console {
 namespace {
 
-using axis::ConfigValue;
-using axis::Kind;
-using ros_node::numberText;
+using config::ConfigValue;
+using config::Kind;
+using ros_node::roundedText;
 using Map = ConfigValue::Map;
 
 /// The map below a key, which is made where it isn't there.
@@ -89,7 +89,7 @@ ConfigValue corrected(ConfigValue parameters, const Findings& findings) {
   return parameters;
 }
 
-std::vector<std::string> changesText(const Findings& findings, const axis::AxisConfig& config) {
+std::vector<std::string> changesText(const Findings& findings, const config::AxisConfig& config) {
   std::vector<std::string> changes;
   const std::string& axis = findings.axis;
   if (findings.wrong_way) changes.push_back(axis + ": invert/dir is changed: plus was minus");
@@ -103,9 +103,9 @@ std::vector<std::string> changesText(const Findings& findings, const axis::AxisC
     changes.push_back(axis + ": endstops/min and endstops/max are swapped");
   }
   if (findings.scale) {
-    const double steps = config.steps_per_unit / axis::configUnitsPerUnit(config.kind);
-    changes.push_back(axis + ": " + numberText(steps * *findings.scale) + " steps per " +
-                      unitOf(config.kind) + " instead of " + numberText(steps));
+    const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
+    changes.push_back(axis + ": " + roundedText(steps * *findings.scale) + " steps per " +
+                      unitOf(config.kind) + " instead of " + roundedText(steps));
   }
   return changes;
 }

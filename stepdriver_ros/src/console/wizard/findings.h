@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/config.h"
-#include "stepdriver_core/axis/config_value.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/config_value.h"
 
 namespace stepdriver::console {
 
@@ -26,9 +26,9 @@ struct Findings {
 /// The driver's parameters with what they must be by these findings; nothing else is changed.
 ///
 /// @param parameters all of the node's.
-axis::ConfigValue corrected(axis::ConfigValue parameters, const Findings& findings);
+config::ConfigValue corrected(config::ConfigValue parameters, const Findings& findings);
 
 /// What corrected() changes, a sentence for each; none where nothing is.
-std::vector<std::string> changesText(const Findings& findings, const axis::AxisConfig& config);
+std::vector<std::string> changesText(const Findings& findings, const config::AxisConfig& config);
 
 }  // namespace stepdriver::console

@@ -3,37 +3,37 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../../text.h"
+#include "common/text.h"
 
 namespace stepdriver::console {
 namespace {
 
-using axis::Kind;
-using ros_node::numberText;
+using config::Kind;
+using ros_node::roundedText;
 
 // One that was read before may be on its way when a call is answered; the one after it is new.
 constexpr int kStatesUntilFresh = 2;
 
-SmallMove slowly(const axis::AxisConfig& config, double distance, double speed) {
-  const double highest = config.max_speed * axis::configUnitsPerUnit(config.kind);
+SmallMove slowly(const config::AxisConfig& config, double distance, double speed) {
+  const double highest = config.max_speed * config::configUnitsPerUnit(config.kind);
   return {distance, std::min(speed, highest / 2.0)};
 }
 
 }  // namespace
 
-SmallMove visibleMove(const axis::AxisConfig& config) {
+SmallMove visibleMove(const config::AxisConfig& config) {
   return config.kind == Kind::kLinear ? slowly(config, 2.0, 5.0) : slowly(config, 10.0, 20.0);
 }
 
-SmallMove measurableMove(const axis::AxisConfig& config) {
+SmallMove measurableMove(const config::AxisConfig& config) {
   return config.kind == Kind::kLinear ? slowly(config, 20.0, 10.0) : slowly(config, 90.0, 45.0);
 }
 
 double HandMove::ask(const SmallMove& move) {
   const std::string unit = unitOf(config_.kind);
-  const std::string what = config_.name + " will move " + numberText(std::abs(move.distance)) +
+  const std::string what = config_.name + " will move " + roundedText(std::abs(move.distance)) +
                            " " + unit + " towards " + (move.distance < 0.0 ? "minus" : "plus") +
-                           ", as it is configured, at " + numberText(move.speed) + " " + unit +
+                           ", as it is configured, at " + roundedText(move.speed) + " " + unit +
                            "/s. Enter stops it. Move?";
   if (!askYesNo(dialogue_, what, false)) return 0.0;
   const double start = machine_.state(config_.name).position;

@@ -2,7 +2,7 @@
 
 #include "dialogue.h"
 #include "machine_at_hand.h"
-#include "stepdriver_core/axis/config.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::console {
 
@@ -13,16 +13,16 @@ struct SmallMove {
 };
 
 /// To see which way it goes.
-SmallMove visibleMove(const axis::AxisConfig& config);
+SmallMove visibleMove(const config::AxisConfig& config);
 /// To measure it.
-SmallMove measurableMove(const axis::AxisConfig& config);
+SmallMove measurableMove(const config::AxisConfig& config);
 
 /// Moves an axis after a question, and watches it: a line of the person, and any switch that
 /// changes, stop it, as nobody knows yet which switch is at which end.
 class HandMove {
  public:
   /// All outlive this object.
-  HandMove(Dialogue& dialogue, MachineAtHand& machine, const axis::AxisConfig& config)
+  HandMove(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config)
       : dialogue_(dialogue), machine_(machine), config_(config) {}
 
   /// @param move its distance is negative towards minus.
@@ -37,7 +37,7 @@ class HandMove {
 
   Dialogue& dialogue_;
   MachineAtHand& machine_;
-  const axis::AxisConfig& config_;
+  const config::AxisConfig& config_;
 };
 
 }  // namespace stepdriver::console

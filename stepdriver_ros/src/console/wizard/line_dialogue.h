@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "../../end_requests.h"
+#include "common/end_requests.h"
 #include "dialogue.h"
 
 namespace stepdriver::console {

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "../../client/background_call.h"
 #include "../driver_view.h"
+#include "common/background_call.h"
 
 namespace stepdriver::console {
 

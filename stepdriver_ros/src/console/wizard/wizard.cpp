@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "../../node_config.h"
-#include "../../node_start.h"
 #include "../driver_parameters.h"
 #include "axis_bring_up.h"
+#include "common/node_config.h"
+#include "common/node_start.h"
 #include "configuration_file.h"
 #include "driver_at_hand.h"
 #include "line_dialogue.h"
@@ -15,11 +15,11 @@
 namespace stepdriver::console {
 namespace {
 
-std::vector<axis::AxisConfig> chosenAxes(const DriverParameters& parameters,
-                                         const std::string& only) {
-  std::vector<axis::AxisConfig> axes;
+std::vector<config::AxisConfig> chosenAxes(const DriverParameters& parameters,
+                                           const std::string& only) {
+  std::vector<config::AxisConfig> axes;
   std::string names;
-  for (const axis::AxisConfig& axis : parameters.axes) {
+  for (const config::AxisConfig& axis : parameters.axes) {
     names += (names.empty() ? "" : ", ") + axis.name;
     if (only.empty() || axis.name == only) axes.push_back(axis);
   }
@@ -30,7 +30,7 @@ std::vector<axis::AxisConfig> chosenAxes(const DriverParameters& parameters,
 /// The driver must take what is written for it.
 ///
 /// @throw ConfigError
-void check(const axis::ConfigValue& parameters, const std::string& driver) {
+void check(const config::ConfigValue& parameters, const std::string& driver) {
   std::vector<ConfigIssue> issues;
   ros_node::readNodeConfig(parameters, driver, issues);
   if (!issues.empty()) throw ConfigError(issues);
@@ -47,10 +47,10 @@ std::vector<std::string> commentOf(const std::string& driver,
 
 /// @return what must be changed, in words.
 std::vector<std::string> bringUpAll(Dialogue& dialogue, MachineAtHand& machine,
-                                    const std::vector<axis::AxisConfig>& axes,
-                                    axis::ConfigValue& parameters) {
+                                    const std::vector<config::AxisConfig>& axes,
+                                    config::ConfigValue& parameters) {
   std::vector<std::string> changes;
-  for (const axis::AxisConfig& axis : axes) {
+  for (const config::AxisConfig& axis : axes) {
     if (axes.size() > 1 && !askYesNo(dialogue, "Look at axis " + axis.name + "?", true)) continue;
     const Findings findings = bringUp(dialogue, machine, axis);
     parameters = corrected(std::move(parameters), findings);
@@ -65,8 +65,8 @@ bool runWizard(const ros::NodeHandle& node, const std::string& driver, const Wiz
                ros_node::EndRequests& end_requests) {
   checkNewFile(options.output, options.overwrite);
   const DriverParameters known = readDriverParameters(driver);
-  const std::vector<axis::AxisConfig> axes = chosenAxes(known, options.axis);
-  axis::ConfigValue parameters = ros_node::privateParameters(ros::NodeHandle(driver));
+  const std::vector<config::AxisConfig> axes = chosenAxes(known, options.axis);
+  config::ConfigValue parameters = ros_node::privateParameters(ros::NodeHandle(driver));
   DriverAtHand machine(node, driver, known);
   LineDialogue dialogue(end_requests, [&machine] { machine.poll(); });
   try {

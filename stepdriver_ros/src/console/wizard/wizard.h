@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "../../end_requests.h"
+#include "common/end_requests.h"
 
 namespace stepdriver::console {
 

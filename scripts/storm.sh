@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# Calls everything at once against a running node, and judges what came of it.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/storm.sh [--minutes MINUTES] [--seed SEED]
+
+Installs what is missing, builds the package, and lets four clients send random requests of every kind
+(moves, lines, trajectories, jogs, homings, stops, holds, disables, emergency stops, settings) to a node
+with three axes on the simulated rig, for MINUTES (default: 5), from SEED (default: another one each time,
+which is printed). Then test/node/storm/oracle.h holds the rig's pin trace against the answers. Each
+broken promise is printed with the requests around it. Exit code 0: every promise was kept.
+END
+}
+
+minutes=5 seed=$((RANDOM * 32768 + RANDOM))
+while (($# > 0)); do
+  case $1 in
+    -h | --help) usage && exit ;;
+    --minutes | --seed)
+      [[ ${2:-} =~ ^[0-9]+$ ]] || { usage >&2 && exit 2; }
+      printf -v "${1#--}" %s "$2"
+      shift 2
+      ;;
+    *) usage >&2 && exit 2 ;;
+  esac
+done
+
+choose_build_folder
+install_packages core ros
+build_storm() {
+  configure_catkin && cmake --build "$build/catkin" -j "$jobs" --target stepdriver_node storm_test
+}
+say "Building"
+quietly storm-build build_storm
+use_ros "$build/catkin/devel"
+say "Seed $seed, for $minutes minutes"
+# The end is judged after the storm: the trace of an hour takes a while to read.
+rostest --text "$src/test/node/storm/storm.test" "seconds:=$((minutes * 60))" "seed:=$seed" \
+  "limit:=$((minutes * 90 + 300))"

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "stepdriver_core/bias.h"
+#include "stepdriver_core/config/homing_config.h"
+#include "stepdriver_core/driver/driver_chip.h"
+
+namespace stepdriver::config {
+
+/// What an axis moves along, and so its units.
+enum class Kind {
+  kLinear,  ///< mm in configurations, m outside
+  kRotary,  ///< degrees in configurations, rad outside
+};
+
+/// A unit of configurations, mm or degree, in one of the axis's, m or rad.
+constexpr double configUnitsPerUnit(Kind kind) {
+  return kind == Kind::kLinear ? 1000.0 : 180.0 / 3.14159265358979323846;
+}
+
+/// A line of the driver chip. An empty name: the pin isn't wired.
+struct Pin {
+  std::string line;       ///< `chip:offset`, `label:offset` or the kernel's name
+  bool inverted = false;  ///< the wiring inverts the level on its way to the chip
+
+  bool wired() const { return !line.empty(); }
+};
+
+/// The lines to the pins of a driver chip. ms1 to ms3 are M0 to M2 on a DRV8825.
+struct Pins {
+  Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
+};
+
+/// A switch on an input line: an endstop, or the emergency stop of the whole machine.
+struct InputSwitch {
+  std::string line;
+  bool active_level = false;  ///< level of the line while the switch is pressed
+  Bias bias = Bias::kAsIs;
+};
+
+/// A switch at one end of an axis.
+using Endstop = InputSwitch;
+
+/// The chip's nFAULT: an open drain that is pulled low at over-current or over-temperature.
+struct FaultPin {
+  std::string line;
+  Bias bias = Bias::kAsIs;
+};
+
+/// How the motor's current is taken away at rest.
+enum class IdleAction { kDisable, kSleep };
+
+/// All that an axis needs to know, checked by readAxes(). A unit is m on a linear axis, rad on a
+/// rotary one; a step is a microstep of the configured mode.
+struct AxisConfig {
+  std::string name;
+  std::string joint;  ///< its name in joint_states and in the URDF
+  Kind kind = Kind::kLinear;
+  driver::Model driver = driver::Model::kA4988;
+  driver::Timing timing{};
+  Pins pins;
+
+  int microsteps = 1;            ///< microsteps per full step that steps_per_unit counts
+  double steps_per_unit = 0.0;   ///< [steps/unit]
+  double steps_per_round = 0.0;  ///< [steps/round of the motor]; 0: not known
+
+  double max_speed = 0.0;     ///< [unit/s]
+  double start_speed = 0.0;   ///< [unit/s] reached without a ramp (pull-in); 0: ramps start at rest
+  double acceleration = 0.0;  ///< [unit/s^2]
+  double deceleration = 0.0;  ///< [unit/s^2]
+  /// [unit/s^2] Of a stop, at least the deceleration; none: that.
+  std::optional<double> stop_deceleration;
+  double jerk = 0.0;                   ///< [unit/s^3] 0: the acceleration may jump
+  double backlash = 0.0;               ///< [unit] that a reversal loses; made up for
+  std::optional<double> min_position;  ///< [unit] soft limits
+  std::optional<double> max_position;
+
+  std::optional<Endstop> endstop_min;
+  std::optional<Endstop> endstop_max;
+  std::optional<FaultPin> fault;
+
+  std::optional<HomingConfig> homing;
+  bool require_homing = false;  ///< absolute moves are refused before it is homed
+
+  bool enable_on_start = false;
+  bool disable_on_shutdown = true;
+  /// A microstep change where the new mode has no position moves to the nearest common one first;
+  /// else it is refused.
+  bool align_on_microstep_change = false;
+
+  double idle_timeout = 0.0;  ///< [s] at rest, then the idle action is taken; 0: never
+  IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired, where there is a timeout
+  /// The carriage stays where it is without current, as a self-locking screw has it.
+  bool holds_position_unpowered = false;
+};
+
+}  // namespace stepdriver::config

@@ -1,0 +1,179 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/config_value.h"
+#include "stepdriver_core/config/used_lines.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::config {
+
+/// What a number may be; bounds included unless said otherwise.
+struct Range {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool min_excluded = false;
+
+  static Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
+  static Range notNegative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
+
+  /// False for NaN, whatever the bounds.
+  bool holds(double number) const;
+};
+
+/// Whether a key that isn't there is an issue.
+enum class Presence { kRequired, kOptional };
+
+/// Reads one map of a configuration strictly: the types are exact (an int is taken where a double
+/// is wanted, nothing else is converted), numbers are finite, unknown keys are errors. It collects
+/// every issue, under the full name of the parameter, and never throws on what it reads.
+///
+/// A reader that found something wrong returns the default; whoever reads looks at the issues
+/// before using anything. Where something is to be computed from several values, the find...()
+/// functions tell what is right from what is wrong, so that one mistake gives one message. A reader
+/// of something that isn't a map has said so once, and finds nothing else to say.
+class ConfigReader {
+ public:
+  /// @param value the map; where it isn't one, that is the first issue. Outlives the reader.
+  /// @param name full name of the map, as `/stepdriver/axes/x`.
+  /// @param issues where issues go; outlives the reader.
+  ConfigReader(const ConfigValue& value, std::string name, std::vector<ConfigIssue>& issues);
+  ConfigReader(ConfigValue&&, std::string, std::vector<ConfigIssue>&) = delete;
+
+  /// False where the value isn't a map, which has been reported.
+  bool isMap() const { return map_ != nullptr; }
+  bool has(const std::string& key) const;
+  /// The value of a key as messages show it.
+  std::string shown(const std::string& key) const;
+  /// The value of a key as it was written; nothing if there is no such key.
+  const ConfigValue& value(const std::string& key) const;
+  /// @param key empty: the map itself.
+  std::string fullName(const std::string& key) const;
+
+  /// @name Values of keys. With a default the key may be missing; without, that is an issue.
+  /// @{
+  double number(const std::string& key, const Range& range, std::optional<double> fallback = {});
+  int integer(const std::string& key, int min, int max, std::optional<int> fallback = {});
+  bool boolean(const std::string& key, std::optional<bool> fallback = {});
+  std::string text(const std::string& key, const std::optional<std::string>& fallback = {});
+  std::string oneOf(const std::string& key, const std::vector<std::string>& allowed,
+                    const std::optional<std::string>& fallback = {});
+  /// @}
+
+  /// @name None where the key is missing, or where its value is wrong, which is an issue.
+  /// @{
+  std::optional<double> findNumber(const std::string& key, const Range& range, Presence presence);
+  std::optional<int> findInteger(const std::string& key, int min, int max, Presence presence);
+  std::optional<int> findOneOf(const std::string& key, const std::vector<int>& allowed,
+                               Presence presence);
+  std::optional<bool> findBoolean(const std::string& key, Presence presence);
+  /// @param wanted what the text must be, for the messages.
+  std::optional<std::string> findText(const std::string& key, Presence presence,
+                                      const std::string& wanted = "a string");
+  std::optional<std::string> findOneOf(const std::string& key,
+                                       const std::vector<std::string>& allowed, Presence presence);
+  /// @}
+
+  /// A map below this one; an empty one where the key is missing.
+  ConfigReader map(const std::string& key);
+
+  /// @param key empty: the issue is with the map itself.
+  /// @param message reads on from the name of the parameter.
+  void issue(const std::string& key, const std::string& message);
+
+  /// Everything that was wrong so far, of other readers too.
+  std::vector<ConfigIssue>& issues() const { return issues_; }
+
+  /// Takes a key as known although nothing asks for its value.
+  void allow(const std::string& key);
+
+  /// Reports every key of the map that nothing has asked for, with the nearest known one.
+  void rejectUnknown();
+
+ private:
+  ConfigReader(const ConfigValue::Map* map, std::string name, std::vector<ConfigIssue>& issues);
+
+  /// @return nullptr where there is no such key; that is an issue where it is required.
+  const ConfigValue* find(const std::string& key, Presence presence, const std::string& wanted);
+  void wrong(const std::string& key, const std::string& is, const std::string& wanted);
+
+  std::string name_;
+  const ConfigValue::Map* map_;  ///< nullptr: not a map, and reported as such
+  std::vector<ConfigIssue>& issues_;
+  std::set<std::string> known_;
+};
+
+/// Makes an issue of a map with a name that no axis can have: it is a part of ROS names.
+void checkAxisName(const std::string& name, ConfigReader& axis);
+
+/// Reads the map of axes.
+///
+/// @code{.yaml}
+/// axes:
+///   x:                          # [a-zA-Z][a-zA-Z0-9_]*
+///     driver: a4988             # a4988, drv8825 or tb6600
+///     joint: x_joint            # default: the axis's name
+///     pins:                     # `chip:offset` or the name of a line; each once only, but enable
+///       step: "gpiochip0:17"
+///       dir: "gpiochip0:27"
+///       enable: "gpiochip0:22"  # this and all below: optional
+///       ms1: "gpiochip0:5"      # ms1 to ms3 all or none; m0 to m2 on a drv8825; not on a tb6600
+///       ms2: "gpiochip0:6"
+///       ms3: "gpiochip0:13"
+///       sleep: "gpiochip0:19"   # not on a tb6600
+///       reset: "gpiochip0:26"   # not on a tb6600
+///     invert: {dir: true}       # of wired pins; default: false
+///     common_anode: false       # tb6600: step, dir and enable inverted; then only dir in `invert`
+///     microsteps: 16
+///     # one of the ways to scale the axis; `degree` and `deg` in place of `mm` on a rotary axis:
+///     steps_per_mm: 80.0        # [microsteps/mm] at `microsteps`; steps_per_degree
+///     # or
+///     full_steps_per_round: 200
+///     mm_per_round: 40.0        # [mm] per round behind the gear; linear axes only
+///     wheel_diameter_mm: 65.0   # in place of mm_per_round: a round travels pi times that
+///     gear_ratio: 1.0           # motor rounds per round behind the gear
+///     # end of the ways
+///     steps_per_round: 3200     # [microsteps] per motor round; default: from full_steps_per_round
+///     max_speed_mm_s: 100.0     # max_speed_deg_s, and so on
+///     min_speed_mm_s: 0.0       # reached without a ramp; default: 0
+///     acceleration_mm_s2: 500.0
+///     deceleration_mm_s2: 500.0 # default: the acceleration
+///     backlash_mm: 0.0          # that a reversal loses, and that is made up for; default: 0
+///     min_position_mm: 0.0      # default: no limit
+///     max_position_mm: 200.0
+///     endstops:                 # both optional
+///       min: {pin: "gpiochip0:20", active_level: low}   # low or high
+///       max: {pin: "gpiochip0:21", active_level: low}
+///     timing:                   # each overrides the chip's
+///       {step_high_us: 1.0, step_low_us: 1.0, dir_setup_us: 0.2, dir_hold_us: 0.2,
+///        mode_setup_us: 0.2, mode_hold_us: 0.2, enable_ms: 0.0, wake_ms: 1.0,
+///        reset_low_ms: 1.0, reset_wait_ms: 10.0}
+///     enable_on_start: false
+///     disable_on_shutdown: true
+///     align_on_microstep_change: false
+///     idle_timeout_s: 0.0       # at rest, then idle; 0: never
+///     idle_action: disable      # or sleep
+///     holds_position_unpowered: false
+/// @endcode
+///
+/// @param name full name of the map, as `/stepdriver/axes`.
+/// @param issues everything that is wrong is added here.
+/// @param used the lines of the axes are added here, for what else names lines.
+/// @return the axes in the order of their names; to be used only where no issue was added.
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues, UsedLines& used);
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues);
+
+/// Reads `{pin: "gpiochip0:25", active_level: high, bias: as_is}`; bias is optional.
+///
+/// @return none where the key is missing.
+std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
+                                           UsedLines& used);
+
+}  // namespace stepdriver::config

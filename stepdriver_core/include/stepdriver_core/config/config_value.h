@@ -1,0 +1,48 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace stepdriver::config {
+
+/// A configuration as it was written, before anyone believes it: what the parameter server or a
+/// YAML file holds.
+class ConfigValue {
+ public:
+  /// Both may hold values of any type, also each other.
+  using List = std::vector<ConfigValue>;
+  using Map = std::map<std::string, ConfigValue>;
+
+  ConfigValue() = default;
+  ConfigValue(bool value) : value_(value) {}                      // NOLINT: a value is a value
+  ConfigValue(int value) : value_(value) {}                       // NOLINT
+  ConfigValue(double value) : value_(value) {}                    // NOLINT
+  ConfigValue(const char* value) : value_(std::string(value)) {}  // NOLINT
+  ConfigValue(std::string value) : value_(std::move(value)) {}    // NOLINT
+  ConfigValue(List value) : value_(std::move(value)) {}           // NOLINT
+  ConfigValue(Map value) : value_(std::move(value)) {}            // NOLINT
+
+  /// @return nullptr where the value is of another type. An int is not a double here.
+  template <typename T>
+  const T* as() const {
+    return std::get_if<T>(&value_);
+  }
+  template <typename T>
+  T* as() {
+    return std::get_if<T>(&value_);
+  }
+
+  /// Whether there is a key with no value behind it, as `key:` in YAML.
+  bool isNothing() const { return std::holds_alternative<std::monostate>(value_); }
+
+  /// The value as messages show it: `"abc"`, `1.5`, `true`, `a map of 3`, `nothing`.
+  std::string shown() const;
+
+ private:
+  std::variant<std::monostate, bool, int, double, std::string, List, Map> value_;
+};
+
+}  // namespace stepdriver::config

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "stepdriver_core/pulse/capability.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/cpu_latency.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+
+namespace stepdriver::pulse {
+
+/// A thread that keeps an engine served.
+///
+/// It asks for SCHED_FIFO 50, locked memory and processors that don't sleep if the clock says that
+/// being late matters. If that is refused it works without, and rights() says so.
+class PulseThread {
+ public:
+  /// @param engine, clock outlive the thread. @param listener is told when an alarm goes off;
+  ///   nullptr: nobody.
+  /// @param latency_device see CpuLatencyHold; empty: the processors may sleep.
+  PulseThread(PulseEngine& engine, Clock& clock, NewsListener* listener = nullptr,
+              const std::string& latency_device = CpuLatencyHold::kDevice);
+
+  /// stop(), if that wasn't called.
+  ~PulseThread();
+  PulseThread(const PulseThread&) = delete;
+  PulseThread& operator=(const PulseThread&) = delete;
+
+  /// Ends the thread; no pulse goes out from then on.
+  void stop();
+
+  /// The listener is told when the clock has come to this time: a virtual clock, which goes from
+  /// event to event, doesn't jump past it. Replaces the alarm before it; kNever: none. From any
+  /// thread.
+  void setAlarm(Nanoseconds time);
+
+  /// What the thread asked for and was given.
+  RealtimeRights rights() const;
+
+ private:
+  void run();
+
+  PulseEngine& engine_;
+  Clock& clock_;
+  NewsListener* const listener_;
+  std::atomic<Nanoseconds> alarm_{kNever};
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not asked for
+  std::atomic<int> lock_error_{-1};
+  std::optional<CpuLatencyHold> latency_;
+  std::thread thread_;
+};
+
+}  // namespace stepdriver::pulse

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/setup/machine_config.h"
+#include "stepdriver_core/setup/simulation.h"
+
+namespace stepdriver::setup {
+
+/// What a configured machine drives, and the clock that times its pulses: the GPIO lines of this
+/// computer on CLOCK_MONOTONIC, or the simulated rig on a clock of its own. A machine::Machine
+/// requests the lines; until then none is touched.
+class Hardware {
+ public:
+  /// @param name of the map that the configuration was read from, for messages; it may be empty.
+  /// @throw ConfigError if the rig's trace can't be written.
+  /// @throw GpioError if the backend is libgpiod and stepdriver was built without it.
+  explicit Hardware(const MachineConfig& config, const std::string& name = "");
+
+  gpio::Backend& backend();
+  pulse::Clock& clock();
+
+  /// "the simulated rig", "GPIO lines (libgpiod 1.6.3)"
+  std::string description() const;
+
+  /// @return nullptr if the lines are real.
+  Simulation* simulation() { return simulation_.get(); }
+
+ private:
+  std::unique_ptr<Simulation> simulation_;
+  // If there is no simulation:
+  std::unique_ptr<gpio::Backend> gpio_;
+  pulse::SteadyClock clock_;
+};
+
+}  // namespace stepdriver::setup

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/config_reader.h"
+#include "stepdriver_core/config/config_value.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/setup/simulation_config.h"
+
+/// From a configuration to the parts of a machine: which lines it drives, by which clock, with what
+/// options.
+namespace stepdriver::setup {
+
+/// The lines that a machine drives.
+enum class GpioBackend {
+  kSimulated,  ///< those of the simulated rig
+  kLibgpiod,   ///< the GPIO lines of this computer
+};
+
+/// What a configuration says of a machine. The node reads it from its parameters, and
+/// yaml::readFile() from a file.
+struct MachineConfig {
+  GpioBackend backend{};
+  SimulationConfig simulation;           ///< only for the simulated backend
+  std::vector<config::AxisConfig> axes;  ///< in the order of their names
+  double max_lateness = 0.005;           ///< [s] a pulse that is later is a fault
+  double write_timeout = 0.5;            ///< [s] of a line other than STEP and DIR
+  bool enforce_realtime = false;         ///< don't start if the computer is too slow for the axes
+  bool keep_cpus_awake = true;           ///< see machine::MachineOptions::latency_device
+  std::optional<config::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
+  std::string state_file;                             ///< see machine::MachineOptions
+
+  /// What a machine::Machine of this configuration takes, in addition to the axes.
+  machine::MachineOptions options() const;
+};
+
+/// Reads the keys of a machine from a map that may hold other keys too.
+///
+/// @code{.yaml}
+/// gpio:
+///   backend: simulated           # or libgpiod: the GPIO lines of this computer
+///   write_timeout_ms: 500.0      # of a line other than STEP and DIR
+/// realtime:                      # or `enforce` or `warn` alone
+///   policy: warn                 # if the computer is too slow for its axes: warn, or enforce:
+///                                # don't start
+///   max_lateness_ms: 5.0
+///   keep_cpus_awake: true        # with libgpiod; false: they may sleep, and wake late
+/// emergency_stop:                # optional; see config::readInputSwitch()
+///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
+/// state_file: ""                 # absolute path of a file that keeps the positions; empty: no
+/// file simulation: {...}              # see readSimulation(); only a simulated machine heeds it
+/// axes: {...}                    # see config::readAxes()
+/// @endcode
+///
+/// @param reader of that map. It takes every issue.
+/// @return to be used only if there was no issue.
+MachineConfig readMachineConfig(config::ConfigReader& reader);
+
+/// How the file of a configuration is meant.
+enum class BackendChoice {
+  kAsInTheFile,  ///< a file that names no backend means libgpiod
+  kSimulated,    ///< on the simulated rig, whatever the file says
+  kLibgpiod,     ///< on GPIO lines, whatever the file says; then the rig's trace is left out
+};
+
+/// Writes the chosen backend into a configuration. Anything else stays, right or wrong.
+void chooseBackend(config::ConfigValue& tree, BackendChoice choice);
+
+/// Reads a whole configuration, with or without the keys that only the ROS node heeds.
+///
+/// @throw ConfigError with everything that is wrong.
+MachineConfig machineConfigOf(config::ConfigValue tree,
+                              BackendChoice choice = BackendChoice::kAsInTheFile);
+
+/// @throw ConfigError if there are issues, with names that begin below the map that was read.
+void throwIssues(std::vector<ConfigIssue> issues);
+
+}  // namespace stepdriver::setup

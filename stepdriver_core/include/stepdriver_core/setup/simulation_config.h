@@ -1,0 +1,91 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/config_reader.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::setup {
+
+/// How the rig is really wired if the configuration is wrong about it. Whatever isn't set is as
+/// configured.
+struct SimulatedWiring {
+  std::optional<bool> dir_inverted;      ///< DIR, on its way to the chip
+  std::optional<double> steps_per_unit;  ///< [microsteps/mm|deg] at the configured microsteps
+  std::optional<std::string> min_pin;    ///< the line that the switch at the min end is at
+  std::optional<std::string> max_pin;
+  std::optional<bool> min_active_level;  ///< of that line, while the switch is pressed
+  std::optional<bool> max_active_level;
+};
+
+/// How the rig of one axis is built, and what is wrong with it. Lengths are in mm on a linear axis,
+/// in degrees on a rotary one.
+struct SimulatedAxis {
+  double start = 0.0;                ///< [mm|deg] where the carriage stands at first
+  double switch_hysteresis = 0.0;    ///< [mm|deg]
+  int bounces = 0;                   ///< extra on-off pairs after each change of a switch
+  double bounce_ms = 0.2;            ///< [ms] from one bounce edge to the next
+  std::optional<double> min_switch;  ///< [mm|deg] place of the switch; none: outside the soft limit
+  std::optional<double> max_switch;
+  SimulatedWiring wiring;
+  sim::RigFaults faults;
+  std::optional<int> fail_step_write_after;  ///< [writes] to STEP that work before all others fail
+};
+
+/// What a configuration says of the simulated rig.
+struct SimulationConfig {
+  double speed = 1.0;           ///< seconds of the rig per second; 0: as fast as it goes
+  std::string trace;            ///< path of the VCD file; empty: none
+  bool emergency_stop = false;  ///< its button is pressed at the start
+  std::map<std::string, SimulatedAxis> axes;
+};
+
+/// Reads the map `simulation` of a configuration; every key is optional.
+///
+/// @code{.yaml}
+/// simulation:
+///   speed: 1.0                   # seconds of the rig per second; 0: as fast as it goes
+///   trace: /tmp/axis.vcd         # where the pin trace goes; default: nowhere
+///   emergency_stop: false        # true: the button of the emergency-stop input is pressed at
+///   first
+///   axes:
+///     x:                         # `deg` in place of `mm` on a rotary axis
+///       start_mm: 0.0            # where the carriage stands at first
+///       min_switch_mm: -2.0      # default: 2 mm (2 degrees) outside the soft limit
+///       max_switch_mm: 202.0
+///       switch_hysteresis_mm: 0.0
+///       bounces: 0
+///       bounce_ms: 0.2
+///       wiring:                # what the configuration is wrong about; default: nothing
+///         dir_inverted: true
+///         steps_per_mm: 100.0  # steps_per_degree
+///         min_pin: GPIO24      # the line of the switch at the min end
+///         max_pin: GPIO23
+///         min_active_level: low
+///         max_active_level: low
+///       min_stuck: none          # active, inactive or none
+///       max_stuck: none
+///       lose_every: 0            # every n-th step slips; 0: none
+///       chip_fault_after: 1000        # steps of the motor; then the chip reports over-current
+///       fail_step_write_after: 1000   # writes to STEP; those after them fail. Default: none fails
+/// @endcode
+///
+/// @param reader of that map.
+/// @param axes the axes that are simulated.
+/// @param axes_are_right false: issues were found in them. Then what depends on them is not judged.
+SimulationConfig readSimulation(config::ConfigReader reader,
+                                const std::vector<config::AxisConfig>& axes, bool axes_are_right);
+
+/// Checks what depends on the limits of the axes: the min switch must be below the max switch.
+///
+/// @param name full name of the map `simulation`.
+/// @param issues everything that is wrong is added here.
+void checkSimulation(const std::vector<config::AxisConfig>& axes, const SimulationConfig& config,
+                     const std::string& name, std::vector<ConfigIssue>& issues);
+
+}  // namespace stepdriver::setup

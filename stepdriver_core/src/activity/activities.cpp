@@ -1,0 +1,131 @@
+#include "activities.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "come_to_rest.h"
+
+namespace stepdriver::activity {
+namespace {
+
+bool has(const std::vector<axis::AxisModel*>& axes, const axis::AxisModel* axis) {
+  return std::find(axes.begin(), axes.end(), axis) != axes.end();
+}
+
+}  // namespace
+
+Activity* Activities::owner(const axis::AxisModel& axis) const {
+  for (const auto& activity : all_) {
+    if (activity->hasBegun() && !activity->isFinished() && has(activity->axes(), &axis)) {
+      return activity.get();
+    }
+  }
+  return nullptr;
+}
+
+Activity* Activities::heir(const axis::AxisModel& axis) const {
+  for (const auto& activity : all_) {
+    if (!activity->hasBegun() && !activity->isFinished() && has(activity->axes(), &axis)) {
+      return activity.get();
+    }
+  }
+  return nullptr;
+}
+
+void Activities::begin(std::unique_ptr<Activity> activity, const Why& why) {
+  bool at_speed = activity->handover() == Activity::Handover::kAtSpeed;
+  for (axis::AxisModel* axis : activity->axes()) {
+    const Activity* now = owner(*axis);
+    at_speed = at_speed && (now == nullptr || now->canHandOver());
+  }
+  if (at_speed) activity->prepare();
+  for (axis::AxisModel* axis : activity->axes()) {
+    if (Activity* next = heir(*axis)) next->end(why);
+  }
+  if (at_speed) return takeOver(std::move(activity));
+  for (axis::AxisModel* axis : activity->axes()) {
+    Activity* now = owner(*axis);
+    if (now != nullptr && !now->isInBackground()) now->end(why);
+  }
+  all_.push_back(std::move(activity));
+}
+
+void Activities::takeOver(std::unique_ptr<Activity> activity) {
+  std::vector<Predecessor> predecessors;
+  std::vector<Predecessor> companions;
+  for (axis::AxisModel* axis : activity->axes()) {
+    Activity* now = owner(*axis);
+    if (now == nullptr) continue;
+    for (Predecessor& left : now->handOver("another command took over")) {
+      (has(activity->axes(), left.axis) ? predecessors : companions).push_back(std::move(left));
+    }
+  }
+  Activity& begun = *activity;
+  all_.push_back(std::move(activity));
+  begun.begin(std::move(predecessors));
+  // An axis that was given another goal has left the others of its course, and they can't go on
+  // without it.
+  const std::string left_by = begun.axes().front()->name();
+  for (Predecessor& companion : companions) {
+    all_.push_back(std::make_unique<ComeToRest>(
+        context_, std::move(companion),
+        Why{axis::MoveEnd::kStopped,
+            left_by + ", which it moved together with, was given another goal"}));
+    all_.back()->begin({});
+  }
+}
+
+void Activities::end(const axis::AxisModel& axis, const Why& why, const Ack& call) {
+  if (Activity* next = heir(axis)) next->end(why);
+  if (Activity* now = owner(axis)) now->end(why, call);
+}
+
+void Activities::endAll(const Why& why, const Ack& call) {
+  for (const auto& axis : context_.axes) end(*axis, why, call);
+}
+
+void Activities::look() {
+  // What begins in it looks too.
+  for (std::size_t i = 0; i < all_.size(); ++i) all_[i]->look();
+  while (sweep()) {
+  }
+}
+
+bool Activities::mayBegin(const Activity& activity) const {
+  return std::all_of(activity.axes().begin(), activity.axes().end(),
+                     [this](const axis::AxisModel* axis) { return owner(*axis) == nullptr; });
+}
+
+bool Activities::sweep() {
+  all_.erase(std::remove_if(all_.begin(), all_.end(),
+                            [](const auto& activity) { return activity->isFinished(); }),
+             all_.end());
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    Activity& next = *all_[i];
+    if (next.hasBegun() || !mayBegin(next)) continue;
+    next.begin({});
+    next.look();
+    return true;
+  }
+  return std::any_of(all_.begin(), all_.end(),
+                     [](const auto& activity) { return activity->isFinished(); });
+}
+
+void Activities::forEach(const std::function<void(Activity&)>& action) const {
+  for (std::size_t i = 0; i < all_.size(); ++i) action(*all_[i]);
+}
+
+pulse::Nanoseconds Activities::due() const {
+  pulse::Nanoseconds due = pulse::kNever;
+  for (const auto& activity : all_) {
+    if (activity->hasBegun()) due = std::min(due, activity->due());
+  }
+  return due;
+}
+
+bool Activities::watchInputs() const {
+  return std::any_of(all_.begin(), all_.end(),
+                     [](const auto& activity) { return activity->watchesInputs(); });
+}
+
+}  // namespace stepdriver::activity

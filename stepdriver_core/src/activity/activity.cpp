@@ -1,0 +1,22 @@
+#include "activity.h"
+
+namespace stepdriver::activity {
+
+void Activity::begin(std::vector<Predecessor> predecessors) {
+  begun_ = true;
+  onBegin(std::move(predecessors));
+}
+
+void Activity::look() {
+  if (begun_ && !finished_) onLook();
+}
+
+void Activity::end(const Why& why, const Ack& call) {
+  if (finished_) return;
+  if (begun_) return onEnd(why, call);
+  if (!endsBeforeItBegins()) return;
+  onAbandon(why);
+  finish();
+}
+
+}  // namespace stepdriver::activity

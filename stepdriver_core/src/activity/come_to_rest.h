@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "activity.h"
+#include "manoeuvre.h"
+
+namespace stepdriver::activity {
+
+/// One axis comes to rest from a motion that somebody else has begun and left.
+class ComeToRest : public Activity {
+ public:
+  ComeToRest(Context& context, Predecessor left, Why why)
+      : Activity(context, {left.axis}, Handover::kAtSpeed),
+        manoeuvre_(context, {{left.axis, goalOf(left.goal)}}),
+        why_(std::move(why)) {}
+
+  bool canHandOver() const override { return true; }
+  const Manoeuvre* motion() const override { return &manoeuvre_; }
+  std::vector<Predecessor> handOver(const std::string& /*by*/) override {
+    finish();
+    return manoeuvre_.handOver();
+  }
+
+ protected:
+  void onBegin(std::vector<Predecessor> /*predecessors*/) override {
+    manoeuvre_.beginStop(why_);
+    onLook();
+  }
+  void onLook() override {
+    if (manoeuvre_.look()) finish();
+  }
+  void onEnd(const Why& why, const Ack& call) override { manoeuvre_.stop(why, call); }
+  void onAbandon(const Why& /*why*/) override {}
+
+ private:
+  // It leaves the course that it was on.
+  static Goal goalOf(Goal goal) {
+    goal.kind = Goal::Kind::kMove;
+    return goal;
+  }
+
+  Manoeuvre manoeuvre_;
+  const Why why_;
+};
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "axis/axis_model.h"
+#include "call.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/command.h"
+
+namespace stepdriver::activity {
+
+/// A write of a line that isn't STEP or DIR, for whoever writes the slow lines.
+struct PinJob {
+  std::uint64_t id = 0;
+  int output = -1;
+  bool level = false;
+};
+
+/// What has become of it.
+struct PinDone {
+  std::uint64_t id = 0;
+  int error = 0;  ///< errno; 0: the line was written
+};
+
+/// What a turn of the controller wants done, in this order: first what is shown, then the answers,
+/// then the orders.
+struct Outputs {
+  std::vector<pulse::Command> commands;
+  std::vector<PinJob> pin_jobs;
+  std::vector<std::pair<CallId, Reply>> answers;
+  std::uint64_t clear_stops = 0;  ///< emergency stops up to this count are over
+};
+
+/// What activities work with: the axes, the state of the machine, the time of this turn, and where
+/// their orders go.
+class Context : public AnswerSink {
+ public:
+  explicit Context(std::size_t inputs) : levels(inputs) {}
+
+  axis::MachineMode mode;
+  axis::InputLevels levels;
+  axis::LineNames lines;
+  std::vector<std::unique_ptr<axis::AxisModel>> axes;
+
+  /// @name Of this turn
+  /// @{
+  pulse::Nanoseconds now = 0;      ///< clock time
+  pulse::Nanoseconds slipped = 0;  ///< motion time is clock time less this
+  std::uint64_t stops_asked = 0;   ///< emergency stops
+  std::optional<PinDone> pin_done;
+  Outputs* out = nullptr;
+  /// @}
+  /// Emergency stops that were handled, and those of them that were cleared.
+  std::uint64_t stops_handled = 0;
+  std::uint64_t stops_cleared = 0;
+
+  pulse::Nanoseconds motionNow() const { return now - slipped; }
+  std::uint64_t newGroup() { return ++groups_; }
+  std::uint64_t newMove() { return ++moves_; }
+  std::uint64_t newJob() { return ++jobs_; }
+
+  void answer(CallId call, Reply reply) override {
+    if (call != 0) out->answers.emplace_back(call, std::move(reply));
+  }
+
+ private:
+  std::uint64_t groups_ = 0;
+  std::uint64_t moves_ = 0;
+  std::uint64_t jobs_ = 0;
+};
+
+/// Why something is ended before its time.
+struct Why {
+  axis::MoveEnd end = axis::MoveEnd::kStopped;
+  std::string text;
+};
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,249 @@
+#include "driver_activities.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "axis/scale.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::activity {
+namespace {
+
+// A level that has changed is told in this time, even if its edge was lost.
+constexpr pulse::Nanoseconds kLevelIsTold = 250'000'000;
+
+void append(Steps& steps, Steps more) {
+  for (auto& step : more) steps.push_back(std::move(step));
+}
+
+}  // namespace
+
+// ---- current ----
+
+Steps BringUp::plan() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  if (const auto sequence = axis.motor.pins().bringUp(); sequence.size > 0) {
+    add(steps, pinsStep(context(), axis, sequence));
+  }
+  add(steps, std::make_unique<RunStep>([this, &axis] {
+        if (!axis.config.enable_on_start || !axis.motor.pins().hasEnable() || axis.fault) return;
+        if (context().stops_asked != context().stops_handled) return;
+        Steps enabling;
+        add(enabling,
+            enableStep(context(), axis, true, [&axis] { axis.motor.power().setEnabled(true); }));
+        insert(std::move(enabling));
+      }));
+  return steps;
+}
+
+Steps Enable::plan() {
+  axis::AxisModel& axis = *axes().front();
+  if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+  Steps steps = wakeSteps(context(), axis);
+  if (axis.motor.power().wantsEnabled()) return steps;
+  add(steps, enableStep(context(), axis, true, [&axis] { axis.motor.power().setEnabled(true); }));
+  return steps;
+}
+
+Steps Disable::plan() {
+  axis::AxisModel& axis = *axes().front();
+  const motor::Power& power = axis.motor.power();
+  Steps steps;
+  if (!power.wantsEnabled()) return steps;
+  if (power.isEnabled()) add(steps, enableStep(context(), axis, false, {}));
+  if (power.wantsSleep() != power.isAsleep()) {
+    add(steps, pinsStep(context(), axis, axis.motor.pins().sleep(power.wantsSleep())));
+  }
+  add(steps, std::make_unique<RunStep>([this, &axis] {
+        axis.motor.power().setEnabled(false);
+        joined_.clear();
+      }));
+  return steps;
+}
+
+Steps Sleep::plan() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  if (!asleep_) steps = wakeSteps(context(), axis);
+  if (axis.motor.power().wantsSleep() == asleep_) return steps;
+  add(steps, pinsStep(context(), axis, axis.motor.pins().sleep(asleep_)));
+  add(steps, std::make_unique<RunStep>([this, &axis] {
+        const motor::Power& power = axis.motor.power();
+        if (power.wantsEnabled() == power.isEnabled()) return;
+        Steps enabling;
+        add(enabling, enableStep(context(), axis, power.wantsEnabled(), {}));
+        insert(std::move(enabling));
+      }));
+  add(steps, std::make_unique<RunStep>([this, &axis] {
+        axis.motor.power().setAsleep(asleep_);
+        axis.noteUnpowered();
+        axis.noteHome();
+      }));
+  return steps;
+}
+
+Steps Reset::plan() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  add(steps, pinsStep(context(), axis, axis.motor.pins().reset(), [&axis] {
+        axis.noteUnpowered();
+        axis.noteHome();
+      }));
+  return steps;
+}
+
+Steps GoIdle::plan() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  if (axis.config.idle_action == config::IdleAction::kSleep) {
+    add(steps, pinsStep(context(), axis, axis.motor.pins().sleep(true), [&axis] {
+          axis.motor.power().setIdle(true);
+          axis.noteUnpowered();
+          axis.noteHome();
+        }));
+  } else {
+    add(steps, enableStep(context(), axis, false, [&axis] { axis.motor.power().setIdle(true); }));
+  }
+  return steps;
+}
+
+// ---- faults ----
+
+Steps Recover::plan() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  if (axis.motor.pinsAreDoubtful()) {
+    const motor::Power& power = axis.motor.power();
+    const motor::DriverPins& pins = axis.motor.pins();
+    add(steps, pinsStep(context(), axis,
+                        pins.restore(power.isEnabled() || axis.motor.enableIsHeldByOthers(),
+                                     power.isAsleep())));
+    // Each pin on the way back that the failed change did not reach is where it should be already.
+    if (const int failed = axis.motor.failedMode(); failed != 0) {
+      add(steps, pinsStep(context(), axis, pins.mode(failed, axis.motor.microsteps())));
+    }
+    add(steps, std::make_unique<RunStep>([&axis] { axis.motor.pinsRestored(); }));
+  }
+  add(steps, std::make_unique<RunStep>([this] { insert(resetIfFaulty()); }));
+  add(steps, std::make_unique<RunStep>([this] { clearFault(); }));
+  return steps;
+}
+
+bool Recover::isFaulty() {
+  axis::AxisModel& axis = *axes().front();
+  return axis.config.fault && !axis.motor.power().isAsleep() &&
+         axis.readInput(axis.motor.lines().fault) == 0;
+}
+
+Steps Recover::resetIfFaulty() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  // Asleep a chip says nothing of the fault that it may have kept.
+  const bool unknown = axis.config.fault && axis.motor.power().isAsleep();
+  if (!(isFaulty() || unknown) || !axis.motor.pins().hasReset()) return steps;
+  add(steps, pinsStep(context(), axis, axis.motor.pins().reset(), [&axis] {
+        axis.noteUnpowered();
+        axis.noteHome();
+      }));
+  add(steps, std::make_unique<WaitStep>(context(), [&axis] { return axis.motor.state().ready; }));
+  // The line has another level by then, which may be told a little later.
+  add(steps, std::make_unique<WaitStep>(
+                 context(), [&axis] { return axis.motor.state().ready + kLevelIsTold; },
+                 [this] { return !isFaulty(); }));
+  return steps;
+}
+
+void Recover::clearFault() {
+  axis::AxisModel& axis = *axes().front();
+  if (isFaulty()) {
+    axis.refuse(
+        std::string("the driver chip still reports a fault on nFAULT") +
+        (axis.motor.pins().hasReset() ? "" : "; RESET isn't wired, so only its power ends that"));
+  }
+  if (context().stops_asked != context().stops_cleared) {
+    axis.refuse("an emergency stop has come meanwhile");
+  }
+  axis.fault.clear();
+}
+
+// ---- scales ----
+
+Steps ChangeMicrosteps::plan() {
+  axis::AxisModel& axis = *axes().front();
+  const std::int64_t common =
+      axis.motor.translator().nearestCommon(axis.motor.state().count, wanted_);
+  Steps steps;
+  if (common != axis.motor.state().count) {
+    append(steps, wakeSteps(context(), axis));
+    Goal goal;
+    goal.target = common;
+    goal.velocity = axis.maxSpeed();
+    goal.of_motor = true;
+    goal.outcome = std::make_shared<axis::Outcome<axis::MoveResult>>();
+    add(steps, std::make_unique<FollowStep>(
+                   context(), std::vector<Order>{{&axis, goal}}, JoinPath(),
+                   [] { return std::vector<Predecessor>(); }, [] { return Ack(); }));
+    add(steps, std::make_unique<RunStep>([&axis, goal] {
+          const auto result = goal.outcome->get();
+          if (!result || result->end != axis::MoveEnd::kReached) {
+            axis.refuse(result ? result->message : "it could not move to the common position");
+          }
+          axis.refuseUnlessOpen();
+          if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+        }));
+  }
+  add(steps, std::make_unique<PinsStep>(context(), axis, [this] { return writes(); }));
+  return steps;
+}
+
+PinsStep::Writes ChangeMicrosteps::writes() {
+  axis::AxisModel& axis = *axes().front();
+  const pulse::ChannelState& state = axis.motor.state();
+  const auto change = axis.motor.translator().changeTo(wanted_, state.count);
+  const double kept = axis.positionNow();
+  const double per_unit = axis::stepsPerUnit(axis.config, wanted_);
+  const std::int64_t play = std::llround(axis.config.backlash * per_unit);
+  const double scale = static_cast<double>(wanted_) / axis.motor.microsteps();
+  const std::int64_t slack =
+      std::min<std::int64_t>(std::llround(static_cast<double>(state.slack) * scale), play);
+  // If Home has no count in the new mode, the counting starts anew from it, at the same position;
+  // and what is taken up of the backlash need not be whole microsteps of it.
+  const bool rescales = !change.home_stays || state.slack != 0;
+  const double origin = rescales ? kept - static_cast<double>(change.count - slack) / per_unit
+                                 : axis.position.origin();
+  PinsStep::Writes writes;
+  writes.sequence = axis.motor.pins().mode(axis.motor.microsteps(), wanted_);
+  writes.scale = pulse::Command::Scale{change.count, slack, play};
+  writes.then = [&axis, change, origin] {
+    axis.motor.translator().changed(change);
+    axis.position.rescale(origin);
+  };
+  writes.failed = [&axis, wanted = wanted_] { axis.motor.modeFailed(wanted); };
+  return writes;
+}
+
+Steps RestorePosition::plan() {
+  axis::AxisModel& axis = *axes().front();
+  const std::int64_t play = axis.backlash();
+  Steps steps;
+  if (play != 0) {
+    add(steps, std::make_unique<PinsStep>(context(), axis, [this, &axis, play] {
+          PinsStep::Writes writes;
+          const auto slack =
+              std::min<std::int64_t>(std::llround(kept_.slack * axis.stepsPerUnit()), play);
+          writes.scale = pulse::Command::Scale{axis.motor.state().count, slack, play};
+          return writes;
+        }));
+  }
+  add(steps, std::make_unique<RunStep>([this, &axis] {
+        const double origin =
+            kept_.position - static_cast<double>(axis.jointCount()) / axis.stepsPerUnit();
+        axis.position.restore(origin, axis.whyUnverified(kept_, clean_), kept_.homed);
+      }));
+  return steps;
+}
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "script.h"
+#include "steps.h"
+
+/// What is done with the pins of a driver chip.
+namespace stepdriver::activity {
+
+/// A sequence of pins, which is completed whatever comes.
+class PinScript : public Script {
+ public:
+  PinScript(Context& context, axis::AxisModel& axis, Ack call)
+      : Script(context, {&axis}, Handover::kAfterRest, std::move(call)) {}
+
+ protected:
+  void onEnd(const Why& /*why*/, const Ack& /*call*/) override {}
+  bool endsBeforeItBegins() const override { return false; }
+};
+
+/// Wakes a chip, ends its reset, and enables it if the configuration says so.
+class BringUp : public PinScript {
+ public:
+  BringUp(Context& context, axis::AxisModel& axis, Ack call)
+      : PinScript(context, axis, std::move(call)) {}
+
+ protected:
+  Steps plan() override;
+};
+
+/// Energizes the motor.
+class Enable : public PinScript {
+ public:
+  Enable(Context& context, axis::AxisModel& axis, Ack call)
+      : PinScript(context, axis, std::move(call)) {}
+
+ protected:
+  Steps plan() override;
+};
+
+/// Takes the motor's current away when the axis has come to rest.
+class Disable : public PinScript {
+ public:
+  Disable(Context& context, axis::AxisModel& axis, Ack call)
+      : PinScript(context, axis, std::move(call)) {}
+
+  /// Another call waits for it too.
+  void join(Ack call) { joined_.push_back(std::move(call)); }
+
+ protected:
+  Steps plan() override;
+
+ private:
+  std::vector<Ack> joined_;
+};
+
+/// Puts the chip to sleep, or wakes it.
+class Sleep : public PinScript {
+ public:
+  Sleep(Context& context, axis::AxisModel& axis, bool asleep, Ack call)
+      : PinScript(context, axis, std::move(call)), asleep_(asleep) {}
+
+ protected:
+  Steps plan() override;
+
+ private:
+  const bool asleep_;
+};
+
+/// Pulses RESET.
+class Reset : public PinScript {
+ public:
+  Reset(Context& context, axis::AxisModel& axis, Ack call)
+      : PinScript(context, axis, std::move(call)) {}
+
+ protected:
+  Steps plan() override;
+};
+
+/// Takes the current of a motor away that has stood for its idle timeout.
+class GoIdle : public PinScript {
+ public:
+  GoIdle(Context& context, axis::AxisModel& axis) : PinScript(context, axis, nullptr) {}
+  bool isInBackground() const override { return true; }
+
+ protected:
+  Steps plan() override;
+};
+
+/// Ends a fault: restores the pins if a write had failed, and resets a chip that reports one.
+class Recover : public PinScript {
+ public:
+  Recover(Context& context, axis::AxisModel& axis, Ack call)
+      : PinScript(context, axis, std::move(call)) {}
+  bool watchesInputs() const override { return true; }
+
+ protected:
+  Steps plan() override;
+
+ private:
+  Steps resetIfFaulty();
+  bool isFaulty();
+  void clearFault();
+};
+
+/// Changes the microstep mode and keeps the position; moves to the nearest common position first if
+/// there is none here.
+class ChangeMicrosteps : public Script {
+ public:
+  ChangeMicrosteps(Context& context, axis::AxisModel& axis, int wanted, Ack call)
+      : Script(context, {&axis}, Handover::kAfterRest, std::move(call)), wanted_(wanted) {}
+
+ protected:
+  Steps plan() override;
+
+ private:
+  PinsStep::Writes writes();
+  const int wanted_;
+};
+
+/// Takes the position of an earlier run.
+class RestorePosition : public PinScript {
+ public:
+  RestorePosition(Context& context, axis::AxisModel& axis, const axis::AxisMemory& kept, bool clean,
+                  Ack call)
+      : PinScript(context, axis, std::move(call)), kept_(kept), clean_(clean) {}
+
+ protected:
+  Steps plan() override;
+
+ private:
+  const axis::AxisMemory kept_;
+  const bool clean_;
+};
+
+}  // namespace stepdriver::activity

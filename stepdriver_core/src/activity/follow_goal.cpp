@@ -1,0 +1,133 @@
+#include "follow_goal.h"
+
+#include <utility>
+
+#include "axis/line_path.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::activity {
+
+std::vector<axis::AxisModel*> axesOf(const std::vector<Order>& orders) {
+  std::vector<axis::AxisModel*> axes;
+  axes.reserve(orders.size());
+  for (const Order& order : orders) axes.push_back(order.axis);
+  return axes;
+}
+
+std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes, std::int64_t at) {
+  std::vector<axis::PathStart> starts;
+  starts.reserve(axes.size());
+  for (const axis::AxisModel* axis : axes) starts.push_back(axis->pathStart(at));
+  return starts;
+}
+
+// ---- from whatever the axes do ----
+
+FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call)
+    : Script(context, axesOf(orders), Handover::kAtSpeed, std::move(call)),
+      orders_(std::move(orders)),
+      join_(std::move(join)) {}
+
+std::unique_ptr<FollowStep> FollowGoal::follow() {
+  return std::make_unique<FollowStep>(
+      context(), orders_, join_, [this] { return takePredecessors(); },
+      [this] { return takeCall(); });
+}
+
+void FollowGoal::prepare() {
+  for (const Order& order : orders_) {
+    if (order.axis->motor.power().isIdle()) return;  // it is planned when the motor has current
+  }
+  prepared_ = follow();
+  prepared_->prepare();
+}
+
+Steps FollowGoal::plan() {
+  Steps steps;
+  for (const Order& order : orders_) {
+    order.axis->refuseUnlessReady();  // as an heir it begins later than it was accepted
+    for (auto& step : wakeSteps(context(), *order.axis)) steps.push_back(std::move(step));
+  }
+  steps.push_back(prepared_ ? std::move(prepared_) : follow());
+  return steps;
+}
+
+// ---- a line ----
+
+FollowLine::FollowLine(Context& context, std::vector<Order> orders, double velocity,
+                       double duration, Ack call)
+    : Script(context, axesOf(orders), Handover::kAfterRest, std::move(call)),
+      orders_(std::move(orders)),
+      velocity_(velocity),
+      duration_(duration) {}
+
+Failure FollowLine::notDone(const std::string& why) const {
+  return Script::notDone("the line did not begin: " + why);
+}
+
+void FollowLine::check() const {
+  for (const Order& order : orders_) {
+    if (order.axis->fault) throw Refused(notDone(order.axis->fault.what()).text);
+    order.axis->refuseUnlessReady();
+    order.axis->refuseIntoEndstop(*order.goal.target - order.axis->jointCount());
+  }
+}
+
+Steps FollowLine::plan() {
+  check();
+  Steps steps;
+  for (const Order& order : orders_) {
+    for (auto& step : wakeSteps(context(), *order.axis)) steps.push_back(std::move(step));
+  }
+  for (const Order& order : orders_) {
+    add(steps, std::make_unique<RunStep>([this, &order] { insert(takeUp(order)); }));
+  }
+  add(steps, std::make_unique<RunStep>([this] { insert(followLine()); }));
+  return steps;
+}
+
+// Brings the motor to where the joint moves with its first step of the line.
+Steps FollowLine::takeUp(const Order& order) {
+  axis::AxisModel& axis = *order.axis;
+  const std::int64_t way = *order.goal.target - axis.jointCount();
+  const std::int64_t wanted = way > 0 ? axis.backlash() : 0;
+  Steps steps;
+  if (way == 0 || axis.motor.state().slack == wanted) return steps;
+  Goal goal;
+  goal.target = axis.jointCount() + wanted;
+  goal.velocity = axis.maxSpeed();
+  goal.of_motor = true;
+  goal.outcome = std::make_shared<axis::Outcome<axis::MoveResult>>();
+  const auto nobody = [] { return std::vector<Predecessor>(); };
+  add(steps, std::make_unique<FollowStep>(context(), std::vector<Order>{{&axis, goal}}, JoinPath(),
+                                          nobody, [] { return Ack(); }));
+  add(steps, std::make_unique<RunStep>([this, &axis, goal] {
+        check();
+        const auto result = goal.outcome->get();
+        if (result && result->end != axis::MoveEnd::kReached) {
+          throw Refused(axis.name() + ": the line did not begin: " + result->message);
+        }
+      }));
+  return steps;
+}
+
+Steps FollowLine::followLine() {
+  check();
+  std::vector<std::int64_t> targets;
+  for (const Order& order : orders_) targets.push_back(*order.goal.target);
+  std::vector<axis::PathAxis> facts;
+  for (const axis::AxisModel* axis : axes()) facts.push_back(axis->pathAxis());
+  const auto path = std::make_shared<const axis::LinePath>(std::move(facts), startsOf(axes(), 0),
+                                                           targets, velocity_, duration_);
+  const auto join = [this, path](std::int64_t at) -> std::shared_ptr<const axis::SharedPath> {
+    path->requireStart(startsOf(axes(), at));
+    return {path};
+  };
+  Steps steps;
+  add(steps, std::make_unique<FollowStep>(
+                 context(), orders_, join, [] { return std::vector<Predecessor>(); },
+                 [this] { return takeCall(); }));
+  return steps;
+}
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "axis/path_axis.h"
+#include "script.h"
+#include "steps.h"
+
+namespace stepdriver::activity {
+
+/// A move or a jog of one axis, or a path of several, from whatever they do.
+class FollowGoal : public Script {
+ public:
+  /// @param join empty for one axis alone.
+  FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call);
+
+  void prepare() override;
+
+ protected:
+  Steps plan() override;
+
+ private:
+  std::unique_ptr<FollowStep> follow();
+
+  std::vector<Order> orders_;
+  const JoinPath join_;
+  std::unique_ptr<FollowStep> prepared_;
+};
+
+/// A straight line of several axes from rest: they come to rest, take up their backlash, one after
+/// the other, and begin together.
+class FollowLine : public Script {
+ public:
+  /// @param targets [microsteps] of the joints.
+  /// @param velocity, duration as machine::LineRequest has them.
+  FollowLine(Context& context, std::vector<Order> orders, double velocity, double duration,
+             Ack call);
+
+ protected:
+  Steps plan() override;
+
+ private:
+  Failure notDone(const std::string& why) const override;
+  void check() const;
+  Steps takeUp(const Order& order);
+  Steps followLine();
+
+  std::vector<Order> orders_;
+  const double velocity_;
+  const double duration_;
+};
+
+/// Where axes will be at a motion time.
+std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes, std::int64_t at);
+
+/// The axes of orders.
+std::vector<axis::AxisModel*> axesOf(const std::vector<Order>& orders);
+
+}  // namespace stepdriver::activity

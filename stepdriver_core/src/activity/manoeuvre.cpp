@@ -1,0 +1,503 @@
+#include "manoeuvre.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include "point_motion.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::activity {
+namespace {
+
+constexpr pulse::Nanoseconds kLongestLead = 2'000'000'000;
+
+std::string inMilliseconds(pulse::Nanoseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3g ms", static_cast<double>(time) * 1e-6);
+  return text;
+}
+
+double secondsSince(std::int64_t began_ns, std::int64_t end_ns) {
+  return std::max(0.0, static_cast<double>(end_ns - began_ns) * 1e-9);
+}
+
+/// How the engine ended an axis's motion, and in words.
+std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis) {
+  switch (axis.motor.state().end) {
+    case pulse::EndReason::kDone:
+      return {axis::MoveEnd::kReached, ""};
+    case pulse::EndReason::kEndstopMin:
+      return {axis::MoveEnd::kEndstopMin, "the min endstop was met"};
+    case pulse::EndReason::kEndstopMax:
+      return {axis::MoveEnd::kEndstopMax, "the max endstop was met"};
+    case pulse::EndReason::kEmergencyStop:
+      return {axis::MoveEnd::kEmergencyStop, axis.fault.what()};
+    case pulse::EndReason::kChipFault:
+    case pulse::EndReason::kTooLate:
+    case pulse::EndReason::kLineError:
+      return {axis::MoveEnd::kFault, axis.fault.what()};
+    case pulse::EndReason::kCompanion:
+      break;
+  }
+  return {axis::MoveEnd::kCompanion, "an axis that it moved together with was stopped"};
+}
+
+axis::MoveResult resultWith(const axis::AxisModel& axis, const Goal& goal, axis::MoveEnd end,
+                            const std::string& why) {
+  const pulse::ChannelState& state = axis.motor.state();
+  axis::MoveResult result;
+  result.end = end;
+  result.position = axis.positionNow();
+  result.duration = secondsSince(goal.began_ns, state.end_time);
+  if (end == axis::MoveEnd::kReached) {
+    result.message = axis.name() + " reached " + axis.show(result.position);
+    return result;
+  }
+  result.message = standsAt(axis, goal, why);
+  if (!axis.position.isValid() && state.end_abrupt) {
+    result.message += "; it stopped too fast for the position to be trusted";
+  }
+  return result;
+}
+
+void conclude(const Goal& goal, axis::MoveResult result) {
+  if (goal.outcome) goal.outcome->set(std::move(result));
+}
+
+}  // namespace
+
+Failure failureOf(const std::exception& error) {
+  if (dynamic_cast<const Refused*>(&error) != nullptr) {
+    return {Failure::Kind::kRefused, error.what()};
+  }
+  if (dynamic_cast<const GpioError*>(&error) != nullptr) {
+    return {Failure::Kind::kGpio, error.what()};
+  }
+  return {Failure::Kind::kOther, error.what()};
+}
+
+std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why) {
+  std::string text = axis.name() + " stands at " + axis.show(axis.positionNow());
+  if (goal.target) {
+    text += ", not at " + axis.show(axis.positionOf(static_cast<double>(*goal.target)));
+  }
+  return text + ": " + why;
+}
+
+Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join)
+    : context_(context),
+      orders_(std::move(orders)),
+      join_(std::move(join)),
+      group_(join_ ? context.newGroup() : 0),
+      lead_(kLead) {}
+
+// ---- plans ----
+
+std::shared_ptr<const motion::Profile> Manoeuvre::planPath(std::int64_t at) {
+  const double factor = context_.mode.speed_override;
+  const auto shared = [](motion::Profile profile) {
+    return std::make_shared<const motion::Profile>(std::move(profile));
+  };
+  if (path_ == nullptr) {
+    shared_path_ = join_(at);
+    return shared(shared_path_->plan(at, shared_path_->begin(), factor));
+  }
+  const axis::SharedPath& along = *shared_path_;
+  if (!anyMoves()) return shared(along.plan(at, {path_->endPosition(), 0.0, 0.0}, factor));
+  const motion::MotionState from = path_->stateAt(at);
+  return shared(slowsDown() ? along.planStop(at, from) : along.plan(at, from, factor));
+}
+
+Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
+  Plans plans;
+  for (const Order& order : orders_) {
+    plans.at = std::max(plans.at, earliestStart(context_, *order.axis, lead));
+  }
+  try {
+    if (join_) {
+      plans.path = planPath(plans.at);
+      for (std::size_t i = 0; i < orders_.size(); ++i) {
+        plans.planned.push_back(
+            {std::make_shared<const motion::Profile>(shared_path_->profileOf(i, *plans.path)),
+             0.0});
+      }
+      return plans;
+    }
+    const Order& order = orders_.front();
+    if (slowsDown()) {
+      plans.planned.push_back(
+          {std::make_shared<const motion::Profile>(planStop(*order.axis, plans.at)), 0.0});
+    } else {
+      motion::Plan own = planGoal(*order.axis, order.goal, plans.at);
+      plans.planned.push_back(
+          {std::make_shared<const motion::Profile>(std::move(own.profile)), own.overshoot});
+    }
+  } catch (const std::range_error& error) {
+    orders_.front().axis->refuse(error.what());
+  }
+  return plans;
+}
+
+std::vector<axis::Move> Manoeuvre::prepare() {
+  prepared_ = plan(lead_);
+  std::vector<axis::Move> moves;
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    const Planned& planned = prepared_->planned[i];
+    moves.push_back(moveOf(*orders_[i].axis, *planned.profile, planned.overshoot));
+    moves.back().id = orders_[i].goal.move;
+    moves.back().outcome = orders_[i].goal.outcome;
+  }
+  return moves;
+}
+
+// ---- orders to the engine ----
+
+void Manoeuvre::order(Plans plans) {
+  auto follows = std::make_shared<std::vector<pulse::Follow>>();
+  OpenOrder open;
+  open.mode = mode_;
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    axis::AxisModel& axis = *orders_[i].axis;
+    const motor::Motion* before = axis.motor.motions().latest();
+    open.serials.push_back(axis.motor.nextSerial());
+    follows->push_back({axis.motor.channel(), open.serials[i], plans.planned[i].profile.get(),
+                        before != nullptr ? before->serial : 0, axis.restartInterval(), group_,
+                        context_.stops_handled});
+  }
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    Order& order = orders_[i];
+    if (!started_ && !slowsDown()) order.goal.began_ns = plans.at;
+    motor::Motion motion;
+    motion.serial = open.serials[i];
+    motion.overshoot = plans.planned[i].overshoot;
+    motion.profile = plans.planned[i].profile;
+    motion.order = follows;
+    motion.target = order.goal.target;
+    motion.slows_down = mode_ == Mode::kStop;
+    order.axis->motor.ordered(std::move(motion));
+  }
+  path_ = plans.path;
+  open.plans = std::move(plans);
+  open_.push_back(std::move(open));
+  pulse::Command command;
+  command.follows = follows->data();
+  command.follow_count = follows->size();
+  context_.out->commands.push_back(command);
+}
+
+void Manoeuvre::begin(std::vector<Predecessor> predecessors, Ack call) {
+  predecessors_ = std::move(predecessors);
+  call_ = std::move(call);
+  order(*std::exchange(prepared_, std::nullopt));
+}
+
+void Manoeuvre::beginStop(const Why& why) {
+  started_ = true;
+  stop(why);
+  look();
+}
+
+bool Manoeuvre::anyMoves() const {
+  return std::any_of(orders_.begin(), orders_.end(),
+                     [](const Order& order) { return order.axis->moving(); });
+}
+
+void Manoeuvre::change(Mode mode, const Ack& call) {
+  mode_ = mode;
+  if (call) calls_.push_back(call);
+  if (!anyMoves() && !held_) return calls_.clear();
+  try {
+    order(plan(lead_));
+  } catch (const std::exception& error) {
+    if (call) call->fail(failureOf(error));
+    calls_.clear();
+  }
+}
+
+void Manoeuvre::stop(const Why& why, const Ack& call) {
+  if (over_) return;
+  if (mode_ == Mode::kStop) {
+    if (call && !open_.empty()) calls_.push_back(call);
+    return;
+  }
+  why_ = why;
+  if (anyMoves()) return change(Mode::kStop, call);
+  if (held_) drop();  // else it has come to rest by itself
+}
+
+// What it kept at rest is given up.
+void Manoeuvre::drop() {
+  for (const Order& order : orders_) {
+    activity::conclude(order.goal, droppedResult(order, &order == &orders_.front()));
+  }
+  result_ = droppedResult(orders_.front(), true);
+  finish();
+}
+
+void Manoeuvre::hold(const Ack& call) {
+  if (over_ || mode_ != Mode::kRun) return;
+  if (orders_.front().goal.kind == Goal::Kind::kJog) {
+    return stop({axis::MoveEnd::kStopped, "it was held, which ends a jog"}, call);
+  }
+  change(Mode::kHold, call);
+}
+
+void Manoeuvre::resume(const Ack& call) {
+  if (over_ || mode_ != Mode::kHold) return;
+  if (!anyMoves()) {
+    for (const Order& order : orders_) {
+      order.axis->refuseUnlessReady();
+      order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
+    }
+  }
+  from_rest_ = !anyMoves();
+  change(Mode::kRun, call);
+  held_ = false;
+}
+
+void Manoeuvre::replan(const Ack& call) {
+  if (over_ || mode_ != Mode::kRun || !anyMoves()) return;
+  change(Mode::kRun, call);
+}
+
+// ---- what the engine has made of it ----
+
+bool Manoeuvre::isOpen() const {
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    if (!open_.empty() && orders_[i].axis->motor.state().taken < open_.back().serials[i]) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool Manoeuvre::look() {
+  if (over_) return true;
+  if (isOpen()) return false;
+  if (!open_.empty()) {
+    // What was ordered after a refused order is refused too.
+    const std::uint64_t accepted = orders_.front().axis->motor.state().accepted;
+    const std::vector<OpenOrder> orders = std::exchange(open_, {});
+    for (const OpenOrder& order : orders) {
+      if (order.serials.front() <= accepted) accept(order);
+    }
+    if (orders.back().serials.front() <= accepted) {
+      calls_.clear();
+    } else {
+      refused();
+    }
+  }
+  if (!over_ && open_.empty() && !anyMoves() && !held_) rested();
+  return over_;
+}
+
+void Manoeuvre::accept(const OpenOrder& order) {
+  lead_ = kLead;
+  started_ = true;
+  from_rest_ = false;
+  accepted_mode_ = order.mode;
+  accepted_path_ = order.plans.path;
+  for (const Predecessor& before : std::exchange(predecessors_, {})) {
+    for (std::size_t i = 0; i < orders_.size(); ++i) {
+      if (orders_[i].axis != before.axis) continue;
+      activity::conclude(before.goal,
+                         replacedResult(before, orders_[i], *order.plans.planned[i].profile));
+    }
+  }
+  call_.reset();
+}
+
+void Manoeuvre::refused() {
+  path_ = accepted_path_;
+  for (auto before = predecessors_.begin(); before != predecessors_.end();) {
+    const bool ended = !before->axis->moving();
+    if (ended) conclude(*before);
+    before = ended ? predecessors_.erase(before) : before + 1;
+  }
+  // What was to change has ended by itself.
+  if (started_ && !anyMoves()) {
+    if (!from_rest_) return calls_.clear();
+    if (mode_ == Mode::kHold) held_ = true;
+    if (mode_ == Mode::kStop) drop();
+    if (slowsDown()) return calls_.clear();
+  }
+  // An emergency stop that has come is told soon, and ends this.
+  if (context_.stops_asked != context_.stops_handled) return;
+  tryAgain();
+}
+
+void Manoeuvre::tryAgain() {
+  if (lead_ > kLongestLead) {
+    return fail({Failure::Kind::kRefused,
+                 orders_.front().axis->name() +
+                     ": the pulse thread doesn't keep up: it took a plan later than " +
+                     inMilliseconds(lead_) + " after it was made"});
+  }
+  lead_ *= 2;
+  try {
+    if (!started_ && mode_ != Mode::kRun) {
+      throw Refused(orders_.front().axis->name() + ": " + why_.text);
+    }
+    if (!slowsDown()) {
+      for (const Order& order : orders_) {
+        order.axis->refuseUnlessReady();
+        if (!order.axis->moving()) {
+          order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
+        }
+      }
+    }
+    order(plan(lead_));
+  } catch (const std::exception& error) {
+    fail(failureOf(error));
+  }
+}
+
+// It can't go on as it was to. What moves still comes to rest.
+void Manoeuvre::fail(Failure failure) {
+  if (call_) call_->fail(failure);
+  call_.reset();
+  for (const Ack& call : std::exchange(calls_, {})) {
+    if (anyMoves()) call->fail(failure);
+  }
+  why_ = {axis::MoveEnd::kStopped, failure.text};
+  if (!started_) failure_ = std::move(failure);
+  if (!anyMoves()) return finish();
+  started_ = true;
+  mode_ = Mode::kStop;
+  lead_ = kLead;
+  try {
+    order(plan(lead_));
+  } catch (const std::exception&) {
+    // What the engine follows comes to rest by itself.
+    mode_ = Mode::kRun;
+  }
+}
+
+void Manoeuvre::rested() {
+  if (!started_) {
+    // An emergency stop or a fault has come before it began.
+    if (why_.text.empty()) return;
+    return fail({Failure::Kind::kRefused, orders_.front().axis->name() + ": " + why_.text});
+  }
+  const bool done = std::all_of(orders_.begin(), orders_.end(), [](const Order& order) {
+    return order.axis->motor.state().end == pulse::EndReason::kDone;
+  });
+  if (accepted_mode_ == Mode::kHold && mode_ == Mode::kHold && done) {
+    held_ = true;
+    return calls_.clear();
+  }
+  concludeGoals();
+  finish();
+}
+
+void Manoeuvre::concludeGoals() {
+  reached_ = true;
+  for (const Order& order : orders_) {
+    const axis::MoveResult result = resultOf(order);
+    reached_ = reached_ && result.end == axis::MoveEnd::kReached;
+    if (&order == &orders_.front()) result_ = result;
+    activity::conclude(order.goal, result);
+  }
+}
+
+void Manoeuvre::concludePredecessors() {
+  for (const Predecessor& before : std::exchange(predecessors_, {})) conclude(before);
+}
+
+void Manoeuvre::finish() {
+  concludePredecessors();
+  over_ = true;
+  held_ = false;
+  call_.reset();
+  calls_.clear();
+}
+
+std::vector<Predecessor> Manoeuvre::handOver() {
+  std::vector<Predecessor> left = std::exchange(predecessors_, {});
+  for (const Order& order : orders_) {
+    left.push_back({order.axis, order.goal, accepted_mode_ == Mode::kStop, why_.text, call_});
+  }
+  over_ = true;
+  call_.reset();
+  calls_.clear();
+  return left;
+}
+
+const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
+  for (const Order& order : orders_) {
+    if (order.axis == &axis) return &order.goal;
+  }
+  return nullptr;
+}
+
+// ---- how it ended, in words ----
+
+void Manoeuvre::conclude(const Predecessor& ended) {
+  if (ended.call) {
+    // Neither it nor what took over from it was begun.
+    ended.call->fail({Failure::Kind::kRefused,
+                      ended.axis->name() + ": another command took over before it began"});
+  }
+  auto [end, why] = endOf(*ended.axis);
+  if (end == axis::MoveEnd::kReached && ended.slowed_down) {
+    end = axis::MoveEnd::kStopped;
+    why = ended.stopped_by;
+  }
+  activity::conclude(ended.goal, resultWith(*ended.axis, ended.goal, end, why));
+}
+
+axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
+  auto [end, why] = endOf(*order.axis);
+  if (end == axis::MoveEnd::kReached && accepted_mode_ != Mode::kRun) {
+    end = axis::MoveEnd::kStopped;
+    why = why_.text;
+  } else if (end == axis::MoveEnd::kCompanion) {
+    why = endedWith(*order.axis);
+  }
+  return resultWith(*order.axis, order.goal, end, why);
+}
+
+std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
+  for (const Order& other : orders_) {
+    const pulse::EndReason end = other.axis->motor.state().end;
+    if (other.axis != &axis && end != pulse::EndReason::kDone &&
+        end != pulse::EndReason::kCompanion) {
+      return "it moved together with " + other.axis->name() + ", which was stopped";
+    }
+  }
+  return "an axis that it moved together with was stopped";
+}
+
+// Of what was held at rest.
+axis::MoveResult Manoeuvre::droppedResult(const Order& order, bool by_it) const {
+  if (by_it || orders_.size() == 1) {
+    return resultWith(*order.axis, order.goal, why_.end, why_.text);
+  }
+  return resultWith(*order.axis, order.goal, axis::MoveEnd::kCompanion,
+                    "it was held together with " + orders_.front().axis->name() + ": " + why_.text);
+}
+
+axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Order& by,
+                                           const motion::Profile& profile) {
+  const axis::AxisModel& axis = *before.axis;
+  axis::MoveResult result;
+  result.end = axis::MoveEnd::kReplaced;
+  result.position = axis.positionNow();
+  result.duration = secondsSince(before.goal.began_ns, profile.startNs());
+  result.message = axis.name() + " was at " + axis.show(result.position) + " when ";
+  if (by.goal.kind == Goal::Kind::kJog) {
+    result.message += "a jog took over";
+  } else if (by.goal.kind == Goal::Kind::kTogether) {
+    result.message += "a motion together with other axes took over";
+  } else {
+    result.message += "a move to " +
+                      axis.show(axis.positionOf(static_cast<double>(*by.goal.target))) +
+                      " took over";
+  }
+  return result;
+}
+
+}  // namespace stepdriver::activity

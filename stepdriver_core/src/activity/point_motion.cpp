@@ -1,0 +1,78 @@
+#include "point_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace stepdriver::activity {
+namespace {
+
+// A joint that is to come to its target upwards has all of the backlash taken up there, downwards
+// none of it. At rest on its target it stays, and a moving one comes to it from where it would
+// stop.
+std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
+                         const motion::MotionState& from, const motion::MotionLimits& within) {
+  const std::int64_t down = *goal.target;
+  if (axis.backlash() == 0 || goal.of_motor) return down;
+  const std::int64_t up = down + axis.backlash();
+  if (!axis.moving()) {
+    const std::int64_t way = down - axis.jointCount();
+    return way > 0 ? up : way < 0 ? down : axis.motor.state().count;
+  }
+  const double rest = motion::planStop(0, from, within).endPosition().value();
+  if (from.velocity > 0.0) return rest <= static_cast<double>(up) ? up : down;
+  return rest >= static_cast<double>(down) ? down : up;
+}
+
+}  // namespace
+
+motion::Plan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at) {
+  const motion::MotionState from = axis.motor.stateAt(at);
+  const double velocity =
+      std::min(std::abs(goal.velocity) * axis.mode.speed_override, axis.maxSpeed());
+  const motion::MotionLimits within = axis.limits(velocity);
+  if (goal.kind == Goal::Kind::kJog) {
+    std::optional<std::int64_t> stand_at = goal.target;
+    if (stand_at && goal.velocity > 0.0) *stand_at += axis.backlash();
+    return motion::planVelocity(
+        at, from, std::copysign(velocity * axis.stepsPerUnit(), goal.velocity), within, stand_at);
+  }
+  return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
+}
+
+motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
+  const motor::Motion& before = *axis.motor.motions().latest();
+  const motion::MotionState from = before.profile->stateAt(at);
+  const motion::MotionLimits stopping = axis.stopLimits();
+  const motion::DoubleDouble end = before.profile->endPosition();
+  // What hasn't begun to move has nothing ahead.
+  const bool ends_ahead = (end - from.position).value() * from.velocity > 0.0;
+  if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
+  return motion::planStop(at, from, stopping, std::llround(end.value()));
+}
+
+std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
+                           pulse::Nanoseconds lead) {
+  const pulse::Nanoseconds now = context.motionNow();
+  if (const motor::Motion* before = axis.motor.motions().latest()) {
+    return std::max(now + lead, before->profile->startNs());
+  }
+  // DIR is set when the profile is taken, and the chip may still be waking.
+  const pulse::Nanoseconds dir = axis.config.timing.dir_hold_ns + axis.config.timing.dir_setup_ns;
+  return std::max(now + lead + dir, now + (axis.motor.state().ready - context.now) + dir);
+}
+
+std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
+  if (goal.kind == Goal::Kind::kJog) return goal.velocity > 0.0 ? 1 : -1;
+  return *goal.target - axis.jointCount();
+}
+
+axis::Move moveOf(const axis::AxisModel& axis, const motion::Profile& profile, double overshoot) {
+  axis::Move move;
+  move.target = axis.positionOf(axis.jointAt(profile.endPosition().value()));
+  move.duration = static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9;
+  move.overshoot = overshoot / axis.stepsPerUnit();
+  return move;
+}
+
+}  // namespace stepdriver::activity

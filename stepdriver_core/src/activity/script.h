@@ -1,0 +1,84 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "activity.h"
+#include "manoeuvre.h"
+
+namespace stepdriver::activity {
+
+/// A part of a script. It is begun once, and looks until it is done. Either may throw an Error,
+/// with which the script fails.
+class Step {
+ public:
+  Step() = default;
+  virtual ~Step() = default;
+  Step(const Step&) = delete;
+  Step& operator=(const Step&) = delete;
+
+  virtual void begin() {}
+  /// @return whether it is done.
+  virtual bool look() = 0;
+  /// The script is ended: a motion comes to rest, anything else is completed.
+  virtual void end(const Why& /*why*/, const Ack& /*call*/) {}
+  virtual pulse::Nanoseconds due() const { return pulse::kNever; }
+  /// The motion that it makes; nullptr if it makes none. Such a step waits while the machine is
+  /// held.
+  virtual Manoeuvre* manoeuvre() { return nullptr; }
+};
+
+using Steps = std::vector<std::unique_ptr<Step>>;
+
+/// An activity that is a list of steps, one after the other. What ends it lets the step of now come
+/// to its end, and leaves out those after it.
+class Script : public Activity {
+ public:
+  Script(Context& context, std::vector<axis::AxisModel*> axes, Handover handover, Ack call)
+      : Activity(context, std::move(axes), handover), call_(std::move(call)) {}
+
+  bool canHandOver() const override;
+  std::vector<Predecessor> handOver(const std::string& by) override;
+  void hold(const Ack& call) override;
+  void resume(const Ack& call) override;
+  void speedChanged(const Ack& call) override;
+  pulse::Nanoseconds due() const override;
+  const Manoeuvre* motion() const override;
+
+ protected:
+  void onBegin(std::vector<Predecessor> predecessors) override;
+  void onLook() override { run(); }
+  void onEnd(const Why& why, const Ack& call) override;
+  void onAbandon(const Why& why) override;
+
+  /// Its steps, when it begins. May throw an Error.
+  virtual Steps plan() = 0;
+  /// What its call is told if it ends before it has done what was asked for. @param why in words
+  virtual Failure notDone(const std::string& why) const;
+  /// Steps that come before those that are left.
+  void insert(Steps steps);
+  void add(Steps& steps, std::unique_ptr<Step> step) { steps.push_back(std::move(step)); }
+  /// Of who waits for it to be done, or, if it moves, to begin that.
+  const Ack& call() const { return call_; }
+  Ack takeCall() { return std::exchange(call_, nullptr); }
+  /// Of the motion that it takes over from.
+  std::vector<Predecessor> takePredecessors() { return std::exchange(predecessors_, {}); }
+  Step* current() { return current_.get(); }
+  const Step* current() const { return current_.get(); }
+
+ private:
+  void run();
+  void fail(const Failure& failure);
+
+  Ack call_;
+  std::deque<std::unique_ptr<Step>> steps_;
+  std::unique_ptr<Step> current_;
+  std::vector<Predecessor> predecessors_;
+  std::optional<Why> ended_;
+};
+
+}  // namespace stepdriver::activity

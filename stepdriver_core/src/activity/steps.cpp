@@ -1,0 +1,127 @@
+#include "steps.h"
+
+#include <algorithm>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::activity {
+
+// ---- pins ----
+
+void PinsStep::post(pulse::Command::Kind kind) {
+  pulse::Command command;
+  command.kind = kind;
+  command.channel = axis_.motor.channel();
+  command.serial = serial_ = axis_.motor.nextSerial();
+  if (kind == pulse::Command::Kind::kRelease) {
+    command.ready = due_;
+    command.scale = writes_.scale;
+  }
+  context_.out->commands.push_back(command);
+}
+
+void PinsStep::begin() {
+  writes_ = build_();
+  post(pulse::Command::Kind::kReserve);
+}
+
+bool PinsStep::look() {
+  const pulse::ChannelState& state = axis_.motor.state();
+  if (phase_ == Phase::kReserving) {
+    if (state.taken < serial_) return false;
+    if (state.accepted != serial_) axis_.refuse("it moves");
+    const driver::Timing& timing = axis_.config.timing;
+    const pulse::Nanoseconds held = state.rose + std::max(timing.mode_hold_ns, timing.step_high_ns);
+    due_ = state.pulses != 0 ? std::max(context_.now, held) : context_.now;
+    phase_ = Phase::kWaiting;
+  }
+  if (phase_ == Phase::kWriting) {
+    if (!context_.pin_done || context_.pin_done->id != job_) return false;
+    if (context_.pin_done->error != 0) fail(context_.pin_done->error);
+    due_ = context_.now + writes_.sequence.writes[next_ - 1].then_wait;
+    phase_ = Phase::kWaiting;
+  }
+  if (phase_ == Phase::kWaiting) {
+    if (next_ < writes_.sequence.size) {
+      writeNext();
+      return false;
+    }
+    post(pulse::Command::Kind::kRelease);
+    phase_ = Phase::kReleasing;
+    return false;
+  }
+  if (state.taken < serial_) return false;
+  axis_.rest_since = context_.now;
+  if (writes_.then) writes_.then();
+  return true;
+}
+
+void PinsStep::writeNext() {
+  if (context_.now < due_) return;
+  const motor::PinSequence::Write& write = writes_.sequence.writes[next_++];
+  job_ = context_.newJob();
+  context_.out->pin_jobs.push_back({job_, write.line, write.level});
+  phase_ = Phase::kWriting;
+}
+
+void PinsStep::fail(int error) {
+  const pulse::LineFailure failure{error, writes_.sequence.writes[next_ - 1].line, false};
+  const std::string text = axis_.failureText(failure);
+  axis_.fault.latch(text, "then call recover");
+  axis_.position.distrust();
+  axis_.motor.doubtPins();
+  axis_.rest_since = context_.now;
+  if (writes_.failed) writes_.failed();
+  writes_.scale.reset();
+  due_ = context_.now;
+  post(pulse::Command::Kind::kRelease);
+  throw GpioError(axis_.name() + ": " + text);
+}
+
+std::unique_ptr<Step> pinsStep(Context& context, axis::AxisModel& axis,
+                               const motor::PinSequence& sequence, std::function<void()> then) {
+  return std::make_unique<PinsStep>(context, axis, [sequence, then = std::move(then)] {
+    PinsStep::Writes writes;
+    writes.sequence = sequence;
+    writes.then = then;
+    return writes;
+  });
+}
+
+std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool on,
+                                 std::function<void()> then) {
+  return std::make_unique<PinsStep>(context, axis, [&context, &axis, on, then = std::move(then)] {
+    PinsStep::Writes writes;
+    if (on || !axis.motor.enableIsHeldByOthers()) writes.sequence = axis.motor.pins().enable(on);
+    axis.motor.noteEnable(on);
+    for (const auto& other : context.axes) {
+      if (other->motor.takeReleases()) other->noteUnpowered();
+    }
+    writes.then = then;
+    writes.failed = [&axis, on] { axis.motor.noteEnable(!on); };
+    return writes;
+  });
+}
+
+Steps wakeSteps(Context& context, axis::AxisModel& axis) {
+  Steps steps;
+  if (!axis.motor.power().isIdle()) return steps;
+  const auto awake = [&axis] { axis.motor.power().setIdle(false); };
+  if (axis.config.idle_action == config::IdleAction::kSleep) {
+    steps.push_back(pinsStep(context, axis, axis.motor.pins().sleep(false), awake));
+  } else {
+    steps.push_back(enableStep(context, axis, true, awake));
+  }
+  return steps;
+}
+
+// ---- motions ----
+
+void FollowStep::begin() {
+  if (moves_.empty()) prepare();
+  Ack call = call_();
+  if (call) call->succeed(moves_);
+  manoeuvre_.begin(predecessors_(), std::move(call));
+}
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "context.h"
+#include "motor/pin_sequence.h"
+#include "script.h"
+
+namespace stepdriver::activity {
+
+/// Does something at once.
+class RunStep : public Step {
+ public:
+  explicit RunStep(std::function<void()> action) : action_(std::move(action)) {}
+  bool look() override {
+    action_();
+    return true;
+  }
+
+ private:
+  std::function<void()> action_;
+};
+
+/// Waits for a clock time.
+class WaitStep : public Step {
+ public:
+  /// @param until asked when the step begins. @param earlier if it says so, the wait is over.
+  WaitStep(const Context& context, std::function<pulse::Nanoseconds()> until,
+           std::function<bool()> earlier = {})
+      : context_(context), until_(std::move(until)), earlier_(std::move(earlier)) {}
+  void begin() override { due_ = until_(); }
+  bool look() override { return context_.now >= due_ || (earlier_ && earlier_()); }
+  pulse::Nanoseconds due() const override { return due_; }
+
+ private:
+  const Context& context_;
+  std::function<pulse::Nanoseconds()> until_;
+  std::function<bool()> earlier_;
+  pulse::Nanoseconds due_ = 0;
+};
+
+/// Writes pins of one driver chip, at rest, one after the other, each with the time that the chip
+/// needs after it. The engine has the channel reserved meanwhile.
+class PinsStep : public Step {
+ public:
+  /// What is to be written.
+  struct Writes {
+    motor::PinSequence sequence;
+    std::optional<pulse::Command::Scale> scale;  ///< where the motor stands then, in a new mode
+    std::function<void()> then;                  ///< when all is done
+    std::function<void()> failed;                ///< a line could not be written
+  };
+  /// @param writes asked when the step begins.
+  PinsStep(Context& context, axis::AxisModel& axis, std::function<Writes()> writes)
+      : context_(context), axis_(axis), build_(std::move(writes)) {}
+
+  void begin() override;
+  bool look() override;
+  pulse::Nanoseconds due() const override {
+    return phase_ == Phase::kWaiting ? due_ : pulse::kNever;
+  }
+
+ private:
+  enum class Phase { kReserving, kWaiting, kWriting, kReleasing };
+
+  void post(pulse::Command::Kind kind);
+  void writeNext();
+  void fail(int error);
+
+  Context& context_;
+  axis::AxisModel& axis_;
+  std::function<Writes()> build_;
+  Writes writes_;
+  Phase phase_ = Phase::kReserving;
+  std::size_t next_ = 0;
+  std::uint64_t serial_ = 0;
+  std::uint64_t job_ = 0;
+  pulse::Nanoseconds due_ = 0;
+};
+
+/// Follows a motion to its end.
+class FollowStep : public Step {
+ public:
+  /// @param predecessors, call are taken when it begins.
+  FollowStep(Context& context, std::vector<Order> orders, JoinPath join,
+             std::function<std::vector<Predecessor>()> predecessors, std::function<Ack()> call)
+      : manoeuvre_(context, std::move(orders), std::move(join)),
+        predecessors_(std::move(predecessors)),
+        call_(std::move(call)) {}
+
+  /// Plans it beforehand. @throw Refused
+  void prepare() { moves_ = manoeuvre_.prepare(); }
+
+  void begin() override;
+  bool look() override { return manoeuvre_.look(); }
+  void end(const Why& why, const Ack& call) override { manoeuvre_.stop(why, call); }
+  Manoeuvre* manoeuvre() override { return &manoeuvre_; }
+
+ private:
+  Manoeuvre manoeuvre_;
+  std::vector<axis::Move> moves_;
+  std::function<std::vector<Predecessor>()> predecessors_;
+  std::function<Ack()> call_;
+};
+
+/// @name Pins that more than one script writes
+/// @{
+
+/// Energizes the motor, or takes its current away. A line that another axis wants stays as it is.
+std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool on,
+                                 std::function<void()> then);
+/// Writes a fixed sequence.
+std::unique_ptr<Step> pinsStep(Context& context, axis::AxisModel& axis,
+                               const motor::PinSequence& sequence, std::function<void()> then = {});
+/// Gives an idle motor its current back; does nothing if it isn't idle.
+Steps wakeSteps(Context& context, axis::AxisModel& axis);
+/// @}
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,253 @@
+#include "axis_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "config/restart_speed.h"
+#include "message_text.h"
+#include "scale.h"
+#include "stepdriver_core/config/lowest_limits.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
+
+namespace stepdriver::axis {
+AxisModel::AxisModel(config::AxisConfig axis_config, const motor::MotorLines& motor_lines,
+                     int channel, const MachineMode& machine_mode, const InputLevels& input_levels,
+                     const LineNames& line_names)
+    : config(std::move(axis_config)),
+      motor(config, motor_lines, channel),
+      mode(machine_mode),
+      inputs(input_levels),
+      lines(line_names),
+      limits_now_{config.max_speed, config.acceleration, config.deceleration, config.jerk},
+      limits_next_(limits_now_) {}
+
+// ---- scales ----
+
+double AxisModel::stepsPerUnit() const { return axis::stepsPerUnit(config, motor.microsteps()); }
+
+std::int64_t AxisModel::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
+
+double AxisModel::jointAt(double motor_count) const {
+  const pulse::ChannelState& state = motor.state();
+  const double slack =
+      static_cast<double>(state.slack) + motor_count - static_cast<double>(state.count);
+  return motor_count - std::clamp(slack, 0.0, static_cast<double>(backlash()));
+}
+
+PathAxis AxisModel::pathAxis() const {
+  PathAxis facts;
+  facts.name = config.name;
+  facts.kind = config.kind;
+  facts.microsteps = motor.microsteps();
+  facts.steps_per_unit = stepsPerUnit();
+  facts.origin = position.origin();
+  facts.min_position = config.min_position;
+  facts.max_position = config.max_position;
+  facts.configured_backlash = config.backlash;
+  facts.backlash = backlash();
+  facts.limits = limits(maxSpeed());
+  facts.stop_deceleration = stopDeceleration();
+  facts.stop_jerk = config.jerk * stepsPerUnit();
+  return facts;
+}
+
+PathStart AxisModel::pathStart(std::int64_t at) const {
+  PathStart start;
+  start.motor = motor.stateAt(at);
+  const double count = start.motor.position.value();
+  start.slack = count - jointAt(count);
+  start.moves = moving();
+  return start;
+}
+
+// ---- limits ----
+
+double AxisModel::maxSpeed() const {
+  // At finer microsteps than the configured ones the chip's own limit may come first.
+  const double period =
+      static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
+  return std::min(limits_now_.max_speed, 1.0 / (period * stepsPerUnit()));
+}
+
+motion::MotionLimits AxisModel::limits(double velocity) const {
+  const double scale = stepsPerUnit();
+  return {config.start_speed * scale, velocity * scale, limits_now_.acceleration * scale,
+          limits_now_.deceleration * scale, limits_now_.jerk * scale};
+}
+
+motion::MotionLimits AxisModel::stopLimits() const {
+  const double scale = stepsPerUnit();
+  return {config.start_speed * scale, maxSpeed() * scale, config.acceleration * scale,
+          stopDeceleration(), config.jerk * scale};
+}
+
+double AxisModel::stopDeceleration() const {
+  return config.stop_deceleration.value_or(config.deceleration) * stepsPerUnit();
+}
+
+pulse::Nanoseconds AxisModel::restartInterval() const {
+  return static_cast<pulse::Nanoseconds>(1e9 / (config::restartSpeed(config) * stepsPerUnit()));
+}
+
+double AxisModel::checkedLimit(const char* what, double wanted, double configured, double lowest,
+                               const char* per) const {
+  if (!std::isfinite(wanted) || wanted < 0.0) {
+    refuse(std::string("the ") + what +
+           " must be a finite number, above 0 or 0 for what is configured");
+  }
+  // The bound as the configuration rounds it is not below itself.
+  const double bound = lowest / config.steps_per_unit;
+  if (wanted > 0.0 && wanted * (1.0 + 1e-9) < bound) {
+    refuse(std::string("the ") + what + " " + show(wanted, per) + " is below the lowest, " +
+           lowerBoundText(bound) + (config.kind == config::Kind::kLinear ? " m" : " rad") + per +
+           ", which is " + numberText(lowest) + " steps" + per);
+  }
+  // Without a jerk limit in the configuration any is within it.
+  if (configured > 0.0 && wanted > configured * (1.0 + 1e-12)) {
+    refuse(std::string("the ") + what + " " + show(wanted, per) + " is above the configured " +
+           show(configured, per));
+  }
+  return wanted > 0.0 ? wanted : configured;
+}
+
+AxisLimits AxisModel::checkedLimits(const AxisLimits& wanted) const {
+  AxisLimits next;
+  next.max_speed =
+      checkedLimit("max_speed", wanted.max_speed, config.max_speed, config::kLowestRate, "/s");
+  next.acceleration = checkedLimit("acceleration", wanted.acceleration, config.acceleration,
+                                   config::kLowestAcceleration, "/s^2");
+  next.deceleration = checkedLimit("deceleration", wanted.deceleration, config.deceleration,
+                                   config::kLowestAcceleration, "/s^2");
+  next.jerk = checkedLimit("jerk", wanted.jerk, config.jerk, config::kLowestJerk, "/s^3");
+  return next;
+}
+
+void AxisModel::changeLimits(const AxisLimits& wanted) {
+  limits_next_ = wanted;
+  limits_now_.max_speed = wanted.max_speed;
+  if (!moving()) limits_now_ = limits_next_;
+}
+
+// ---- refusals ----
+
+void AxisModel::refuse(const std::string& why) const { throw Refused(config.name + ": " + why); }
+
+void AxisModel::refuseUnlessOpen() const {
+  if (!mode.closed.empty()) refuse(mode.closed);
+}
+
+void AxisModel::refuseWhileHeld() const {
+  if (mode.held) refuse("held; resume or stop it first");
+}
+
+void AxisModel::refuseUnlessHomed() const {
+  if (!config.require_homing || position.isHomed()) return;
+  refuse("it isn't homed, and require_homing allows absolute positions only then; home it first");
+}
+
+void AxisModel::refuseUnlessReady() const {
+  refuseUnlessOpen();
+  if (fault) refuse("at fault: " + fault.what() + "; call recover first");
+  if (!motor.power().wantsEnabled()) refuse("disabled; enable it first");
+  if (motor.power().wantsSleep()) refuse("asleep; wake it first");
+}
+
+void AxisModel::refuseTooFast(double speed) const {
+  if (speed <= maxSpeed() * (1.0 + 1e-12)) return;
+  refuse("the velocity " + show(speed, "/s") + " is above the maximum " + show(maxSpeed(), "/s"));
+}
+
+double AxisModel::checkedVelocity(double velocity) const {
+  if (!std::isfinite(velocity) || velocity < 0.0) {
+    refuse("the velocity must be a finite number, above 0 or 0 for the maximum");
+  }
+  refuseTooFast(velocity);
+  return velocity > 0.0 ? std::min(velocity, maxSpeed()) : maxSpeed();
+}
+
+void AxisModel::refuseIntoEndstop(std::int64_t steps) const {
+  const motor::MotorLines& own = motor.lines();
+  if (steps > 0 && endstopActive(own.endstop_max, config.endstop_max).value_or(false)) {
+    refuse("the max endstop is active; it moves only towards min");
+  }
+  if (steps < 0 && endstopActive(own.endstop_min, config.endstop_min).value_or(false)) {
+    refuse("the min endstop is active; it moves only towards max");
+  }
+}
+
+void AxisModel::refuseMicrosteps(int wanted) const {
+  const driver::DriverChip& chip = driver::driverChipOf(config.driver);
+  const auto& known = chip.microsteps;
+  if (chip.modes.empty()) {
+    refuse("the microsteps of a " + chip.title +
+           " are set by its DIP switches while its power is off, not by software; they are "
+           "configured as `microsteps`, here " +
+           std::to_string(motor.microsteps()));
+  }
+  if (std::find(known.begin(), known.end(), wanted) == known.end()) {
+    std::string list;
+    for (const int mode_known : known) {
+      list += (list.empty() ? "" : ", ") + std::to_string(mode_known);
+    }
+    refuse("a " + chip.title + " has no 1/" + std::to_string(wanted) + " mode; it has " + list);
+  }
+  if (!motor.pins().hasMode()) {
+    refuse("the microstep pins aren't configured: the board decides, here 1/" +
+           std::to_string(motor.microsteps()));
+  }
+}
+
+// ---- lines ----
+
+std::optional<bool> AxisModel::endstopActive(int line,
+                                             const std::optional<config::Endstop>& endstop) const {
+  if (!endstop) return std::nullopt;
+  return (readInput(line) != 0) == endstop->active_level;
+}
+
+int AxisModel::readInput(int line) const {
+  const int level = inputs.level(line);
+  if (level < 0) throw GpioError(config.name + ": " + failureText({-level, line, true}));
+  return level;
+}
+
+// ---- the driver chip ----
+
+void AxisModel::noteUnpowered() {
+  if (!config.holds_position_unpowered) position.distrust();
+}
+
+void AxisModel::noteHome() {
+  if (!motor.translator().isAtHome(motor.state().count)) position.distrust();
+  motor.translator().wentHome(motor.state().count);
+}
+
+// ---- over a restart ----
+
+AxisMemory AxisModel::memory() const {
+  AxisMemory memory;
+  memory.kind = config.kind;
+  memory.steps_per_unit = config.steps_per_unit;
+  memory.position = positionNow();
+  memory.slack = static_cast<double>(motor.state().slack) / stepsPerUnit();
+  memory.valid = position.isValid();
+  memory.homed = position.isHomed();
+  memory.at_home = motor.translator().isAtHome(motor.state().count);
+  return memory;
+}
+
+std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean) const {
+  if (!clean) return "the node that kept this position wasn't shut down";
+  if (!kept.valid) return "the position couldn't be trusted when it was kept";
+  if (!config.holds_position_unpowered) {
+    return "the motor had no current in between, and holds_position_unpowered isn't set";
+  }
+  if (!kept.at_home) {
+    return "the chip began anew in between, from where its motor isn't: up to two full steps off";
+  }
+  return "";
+}
+
+}  // namespace stepdriver::axis

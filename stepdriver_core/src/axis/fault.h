@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <utility>
+
+namespace stepdriver::axis {
+
+/// The fault of an axis, which stays until it is cleared. An emergency stop by the input is known
+/// to be the input's, whatever comes after it.
+class Fault {
+ public:
+  static constexpr const char* kEmergencyStop = "emergency stop";
+  static constexpr const char* kEmergencyStopInput = "emergency stop input";
+
+  explicit operator bool() const { return !what_.empty(); }
+  const std::string& what() const { return what_; }
+  /// What ends it, in words; empty if there is no fault.
+  const std::string& remedy() const { return remedy_; }
+  bool isEmergencyStop() const { return what_ == kEmergencyStop || what_ == kEmergencyStopInput; }
+
+  void latch(std::string what, std::string remedy) {
+    what_ = std::move(what);
+    remedy_ = std::move(remedy);
+  }
+  void latchEmergencyStop(bool by_input) {
+    if (what_ == kEmergencyStopInput) return;
+    if (by_input) {
+      latch(kEmergencyStopInput, "release the button, then call recover");
+    } else {
+      latch(kEmergencyStop, "call recover when all is safe");
+    }
+  }
+  void clear() {
+    what_.clear();
+    remedy_.clear();
+  }
+
+ private:
+  std::string what_;
+  std::string remedy_;
+};
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "line_names.h"
+#include "motor/motor_lines.h"
+#include "stepdriver_core/pulse/channel.h"
+
+namespace stepdriver::axis {
+
+/// A line of an axis that could not be read or written, in words, with what to do about it.
+std::string lineFailureText(const pulse::LineFailure& failure, const motor::MotorLines& own,
+                            const LineNames& names);
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,123 @@
+#include "line_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <utility>
+
+#include "message_text.h"
+#include "motion/root.h"
+#include "stepdriver_core/motion/compose.h"
+#include "stepdriver_core/motion/planner.h"
+
+namespace stepdriver::axis {
+
+using motion::DoubleDouble;
+
+LinePath::LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
+                   const std::vector<std::int64_t>& targets, double velocity, double duration)
+    : axes_(std::move(axes)) {
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    origins_.push_back(starts[i].motor.position);
+    // The backlash is taken up, so that the motor makes the way of the joint.
+    const std::int64_t slack = std::llround(starts[i].slack);
+    ways_.push_back(motion::fromInteger(targets[i] + slack) - origins_[i]);
+    length_ = std::max(length_, static_cast<std::int64_t>(std::ceil(std::abs(ways_[i].value()))));
+  }
+  takeLimits();
+  speed_ = velocity > 0.0 ? std::min(limits_.max_speed, pathSpeed(velocity)) : limits_.max_speed;
+  if (duration > 0.0 && length_ > 0) speed_ = speedFor(duration);
+}
+
+double LinePath::scale(std::size_t member) const {
+  return std::abs(ways_[member].value()) / static_cast<double>(length_);
+}
+
+// Each axis does its scale of what the path does.
+void LinePath::takeLimits() {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  limits_ = {kNone, kNone, kNone, kNone, 0.0};
+  double stop_deceleration = kNone;
+  double jerk = kNone;
+  double stop_jerk = kNone;
+  const auto lower = [](double& limit, double other) { limit = std::min(limit, other); };
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (ways_[i].value() == 0.0) continue;
+    const motion::MotionLimits& own = axes_[i].limits;
+    const double share = scale(i);
+    lower(limits_.start_speed, own.start_speed / share);
+    lower(limits_.max_speed, own.max_speed / share);
+    lower(limits_.acceleration, own.acceleration / share);
+    lower(limits_.deceleration, own.deceleration / share);
+    lower(stop_deceleration, axes_[i].stop_deceleration / share);
+    if (own.jerk > 0.0) lower(jerk, own.jerk / share);
+    if (axes_[i].stop_jerk > 0.0) lower(stop_jerk, axes_[i].stop_jerk / share);
+  }
+  stop_limits_ = limits_;
+  stop_limits_.deceleration = stop_deceleration;
+  if (jerk < kNone) limits_.jerk = jerk;
+  if (stop_jerk < kNone) stop_limits_.jerk = stop_jerk;
+}
+
+// Of the linear axes if one of them moves, else of the rotary ones.
+double LinePath::pathSpeed(double velocity) const {
+  double linear = 0.0;
+  double rotary = 0.0;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const double way = ways_[i].value() / axes_[i].steps_per_unit;
+    (axes_[i].kind == config::Kind::kLinear ? linear : rotary) += way * way;
+  }
+  return velocity * static_cast<double>(length_) / std::sqrt(linear > 0.0 ? linear : rotary);
+}
+
+double LinePath::durationAt(double speed) const {
+  motion::MotionLimits limits = limits_;
+  limits.max_speed = speed;
+  return motion::planMove(0, {}, length_, limits).profile.duration().value();
+}
+
+double LinePath::speedFor(double duration) const {
+  const double highest = limits_.max_speed;
+  const double fastest = durationAt(highest);
+  if (duration < fastest * (1.0 - 1e-9)) {
+    axes_.front().refuse("the line can't be done in " + numberText(duration) +
+                         " s; the axes' limits allow " + lowerBoundText(fastest) + " s");
+  }
+  if (duration <= fastest) return highest;
+  // The duration falls as the speed rises.
+  double low = static_cast<double>(length_) / (2.0 * duration);
+  while (low > 0.0 && durationAt(low) < duration) low /= 2.0;
+  const auto too_long = [&](DoubleDouble more) {
+    return DoubleDouble(durationAt(low + more.value()) - duration);
+  };
+  return std::min(highest, low + motion::rootOf(too_long, highest - low).value());
+}
+
+void LinePath::requireStart(const std::vector<PathStart>& starts) const {
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const PathStart& start = starts[i];
+    if (start.moves || (start.motor.position - origins_[i]).value() != 0.0) {
+      axes_[i].refuse("busy: another motion began before the line");
+    }
+  }
+}
+
+motion::Profile LinePath::plan(std::int64_t at, const motion::MotionState& from,
+                               double speed_override) const {
+  motion::MotionLimits limits = limits_;
+  limits.max_speed = std::min(speed_ * speed_override, limits_.max_speed);
+  return motion::planMove(at, from, length_, limits).profile;
+}
+
+motion::Profile LinePath::planStop(std::int64_t at, const motion::MotionState& from) const {
+  return motion::planStop(at, from, stop_limits_, length_);
+}
+
+motion::Profile LinePath::profileOf(std::size_t member, const motion::Profile& path) const {
+  const DoubleDouble share =
+      length_ == 0 ? DoubleDouble() : ways_[member] / motion::fromInteger(length_);
+  return motion::scaled(path, origins_[member], share);
+}
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "path_axis.h"
+#include "shared_path.h"
+#include "stepdriver_core/motion/limits.h"
+
+namespace stepdriver::axis {
+
+/// A straight line from where the axes rest. The path's unit is about a microstep of the axis that
+/// makes the most of them.
+class LinePath : public SharedPath {
+ public:
+  /// @param starts at rest; the backlash is taken up. @param targets [microsteps] of each joint.
+  /// @param velocity along the path, as machine::LineRequest has it; 0: as the limits allow.
+  /// @param duration [s] that the line takes; 0: as short as the velocity makes it.
+  /// @throw Refused if it can't be that short.
+  LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
+           const std::vector<std::int64_t>& targets, double velocity, double duration);
+
+  /// @throw Refused if an axis isn't where the line begins, at rest.
+  void requireStart(const std::vector<PathStart>& starts) const;
+
+  motion::MotionState begin() const override { return {}; }
+  motion::Profile plan(std::int64_t at, const motion::MotionState& from,
+                       double speed_override) const override;
+  motion::Profile planStop(std::int64_t at, const motion::MotionState& from) const override;
+  motion::Profile profileOf(std::size_t member, const motion::Profile& path) const override;
+
+ private:
+  void takeLimits();
+  double pathSpeed(double velocity) const;
+  double durationAt(double speed) const;
+  double speedFor(double duration) const;
+  double scale(std::size_t member) const;
+
+  std::vector<PathAxis> axes_;
+  std::vector<motion::DoubleDouble> origins_;  // microsteps of the motor
+  std::vector<motion::DoubleDouble> ways_;
+  std::int64_t length_ = 0;           // of the path: the longest way, and up to a microstep more
+  motion::MotionLimits limits_;       // as the axes allow
+  motion::MotionLimits stop_limits_;  // the same, for stops
+  double speed_ = 0.0;                // wanted, at a speed override of 1
+};
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/motion/limits.h"
+#include "stepdriver_core/motion/profile.h"
+
+namespace stepdriver::axis {
+
+/// All that a path of several axes needs to know of one of them. A copy: a path may be planned from
+/// it in any thread, and compared later with what is true by then.
+struct PathAxis {
+  std::string name;  ///< refusals begin with it
+  config::Kind kind = config::Kind::kLinear;
+  int microsteps = 1;           ///< of a full step
+  double steps_per_unit = 1.0;  ///< [microsteps/unit]
+  double origin = 0.0;          ///< [unit] the position at count 0
+  /// [unit] Soft limits.
+  std::optional<double> min_position;
+  std::optional<double> max_position;
+  double configured_backlash = 0.0;  ///< [unit]
+  std::int64_t backlash = 0;         ///< [microsteps]
+  /// [microsteps] Of motions that begin now; the maximum speed without any override.
+  motion::MotionLimits limits;
+  double stop_deceleration = 0.0;  ///< [microsteps/s^2]
+  double stop_jerk = 0.0;  ///< [microsteps/s^3] as configured, whatever `limits` has; 0: none
+
+  bool operator==(const PathAxis& other) const;
+  bool operator!=(const PathAxis& other) const { return !(*this == other); }
+
+  double positionOf(double count) const { return origin + count / steps_per_unit; }
+  double countOf(double position) const { return (position - origin) * steps_per_unit; }
+  /// [microsteps/s^2] The larger of acceleration and deceleration.
+  double mostAcceleration() const;
+
+  /// "0.1 m", "0.1 rad/s"
+  std::string show(double value, const char* per = "") const;
+  /// @throw Refused always: "x: why".
+  [[noreturn]] void refuse(const std::string& why) const;
+  /// @param position [unit] @param what "the position"
+  /// @throw Refused if it is beyond a soft limit, or too many steps away.
+  void refuseBeyondLimits(double position, const std::string& what) const;
+};
+
+/// Where an axis is at the time at which a path begins.
+struct PathStart {
+  motion::MotionState motor;  ///< [microsteps]
+  double slack = 0.0;         ///< [microsteps] of the backlash, what is taken up
+  bool moves = false;         ///< else it is at rest
+};
+
+}  // namespace stepdriver::axis

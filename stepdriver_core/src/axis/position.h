@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace stepdriver::axis {
+
+/// Where an axis says that it stands: the position at count 0, and whether it can be trusted. It
+/// alone changes these.
+class Position {
+ public:
+  /// [unit] The position at count 0.
+  double origin() const { return origin_; }
+  /// The position can be trusted.
+  bool isValid() const { return valid_; }
+  bool isHomed() const { return homed_; }
+  /// Why the position that was kept over a restart can't be trusted; empty if it can, or if there
+  /// is none.
+  const std::string& note() const { return valid_ ? kNothing : note_; }
+
+  /// Something has happened after which nobody knows where the axis stands.
+  void distrust() { valid_ = homed_ = false; }
+
+  /// Somebody who knows says where the axis stands.
+  void declare(double origin) {
+    origin_ = origin;
+    valid_ = true;
+  }
+  void home(double origin) {
+    declare(origin);
+    homed_ = true;
+  }
+  void beginHoming() { homed_ = false; }
+
+  /// Counts mean something else from now on; the axis stands where it stood.
+  void rescale(double origin) { origin_ = origin; }
+
+  /// Takes the position of an earlier run.
+  /// @param doubt why it can't be trusted; empty: it can.
+  void restore(double origin, std::string doubt, bool homed) {
+    origin_ = origin;
+    note_ = std::move(doubt);
+    valid_ = note_.empty();
+    homed_ = valid_ && homed;
+  }
+  void setNote(std::string why) { note_ = std::move(why); }
+
+ private:
+  inline static const std::string kNothing;
+
+  double origin_ = 0.0;
+  bool valid_ = false;
+  bool homed_ = false;
+  std::string note_;
+};
+
+}  // namespace stepdriver::axis

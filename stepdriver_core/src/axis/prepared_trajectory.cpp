@@ -1,0 +1,293 @@
+#include "prepared_trajectory.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "message_text.h"
+#include "stepdriver_core/motion/profile_parts.h"
+
+namespace stepdriver::axis {
+namespace {
+
+using motion::DoubleDouble;
+using motion::Peak;
+using motion::Profile;
+using motion::ProfilePeaks;
+
+// What it has itself it may have again.
+constexpr double kMore = 1.0 + kTrajectoryTolerance;
+// So many are planned anew when a motion joins, if what was prepared is of no use.
+constexpr std::size_t kFewPieces = 5000;
+
+std::string at(double seconds) { return roughText(seconds) + " s after its start"; }
+
+Peak later(Peak peak, double seconds) {
+  peak.time_s += seconds;
+  return peak;
+}
+
+void requireWithin(const PathAxis& axis, const Peak& peak, double most, const char* what,
+                   const char* per) {
+  if (std::abs(peak.value) <= most * kMore) return;
+  const double scale = axis.steps_per_unit;
+  axis.refuse("the trajectory's " + std::string(what) + " is " +
+              axis.show(peak.value / scale, per) + " " + at(peak.time_s) + ", but the axis has " +
+              axis.show(most / scale, per));
+}
+
+void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double begin) {
+  for (const Peak& peak : {joint.lowest, joint.highest}) {
+    axis.refuseBeyondLimits(axis.positionOf(peak.value),
+                            "the trajectory's position " + at(begin + peak.time_s) + ",");
+  }
+}
+
+void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double begin) {
+  if (axis.limits.jerk == 0.0) return;
+  const Peak& jump = jerk.acceleration_jump;
+  if (std::abs(jump.value) > kTrajectoryTolerance * axis.mostAcceleration()) {
+    axis.refuse("the trajectory's acceleration jumps by " +
+                axis.show(jump.value / axis.steps_per_unit, "/s^2") + " " +
+                at(begin + jump.time_s) +
+                ", but the axis has a jerk limit: all points must have velocities and "
+                "accelerations, 0 at the last");
+  }
+  requireWithin(axis, later(jerk.jerk, begin), axis.limits.jerk, "jerk", "/s^3");
+}
+
+void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin) {
+  requireWithin(axis, later(motor.velocity, begin), axis.limits.max_speed, "velocity", "/s");
+  requireWithin(axis, later(motor.acceleration, begin), axis.mostAcceleration(), "acceleration",
+                "/s^2");
+  // A jump of less than a microstep/s is rounding.
+  Peak jump = later(motor.velocity_jump, begin);
+  if (std::abs(jump.value) < 1.0) jump.value = 0.0;
+  requireWithin(axis, jump, axis.limits.start_speed, "jump of the velocity", "/s");
+}
+
+[[noreturn]] void refuseTurn(const PathAxis& axis, double time_s) {
+  axis.refuse("the trajectory turns " + at(time_s) +
+              ", and goes on so close to the axis's limits that its backlash of " +
+              axis.show(axis.configured_backlash) + " can't be taken up meanwhile");
+}
+
+// At rest a first point at time 0 says where the trajectory believes the axis to be.
+void requireStart(const PathAxis& axis, const motion::Waypoint& first, const PathStart& start) {
+  const double count = std::round(start.motor.position.value()) - start.slack;
+  if (std::abs(first.position - count) <= axis.microsteps) return;
+  axis.refuse("the trajectory begins at " + axis.show(axis.positionOf(first.position)) +
+              ", but the axis stands at " + axis.show(axis.positionOf(count)) +
+              "; they may differ by one full step");
+}
+
+double jerkOf(const Profile& profile) {
+  double jerk = 0.0;
+  for (const motion::Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
+  return jerk;
+}
+
+void widen(motion::MotorBounds& bounds, const PathAxis& axis, const ProfilePeaks& peaks,
+           const Profile& profile) {
+  bounds.acceleration = std::max(bounds.acceleration, std::abs(peaks.acceleration.value));
+  if (axis.limits.jerk > 0.0) bounds.jerk = std::max(bounds.jerk, jerkOf(profile));
+}
+
+double endVelocity(const Profile& profile) {
+  const motion::Piece last = profile.pieces().back();
+  return last.velocityAt(last.duration).value();
+}
+
+}  // namespace
+
+PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
+                                       const std::vector<CoursePoint>& points)
+    : axes_(std::move(axes)) {
+  if (points.empty()) axes_.front().refuse("the trajectory has no points");
+  parts_.reserve(axes_.size());
+  for (std::size_t member = 0; member < axes_.size(); ++member) {
+    parts_.push_back(prepare(member, points));
+    targets_.push_back(std::llround(std::nearbyint(parts_.back().ends.back().position)));
+  }
+}
+
+motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t index,
+                                                const CoursePoint& point,
+                                                const std::vector<motion::Waypoint>& before) const {
+  const PathAxis& axis = axes_[member];
+  // Made for a refusal only: there are many points.
+  const auto name = [&] { return "point " + std::to_string(index) + " of the trajectory "; };
+  const auto check = [&](const std::vector<double>& numbers, const char* what, bool optional) {
+    if (optional && numbers.empty()) return;
+    if (numbers.size() != axes_.size()) {
+      axis.refuse(name() + "has " + std::to_string(numbers.size()) + " " + what +
+                  ", but must have " + std::to_string(axes_.size()) + (optional ? " or none" : ""));
+    }
+    if (!std::isfinite(numbers[member])) {
+      axis.refuse(name() + "has " + numberText(numbers[member]) + " among its " + what +
+                  ", but they must be finite");
+    }
+  };
+  check(point.positions, "positions", false);
+  check(point.velocities, "velocities", true);
+  check(point.accelerations, "accelerations", true);
+  constexpr double kLongest = Profile::kLongest;
+  if (!(point.time >= 0.0 && point.time < kLongest)) {
+    axis.refuse(name() + "is at " + numberText(point.time) + " s, but must be from 0 s to " +
+                numberText(kLongest) + " s");
+  }
+  motion::Waypoint waypoint;
+  waypoint.time_ns = std::llround(point.time * 1e9);
+  if (!before.empty() && waypoint.time_ns <= before.back().time_ns) {
+    axis.refuse(name() + "is at " + numberText(point.time) +
+                " s, but must be later than the one before it, at " +
+                roughText(static_cast<double>(before.back().time_ns) * 1e-9) + " s");
+  }
+  axis.refuseBeyondLimits(point.positions[member], name() + "at");
+  waypoint.position = axis.countOf(point.positions[member]);
+  if (!point.velocities.empty()) {
+    waypoint.velocity = point.velocities[member] * axis.steps_per_unit;
+  }
+  if (!point.accelerations.empty()) {
+    waypoint.acceleration = point.accelerations[member] * axis.steps_per_unit;
+  }
+  return waypoint;
+}
+
+motion::MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {
+  motion::MotionLimits limits = axes_[member].limits;
+  limits.acceleration = axes_[member].mostAcceleration();
+  return limits;
+}
+
+PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
+                                                     const std::vector<CoursePoint>& points) const {
+  const PathAxis& axis = axes_[member];
+  std::vector<motion::Waypoint> waypoints;
+  waypoints.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    waypoints.push_back(waypointOf(member, i, points[i], waypoints));
+  }
+  Part part;
+  part.ends = {waypoints.front(), waypoints.back()};
+  part.begins_at_start = waypoints.size() > 1 && waypoints.front().time_ns == 0;
+  part.bounds = {axis.mostAcceleration() * kMore, axis.limits.jerk * kMore};
+  try {
+    part.spline = std::make_unique<const motion::SplineTail>(waypoints);
+  } catch (const std::invalid_argument& error) {
+    axis.refuse(error.what());
+  }
+  const Profile* joint = part.spline->profile();
+  if (joint == nullptr) return part;
+  const double begin = part.spline->beginS();
+  const ProfilePeaks joint_peaks = motion::profilePeaks(*joint, joint->piece(0).v0);
+  requirePositions(axis, joint_peaks, begin);
+  requireSmooth(axis, part.spline->jerk(), begin);
+  if (axis.backlash == 0) {
+    requireLimits(axis, joint_peaks, begin);
+    widen(part.bounds, axis, joint_peaks, *joint);
+    return part;
+  }
+  part.motor =
+      std::make_unique<const motion::MotorTail>(*joint, axis.backlash, motorLimits(member));
+  if (const auto time = part.motor->noRoom()) refuseTurn(axis, begin + *time);
+  const Profile& motor = part.motor->profile();
+  const ProfilePeaks peaks = motion::profilePeaks(motor, motor.piece(0).v0);
+  requireLimits(axis, peaks, begin);
+  widen(part.bounds, axis, peaks, motor);
+  return part;
+}
+
+motion::MotorPlan PreparedTrajectory::planWhole(std::size_t member, const Profile& joint,
+                                                double slack) const {
+  if (joint.pieceCount() > kFewPieces) {
+    axes_[member].refuse(
+        "the trajectory can't begin from here: it turns so often that its backlash is never "
+        "taken up; let the axis come to rest before the first point");
+  }
+  return motion::planMotor(joint, slack, axes_[member].backlash, motorLimits(member));
+}
+
+TrajectoryPath::Member PreparedTrajectory::joinMember(
+    const std::shared_ptr<const PreparedTrajectory>& own, std::size_t member,
+    const PathStart& start) const {
+  const PathAxis& axis = axes_[member];
+  const Part& part = parts_[member];
+  if (!start.moves && part.begins_at_start) requireStart(axis, part.ends.front(), start);
+  const motion::MotionState from{start.motor.position - start.slack, start.motor.velocity,
+                                 start.motor.acceleration};
+  std::vector<motion::Piece> pieces;
+  motion::SplineJerk jerk;
+  try {
+    pieces = part.spline->head(from);
+    jerk = part.spline->headJerk(from);
+  } catch (const std::invalid_argument& error) {
+    axis.refuse(error.what());
+  }
+  const Profile head(0, pieces);
+  const DoubleDouble begin = head.duration();
+  const Profile* tail = part.spline->profile();
+  requirePositions(axis, motion::profilePeaks(head), 0.0);
+  requireSmooth(axis, jerk, 0.0);
+
+  motion::Sections sections;
+  sections.add(pieces);
+  if (tail != nullptr) {
+    sections.add(motion::Excerpt{{own, tail}, 0.0, tail->duration()});
+  }
+  const auto joint = std::make_shared<const Profile>(0, std::move(sections));
+  std::shared_ptr<const Profile> motor = joint;
+  std::vector<motion::JoinedMotor::Stretch> fresh{{0.0, begin.value()}};
+  if (axis.backlash > 0) {
+    std::optional<motion::JoinedMotor> joined;
+    if (tail != nullptr) {
+      joined = part.motor->join({own, part.motor.get()}, joint, begin, start.slack);
+    }
+    if (!joined) {
+      motion::MotorPlan whole = planWhole(member, *joint, start.slack);
+      const double end = whole.profile.duration().value();
+      joined = motion::JoinedMotor{std::move(whole.profile), {{0.0, end}}, whole.no_room};
+    }
+    if (joined->no_room) refuseTurn(axis, *joined->no_room);
+    fresh = joined->fresh;
+    motor = std::make_shared<const Profile>(std::move(joined->profile));
+  }
+
+  TrajectoryPath::Member made{motor, part.bounds, {}};
+  ProfilePeaks peaks;
+  bool first = true;
+  for (const auto& stretch : fresh) {
+    const Profile planned = motion::part(*motor, stretch.from, stretch.to);
+    if (planned.pieceCount() == 0) continue;
+    // The backlash doesn't make the speed jump: where the tail begins it is the joint that does.
+    const double seam = first && tail != nullptr ? tail->piece(0).v0 - endVelocity(head) : 0.0;
+    const bool to_rest = first && tail == nullptr;
+    const ProfilePeaks own_peaks =
+        motion::profilePeaks(planned, first ? start.motor.velocity : planned.piece(0).v0,
+                             to_rest ? 0.0 : endVelocity(planned) + seam);
+    peaks = first ? own_peaks : motion::joinPeaks(peaks, own_peaks, stretch.from);
+    widen(made.bounds, axis, own_peaks, planned);
+    first = false;
+  }
+  requireLimits(axis, peaks, 0.0);
+  made.stop_bounds = made.bounds;
+  made.stop_bounds.acceleration = std::max(made.bounds.acceleration, axis.stop_deceleration);
+  made.stop_bounds.jerk =
+      axis.stop_jerk > 0.0 ? std::max(made.bounds.jerk, axis.stop_jerk * kMore) : 0.0;
+  return made;
+}
+
+std::shared_ptr<const TrajectoryPath> PreparedTrajectory::join(
+    const std::shared_ptr<const PreparedTrajectory>& prepared,
+    const std::vector<PathStart>& starts) {
+  std::vector<TrajectoryPath::Member> members;
+  members.reserve(starts.size());
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    members.push_back(prepared->joinMember(prepared, i, starts[i]));
+  }
+  return std::make_shared<const TrajectoryPath>(std::move(members));
+}
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,120 @@
+#include "trajectory_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "stepdriver_core/motion/profile_parts.h"
+
+namespace stepdriver::axis {
+namespace {
+
+using motion::DoubleDouble;
+
+constexpr double kSteepest = 1000.0;  // 1/s: from full rate to none in a millisecond
+constexpr double kSteepestJerk = kSteepest * kSteepest;  // 1/s^2
+constexpr double kGentler = 0.8;
+constexpr int kTries = 60;             // down to a millionth of the steepest
+constexpr double kFirstDelay = 0.010;  // s
+
+// When a path that planRate() has made comes to the rate, or to its end [s].
+double timeToRate(const motion::Profile& path, double rate) {
+  const double duration = path.duration().value();
+  if (path.pieceCount() == 0) return duration;
+  const motion::Piece last = path.pieces().back();
+  const bool there = rate > 0.0 && last.v0 == rate && last.a == 0.0 && last.j == 0.0;
+  return there ? duration - last.duration.value() : duration;
+}
+
+}  // namespace
+
+TrajectoryPath::TrajectoryPath(std::vector<Member> members) : members_(std::move(members)) {
+  endTogether();
+}
+
+// What takes up a backlash at the end may last longer than the trajectory.
+void TrajectoryPath::endTogether() {
+  DoubleDouble longest;
+  for (const Member& member : members_) longest = std::max(longest, member.curve->duration());
+  for (Member& member : members_) {
+    const DoubleDouble left = longest - member.curve->duration();
+    if (!(left.hi > 0.0)) continue;
+    motion::Sections sections;
+    sections.add(motion::Excerpt{member.curve, 0.0, member.curve->duration()});
+    sections.add(motion::Piece{left, member.curve->endPosition()});
+    member.curve = std::make_shared<const motion::Profile>(0, std::move(sections));
+  }
+}
+
+motion::Profile TrajectoryPath::plan(std::int64_t at_ns, const motion::MotionState& from,
+                                     double speed_override) const {
+  return changeRate(at_ns, from, std::min(speed_override, 1.0), &Member::bounds);
+}
+
+motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
+                                         const motion::MotionState& from) const {
+  return changeRate(at_ns, from, 0.0, &Member::stop_bounds);
+}
+
+// As fast as no axis gets more acceleration and jerk than it may have: now, or where one of them
+// has all of it already, as soon as it leaves some. Where that is never, the trajectory goes on
+// nearly as it is: it ends at rest too.
+motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::MotionState& from,
+                                           double rate, Bounds bounds) const {
+  const DoubleDouble end = members_.front().curve->duration();
+  if (from.velocity == rate && from.acceleration == 0.0) {
+    return motion::planRate(at_ns, from, rate, {1.0, 1.0}, 0.0, end);
+  }
+  const double left = (end - from.position).value();
+  std::optional<motion::Profile> best;
+  double soonest = std::numeric_limits<double>::infinity();
+  double delay = 0.0;
+  do {
+    motion::RateLimits limits = steepest(from, delay, bounds);
+    for (int i = 0; i < kTries; ++i, limits.slope *= kGentler, limits.jerk *= kGentler) {
+      motion::Profile path = motion::planRate(at_ns, from, rate, limits, delay, end);
+      const double time = timeToRate(path, rate);
+      if (time >= soonest) break;
+      const bool last_resort = delay == 0.0 && i + 1 == kTries;
+      if (!last_resort && !keeps(motion::part(path, 0.0, time), bounds)) continue;
+      best = std::move(path);
+      soonest = last_resort ? soonest : time;
+      break;
+    }
+    delay = std::max(kFirstDelay, 2.0 * delay);
+  } while (delay < soonest && delay * from.velocity < left && from.velocity > 0.0);
+  return *std::move(best);
+}
+
+motion::RateLimits TrajectoryPath::steepest(const motion::MotionState& from, double delay,
+                                            Bounds bounds) const {
+  const DoubleDouble place = from.position + DoubleDouble(delay * from.velocity);
+  motion::RateLimits limits{kSteepest, 0.0};
+  for (std::size_t member = 0; member < members_.size(); ++member) {
+    const auto state = members_[member].curve->stateAt(motion::splitNanoseconds(place).whole);
+    const double speed = std::abs(state.velocity);
+    if ((members_[member].*bounds).jerk > 0.0) {
+      const double jerk =
+          speed > 0.0 ? 2.0 * (members_[member].*bounds).jerk / speed : kSteepestJerk;
+      limits.jerk = std::min(limits.jerk > 0.0 ? limits.jerk : kSteepestJerk, jerk);
+    }
+    if (speed > 0.0)
+      limits.slope = std::min(limits.slope, 2.0 * (members_[member].*bounds).acceleration / speed);
+  }
+  return limits;
+}
+
+bool TrajectoryPath::keeps(const motion::Profile& path, Bounds bounds) const {
+  for (std::size_t member = 0; member < members_.size(); ++member) {
+    if (!motion::staysWithin(*members_[member].curve, path, members_[member].*bounds)) return false;
+  }
+  return true;
+}
+
+motion::Profile TrajectoryPath::profileOf(std::size_t member, const motion::Profile& path) const {
+  return motion::composeAlong(members_[member].curve, path);
+}
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,26 @@
+#include "stepdriver_core/config/config_value.h"
+
+#include "message_text.h"
+
+namespace stepdriver::config {
+namespace {
+
+/// With a point where the text alone would look like an int's: the difference matters here.
+std::string doubleText(double number) {
+  const std::string text = numberText(number);
+  return text.find_first_not_of("-0123456789") == std::string::npos ? text + ".0" : text;
+}
+
+}  // namespace
+
+std::string ConfigValue::shown() const {
+  if (const auto* flag = as<bool>()) return *flag ? "true" : "false";
+  if (const auto* integer = as<int>()) return std::to_string(*integer);
+  if (const auto* number = as<double>()) return doubleText(*number);
+  if (const auto* text = as<std::string>()) return '"' + *text + '"';
+  if (const auto* list = as<List>()) return "a list of " + std::to_string(list->size());
+  if (const auto* map = as<Map>()) return "a map of " + std::to_string(map->size());
+  return "nothing";
+}
+
+}  // namespace stepdriver::config

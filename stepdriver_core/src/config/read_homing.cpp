@@ -1,0 +1,149 @@
+#include "read_homing.h"
+
+#include <string>
+#include <vector>
+
+#include "message_text.h"
+#include "motion_keys.h"
+#include "read_motion.h"
+#include "restart_speed.h"
+
+namespace stepdriver::config {
+namespace {
+
+constexpr double kLongestTimeout = 86'400.0;  // [s]
+constexpr double kLongestDebounceMs = 1000.0;
+constexpr int kHighestOrder = 1000;
+constexpr double kFarthest = 1099511627776.0;  // 2^40 steps, as for any move
+
+class HomingReader {
+ public:
+  HomingReader(ConfigReader& axis, const MotionKeys& keys, const AxisConfig& config)
+      : axis_(axis), homing_(axis.map("homing")), keys_(keys), config_(config) {}
+
+  HomingConfig read() {
+    HomingConfig homing;
+    const bool has_switch = readSwitch(homing);
+    readSpeeds(homing);
+    readDistances(homing, has_switch);
+    homing.timeout = homing_.number("timeout_s", {0.0, kLongestTimeout, true}, homing.timeout);
+    homing.debounce =
+        homing_.number("debounce_ms", {0.0, kLongestDebounceMs}, homing.debounce * 1e3) * 1e-3;
+    homing.order = homing_.integer("order", 0, kHighestOrder, homing.order);
+    homing_.rejectUnknown();
+    return homing;
+  }
+
+ private:
+  double si(double units) const { return static_cast<double>(units / keys_.units_per_si_unit); }
+  double units(double si) const { return static_cast<double>(si * keys_.units_per_si_unit); }
+  std::string inUnit(const char* key) const {
+    return std::string(key) + (keys_.kind == Kind::kLinear ? "_mm" : "_deg");
+  }
+  std::string is(const std::string& key) const {
+    return "is " + homing_.shown(key) + ", but must be ";
+  }
+
+  /// @return whether it is right.
+  bool readSwitch(HomingConfig& homing) {
+    const auto which =
+        homing_.findOneOf("switch", std::vector<std::string>{"min", "max"}, Presence::kRequired);
+    if (!which) return false;
+    homing.at_max = *which == "max";
+    if (homing.at_max ? config_.endstop_max : config_.endstop_min) return true;
+    homing_.issue("switch",
+                  is("switch") + "a switch that the axis has: endstops/" + *which + " is missing");
+    return false;
+  }
+
+  std::optional<double> readSpeed(const std::string& key, double highest, const std::string& what) {
+    const auto speed = homing_.findNumber(key, Range::positive(), Presence::kRequired);
+    if (speed && highest > 0.0 && *speed > highest * kSlack) {
+      homing_.issue(key, is(key) + "at most " + what);
+    }
+    return speed;
+  }
+
+  void readSpeeds(HomingConfig& homing) {
+    const std::string seek_key = inUnit("seek_speed") + "_s";
+    const std::string latch_key = inUnit("latch_speed") + "_s";
+    const auto seek = readSpeed(seek_key, units(config_.max_speed),
+                                keys_.max_speed + ", which is " + axis_.shown(keys_.max_speed));
+    // Only at a speed from which the motor stops at once does the count stay true at the switch.
+    const bool known = config_.steps_per_unit > 0.0 && config_.acceleration > 0.0;
+    const double restart = known ? units(restartSpeed(config_)) : 0.0;
+    const auto latch = readSpeed(latch_key, restart,
+                                 upperBoundText(restart) +
+                                     ", the speed that the motor stops from without a ramp (" +
+                                     keys_.min_speed + ", or that after one full step)");
+    if (seek && latch && *latch > *seek) {
+      homing_.issue(latch_key, is(latch_key) + "at most " + seek_key + ", which is " +
+                                   homing_.shown(seek_key));
+    }
+    homing.seek_speed = si(seek.value_or(0.0));
+    homing.latch_speed = si(latch.value_or(0.0));
+  }
+
+  void readDistances(HomingConfig& homing, bool has_switch) {
+    const std::string travel_key = inUnit("max_travel");
+    const std::string pull_off_key = inUnit("pull_off");
+    const auto travel = homing_.findNumber(travel_key, Range::positive(), Presence::kRequired);
+    const double steps = config_.steps_per_unit / units(1.0);
+    if (travel && steps > 0.0 && *travel * steps > kFarthest) {
+      homing_.issue(travel_key, is(travel_key) + "at most " + upperBoundText(kFarthest / steps) +
+                                    ", which is 2^40 steps");
+    }
+    const auto pull_off =
+        homing_.findNumber(pull_off_key, Range::notNegative(), Presence::kRequired);
+    const bool too_far = travel && pull_off && *pull_off > *travel;
+    if (too_far) {
+      homing_.issue(pull_off_key, is(pull_off_key) + "at most " + travel_key + ", which is " +
+                                      homing_.shown(travel_key));
+    }
+    const std::string offset_key = inUnit("offset");
+    const auto offset = homing_.findNumber(offset_key, Range{}, Presence::kOptional);
+    homing.max_travel = si(travel.value_or(0.0));
+    homing.pull_off = si(pull_off.value_or(0.0));
+    homing.offset = si(offset.value_or(0.0));
+    const bool all_right = pull_off && !too_far && offset.has_value() == homing_.has(offset_key);
+    if (has_switch && all_right) checkRest(homing, offset_key);
+  }
+
+  /// Where it stands when it is homed it must be able to move from.
+  void checkRest(const HomingConfig& homing, const std::string& offset_key) {
+    const double rest = homing.offset + (homing.at_max ? -homing.pull_off : homing.pull_off);
+    const std::string stands =
+        homing_.has(offset_key) ? "is " + homing_.shown(offset_key) : "is missing, and so 0";
+    const auto check = [&](const std::optional<double>& limit, bool beyond, const char* word,
+                           const std::string& key) {
+      if (!limit || !beyond) return;
+      homing_.issue(offset_key, stands + ", so that the axis stands at " + roughText(units(rest)) +
+                                    " when it is homed, but that must be " + word + " " + key +
+                                    ", which is " + axis_.shown(key));
+    };
+    const double tolerance = config_.steps_per_unit > 0.0 ? 1.0 / config_.steps_per_unit : 0.0;
+    check(config_.min_position, rest < config_.min_position.value_or(0.0) - tolerance, "at least",
+          keys_.min_position);
+    check(config_.max_position, rest > config_.max_position.value_or(0.0) + tolerance, "at most",
+          keys_.max_position);
+  }
+
+  ConfigReader& axis_;
+  ConfigReader homing_;
+  const MotionKeys& keys_;
+  const AxisConfig& config_;
+};
+
+}  // namespace
+
+void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {
+  axis.allow("homing");
+  config.require_homing = axis.boolean("require_homing", config.require_homing);
+  if (axis.has("homing")) {
+    if (kind) config.homing = HomingReader(axis, motionKeys(*kind), config).read();
+  } else if (config.require_homing) {
+    axis.issue("require_homing", "is true, but must be false where there is no homing");
+  }
+}
+
+}  // namespace stepdriver::config

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "stepdriver_core/config/config_reader.h"
+#include "stepdriver_core/config/used_lines.h"
+
+namespace stepdriver::config {
+
+/// Reads `pins`, `fault_bias`, `invert` and `common_anode`.
+///
+/// @param chip nullptr where it isn't known; then what depends on it is let pass.
+void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
+              UsedLines& used);
+
+/// Reads `endstops`.
+void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used);
+
+}  // namespace stepdriver::config

@@ -1,0 +1,130 @@
+#include "line_writers.h"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+#include <utility>
+
+namespace stepdriver::gpio {
+namespace {
+
+std::int64_t steadyNow() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+}  // namespace
+
+// What the threads share; it outlives whoever hangs in a write.
+struct LineWriters::Shared {
+  std::shared_ptr<Lines> lines;
+  std::mutex mutex;
+  std::function<void()> told;  // empty: nobody listens any more
+  std::vector<Done> done;
+};
+
+struct LineWriters::Chip {
+  std::condition_variable changed;
+  std::deque<Job> jobs;  // the first one is being written
+  bool ending = false;
+  bool ended = false;
+  std::thread thread;
+};
+
+LineWriters::LineWriters(std::shared_ptr<Lines> lines, bool threaded, std::int64_t timeout_ns,
+                         std::function<void()> told)
+    : threaded_(threaded), timeout_ns_(timeout_ns), shared_(std::make_shared<Shared>()) {
+  shared_->lines = std::move(lines);
+  shared_->told = std::move(told);
+}
+
+LineWriters::~LineWriters() {
+  std::unique_lock<std::mutex> lock(shared_->mutex);
+  shared_->told = nullptr;
+  for (auto& [number, chip] : chips_) {
+    chip->ending = true;
+    chip->changed.notify_all();
+  }
+  for (auto& [number, chip] : chips_) {
+    const bool ended = chip->changed.wait_for(lock, std::chrono::nanoseconds(timeout_ns_),
+                                              [&ended_chip = *chip] { return ended_chip.ended; });
+    if (ended) {
+      lock.unlock();
+      chip->thread.join();
+      lock.lock();
+    } else {
+      chip->thread.detach();
+    }
+  }
+}
+
+void LineWriters::write(std::uint64_t id, const LineWrite& write) {
+  if (!threaded_) {
+    const int error = shared_->lines->write(&write, 1);
+    shared_->done.push_back({id, error});
+    return;
+  }
+  const std::size_t number = shared_->lines->outputChip(write.output);
+  std::shared_ptr<Chip>& chip = chips_[number];
+  if (chip == nullptr) {
+    chip = std::make_shared<Chip>();
+    chip->thread = std::thread([shared = shared_, chip] { run(shared, chip); });
+  }
+  const std::lock_guard<std::mutex> lock(shared_->mutex);
+  // Behind one that hangs its time begins too: whoever waits for it is told in time.
+  chip->jobs.push_back({id, write, steadyNow() + timeout_ns_});
+  chip->changed.notify_all();
+}
+
+void LineWriters::run(const std::shared_ptr<Shared>& shared, const std::shared_ptr<Chip>& chip) {
+  pthread_setname_np(pthread_self(), "line writer");
+  std::unique_lock<std::mutex> lock(shared->mutex);
+  for (;;) {
+    chip->changed.wait(lock, [&chip] { return chip->ending || !chip->jobs.empty(); });
+    if (chip->jobs.empty()) break;
+    const Job job = chip->jobs.front();
+    int error = ETIMEDOUT;
+    // What waited behind a write that hung isn't wanted any more.
+    if (!job.told) {
+      lock.unlock();
+      error = shared->lines->write(&job.write, 1);
+      lock.lock();
+    }
+    const bool told = chip->jobs.front().told;
+    chip->jobs.pop_front();
+    if (told) continue;
+    shared->done.push_back({job.id, error});
+    if (shared->told) shared->told();
+  }
+  chip->ended = true;
+  chip->changed.notify_all();
+}
+
+std::vector<LineWriters::Done> LineWriters::collect() {
+  const std::lock_guard<std::mutex> lock(shared_->mutex);
+  const std::int64_t now = steadyNow();
+  for (auto& [number, chip] : chips_) {
+    for (Job& job : chip->jobs) {
+      if (job.told || now < job.deadline_ns) continue;
+      job.told = true;
+      shared_->done.push_back({job.id, ETIMEDOUT});
+    }
+  }
+  return std::exchange(shared_->done, {});
+}
+
+std::optional<std::int64_t> LineWriters::deadline() const {
+  const std::lock_guard<std::mutex> lock(shared_->mutex);
+  std::optional<std::int64_t> earliest;
+  for (const auto& [number, chip] : chips_) {
+    for (const Job& job : chip->jobs) {
+      if (!job.told) earliest = std::min(earliest.value_or(job.deadline_ns), job.deadline_ns);
+    }
+  }
+  return earliest;
+}
+
+}  // namespace stepdriver::gpio

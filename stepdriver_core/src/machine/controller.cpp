@@ -1,0 +1,662 @@
+#include "controller.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "activity/driver_activities.h"
+#include "activity/follow_goal.h"
+#include "activity/homing.h"
+#include "activity/point_motion.h"
+#include "message_text.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
+
+namespace stepdriver::machine {
+namespace {
+
+using activity::Activity;
+using activity::Goal;
+using activity::Order;
+using activity::Why;
+
+const Why kStopped{axis::MoveEnd::kStopped, "it was stopped"};
+const Why kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
+
+constexpr const char* kChipFault =
+    "the driver chip reports over-current or over-temperature on nFAULT";
+constexpr const char* kChipRemedy =
+    "let it cool down, check the motor's wiring and the current that is set, then call recover";
+constexpr const char* kLateRemedy =
+    "lower the axis's speed or the machine's load (stepdriver_check tells what it holds), call "
+    "recover, and home it or set its position";
+
+std::string inMilliseconds(pulse::Nanoseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3g ms", static_cast<double>(time) * 1e-6);
+  return text;
+}
+
+void refuseBadNumber(const axis::AxisModel& axis, const std::string& what, double value) {
+  if (std::isfinite(value) && value >= 0.0) return;
+  axis.refuse("the " + what + " is " + numberText(value) + ", but must be 0 or above, and finite");
+}
+
+}  // namespace
+
+Controller::Controller(const std::vector<config::AxisConfig>& axes,
+                       const std::vector<motor::MotorLines>& lines, axis::LineNames names,
+                       const std::optional<pulse::Signal>& emergency_stop)
+    : context_(names.inputs.size()), activities_(context_), emergency_stop_(emergency_stop) {
+  context_.out = &last_;
+  context_.lines = std::move(names);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    context_.axes.push_back(std::make_unique<axis::AxisModel>(
+        axes[i], lines[i], static_cast<int>(i), context_.mode, context_.levels, context_.lines));
+  }
+}
+
+Controller::~Controller() { context_.out = &last_; }
+
+void Controller::handle(const Input& input, activity::Outputs& out) {
+  context_.now = input.now;
+  context_.slipped = input.slipped;
+  context_.stops_asked = input.stops_asked;
+  context_.out = &out;
+  std::visit([this](const auto& what) { on(what); }, input.what);
+  activities_.look();
+  supervise();
+  context_.pin_done.reset();
+  if (!awaiting_rest_.empty()) {
+    const bool rests = std::none_of(context_.axes.begin(), context_.axes.end(),
+                                    [](const auto& axis) { return axis->moving(); });
+    if (rests) awaiting_rest_.clear();
+  }
+  context_.out = &last_;
+}
+
+pulse::Nanoseconds Controller::due() const {
+  pulse::Nanoseconds due = activities_.due();
+  for (const auto& axis : context_.axes) due = std::min(due, idleDue(*axis));
+  return due;
+}
+
+// ---- the engine ----
+
+void Controller::on(const EngineNews& news) {
+  takeStops(news);
+  for (std::size_t i = 0; i < news.channels.size(); ++i) take(axis(i), news.channels[i]);
+}
+
+void Controller::takeStops(const EngineNews& news) {
+  const bool by_input = news.input_stops != input_stops_seen_;
+  if (news.stops_served == context_.stops_handled) return;
+  context_.stops_handled = news.stops_served;
+  input_stops_seen_ = news.input_stops;
+  for (const auto& axis : context_.axes) axis->fault.latchEmergencyStop(by_input);
+}
+
+void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
+  const pulse::ChannelState before = axis.motor.state();
+  axis.motor.take(state);
+  const bool was_faulty = static_cast<bool>(axis.fault);
+  if (state.line_errors != before.line_errors) {
+    axis.fault.latch(axis.failureText(state.failure), "then call recover");
+    axis.position.distrust();
+    axis.motor.doubtPins();
+  }
+  if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep()) {
+    axis.fault.latch(kChipFault, kChipRemedy);
+    axis.position.distrust();
+  }
+  if (state.ended != before.ended) {
+    axis.rest_since = std::min(context_.now, state.end_time + context_.slipped);
+    if (state.end == pulse::EndReason::kEmergencyStop) axis.fault.latchEmergencyStop(false);
+    if (state.end == pulse::EndReason::kTooLate) {
+      axis.fault.latch("a pulse was " + inMilliseconds(state.end_lateness) +
+                           " late, more than the motor can go on from at this speed",
+                       kLateRemedy);
+      axis.position.distrust();
+    }
+    if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.position.distrust();
+  }
+  if (!axis.moving()) axis.atRest();
+  if (!was_faulty && axis.fault) ++axis.stops;
+}
+
+// What falls due by the state of things alone.
+void Controller::supervise() {
+  for (const auto& axis : context_.axes) {
+    if (axis->fault && !activities_.isFree(*axis)) {
+      const auto end =
+          axis->fault.isEmergencyStop() ? axis::MoveEnd::kEmergencyStop : axis::MoveEnd::kFault;
+      activities_.end(*axis, {end, axis->fault.what()});
+    }
+    superviseIdle(*axis);
+  }
+  activities_.look();
+}
+
+pulse::Nanoseconds Controller::idleDue(const axis::AxisModel& axis) const {
+  const motor::Power& power = axis.motor.power();
+  const bool stays = axis.config.idle_timeout <= 0.0 || power.isIdle() || !power.wantsEnabled() ||
+                     power.wantsSleep() || axis.fault || !context_.mode.closed.empty() ||
+                     context_.mode.held || !activities_.isFree(axis);
+  if (stays) return pulse::kNever;
+  return axis.rest_since + std::llround(axis.config.idle_timeout * 1e9);
+}
+
+void Controller::superviseIdle(axis::AxisModel& axis) {
+  if (context_.now < idleDue(axis)) return;
+  activities_.begin(std::make_unique<activity::GoIdle>(context_, axis), kTakenOver);
+}
+
+// ---- requests ----
+
+void Controller::on(const Requested& requested) {
+  const Ack call = std::make_shared<activity::PendingCall>(context_, requested.call);
+  try {
+    std::visit([this, &call](const auto& wanted) { serve(wanted, call); }, requested.request);
+  } catch (const Error& error) {
+    call->fail(activity::failureOf(error));
+  }
+}
+
+void Controller::refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const {
+  axis.refuseUnlessOpen();
+  const Activity* owner = activities_.owner(axis);
+  if (owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone) {
+    axis.refuse("busy: it is being homed; " + what + " at rest");
+  }
+  if (axis.moving()) axis.refuse("busy: it moves; " + what + " at rest");
+  for (const Activity* busy : {owner, static_cast<const Activity*>(activities_.heir(axis))}) {
+    if (busy == nullptr || busy->isInBackground()) continue;
+    const bool pins = dynamic_cast<const activity::PinScript*>(busy) != nullptr;
+    if (!pins) axis.refuseWhileHeld();  // what is held is to go on from here
+    axis.refuse(pins ? "busy: its driver's pins are being written; " + what + " when that is done"
+                     : "busy: it is about to move; " + what + " at rest");
+  }
+}
+
+void Controller::refuseUnlessReadyToMove(const axis::AxisModel& axis) const {
+  axis.refuseUnlessReady();
+  for (const Activity* busy : {activities_.owner(axis), activities_.heir(axis)}) {
+    if (busy == nullptr || busy->isInBackground() || busy->canHandOver()) continue;
+    if (dynamic_cast<const activity::Disable*>(busy) != nullptr) {
+      axis.refuse("disabled; enable it first");
+    }
+    if (dynamic_cast<const activity::PinScript*>(busy) != nullptr ||
+        dynamic_cast<const activity::ChangeMicrosteps*>(busy) != nullptr) {
+      axis.refuse("busy: its driver's pins are being written");
+    }
+  }
+  axis.refuseWhileHeld();
+}
+
+Goal Controller::goalWithOutcome(Goal goal) {
+  goal.move = context_.newMove();
+  goal.outcome = std::make_shared<axis::Outcome<axis::MoveResult>>();
+  return goal;
+}
+
+// ---- motions ----
+
+double Controller::relativeOrigin(const axis::AxisModel& axis) const {
+  const Activity* owner = activities_.owner(axis);
+  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const motor::Motion* latest = axis.motor.motions().latest();
+  if (motion == nullptr || latest == nullptr) return static_cast<double>(axis.jointCount());
+  if (latest->slows_down) return axis.jointAt(latest->profile->endPosition().value());
+  const Goal* goal = motion->goalOf(axis);
+  if (goal == nullptr || !goal->target) {
+    axis.refuse("busy: it jogs without an end; give an absolute position");
+  }
+  return static_cast<double>(*goal->target);
+}
+
+std::int64_t Controller::targetOf(axis::AxisModel& axis, double position, bool relative) {
+  refuseUnlessReadyToMove(axis);
+  if (!relative) axis.refuseUnlessHomed();
+  if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
+  const double goal = relative ? axis.positionOf(relativeOrigin(axis)) + position : position;
+  axis.refuseBeyondLimits(goal, "the position");
+  return std::llround(axis.countOf(goal));
+}
+
+Goal Controller::goalOf(const MoveTo& wanted) {
+  axis::AxisModel& moved = axis(wanted.axis);
+  Goal goal;
+  goal.target = targetOf(moved, wanted.position, wanted.relative);
+  goal.velocity = moved.checkedVelocity(wanted.velocity);
+  if (!moved.moving()) moved.refuseIntoEndstop(*goal.target - moved.jointCount());
+  return goal;
+}
+
+void Controller::serve(const MoveTo& wanted, const Ack& call) {
+  axis::AxisModel& moved = axis(wanted.axis);
+  const Goal goal = goalWithOutcome(goalOf(wanted));
+  activities_.begin(std::make_unique<activity::FollowGoal>(
+                        context_, std::vector<Order>{{&moved, goal}}, activity::JoinPath(), call),
+                    kTakenOver);
+}
+
+void Controller::serve(const MoveRounds& wanted, const Ack& call) {
+  const axis::AxisModel& moved = axis(wanted.axis);
+  if (moved.config.steps_per_round <= 0.0) {
+    moved.refuse(
+        "the steps of a round are not known: configure steps_per_round or full_steps_per_round");
+  }
+  const double way = wanted.rounds * moved.config.steps_per_round / moved.config.steps_per_unit;
+  serve(MoveTo{wanted.axis, way, true, wanted.velocity}, call);
+}
+
+void Controller::serve(const PlanMove& wanted, const Ack& call) {
+  axis::AxisModel& moved = axis(wanted.move.axis);
+  const Goal goal = goalOf(wanted.move);
+  const motion::Plan planned = [&] {
+    try {
+      return activity::planGoal(moved, goal, activity::earliestStart(context_, moved, 0));
+    } catch (const std::range_error& error) {
+      moved.refuse(error.what());
+    }
+  }();
+  axis::MovePlan shown;
+  shown.steps_per_unit = moved.stepsPerUnit();
+  shown.move = activity::moveOf(moved, planned.profile, planned.overshoot);
+  const double unit = 1.0 / moved.stepsPerUnit();
+  for (const motion::Piece& piece : planned.profile.pieces()) {
+    shown.pieces.push_back({piece.duration.value(), moved.positionOf(piece.p0.value()),
+                            piece.v0 * unit, piece.a * unit, piece.j * unit});
+  }
+  call->succeed(std::move(shown));
+}
+
+void Controller::serve(const Jog& wanted, const Ack& call) {
+  axis::AxisModel& moved = axis(wanted.axis);
+  if (!std::isfinite(wanted.velocity)) moved.refuse("the velocity must be a finite number");
+  const Activity* owner = activities_.owner(moved);
+  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const Goal* current = motion != nullptr && moved.moving() ? motion->goalOf(moved) : nullptr;
+  const bool jogs = current != nullptr && current->kind == Goal::Kind::kJog;
+  if (wanted.velocity == 0.0) {
+    if (jogs) activities_.end(moved, {axis::MoveEnd::kStopped, "the jog ended"}, call);
+    return;
+  }
+  if (moved.stops != wanted.unless_stopped_since.value_or(moved.stops)) {
+    moved.refuse("the jog was stopped; let it pause or send 0 before it begins again");
+  }
+  refuseUnlessReadyToMove(moved);
+  moved.refuseTooFast(std::abs(wanted.velocity));
+  Goal goal;
+  goal.kind = Goal::Kind::kJog;
+  goal.velocity = wanted.velocity;
+  const auto& limit = wanted.velocity > 0.0 ? moved.config.max_position : moved.config.min_position;
+  if (limit) goal.target = std::llround(moved.countOf(*limit));
+  if (!moved.moving()) {
+    const std::int64_t sign = wanted.velocity > 0.0 ? 1 : -1;
+    if (goal.target && (*goal.target - moved.jointCount()) * sign <= 0) {
+      moved.refuse("it stands at the soft limit " + moved.show(*limit) +
+                   "; it jogs only away from it");
+    }
+    moved.refuseIntoEndstop(sign);
+  } else if (jogs && !motion->slowsDown() && current->velocity == wanted.velocity) {
+    return;  // it does so already
+  }
+  activities_.begin(std::make_unique<activity::FollowGoal>(
+                        context_, std::vector<Order>{{&moved, goalWithOutcome(goal)}},
+                        activity::JoinPath(), call),
+                    kTakenOver);
+}
+
+void Controller::serve(const MoveLine& wanted, const Ack& call) {
+  const axis::AxisModel& first = axis(wanted.axes.front());
+  refuseBadNumber(first, "velocity of the line", wanted.velocity);
+  refuseBadNumber(first, "duration of the line", wanted.duration);
+  if (wanted.velocity > 0.0 && wanted.duration > 0.0) {
+    first.refuse("the line has a velocity and a duration; give one of them");
+  }
+  std::vector<Order> orders;
+  for (std::size_t i = 0; i < wanted.axes.size(); ++i) {
+    axis::AxisModel& moved = axis(wanted.axes[i]);
+    Goal goal;
+    goal.kind = Goal::Kind::kTogether;
+    goal.target = targetOf(moved, wanted.positions[i], wanted.relative);
+    orders.push_back({&moved, goalWithOutcome(goal)});
+  }
+  activities_.begin(std::make_unique<activity::FollowLine>(context_, std::move(orders),
+                                                           wanted.velocity, wanted.duration, call),
+                    {axis::MoveEnd::kStopped, "a line was to begin"});
+}
+
+void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
+  std::vector<axis::AxisModel*> axes;
+  std::vector<Order> orders;
+  for (std::size_t i = 0; i < wanted.axes.size(); ++i) {
+    axis::AxisModel& moved = axis(wanted.axes[i]);
+    refuseUnlessReadyToMove(moved);
+    moved.refuseUnlessHomed();
+    if (moved.stops != wanted.stops[i]) moved.refuse("it was stopped while this was prepared");
+    axes.push_back(&moved);
+    Goal goal;
+    goal.kind = Goal::Kind::kTogether;
+    goal.target = wanted.prepared->targets()[i];
+    orders.push_back({&moved, goalWithOutcome(goal)});
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i]->pathAxis() == wanted.prepared->axes()[i]) continue;
+    return call->fail({activity::Failure::Kind::kOutdated,
+                       axes[i]->name() + ": its limits or its scale changed meanwhile"});
+  }
+  const auto join = [prepared = wanted.prepared, axes](std::int64_t at) {
+    return axis::PreparedTrajectory::join(prepared, activity::startsOf(axes, at));
+  };
+  activities_.begin(std::make_unique<activity::FollowGoal>(context_, std::move(orders), join, call),
+                    kTakenOver);
+}
+
+// ---- stops ----
+
+void Controller::serve(const StopAxis& wanted, const Ack& call) {
+  ++axis(wanted.axis).stops;
+  activities_.end(axis(wanted.axis), kStopped, call);
+}
+
+void Controller::serve(const StopMove& wanted, const Ack& call) {
+  axis::AxisModel& stopped = axis(wanted.axis);
+  const Activity* owner = activities_.owner(stopped);
+  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const Goal* goal = motion != nullptr ? motion->goalOf(stopped) : nullptr;
+  if (goal == nullptr || goal->move != wanted.move) return;
+  ++stopped.stops;
+  activities_.end(stopped, kStopped, call);
+}
+
+void Controller::serve(const StopAll& /*wanted*/, const Ack& call) {
+  context_.mode.held = false;
+  for (const auto& axis : context_.axes) ++axis->stops;
+  activities_.endAll(kStopped, call);
+}
+
+void Controller::serve(const Hold& /*wanted*/, const Ack& call) {
+  if (!context_.mode.closed.empty()) throw Refused(context_.mode.closed);
+  if (context_.mode.held) return;
+  context_.mode.held = true;
+  for (const auto& axis : context_.axes) ++axis->stops;
+  activities_.forEach([&](Activity& activity) {
+    if (activity.hasBegun()) activity.hold(call);
+  });
+}
+
+void Controller::serve(const Resume& /*wanted*/, const Ack& call) {
+  if (!context_.mode.held) return;
+  context_.mode.held = false;
+  for (const auto& axis : context_.axes) ++axis->stops;
+  activities_.forEach([&](Activity& activity) {
+    if (!activity.hasBegun()) return;
+    try {
+      activity.resume(call);
+    } catch (const Error& error) {
+      call->fail(activity::failureOf(error));
+      context_.mode.held = true;
+    }
+  });
+}
+
+void Controller::serve(const SetSpeedOverride& wanted, const Ack& call) {
+  context_.mode.speed_override = wanted.factor;
+  activities_.forEach([&](Activity& activity) { activity.speedChanged(call); });
+}
+
+void Controller::serve(const SetLimits& wanted, const Ack& call) {
+  axis::AxisModel& changed = axis(wanted.axis);
+  changed.refuseUnlessOpen();
+  changed.changeLimits(changed.checkedLimits(wanted.limits));
+  Activity* owner = activities_.owner(changed);
+  // Axes that move together keep what they began with.
+  if (owner != nullptr && owner->axes().size() == 1) owner->speedChanged(call);
+}
+
+void Controller::refuseWhileEmergencyStopInput() const {
+  if (!emergency_stop_) return;
+  const int level = context_.levels.level(emergency_stop_->line);
+  const std::string input =
+      "the emergency stop input " + context_.lines.input(emergency_stop_->line);
+  if (level < 0) throw Refused(input + " can't be read: " + gpio::errorText(-level));
+  if ((level != 0) == emergency_stop_->active) throw Refused(input + " is active; release it");
+}
+
+void Controller::serve(const Recover& /*wanted*/, const Ack& call) {
+  refuseWhileEmergencyStopInput();
+  if (context_.stops_asked != context_.stops_handled) {
+    throw Refused("an emergency stop has come meanwhile");
+  }
+  context_.stops_cleared = context_.stops_handled;
+  context_.out->clear_stops = context_.stops_handled;
+  for (const auto& faulty : context_.axes) {
+    if (!faulty->fault) continue;
+    ++faulty->stops;
+    activities_.begin(std::make_unique<activity::Recover>(context_, *faulty, call),
+                      {axis::MoveEnd::kFault, faulty->fault.what()});
+  }
+}
+
+// ---- homing ----
+
+void Controller::serve(const Home& wanted, const Ack& call) {
+  for (const AxisId id : wanted.axes) {
+    activity::Homing::refuseUnlessReady(axis(id));
+    refuseUnlessReadyToMove(axis(id));
+    refuseUnlessFree(axis(id), "it is homed");
+  }
+  if (wanted.only_check) return;
+  activity::AcceptedHoming accepted;
+  for (const AxisId id : wanted.axes) {
+    const auto outcome = std::make_shared<activity::Homing::Result>();
+    accepted.ids.push_back(++homings_);
+    accepted.outcomes.push_back(outcome);
+    activities_.begin(std::make_unique<activity::Homing>(context_, axis(id), homings_, outcome),
+                      kTakenOver);
+  }
+  call->succeed(std::move(accepted));
+}
+
+void Controller::serve(const CancelHoming& wanted, const Ack& /*call*/) {
+  activities_.forEach([&](Activity& activity) {
+    const auto* homing = dynamic_cast<activity::Homing*>(&activity);
+    if (homing == nullptr) return;
+    const auto& ids = wanted.ids;
+    if (std::find(ids.begin(), ids.end(), homing->id()) != ids.end()) activity.cancel();
+  });
+}
+
+// ---- the driver chip ----
+
+void Controller::serve(const Enable& wanted, const Ack& call) {
+  axis::AxisModel& changed = axis(wanted.axis);
+  changed.refuseUnlessOpen();
+  if (!changed.motor.pins().hasEnable()) {
+    changed.refuse("pins/enable isn't configured: the motor is energized as long as the chip is");
+  }
+  if (!wanted.on) return disable(changed, {axis::MoveEnd::kStopped, "it was disabled"}, call);
+  if (changed.fault) changed.refuse("at fault: " + changed.fault.what() + "; call recover first");
+  const bool disabling =
+      dynamic_cast<const activity::Disable*>(activities_.heir(changed)) != nullptr ||
+      dynamic_cast<const activity::Disable*>(activities_.owner(changed)) != nullptr;
+  if (disabling) changed.refuse("busy: it is being disabled");
+  const motor::Power& power = changed.motor.power();
+  const Activity* owner = activities_.owner(changed);
+  if (power.wantsEnabled() && !power.isIdle() && (owner == nullptr || !owner->isInBackground())) {
+    return;
+  }
+  if (!power.wantsEnabled()) refuseUnlessFree(changed, "it is enabled");
+  ++changed.stops;
+  activities_.begin(std::make_unique<activity::Enable>(context_, changed, call), kTakenOver);
+}
+
+void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call) {
+  ++axis.stops;
+  for (Activity* at : {activities_.owner(axis), activities_.heir(axis)}) {
+    if (auto* disabling = dynamic_cast<activity::Disable*>(at)) {
+      return disabling->join(call);
+    }
+  }
+  activities_.begin(std::make_unique<activity::Disable>(context_, axis, call), why);
+}
+
+void Controller::serve(const Sleep& wanted, const Ack& call) {
+  axis::AxisModel& changed = axis(wanted.axis);
+  refuseUnlessFree(changed, wanted.asleep ? "it is put to sleep" : "it is woken");
+  const driver::DriverChip& chip = driver::driverChipOf(changed.config.driver);
+  if (!changed.motor.pins().hasSleep()) {
+    changed.refuse(chip.has_sleep ? "pins/sleep isn't configured"
+                                  : "a " + chip.title + " has no SLEEP pin");
+  }
+  ++changed.stops;
+  activities_.begin(std::make_unique<activity::Sleep>(context_, changed, wanted.asleep, call),
+                    kTakenOver);
+}
+
+void Controller::serve(const Reset& wanted, const Ack& call) {
+  axis::AxisModel& changed = axis(wanted.axis);
+  refuseUnlessFree(changed, "it is reset");
+  const driver::DriverChip& chip = driver::driverChipOf(changed.config.driver);
+  if (!changed.motor.pins().hasReset()) {
+    changed.refuse(chip.has_reset ? "pins/reset isn't configured"
+                                  : "a " + chip.title + " has no RESET pin");
+  }
+  activities_.begin(std::make_unique<activity::Reset>(context_, changed, call), kTakenOver);
+}
+
+void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
+  axis::AxisModel& changed = axis(wanted.axis);
+  changed.refuseMicrosteps(wanted.microsteps);
+  refuseUnlessFree(changed, "its microsteps are changed");
+  if (changed.fault) changed.refuse("at fault: " + changed.fault.what() + "; call recover first");
+  if (wanted.microsteps == changed.motor.microsteps()) return;
+  const std::int64_t count = changed.motor.state().count;
+  const std::int64_t common = changed.motor.translator().nearestCommon(count, wanted.microsteps);
+  if (common != count) {
+    const double place = changed.positionOf(changed.jointAt(static_cast<double>(common)));
+    if (!changed.config.align_on_microstep_change) {
+      changed.refuse("1/" + std::to_string(wanted.microsteps) + " has no position at " +
+                     changed.show(changed.positionNow()) +
+                     "; the nearest that both modes have is " + changed.show(place) +
+                     ": move there first, or configure align_on_microstep_change");
+    }
+    refuseUnlessReadyToMove(changed);
+    changed.refuseBeyondLimits(place, "the common position");
+    changed.refuseIntoEndstop(common - count);
+  }
+  activities_.begin(
+      std::make_unique<activity::ChangeMicrosteps>(context_, changed, wanted.microsteps, call),
+      kTakenOver);
+}
+
+void Controller::serve(const SetPosition& wanted, const Ack& /*call*/) {
+  axis::AxisModel& changed = axis(wanted.axis);
+  refuseUnlessFree(changed, "its position is set");
+  if (!std::isfinite(wanted.position)) changed.refuse("the position must be a finite number");
+  changed.refuseBeyondLimits(wanted.position, "the position");
+  changed.position.declare(wanted.position -
+                           static_cast<double>(changed.jointCount()) / changed.stepsPerUnit());
+}
+
+// ---- beginning and end ----
+
+void Controller::serve(const BringUp& /*wanted*/, const Ack& call) {
+  for (const auto& axis : context_.axes) {
+    activities_.begin(std::make_unique<activity::BringUp>(context_, *axis, call), kTakenOver);
+  }
+}
+
+void Controller::serve(const RestorePosition& wanted, const Ack& call) {
+  axis::AxisModel& restored = axis(wanted.axis);
+  const axis::AxisMemory& kept = wanted.memory;
+  if (kept.kind != restored.config.kind || kept.steps_per_unit != restored.config.steps_per_unit) {
+    restored.position.setNote("the position was kept for another axis, of " +
+                              numberText(kept.steps_per_unit) + " steps per " +
+                              (kept.kind == config::Kind::kLinear ? "m" : "rad"));
+    return;
+  }
+  activities_.begin(
+      std::make_unique<activity::RestorePosition>(context_, restored, kept, wanted.clean, call),
+      kTakenOver);
+}
+
+void Controller::serve(const NotePosition& wanted, const Ack& /*call*/) {
+  axis(wanted.axis).position.setNote(wanted.why);
+}
+
+void Controller::serve(const Close& wanted, const Ack& call) {
+  context_.mode.closed = wanted.reason;
+  context_.mode.held = false;
+  for (const auto& axis : context_.axes) ++axis->stops;
+  activities_.endAll({axis::MoveEnd::kStopped, wanted.reason}, call);
+}
+
+void Controller::serve(const AwaitRest& /*wanted*/, const Ack& call) {
+  awaiting_rest_.push_back(call);
+}
+
+void Controller::serve(const PowerDown& /*wanted*/, const Ack& call) {
+  for (const auto& axis : context_.axes) {
+    if (axis->motor.pins().hasEnable() && axis->config.disable_on_shutdown) {
+      disable(*axis, {axis::MoveEnd::kStopped, context_.mode.closed}, call);
+    }
+  }
+}
+
+// ---- what readers see ----
+
+AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
+  const motor::Power& power = axis.motor.power();
+  const Activity* owner = activities_.owner(axis);
+  AxisSnapshot shown;
+  axis::AxisState& state = shown.state;
+  state.enabled = power.isEnabled();
+  state.asleep = power.isAsleep();
+  state.idle = power.isIdle();
+  state.moving = axis.moving();
+  state.held = context_.mode.held;
+  state.homed = axis.position.isHomed();
+  if (owner != nullptr) state.homing = owner->homingPhase();
+  state.position_valid = axis.position.isValid();
+  state.microsteps = axis.motor.microsteps();
+  state.fault = axis.fault.what();
+  state.remedy = axis.fault.remedy();
+  state.stops = axis.stops;
+  state.position_note = axis.position.note();
+  shown.steps_per_unit = axis.stepsPerUnit();
+  shown.origin = axis.position.origin();
+  shown.backlash = axis.backlash();
+  shown.limits = axis.limitsOfNextMotion();
+  for (const motor::Motion& motion : axis.motor.motions().all()) {
+    AxisSnapshot::Motion view;
+    view.serial = motion.serial;
+    view.profile = motion.profile;
+    view.slows_down = motion.slows_down;
+    if (motion.target) view.target = axis.positionOf(static_cast<double>(*motion.target));
+    shown.motions.push_back(std::move(view));
+  }
+  if (const auto* motion = owner != nullptr ? owner->motion() : nullptr;
+      motion && motion->isHeld()) {
+    const Goal* goal = motion->goalOf(axis);
+    if (goal != nullptr && goal->target) {
+      shown.held_target = axis.positionOf(static_cast<double>(*goal->target));
+    }
+  }
+  shown.path_axis = axis.pathAxis();
+  shown.channel = axis.motor.state();
+  if (!axis.moving()) shown.memory = axis.memory();
+  return shown;
+}
+
+std::shared_ptr<const MachineSnapshot> Controller::snapshot() const {
+  auto snapshot = std::make_shared<MachineSnapshot>();
+  snapshot->stops_handled = context_.stops_handled;
+  for (const auto& axis : context_.axes) snapshot->axes.push_back(snapshotOf(*axis));
+  return snapshot;
+}
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "activity/activities.h"
+#include "activity/context.h"
+#include "motor/motor_lines.h"
+#include "requests.h"
+#include "snapshot.h"
+#include "stepdriver_core/config/axis_config.h"
+
+namespace stepdriver::machine {
+
+/// Owns all state of a machine and decides everything that it does. It has no thread, no lock, no
+/// clock, no line and no file: what it wants done is a function of what it is told, and of the
+/// order in which it is told that.
+class Controller {
+ public:
+  Controller(const std::vector<config::AxisConfig>& axes,
+             const std::vector<motor::MotorLines>& lines, axis::LineNames names,
+             const std::optional<pulse::Signal>& emergency_stop);
+  ~Controller();
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
+
+  /// A turn: takes in what has happened, and says what is to be done.
+  void handle(const Input& input, activity::Outputs& out);
+
+  /// Clock time at which it wants a TimerDue at the latest.
+  pulse::Nanoseconds due() const;
+  /// It acts on the levels of inputs; else they are looked at when a request comes.
+  bool watchesInputs() const { return activities_.watchInputs(); }
+
+  std::shared_ptr<const MachineSnapshot> snapshot() const;
+
+ private:
+  // What comes from outside.
+  void on(const Requested& requested);
+  void on(const EngineNews& news);
+  void on(const InputRead& read) { context_.levels.take(read.input, read.level); }
+  void on(const InputEdge& edge) { context_.levels.take(edge.edge); }
+  void on(const activity::PinDone& done) { context_.pin_done = done; }
+  void on(const TimerDue& /*due*/) {}
+
+  // Requests. Each throws Refused or GpioError, or takes the call.
+  using Ack = activity::Ack;
+  void serve(const MoveTo& wanted, const Ack& call);
+  void serve(const MoveRounds& wanted, const Ack& call);
+  void serve(const PlanMove& wanted, const Ack& call);
+  void serve(const Jog& wanted, const Ack& call);
+  void serve(const MoveLine& wanted, const Ack& call);
+  void serve(const FollowTrajectory& wanted, const Ack& call);
+  void serve(const StopAxis& wanted, const Ack& call);
+  void serve(const StopMove& wanted, const Ack& call);
+  void serve(const StopAll& wanted, const Ack& call);
+  void serve(const Hold& wanted, const Ack& call);
+  void serve(const Resume& wanted, const Ack& call);
+  void serve(const SetSpeedOverride& wanted, const Ack& call);
+  void serve(const SetLimits& wanted, const Ack& call);
+  void serve(const Home& wanted, const Ack& call);
+  void serve(const CancelHoming& wanted, const Ack& call);
+  void serve(const Enable& wanted, const Ack& call);
+  void serve(const Sleep& wanted, const Ack& call);
+  void serve(const Reset& wanted, const Ack& call);
+  void serve(const SetMicrosteps& wanted, const Ack& call);
+  void serve(const SetPosition& wanted, const Ack& call);
+  void serve(const Recover& wanted, const Ack& call);
+  void serve(const BringUp& wanted, const Ack& call);
+  void serve(const RestorePosition& wanted, const Ack& call);
+  void serve(const NotePosition& wanted, const Ack& call);
+  void serve(const Close& wanted, const Ack& call);
+  void serve(const AwaitRest& wanted, const Ack& call);
+  void serve(const PowerDown& wanted, const Ack& call);
+
+  axis::AxisModel& axis(AxisId id) { return *context_.axes.at(id); }
+  activity::Goal goalOf(const MoveTo& wanted);
+  std::int64_t targetOf(axis::AxisModel& axis, double position, bool relative);
+  double relativeOrigin(const axis::AxisModel& axis) const;
+  activity::Goal newGoal() { return goalWithOutcome({}); }
+  activity::Goal goalWithOutcome(activity::Goal goal);
+  /// It neither moves nor changes its pins. @param what is refused, in words.
+  void refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const;
+  void refuseUnlessReadyToMove(const axis::AxisModel& axis) const;
+  void refuseWhileEmergencyStopInput() const;
+  void disable(axis::AxisModel& axis, const activity::Why& why, const Ack& call);
+
+  // The engine.
+  void take(axis::AxisModel& axis, const pulse::ChannelState& state);
+  void takeStops(const EngineNews& news);
+  void supervise();
+  void superviseIdle(axis::AxisModel& axis);
+  pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
+  AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;
+
+  activity::Context context_;
+  activity::Activities activities_;
+  const std::optional<pulse::Signal> emergency_stop_;
+  std::uint64_t input_stops_seen_ = 0;
+  std::uint64_t homings_ = 0;
+  std::vector<Ack> awaiting_rest_;
+  activity::Outputs last_;  // where calls that are never served are answered at the end
+};
+
+}  // namespace stepdriver::machine

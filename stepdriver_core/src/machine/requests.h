@@ -1,0 +1,163 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "activity/call.h"
+#include "activity/context.h"
+#include "axis/prepared_trajectory.h"
+#include "stepdriver_core/axis/axis_limits.h"
+#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/channel.h"
+
+namespace stepdriver::machine {
+
+/// An axis by its number in the configuration.
+using AxisId = std::size_t;
+
+/// @name What a client may ask for. As the calls of Axis and Machine of these names.
+/// @{
+struct MoveTo {
+  AxisId axis = 0;
+  double position = 0.0;
+  bool relative = false;
+  double velocity = 0.0;
+};
+struct MoveRounds {
+  AxisId axis = 0;
+  double rounds = 0.0;
+  double velocity = 0.0;
+};
+struct PlanMove {
+  MoveTo move;
+};
+struct Jog {
+  AxisId axis = 0;
+  double velocity = 0.0;
+  std::optional<std::uint64_t> unless_stopped_since;
+};
+struct MoveLine {
+  std::vector<AxisId> axes;
+  std::vector<double> positions;
+  bool relative = false;
+  double velocity = 0.0;
+  double duration = 0.0;
+};
+struct FollowTrajectory {
+  std::vector<AxisId> axes;
+  std::shared_ptr<const axis::PreparedTrajectory> prepared;
+  /// AxisState::stops of each axis when it was asked for: what was stopped meanwhile isn't begun.
+  std::vector<std::uint64_t> stops;
+};
+struct StopAxis {
+  AxisId axis = 0;
+};
+/// Only if the axis still makes this move, or holds it.
+struct StopMove {
+  AxisId axis = 0;
+  std::uint64_t move = 0;
+};
+struct StopAll {};
+struct Hold {};
+struct Resume {};
+struct SetSpeedOverride {
+  double factor = 1.0;
+};
+struct SetLimits {
+  AxisId axis = 0;
+  axis::AxisLimits limits;
+};
+struct Home {
+  std::vector<AxisId> axes;
+  bool only_check = false;
+};
+struct CancelHoming {
+  std::vector<std::uint64_t> ids;
+};
+struct Enable {
+  AxisId axis = 0;
+  bool on = false;
+};
+struct Sleep {
+  AxisId axis = 0;
+  bool asleep = false;
+};
+struct Reset {
+  AxisId axis = 0;
+};
+struct SetMicrosteps {
+  AxisId axis = 0;
+  int microsteps = 1;
+};
+struct SetPosition {
+  AxisId axis = 0;
+  double position = 0.0;
+};
+struct Recover {};
+/// @}
+
+/// @name What the machine itself asks for
+/// @{
+struct BringUp {};
+struct RestorePosition {
+  AxisId axis = 0;
+  axis::AxisMemory memory;
+  bool clean = false;
+};
+struct NotePosition {
+  AxisId axis = 0;
+  std::string why;
+};
+/// Refuses every request from now on, and brings all axes to rest.
+struct Close {
+  std::string reason;
+};
+/// Answered when every axis rests.
+struct AwaitRest {};
+/// Disables the axes that are configured so.
+struct PowerDown {};
+/// @}
+
+using Request =
+    std::variant<MoveTo, MoveRounds, PlanMove, Jog, MoveLine, FollowTrajectory, StopAxis, StopMove,
+                 StopAll, Hold, Resume, SetSpeedOverride, SetLimits, Home, CancelHoming, Enable,
+                 Sleep, Reset, SetMicrosteps, SetPosition, Recover, BringUp, RestorePosition,
+                 NotePosition, Close, AwaitRest, PowerDown>;
+
+/// @name What the controller is told
+/// @{
+struct Requested {
+  activity::CallId call = 0;
+  Request request;
+};
+/// What the pulse engine has done: its emergency stops, and then all its channels.
+struct EngineNews {
+  std::uint64_t stops_served = 0;
+  std::uint64_t input_stops = 0;
+  std::vector<pulse::ChannelState> channels;
+};
+struct InputRead {
+  int input = -1;
+  int level = 0;  ///< 0 or 1, or -errno
+};
+struct InputEdge {
+  gpio::EdgeEvent edge;
+};
+/// Time has passed.
+struct TimerDue {};
+/// @}
+
+struct Input {
+  pulse::Nanoseconds now = 0;      ///< clock time
+  pulse::Nanoseconds slipped = 0;  ///< motion time is clock time less this
+  std::uint64_t stops_asked = 0;   ///< emergency stops that were asked for
+  std::variant<Requested, EngineNews, InputRead, InputEdge, activity::PinDone, TimerDue> what;
+};
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,398 @@
+#include "shell.h"
+
+#include <pthread.h>
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <utility>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::machine {
+namespace {
+
+constexpr std::int64_t kInputPeriodNs = 100'000'000;
+constexpr pulse::Nanoseconds kOften = 1'000'000;
+constexpr std::size_t kMostRequests = 256;
+
+/// Requests that may be refused because of the level of a switch. Their callers read the inputs
+/// again, so that what was pressed just now counts.
+bool asksForLevels(const Request& request) {
+  return std::holds_alternative<MoveTo>(request) || std::holds_alternative<MoveRounds>(request) ||
+         std::holds_alternative<PlanMove>(request) || std::holds_alternative<Jog>(request) ||
+         std::holds_alternative<MoveLine>(request) || std::holds_alternative<Resume>(request) ||
+         std::holds_alternative<Home>(request) || std::holds_alternative<SetMicrosteps>(request) ||
+         std::holds_alternative<Recover>(request);
+}
+
+std::chrono::steady_clock::time_point steadyTime(std::int64_t time_ns) {
+  return std::chrono::steady_clock::time_point(std::chrono::nanoseconds(time_ns));
+}
+
+}  // namespace
+
+Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
+             std::shared_ptr<gpio::Lines> lines, std::size_t inputs, const Options& options)
+    : controller_(controller),
+      engine_(engine),
+      clock_(clock),
+      lines_(std::move(lines)),
+      inputs_(static_cast<int>(inputs)),
+      threaded_(options.threaded),
+      writers_(lines_, options.threaded, options.write_timeout_ns, [this] { wakeUp(); }),
+      snapshot_(controller.snapshot()),
+      levels_(inputs, 0),
+      posted_(engine.channels()) {
+  engine_.listen(*this);
+  reads_ = readInputs();
+  if (!threaded_) return;
+  pulse_thread_.emplace(engine_, clock_, this, options.latency_device);
+  thread_ = std::thread([this] { run(); });
+  if (inputs_ > 0) watcher_ = std::thread([this] { watchInputs(); });
+}
+
+Shell::~Shell() { stop(); }
+
+void Shell::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (ending_) return;
+    ending_ = true;
+  }
+  wake_.notify_all();
+  lines_->interrupt();
+  if (watcher_.joinable()) watcher_.join();
+  if (thread_.joinable()) thread_.join();
+  if (pulse_thread_) pulse_thread_->stop();
+  for (const Item& item : std::exchange(requests_, {})) {
+    answer(item.call,
+           {activity::Failure{activity::Failure::Kind::kRefused, "the machine was shut down"}, {}});
+  }
+}
+
+pulse::RealtimeRights Shell::rights() const {
+  return pulse_thread_ ? pulse_thread_->rights() : pulse::RealtimeRights{-1, -1, -1};
+}
+
+// ---- clients ----
+
+activity::Reply Shell::call(Request request) {
+  std::vector<InputRead> reads;
+  if (asksForLevels(request)) reads = readInputs();
+  activity::CallId id = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const char* why = ending_                             ? "the machine was shut down"
+                      : requests_.size() >= kMostRequests ? "too many requests wait already"
+                                                          : nullptr;
+    if (why != nullptr) return {activity::Failure{activity::Failure::Kind::kRefused, why}, {}};
+    id = ++calls_;
+    {
+      const std::lock_guard<std::mutex> answers_lock(answers_mutex_);
+      answers_[id];
+    }
+    reads_.insert(reads_.end(), reads.begin(), reads.end());
+    requests_.push_back({id, std::move(request)});
+    woken_ = true;
+  }
+  wake_.notify_one();
+  std::optional<activity::Reply> reply;
+  wait([&] {
+    const std::lock_guard<std::mutex> lock(answers_mutex_);
+    reply = answers_[id].reply;
+    return reply.has_value();
+  });
+  const std::lock_guard<std::mutex> lock(answers_mutex_);
+  answers_.erase(id);
+  return *std::move(reply);
+}
+
+void Shell::wait(const std::function<bool()>& ready, bool often) {
+  if (threaded_) {
+    std::unique_lock<std::mutex> lock(answers_mutex_);
+    for (;;) {
+      const std::uint64_t turns = turns_;
+      lock.unlock();
+      if (ready()) return;
+      lock.lock();
+      const auto another = [&] { return turns_ != turns; };
+      if (often) {
+        answered_.wait_for(lock, std::chrono::nanoseconds(kOften), another);
+      } else {
+        answered_.wait(lock, another);
+      }
+    }
+  }
+  for (;;) {
+    settle();
+    const std::uint64_t turns = turns_;
+    if (ready()) return;
+    if (turns != turns_) continue;  // it has asked for something itself
+    const pulse::Nanoseconds due = std::min(engine_due_, controller_.due());
+    if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
+    clock_.waitUntil(often ? std::min(due, clock_.now() + kOften) : due);
+  }
+}
+
+void Shell::advance(pulse::Nanoseconds time) {
+  engine_.inputsChanged();  // nobody watches them
+  feedInputs();
+  const pulse::Nanoseconds end = clock_.now() + time;
+  for (;;) {
+    settle();
+    const pulse::Nanoseconds due = std::min(engine_due_, controller_.due());
+    if (due > end && clock_.now() >= end) return;
+    clock_.waitUntil(std::min(due, end));
+  }
+}
+
+std::shared_ptr<const MachineSnapshot> Shell::snapshot() const {
+  const std::lock_guard<std::mutex> lock(answers_mutex_);
+  return snapshot_;
+}
+
+axis::AxisState Shell::state(AxisId axis) const {
+  const auto motion_now = [this] { return clock_.now() - engine_.state().slipped; };
+  const pulse::Nanoseconds before = motion_now();
+  const std::shared_ptr<const MachineSnapshot> seen = snapshot();
+  const pulse::ChannelState live = engine_.channel(static_cast<int>(axis));
+  return stateOf(seen->axes.at(axis), live, before, motion_now());
+}
+
+double Shell::peakRate(AxisId axis) const {
+  return peakRateOf(snapshot()->axes.at(axis), engine_.channel(static_cast<int>(axis)));
+}
+
+void Shell::answer(activity::CallId call, activity::Reply reply) {
+  const std::lock_guard<std::mutex> lock(answers_mutex_);
+  const auto waiting = answers_.find(call);
+  if (waiting != answers_.end()) waiting->second.reply = std::move(reply);
+  ++turns_;
+  answered_.notify_all();
+}
+
+// ---- what happens ----
+
+// A virtual clock stands still until the news were taken.
+void Shell::onNews() noexcept {
+  news_.store(true, std::memory_order_release);
+  if (!threaded_) return;
+  if (!news_hold_.exchange(true)) clock_.hold();
+  wakeUp();
+}
+
+void Shell::wakeUp() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    woken_ = true;
+  }
+  wake_.notify_one();
+}
+
+std::vector<InputRead> Shell::readInputs() const {
+  std::vector<InputRead> reads;
+  reads.reserve(static_cast<std::size_t>(inputs_));
+  for (int input = 0; input < inputs_; ++input) reads.push_back({input, lines_->read(input)});
+  return reads;
+}
+
+// An edge is only a wake-up: levels are read. One that was lost, or a chip that was waking when it
+// came, is made good by reading again after a while.
+void Shell::watchInputs() {
+  pthread_setname_np(pthread_self(), "inputs");
+  std::vector<InputRead> known;
+  for (;;) {
+    std::array<gpio::EdgeEvent, 16> events{};
+    const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
+    engine_.inputsChanged();
+    std::vector<InputRead> reads = readInputs();
+    const bool changed =
+        !std::equal(reads.begin(), reads.end(), known.begin(), known.end(),
+                    [](const InputRead& a, const InputRead& b) { return a.level == b.level; });
+    known = reads;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (ending_) return;
+      for (int i = 0; i < count; ++i) edges_.push_back(events.at(static_cast<std::size_t>(i)));
+      if (changed) reads_.insert(reads_.end(), reads.begin(), reads.end());
+    }
+    if (changed || count > 0) wakeUp();
+    // If waiting fails, reading will fail too, and say so.
+    if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
+  }
+}
+
+// ---- the thread of the controller ----
+
+void Shell::run() {
+  pthread_setname_np(pthread_self(), "controller");
+  prctl(PR_SET_TIMERSLACK, 1);
+  bool holding = false;
+  for (;;) {
+    std::int64_t until = writers_.deadline().value_or(pulse::kNever);
+    if (clock_.realtime()) until = std::min(until, controller_.due());
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      const auto ready = [this] { return woken_ || ending_; };
+      if (until == pulse::kNever) {
+        wake_.wait(lock, ready);
+      } else {
+        wake_.wait_until(lock, steadyTime(until), ready);
+      }
+      if (ending_) break;
+      woken_ = false;
+    }
+    if (!holding) clock_.hold();
+    holding = true;
+    if (news_hold_.exchange(false)) clock_.release();
+    while (turn()) {
+    }
+    if (!clock_.realtime()) pulse_thread_->setAlarm(controller_.due());
+    // Until the engine has taken what was ordered, and the lines are written.
+    if (!ordersAreOpen() && writers_.idle()) {
+      clock_.release();
+      holding = false;
+    }
+  }
+  if (holding) clock_.release();
+  if (news_hold_.exchange(false)) clock_.release();
+}
+
+// Without threads.
+void Shell::settle() {
+  do {
+    while (turn()) {
+    }
+    engine_due_ = engine_.serve();
+    if (controller_.watchesInputs()) feedInputs();
+  } while (news_.load(std::memory_order_acquire) || !reads_.empty());
+}
+
+void Shell::feedInputs() {
+  if (inputs_ == 0) return;
+  std::array<gpio::EdgeEvent, 16> events{};
+  for (int count = 1; count > 0;) {
+    count = lines_->waitForEdges(0, events.data(), events.size());
+    for (int i = 0; i < count; ++i) handle(InputEdge{events.at(static_cast<std::size_t>(i))});
+  }
+  take(readInputs());
+}
+
+void Shell::take(const std::vector<InputRead>& reads) {
+  for (const InputRead& read : reads) {
+    int& known = levels_[static_cast<std::size_t>(read.input)];
+    if (std::exchange(known, read.level) != read.level) handle(read);
+  }
+}
+
+void Shell::feedWhatIsWatched() {
+  std::vector<InputRead> reads;
+  std::vector<gpio::EdgeEvent> edges;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    reads.swap(reads_);
+    edges.swap(edges_);
+  }
+  for (const gpio::EdgeEvent& edge : edges) handle(InputEdge{edge});
+  take(reads);
+}
+
+// @return whether there was anything to do.
+bool Shell::turn() {
+  bool any = takeNews();
+  for (const gpio::LineWriters::Done& done : writers_.collect()) {
+    handle(activity::PinDone{done.id, done.error});
+    any = true;
+  }
+  feedWhatIsWatched();
+  std::optional<Item> item;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!requests_.empty()) {
+      item = std::move(requests_.front());
+      requests_.pop_front();
+    }
+  }
+  if (item) {
+    handle(Requested{item->call, std::move(item->request)});
+    any = true;
+  }
+  if (clock_.now() >= controller_.due()) {
+    handle(TimerDue{});
+    any = true;
+  }
+  return any;
+}
+
+bool Shell::takeNews() {
+  if (!news_.exchange(false, std::memory_order_acq_rel)) return false;
+  EngineNews news;
+  news.stops_served = engine_.stopsServed();
+  news.input_stops = engine_.inputStops();
+  for (std::size_t i = 0; i < posted_.size(); ++i) {
+    news.channels.push_back(engine_.channel(static_cast<int>(i)));
+  }
+  news_seen_ = news;
+  handle(std::move(news));
+  postCommands();
+  return true;
+}
+
+void Shell::handle(decltype(Input::what) what) {
+  activity::Outputs out;
+  Input input;
+  input.now = clock_.now();
+  input.slipped = engine_.state().slipped;
+  input.stops_asked = engine_.stopsAsked();
+  input.what = std::move(what);
+  controller_.handle(input, out);
+  carryOut(out);
+}
+
+void Shell::carryOut(activity::Outputs& out) {
+  {
+    std::shared_ptr<const MachineSnapshot> shown = controller_.snapshot();
+    const std::lock_guard<std::mutex> lock(answers_mutex_);
+    snapshot_.swap(shown);
+    for (auto& [call, reply] : out.answers) {
+      const auto waiting = answers_.find(call);
+      if (waiting != answers_.end()) waiting->second.reply = std::move(reply);
+    }
+    ++turns_;
+  }
+  answered_.notify_all();
+  if (out.clear_stops != 0) {
+    engine_.clearEmergencyStop(out.clear_stops);
+    engine_.inputsChanged();
+  }
+  outbox_.insert(outbox_.end(), out.commands.begin(), out.commands.end());
+  postCommands();
+  for (const activity::PinJob& job : out.pin_jobs) {
+    writers_.write(job.id, {job.output, job.level});
+  }
+}
+
+void Shell::postCommands() {
+  while (!outbox_.empty() && engine_.post(outbox_.front())) {
+    const pulse::Command& command = outbox_.front();
+    for (std::size_t i = 0; i < command.follow_count; ++i) {
+      posted_[static_cast<std::size_t>(command.follows[i].channel)] = command.follows[i].serial;
+    }
+    if (command.kind != pulse::Command::Kind::kFollow) {
+      posted_[static_cast<std::size_t>(command.channel)] = command.serial;
+    }
+    outbox_.pop_front();
+  }
+}
+
+bool Shell::ordersAreOpen() const {
+  if (!outbox_.empty()) return true;
+  for (std::size_t i = 0; i < posted_.size(); ++i) {
+    if (i < news_seen_.channels.size() && news_seen_.channels[i].taken < posted_[i]) return true;
+  }
+  return false;
+}
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,137 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "controller.h"
+#include "gpio/line_writers.h"
+#include "requests.h"
+#include "snapshot.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+#include "stepdriver_core/pulse/pulse_thread.h"
+
+namespace stepdriver::machine {
+
+/// Runs a controller: brings it what happens, in order, and does what it says. In threads of its
+/// own, or without any, as a pump that whoever waits works.
+///
+/// The calls of clients are safe from any thread. What they hand over and what they read is behind
+/// mutexes that nobody holds for longer than a copy takes.
+class Shell : public pulse::NewsListener {
+ public:
+  struct Options {
+    bool threaded = true;
+    std::int64_t write_timeout_ns =
+        0;  ///< of one write of a line that the pulse thread doesn't time
+    std::string latency_device;
+  };
+
+  /// @param controller, engine, clock outlive the shell.
+  Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
+        std::shared_ptr<gpio::Lines> lines, std::size_t inputs, const Options& options);
+  /// stop(), if that wasn't called.
+  ~Shell() override;
+
+  /// Hands a request over and waits for its answer.
+  activity::Reply call(Request request);
+
+  /// Returns when `ready` says so. It is asked after whatever happens, from the calling thread.
+  /// @param often it is also asked each millisecond.
+  /// @throw Error without threads, if nothing is under way that could change its answer.
+  void wait(const std::function<bool()>& ready, bool often = false);
+
+  /// Only without threads: lets the clock go on for a while.
+  void advance(pulse::Nanoseconds time);
+
+  std::shared_ptr<const MachineSnapshot> snapshot() const;
+  axis::AxisState state(AxisId axis) const;
+  double peakRate(AxisId axis) const;
+
+  /// How the pulse thread runs.
+  pulse::RealtimeRights rights() const;
+
+  /// Ends all threads; no pulse goes out from then on. Who still waits is refused.
+  void stop();
+
+  void onNews() noexcept override;
+
+ private:
+  struct Call {
+    std::optional<activity::Reply> reply;
+  };
+  struct Item {
+    activity::CallId call = 0;
+    Request request;
+  };
+
+  void run();
+  void watchInputs();
+  std::vector<InputRead> readInputs() const;
+  void feedInputs();
+  void feedWhatIsWatched();
+  void take(const std::vector<InputRead>& reads);
+  bool turn();
+  bool takeNews();
+  void handle(decltype(Input::what) what);
+  void carryOut(activity::Outputs& out);
+  void postCommands();
+  bool ordersAreOpen() const;
+  void settle();
+  void wakeUp();
+  void answer(activity::CallId call, activity::Reply reply);
+  pulse::Nanoseconds alarm() const;
+
+  Controller& controller_;
+  pulse::PulseEngine& engine_;
+  pulse::Clock& clock_;
+  const std::shared_ptr<gpio::Lines> lines_;
+  const int inputs_;
+  const bool threaded_;
+  gpio::LineWriters writers_;
+
+  // From clients and watchers.
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Item> requests_;
+  std::vector<InputRead> reads_;
+  std::vector<gpio::EdgeEvent> edges_;
+  bool ending_ = false;
+  bool woken_ = false;
+  activity::CallId calls_ = 0;
+
+  // To clients.
+  mutable std::mutex answers_mutex_;
+  std::condition_variable answered_;
+  std::unordered_map<activity::CallId, Call> answers_;
+  std::uint64_t turns_ = 0;
+  std::shared_ptr<const MachineSnapshot> snapshot_;
+
+  // From the pulse thread.
+  std::atomic<bool> news_{true};
+  std::atomic<bool> news_hold_{false};  // the clock is held for news that nobody has taken yet
+
+  // Of the thread that runs the controller.
+  std::vector<int> levels_;  // of the inputs, as the controller was told them
+  std::deque<pulse::Command> outbox_;
+  std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
+  EngineNews news_seen_;
+  pulse::Nanoseconds engine_due_ = 0;
+
+  std::optional<pulse::PulseThread> pulse_thread_;
+  std::thread watcher_;
+  std::thread thread_;
+};
+
+}  // namespace stepdriver::machine

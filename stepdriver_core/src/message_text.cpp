@@ -1,0 +1,102 @@
+#include "message_text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <locale>
+#include <numeric>
+#include <sstream>
+
+namespace stepdriver {
+namespace {
+
+constexpr int kRoughDigits = 6;
+
+/// What doesn't change through text and back; the printing and the reading are in one locale, and
+/// so the locale doesn't matter.
+int digitsOf(double number) {
+  for (const int digits : {15, 16}) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.*g", digits, number);
+    if (std::strtod(text, nullptr) == number) return digits;
+  }
+  return 17;
+}
+
+double roughly(double number, double (*round)(double)) {
+  if (number == 0.0 || !std::isfinite(number)) return number;
+  const int place = static_cast<int>(std::floor(std::log10(std::abs(number)))) + 1 - kRoughDigits;
+  // Powers of ten below 1 are not exact: divide by those above.
+  const double power = std::pow(10.0, std::abs(place));
+  const double rounded = place < 0 ? round(number * power) / power : round(number / power) * power;
+  return std::isfinite(rounded) ? rounded : number;
+}
+
+/// How many letters must be changed, put in, left out or swapped with their neighbour.
+std::size_t distance(const std::string& from, const std::string& to) {
+  std::vector<std::size_t> before(to.size() + 1);
+  std::vector<std::size_t> last(to.size() + 1);
+  std::vector<std::size_t> row(to.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 1; i <= from.size(); ++i) {
+    before = last;
+    last = row;
+    row[0] = i;
+    for (std::size_t j = 1; j <= to.size(); ++j) {
+      const std::size_t changed = last[j - 1] + (from[i - 1] == to[j - 1] ? 0 : 1);
+      row[j] = std::min({changed, last[j] + 1, row[j - 1] + 1});
+      if (i > 1 && j > 1 && from[i - 1] == to[j - 2] && from[i - 2] == to[j - 1]) {
+        row[j] = std::min(row[j], before[j - 2] + 1);
+      }
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::string numberText(double number) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text.precision(digitsOf(number));
+  text << number;
+  return text.str();
+}
+
+std::string roughText(double number) {
+  return numberText(roughly(number, [](double scaled) { return std::round(scaled); }));
+}
+
+// The slack keeps a bound that is a round number but for its last bit.
+std::string lowerBoundText(double bound) {
+  return numberText(roughly(bound, [](double scaled) { return std::ceil(scaled - 1e-5); }));
+}
+
+std::string upperBoundText(double bound) {
+  return numberText(roughly(bound, [](double scaled) { return std::floor(scaled + 1e-5); }));
+}
+
+std::string listText(const std::vector<std::string>& words, const std::string& joint) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) text += i + 1 < words.size() ? ", " : " " + joint + " ";
+    text += words[i];
+  }
+  return text;
+}
+
+const std::string* nearest(const std::string& word, const std::vector<std::string>& words) {
+  const std::string* best = nullptr;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 2) + 1;
+  for (const std::string& candidate : words) {
+    const std::size_t candidate_distance = distance(word, candidate);
+    if (candidate_distance < best_distance) {
+      best = &candidate;
+      best_distance = candidate_distance;
+    }
+  }
+  return best;
+}
+
+}  // namespace stepdriver

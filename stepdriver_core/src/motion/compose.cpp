@@ -1,0 +1,259 @@
+#include "stepdriver_core/motion/compose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "hermite.h"
+#include "root.h"
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr double kNoTime = 1e-15;  // s
+constexpr int kSlices = 8;         // of a part, to look at
+
+DoubleDouble velocityOf(const Piece& piece) { return {piece.v0, piece.v0_rest}; }
+DoubleDouble accelerationOf(const Piece& piece) { return {piece.a, piece.a_rest}; }
+
+bool hasConstantRate(const Piece& path) { return path.a == 0.0 && path.j == 0.0; }
+
+// A part of a piece of a course, and the part of a piece of the path that runs through it.
+struct Part {
+  Piece course;
+  DoubleDouble from;  // s in the course's piece
+  Piece path;
+  DoubleDouble begin;  // t in the path's piece
+  DoubleDouble end;
+  DoubleDouble length;  // in s
+
+  DoubleDouble placeAt(DoubleDouble t) const {
+    return from + (path.positionAt(t) - path.positionAt(begin));
+  }
+};
+
+// Of q(s(t)), and of its absolute value, from above.
+double largestFourthDerivative(const Part& part) {
+  const auto largest = [](double a, double b) { return std::max(std::abs(a), std::abs(b)); };
+  const Piece& path = part.path;
+  double rate = largest(path.velocityAt(part.begin).value(), path.velocityAt(part.end).value());
+  const double level = path.j != 0.0 ? -path.a / path.j : 0.0;
+  if (part.begin.value() < level && level < part.end.value()) {
+    rate = std::max(rate, std::abs(path.velocityAt(level).value()));
+  }
+  const double slope =
+      largest(path.accelerationAt(part.begin).value(), path.accelerationAt(part.end).value());
+  const double acceleration = largest(part.course.accelerationAt(part.from).value(),
+                                      part.course.accelerationAt(part.from + part.length).value());
+  return acceleration * (3.0 * slope * slope + 4.0 * rate * std::abs(path.j)) +
+         6.0 * std::abs(part.course.j) * slope * rate * rate;
+}
+
+void appendCubics(std::vector<Piece>& pieces, const Part& part) {
+  const DoubleDouble duration = part.end - part.begin;
+  const double count = cubicsFor(duration.value(), largestFourthDerivative(part), kComposeError);
+  const DoubleDouble slice = duration / DoubleDouble(count);
+  const auto state = [&](double k) {
+    const DoubleDouble t = part.begin + DoubleDouble(k) * slice;
+    const DoubleDouble s = part.placeAt(t);
+    return std::pair{part.course.positionAt(s),
+                     (part.course.velocityAt(s) * part.path.velocityAt(t)).value()};
+  };
+  auto from = state(0.0);
+  for (double k = 1.0; k <= count; ++k) {
+    const auto to = state(k);
+    pieces.push_back(cubic(slice, from.first, from.second, to.first, to.second));
+    from = to;
+  }
+}
+
+// A cubic's way in doubles: what tells how it keeps to a motor's limits needs no more.
+struct Rough {
+  double v0, a, j;
+
+  explicit Rough(const Piece& piece) : v0(piece.v0), a(piece.a), j(piece.j) {}
+  double way(double t) const { return t * (v0 + t * (a / 2.0 + t * (j / 6.0))); }
+  double velocity(double t) const { return v0 + t * (a + t * (j / 2.0)); }
+  double acceleration(double t) const { return a + t * j; }
+};
+
+// The time at which a piece of the path has gone so far, to a double's precision. It only goes
+// forwards: Newton's steps, kept inside a bracket.
+double roughTimeTo(const Rough& path, double way, double duration) {
+  double low = 0.0;
+  double high = duration;
+  double t = path.v0 > 0.0 ? std::min(duration, way / path.v0) : duration / 2.0;
+  for (int i = 0; i < 100; ++i) {
+    const double error = path.way(t) - way;
+    if (error == 0.0) return t;
+    (error < 0.0 ? low : high) = t;
+    double better = t - error / path.velocity(t);
+    if (!(better > low && better < high)) better = low + (high - low) / 2.0;
+    if (std::abs(better - t) <= 2e-16 * high) return better;
+    t = better;
+  }
+  return t;
+}
+
+// The time in a piece of the path, from its beginning, at which it has gone so far.
+DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
+  if (path.j != 0.0) {
+    // Two of Newton's steps give all bits, unless the path is nearly at rest there.
+    const Rough rough(path);
+    const double near = roughTimeTo(rough, way.value(), path.duration.value());
+    if (rough.velocity(near) > 1e-3) {
+      DoubleDouble t = near;
+      for (int i = 0; i < 2; ++i) {
+        t = t + (way - (path.positionAt(t) - path.p0)) / path.velocityAt(t);
+      }
+      return t;
+    }
+    const auto left = [&](DoubleDouble t) { return way - (path.positionAt(t) - path.p0); };
+    return rootOf(left, path.duration.value());
+  }
+  const DoubleDouble rate = velocityOf(path);
+  // Of the two roots the stable form gives the one that comes first.
+  const DoubleDouble under = rate * rate + DoubleDouble(2.0) * accelerationOf(path) * way;
+  const DoubleDouble root = under.hi > 0.0 ? sqrt(under) : DoubleDouble();
+  return DoubleDouble(2.0) * way / (rate + root);
+}
+
+// What a piece of the path makes of the course, if its rate changes.
+std::vector<Piece> cubicsAlong(const Profile& course, const Piece& stretch) {
+  std::vector<Piece> pieces;
+  const DoubleDouble end = stretch.positionAt(stretch.duration);
+  std::size_t index = course.pieceAt(stretch.p0);
+  DoubleDouble s = stretch.p0;
+  DoubleDouble t;
+  while ((stretch.duration - t).hi > kNoTime) {
+    while (index + 1 < course.pieceCount() && !((course.pieceStart(index + 1) - s).hi > kNoTime)) {
+      ++index;
+    }
+    const DoubleDouble knot = course.pieceStart(index + 1);
+    const bool ends_here = index + 1 == course.pieceCount() || !(knot < end);
+    const DoubleDouble next = ends_here ? end : knot;
+    const DoubleDouble until = ends_here ? stretch.duration : timeTo(stretch, next - stretch.p0);
+    appendCubics(pieces,
+                 {course.piece(index), s - course.pieceStart(index), stretch, t, until, next - s});
+    s = next;
+    t = until;
+  }
+  return pieces;
+}
+
+double largest(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
+
+double highestSpeed(const Rough& cubic, double from, double to) {
+  const double level = cubic.j != 0.0 ? -cubic.a / cubic.j : from;
+  const double ends = largest(cubic.velocity(from), cubic.velocity(to));
+  return level > from && level < to ? largest(ends, cubic.velocity(level)) : ends;
+}
+
+// The same parts, for a look at the limits.
+struct RoughPart {
+  Rough course;
+  double from;
+  double length;
+  Rough path;
+  double begin;
+  double end;
+
+  bool keeps(const MotorBounds& bounds) const {
+    if (surelyKeeps(bounds)) return true;
+    for (int i = 0; i <= kSlices; ++i) {
+      if (!keepsAt(begin + i * ((end - begin) / kSlices), bounds)) return false;
+    }
+    return true;
+  }
+
+ private:
+  // By the largest value that each factor has anywhere in it.
+  bool surelyKeeps(const MotorBounds& bounds) const {
+    const double to = from + length;
+    const double q1 = highestSpeed(course, from, to);
+    const double q2 = largest(course.acceleration(from), course.acceleration(to));
+    const double s1 = highestSpeed(path, begin, end);
+    const double s2 = largest(path.acceleration(begin), path.acceleration(end));
+    if (q2 * s1 * s1 + q1 * s2 > bounds.acceleration) return false;
+    const double jerk =
+        std::abs(course.j) * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * std::abs(path.j);
+    return bounds.jerk == 0.0 || jerk <= bounds.jerk;
+  }
+
+  bool keepsAt(double t, const MotorBounds& bounds) const {
+    const double s = from + (path.way(t) - path.way(begin));
+    const double q1 = course.velocity(s);
+    const double q2 = course.acceleration(s);
+    const double s1 = path.velocity(t);
+    const double s2 = path.acceleration(t);
+    const double acceleration = q2 * s1 * s1 + q1 * s2;
+    const double jerk = course.j * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * path.j;
+    return std::abs(acceleration) <= bounds.acceleration &&
+           (bounds.jerk == 0.0 || std::abs(jerk) <= bounds.jerk);
+  }
+};
+
+bool staysWithin(const Profile& course, const Piece& stretch, const MotorBounds& bounds) {
+  const Rough path(stretch);
+  const double duration = stretch.duration.value();
+  const double length = (stretch.positionAt(stretch.duration) - stretch.p0).value();
+  double t = 0.0;
+  double way = 0.0;  // along the path, from the beginning of the stretch
+  for (std::size_t index = course.pieceAt(stretch.p0);; ++index) {
+    const bool last = index + 1 == course.pieceCount();
+    const double knot = (course.pieceStart(index + 1) - stretch.p0).value();
+    const bool ends_here = last || !(knot < length);
+    if (!ends_here && knot - way <= kNoTime) continue;
+    const double next = ends_here ? length : knot;
+    const double until = ends_here ? duration : roughTimeTo(path, next, duration);
+    const double from = way + (stretch.p0 - course.pieceStart(index)).value();
+    const RoughPart part{Rough(course.piece(index)), from, next - way, path, t, until};
+    if (!part.keeps(bounds)) return false;
+    if (ends_here) return true;
+    way = next;
+    t = until;
+  }
+}
+
+}  // namespace
+
+Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale) {
+  if (path.pieces().empty()) return {path.startNs(), origin + scale * path.endPosition()};
+  std::vector<Piece> pieces;
+  pieces.reserve(path.pieces().size());
+  for (const Piece& piece : path.pieces()) {
+    const DoubleDouble velocity = scale * velocityOf(piece);
+    const DoubleDouble acceleration = scale * accelerationOf(piece);
+    pieces.push_back({piece.duration, origin + scale * piece.p0, velocity.hi, acceleration.hi,
+                      (scale * DoubleDouble(piece.j)).value(), velocity.lo, acceleration.lo});
+  }
+  return {path.startNs(), std::move(pieces)};
+}
+
+Profile composeAlong(const std::shared_ptr<const Profile>& course, const Profile& path) {
+  Sections sections;
+  for (const Piece& stretch : path.pieces()) {
+    if (hasConstantRate(stretch)) {
+      const DoubleDouble end = stretch.positionAt(stretch.duration);
+      sections.add(Excerpt{course, stretch.p0, end, velocityOf(stretch)});
+    } else {
+      sections.add(cubicsAlong(*course, stretch));
+    }
+  }
+  if (sections.empty()) {
+    const std::int64_t s_ns = splitNanoseconds(path.endPosition()).whole;
+    return {path.startNs(), course->stateAt(course->startNs() + s_ns).position};
+  }
+  return {path.startNs(), std::move(sections)};
+}
+
+bool staysWithin(const Profile& course, const Profile& path, const MotorBounds& bounds) {
+  for (const Piece& stretch : path.pieces()) {
+    if (!hasConstantRate(stretch) && !staysWithin(course, stretch, bounds)) return false;
+  }
+  return true;
+}
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "motor_lines.h"
+#include "pin_sequence.h"
+#include "stepdriver_core/config/axis_config.h"
+
+namespace stepdriver::motor {
+
+/// What to write to a chip's pins, and how long to wait after each, to have it do something.
+class DriverPins {
+ public:
+  /// @param config outlives the pins.
+  DriverPins(const config::AxisConfig& config, const MotorLines& lines);
+
+  bool hasEnable() const { return lines_.enable >= 0; }
+  bool hasSleep() const { return lines_.sleep >= 0; }
+  bool hasReset() const { return lines_.reset >= 0; }
+  bool hasMode() const { return lines_.mode[0] >= 0; }
+
+  /// From the safe levels to awake and out of reset. Empty where neither pin is wired.
+  PinSequence bringUp() const;
+  PinSequence enable(bool on) const;
+  PinSequence sleep(bool asleep) const;
+  PinSequence reset() const;
+  /// One pin at a time, over defined codes only.
+  PinSequence mode(int from_microsteps, int to_microsteps) const;
+  /// STEP inactive, and the other pins as they should be, whatever they are.
+  PinSequence restore(bool enabled, bool asleep) const;
+
+ private:
+  const config::AxisConfig& config_;
+  const driver::DriverChip& chip_;
+  const MotorLines lines_;
+};
+
+}  // namespace stepdriver::motor

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "stepdriver_core/motion/profile.h"
+#include "stepdriver_core/pulse/channel.h"
+
+namespace stepdriver::motor {
+
+/// A profile that was ordered from the pulse engine.
+struct Motion {
+  std::uint64_t serial = 0;
+  std::optional<std::int64_t> target;  ///< [microsteps of the joint] of a move; none: it has no end
+  bool slows_down = false;             ///< it only comes to rest, wherever that is
+  double overshoot = 0.0;  ///< [microsteps] how far it passes its end before it comes back
+  std::shared_ptr<const motion::Profile> profile;
+  /// What the engine reads until it has taken the order.
+  std::shared_ptr<const void> order;
+};
+
+/// The profiles of one channel that the engine may still look at: from the one that it follows, or
+/// that ended last, to the one that was ordered last. Owns them until the engine has left them.
+class Motions {
+ public:
+  void add(Motion motion) { motions_.push_back(std::move(motion)); }
+
+  /// Forgets what the engine has refused, and what is older than the profile that it follows or
+  /// that ended last.
+  void take(const pulse::ChannelState& state);
+
+  /// The engine follows a profile, or has not yet said what becomes of an order.
+  bool moving() const { return following_ != 0 || inFlight(); }
+  bool inFlight() const { return !motions_.empty() && motions_.back().serial > taken_; }
+
+  /// The one that was ordered last; nullptr at rest.
+  const Motion* latest() const {
+    return moving() && !motions_.empty() ? &motions_.back() : nullptr;
+  }
+  /// @return nullptr if there is none with this serial.
+  const Motion* find(std::uint64_t serial) const;
+
+  /// From the one that the engine follows, or the one that ended last, on.
+  const std::deque<Motion>& all() const { return motions_; }
+
+ private:
+  std::deque<Motion> motions_;
+  std::uint64_t following_ = 0;
+  std::uint64_t taken_ = 0;
+};
+
+}  // namespace stepdriver::motor

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "enable_line.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/channel.h"
+
+namespace stepdriver::motor {
+
+/// Where the lines of an axis are in the request of all axes. -1: not wired.
+struct MotorLines {
+  int step = -1;
+  int dir = -1;
+  int enable = -1;
+  std::shared_ptr<EnableLine> enable_line;  ///< of `enable`, shared with other axes or not
+  std::array<int, 3> mode = {-1, -1, -1};
+  int sleep = -1;
+  int reset = -1;
+  int endstop_min = -1;
+  int endstop_max = -1;
+  int fault = -1;
+};
+
+/// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and
+/// the configured microstep mode. An axis that stays enabled over a shutdown keeps its chip awake.
+///
+/// @param others the axes that the request has already: an ENABLE line of theirs is shared.
+MotorLines requestLines(const config::AxisConfig& config, const std::vector<MotorLines>& others,
+                        std::vector<gpio::OutputRequest>& outputs,
+                        std::vector<gpio::InputRequest>& inputs);
+
+/// The axis as the pulse engine sees it.
+pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const MotorLines& lines);
+
+}  // namespace stepdriver::motor

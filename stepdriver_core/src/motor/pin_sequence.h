@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::motor {
+
+/// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
+/// before what comes next: the next write, or the first step.
+struct PinSequence {
+  /// One write of a pin, and how long nothing else of the chip goes out after it.
+  struct Write {
+    int line;
+    bool level;
+    pulse::Nanoseconds then_wait;
+  };
+
+  static constexpr std::size_t kCapacity = 8;
+  std::array<Write, kCapacity> writes{};
+  std::size_t size = 0;
+
+  /// @throw std::out_of_range beyond kCapacity.
+  void add(int line, bool level, pulse::Nanoseconds then_wait) {
+    writes.at(size++) = {line, level, then_wait};
+  }
+
+  /// @throw std::out_of_range beyond kCapacity.
+  void append(const PinSequence& other) {
+    for (std::size_t i = 0; i < other.size; ++i) writes.at(size++) = other.writes[i];
+  }
+};
+
+}  // namespace stepdriver::motor

@@ -1,0 +1,160 @@
+#include "stepdriver_core/setup/simulation.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <utility>
+
+#include "message_text.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/sim/vcd_trace.h"
+
+namespace stepdriver::setup {
+namespace {
+
+using config::AxisConfig;
+using config::Kind;
+
+// A switch that no parameter places stands this far outside of the soft limit,
+constexpr double kSwitchMargin = 2.0;  // [mm|deg]
+// or, where there is none, this far from the origin or from the other soft limit.
+constexpr double kFarLinear = 100.0;  // [mm]
+constexpr double kFarRotary = 360.0;  // [deg]
+
+struct SwitchPlaces {
+  double min = 0.0;  ///< [mm|deg]
+  double max = 0.0;
+};
+
+SwitchPlaces switchPlaces(const AxisConfig& axis, const SimulatedAxis& simulated) {
+  const double scale = config::configUnitsPerUnit(axis.kind);
+  const double far = axis.kind == Kind::kLinear ? kFarLinear : kFarRotary;
+  SwitchPlaces places{-far, far};
+  if (axis.min_position) places.min = *axis.min_position * scale - kSwitchMargin;
+  if (axis.max_position) places.max = *axis.max_position * scale + kSwitchMargin;
+  if (!axis.min_position) places.min = std::min(places.min, places.max - 2 * far);
+  if (!axis.max_position) places.max = std::max(places.max, places.min + 2 * far);
+  places.min = simulated.min_switch.value_or(places.min);
+  places.max = simulated.max_switch.value_or(places.max);
+  return places;
+}
+
+sim::Wire wireOf(const config::Pin& pin) { return {pin.line, pin.inverted}; }
+
+std::optional<sim::SwitchSpec> switchOf(const std::optional<config::Endstop>& endstop,
+                                        const SimulatedAxis& simulated, double position) {
+  if (!endstop) return {};
+  sim::SwitchSpec spec;
+  spec.line = endstop->line;
+  spec.active_level = endstop->active_level;
+  spec.position = position;
+  spec.hysteresis = simulated.switch_hysteresis;
+  spec.bounces = simulated.bounces;
+  spec.bounce_ns = std::llround(simulated.bounce_ms * 1e6);
+  return spec;
+}
+
+/// The axis as it really is.
+AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
+  if (wiring.dir_inverted) axis.pins.dir.inverted = *wiring.dir_inverted;
+  if (wiring.steps_per_unit) {
+    axis.steps_per_unit = *wiring.steps_per_unit * config::configUnitsPerUnit(axis.kind);
+  }
+  if (axis.endstop_min && wiring.min_pin) axis.endstop_min->line = *wiring.min_pin;
+  if (axis.endstop_max && wiring.max_pin) axis.endstop_max->line = *wiring.max_pin;
+  if (axis.endstop_min && wiring.min_active_level) {
+    axis.endstop_min->active_level = *wiring.min_active_level;
+  }
+  if (axis.endstop_max && wiring.max_active_level) {
+    axis.endstop_max->active_level = *wiring.max_active_level;
+  }
+  return axis;
+}
+
+sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& simulated) {
+  const AxisConfig axis = wired(configured, simulated.wiring);
+  sim::RigAxisSpec spec;
+  spec.name = axis.name;
+  spec.model = axis.driver;
+  spec.timing = axis.timing;
+  spec.step = wireOf(axis.pins.step);
+  spec.dir = wireOf(axis.pins.dir);
+  spec.enable = wireOf(axis.pins.enable);
+  spec.ms1 = wireOf(axis.pins.ms1);
+  spec.ms2 = wireOf(axis.pins.ms2);
+  spec.ms3 = wireOf(axis.pins.ms3);
+  spec.sleep = wireOf(axis.pins.sleep);
+  spec.reset = wireOf(axis.pins.reset);
+  spec.microsteps = axis.microsteps;
+  spec.full_step_travel =
+      axis.microsteps / axis.steps_per_unit * config::configUnitsPerUnit(axis.kind);
+  spec.start = simulated.start;
+  if (axis.fault) spec.fault_line = axis.fault->line;
+  const SwitchPlaces places = switchPlaces(axis, simulated);
+  spec.min_switch = switchOf(axis.endstop_min, simulated, places.min);
+  spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);
+  return spec;
+}
+
+std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
+                                    const SimulationConfig& config) {
+  std::vector<sim::RigAxisSpec> rig;
+  rig.reserve(axes.size());
+  for (const AxisConfig& axis : axes) rig.push_back(rigAxisOf(axis, config.axes.at(axis.name)));
+  return rig;
+}
+
+std::shared_ptr<sim::PinTrace> traceTo(const std::string& path) {
+  if (path.empty()) return nullptr;
+  return std::make_shared<sim::VcdTrace>(path);
+}
+
+}  // namespace
+
+void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config,
+                     const std::string& name, std::vector<ConfigIssue>& issues) {
+  for (const AxisConfig& axis : axes) {
+    if (!axis.endstop_min || !axis.endstop_max) continue;
+    const SwitchPlaces places = switchPlaces(axis, config.axes.at(axis.name));
+    if (places.min < places.max) continue;
+    issues.push_back(
+        {name + "/axes/" + axis.name, "has the min switch at " + roughText(places.min) +
+                                          ", but it must be below the max switch, which is at " +
+                                          roughText(places.max)});
+  }
+}
+
+Simulation::Simulation(const std::vector<AxisConfig>& axes,
+                       std::optional<config::InputSwitch> emergency_stop,
+                       const SimulationConfig& config)
+    : axes_(axes),
+      emergency_stop_(std::move(emergency_stop)),
+      clock_(config.speed),
+      rig_(rigOf(axes, config), traceTo(config.trace)),
+      backend_(rig_, [this] { return clock_.now(); }) {
+  for (const AxisConfig& axis : axes) {
+    const SimulatedAxis& simulated = config.axes.at(axis.name);
+    faults_[axis.name] = simulated.faults;
+    rig_.setFaults(axis.name, simulated.faults);
+    if (simulated.fail_step_write_after) {
+      rig_.failWrites(axis.pins.step.line, *simulated.fail_step_write_after, EIO);
+    }
+  }
+  if (emergency_stop_) pressEmergencyStop(config.emergency_stop);
+}
+
+void Simulation::pressEmergencyStop(bool pressed) {
+  if (!emergency_stop_) throw Refused("emergency_stop isn't configured: there is no button");
+  rig_.setInput(emergency_stop_->line, pressed == emergency_stop_->active_level, clock_.now());
+}
+
+void Simulation::pressEndstop(const std::string& axis, End end, bool pressed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sim::RigFaults& now = pressed_.try_emplace(axis, faults_.at(axis)).first->second;
+  const sim::RigFaults& always = faults_.at(axis);
+  if (end == End::kMin) now.min_stuck = pressed ? std::optional<bool>(true) : always.min_stuck;
+  if (end == End::kMax) now.max_stuck = pressed ? std::optional<bool>(true) : always.max_stuck;
+  rig_.setFaults(axis, now);
+}
+
+}  // namespace stepdriver::setup

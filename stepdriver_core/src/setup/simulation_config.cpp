@@ -1,0 +1,109 @@
+#include "stepdriver_core/setup/simulation_config.h"
+
+#include <limits>
+#include <utility>
+
+namespace stepdriver::setup {
+namespace {
+
+using config::ConfigReader;
+using config::Presence;
+using config::Range;
+
+constexpr double kHighestSpeed = 1e6;
+constexpr int kMostBounces = 1000;
+constexpr double kLongestBounceMs = 1000.0;
+constexpr int kMostWrites = std::numeric_limits<int>::max();
+
+/// Reads the rig of one axis.
+class SimulatedAxisReader {
+ public:
+  /// @param unit suffix of the keys with a length; empty: not certain, either is taken.
+  SimulatedAxisReader(ConfigReader reader, std::string unit)
+      : reader_(std::move(reader)), unit_(std::move(unit)) {}
+
+  SimulatedAxis read() {
+    SimulatedAxis axis;
+    axis.start = length("start", Range{}).value_or(axis.start);
+    axis.switch_hysteresis =
+        length("switch_hysteresis", Range::notNegative()).value_or(axis.switch_hysteresis);
+    axis.min_switch = length("min_switch", Range{});
+    axis.max_switch = length("max_switch", Range{});
+    axis.bounces = reader_.integer("bounces", 0, kMostBounces, axis.bounces);
+    axis.bounce_ms =
+        reader_.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, axis.bounce_ms);
+    readWiring(axis.wiring);
+    axis.faults.min_stuck = stuck("min_stuck");
+    axis.faults.max_stuck = stuck("max_stuck");
+    axis.faults.lose_every = reader_.integer("lose_every", 0, kMostWrites, 0);
+    if (const auto steps =
+            reader_.findInteger("chip_fault_after", 0, kMostWrites, Presence::kOptional)) {
+      axis.faults.chip_fault_after = *steps;
+    }
+    axis.fail_step_write_after =
+        reader_.findInteger("fail_step_write_after", 0, kMostWrites, Presence::kOptional);
+    reader_.rejectUnknown();
+    return axis;
+  }
+
+ private:
+  std::optional<double> length(const std::string& what, const Range& range) {
+    if (!unit_.empty()) return reader_.findNumber(what + "_" + unit_, range, Presence::kOptional);
+    reader_.findNumber(what + "_mm", range, Presence::kOptional);
+    reader_.findNumber(what + "_deg", range, Presence::kOptional);
+    return {};
+  }
+
+  void readWiring(SimulatedWiring& wiring) {
+    ConfigReader reader = reader_.map("wiring");
+    wiring.dir_inverted = reader.findBoolean("dir_inverted", Presence::kOptional);
+    for (const char* key : {"steps_per_mm", "steps_per_degree"}) {
+      const bool wanted = unit_.empty() || (unit_ == "mm") == (key == std::string("steps_per_mm"));
+      if (!wanted) continue;
+      const auto steps = reader.findNumber(key, Range::positive(), Presence::kOptional);
+      if (steps) wiring.steps_per_unit = steps;
+    }
+    wiring.min_pin = reader.findText("min_pin", Presence::kOptional);
+    wiring.max_pin = reader.findText("max_pin", Presence::kOptional);
+    wiring.min_active_level = level(reader, "min_active_level");
+    wiring.max_active_level = level(reader, "max_active_level");
+    reader.rejectUnknown();
+  }
+
+  static std::optional<bool> level(ConfigReader& reader, const std::string& key) {
+    const auto level =
+        reader.findOneOf(key, std::vector<std::string>{"low", "high"}, Presence::kOptional);
+    if (!level) return {};
+    return *level == "high";
+  }
+
+  std::optional<bool> stuck(const std::string& key) {
+    const std::string how = reader_.oneOf(key, {"active", "inactive", "none"}, "none");
+    if (how == "none") return {};
+    return how == "active";
+  }
+
+  ConfigReader reader_;
+  std::string unit_;
+};
+
+}  // namespace
+
+SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::AxisConfig>& axes,
+                                bool axes_are_right) {
+  SimulationConfig config;
+  config.speed = reader.number("speed", Range{0.0, kHighestSpeed}, config.speed);
+  config.trace = reader.text("trace", config.trace);
+  config.emergency_stop = reader.boolean("emergency_stop", config.emergency_stop);
+  ConfigReader rigs = reader.map("axes");
+  for (const config::AxisConfig& axis : axes) {
+    std::string unit;
+    if (axes_are_right) unit = axis.kind == config::Kind::kLinear ? "mm" : "deg";
+    config.axes[axis.name] = SimulatedAxisReader(rigs.map(axis.name), unit).read();
+  }
+  if (!axes.empty()) rigs.rejectUnknown();
+  reader.rejectUnknown();
+  return config;
+}
+
+}  // namespace stepdriver::setup

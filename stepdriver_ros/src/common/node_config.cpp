@@ -1,0 +1,26 @@
+#include "node_config.h"
+
+#include "stepdriver_core/config/config_reader.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr config::Range kJointStateRates{1.0, 1000.0};
+constexpr config::Range kJogTimeouts{0.02, 60.0};
+
+}  // namespace
+
+NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& name,
+                          std::vector<ConfigIssue>& issues) {
+  config::ConfigReader reader(tree, name, issues);
+  NodeConfig config;
+  static_cast<setup::MachineConfig&>(config) = setup::readMachineConfig(reader);
+  config.joint_state_rate =
+      reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
+  config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
+  config.hardware_id = reader.text("hardware_id", config.hardware_id);
+  reader.rejectUnknown();
+  return config;
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/config/config_value.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/setup/machine_config.h"
+
+namespace stepdriver::ros_node {
+
+/// All parameters of the node: those of its machine, and its own.
+struct NodeConfig : setup::MachineConfig {
+  double joint_state_rate = 50.0;  ///< [Hz]
+  double jog_timeout = 0.5;        ///< [s] without a jog message; then the axis comes to rest
+  std::string hardware_id;         ///< of diagnostics; empty: made from the rest
+};
+
+/// Reads the node's private parameters: in addition to those of setup::readMachineConfig()
+///
+/// @code{.yaml}
+/// joint_state_rate: 50.0         # [Hz] from 1 to 1000
+/// jog_timeout: 0.5               # [s] from 0.02 to 60
+/// hardware_id: ""                # of diagnostics; empty: the host and the driver chips
+/// @endcode
+///
+/// @param tree all of them, as one map.
+/// @param name the node's full name.
+/// @param issues everything that is wrong is added here.
+/// @return to be used only if no issue was added.
+NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& name,
+                          std::vector<ConfigIssue>& issues);
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,55 @@
+#include "node_start.h"
+
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/master.h>
+#include <ros/param.h>
+
+#include <chrono>
+#include <cstdio>
+#include <vector>
+
+#include "xmlrpc_value.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr std::chrono::milliseconds kMasterPoll{200};
+
+}  // namespace
+
+std::optional<int> handleArguments(int argc, char** argv, const char* usage) {
+  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  if (arguments.size() < 2) return {};
+  const bool help = arguments[1] == "--help" || arguments[1] == "-h";
+  std::fputs(usage, help ? stdout : stderr);
+  return help ? kExitOk : kExitUsage;
+}
+
+bool waitForMaster(EndRequests& end_requests) {
+  while (!ros::master::check()) {
+    ROS_WARN_ONCE_NAMED("node", "Waiting for the ROS master at %s", ros::master::getURI().c_str());
+    if (!end_requests.waitFor(kMasterPoll).empty()) return false;
+  }
+  return true;
+}
+
+config::ConfigValue privateParameters(const ros::NodeHandle& private_node) {
+  XmlRpc::XmlRpcValue tree;
+  if (!ros::param::get(private_node.getNamespace(), tree)) return config::ConfigValue::Map{};
+  return configValue(tree);
+}
+
+void explain(const ConfigError& error, const std::string& what_follows) {
+  const std::size_t count = error.issues().size();
+  ROS_FATAL_NAMED("node", "%s: %zu %s wrong in the parameters", what_follows.c_str(), count,
+                  count == 1 ? "thing is" : "things are");
+  for (const ConfigIssue& issue : error.issues()) {
+    ROS_ERROR_NAMED("node", "%s %s", issue.key.c_str(), issue.message.c_str());
+  }
+}
+
+}  // namespace stepdriver::ros_node

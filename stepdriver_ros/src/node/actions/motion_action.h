@@ -1,0 +1,127 @@
+#pragma once
+
+#include <actionlib_msgs/GoalStatus.h>
+#include <ros/duration.h>
+#include <ros/node_handle.h>
+
+#include <functional>
+#include <iterator>
+#include <list>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "action_server.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+
+/// How often an action asks how its goals are, while it has any.
+inline const ros::WallDuration kPollPeriod(0.01);
+
+/// An action whose goals are motions. It asks each kPollPeriod how these are: no thread waits for a
+/// motion, and what other commands make of it is seen like anything else that ends it.
+///
+/// @tparam Action the type of the action.
+/// @tparam Following a goal under way; has `GoalHandle handle` and `std::string preempted_by`, a
+///   cancel or a newer goal in words.
+template <typename Action, typename Following>
+class MotionAction {
+ public:
+  MotionAction(const MotionAction&) = delete;
+  MotionAction& operator=(const MotionAction&) = delete;
+  virtual ~MotionAction() = default;
+
+  /// Tells the clients what has become of their goals; to be called each kPollPeriod, from a goal
+  /// that has begun on.
+  ///
+  /// @return whether there may be goals under way.
+  bool poll() {
+    // A goal that begins may wait for a chip to wake, or be long to plan; this thread has others to
+    // look at.
+    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock()) return true;
+    concludeEnded();
+    polls_ = (polls_ + 1) % kPollsPerFeedback;
+    for (Following& following : under_way_) watch(following, polls_ == 0);
+    return !under_way_.empty();
+  }
+
+  /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
+  void tellEnded() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    concludeEnded();
+  }
+
+ protected:
+  using Server = ActionServer<Action>;
+  using GoalHandle = typename Server::GoalHandle;
+
+  /// @param node with the queue of the goals and cancels.
+  /// @param begun is called when a goal has begun.
+  MotionAction(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
+               std::function<void()> begun)
+      : begun_(std::move(begun)),
+        server_(
+            node, name, statuses, [this](const GoalHandle& handle) { take(handle); },
+            [this](const GoalHandle& handle) { cancel(handle); }) {}
+
+  /// To be called when the action is whole.
+  void start() { server_.start(); }
+
+ private:
+  static constexpr int kPollsPerFeedback = 5;
+
+  /// Begins its motion. @throw Error where that is refused.
+  virtual Following begin(const GoalHandle& handle) = 0;
+  virtual void reject(GoalHandle& handle, const Error& error) = 0;
+  /// A newer goal has begun.
+  virtual void takeOver(const Following& newer, Following& older) = 0;
+  /// Decelerates what is still of this goal.
+  virtual void stop(const Following& following) = 0;
+  /// Tells the client where the motion has ended. @return whether it has.
+  virtual bool conclude(Following& following) = 0;
+  /// Looks at a motion under way, and tells how it is.
+  virtual void watch(Following& following, bool tell) = 0;
+
+  void take(GoalHandle handle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
+      handle.setCanceled({}, "it was cancelled before it began");
+      return;
+    }
+    try {
+      Following following = begin(handle);
+      handle.setAccepted();
+      for (Following& older : under_way_) takeOver(following, older);
+      under_way_.push_back(std::move(following));
+      concludeEnded();
+      begun_();
+    } catch (const Error& error) {
+      reject(handle, error);
+    }
+  }
+
+  void cancel(const GoalHandle& handle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (Following& following : under_way_) {
+      if (following.handle != handle) continue;
+      following.preempted_by = "it was cancelled";
+      stop(following);
+    }
+  }
+
+  void concludeEnded() {
+    for (auto following = under_way_.begin(); following != under_way_.end();) {
+      following = conclude(*following) ? under_way_.erase(following) : std::next(following);
+    }
+  }
+
+  const std::function<void()> begun_;
+  std::mutex mutex_;
+  Server server_;
+  std::list<Following> under_way_;
+  int polls_ = 0;
+};
+
+}  // namespace stepdriver::ros_node

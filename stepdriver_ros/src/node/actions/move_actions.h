@@ -1,0 +1,48 @@
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <deque>
+
+#include "action_statuses.h"
+#include "move_action.h"
+#include "node/calls/call_queues.h"
+#include "node/calls/periodic_poll.h"
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+
+/// The actions `move` of all axes. Their goals are taken by the axes' queues.
+class MoveActions {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues, statuses outlive the actions.
+  MoveActions(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+              ActionStatuses& statuses)
+      : poll_(onQueue(queues.control(), node), kPollPeriod, [this] { return poll(); }) {
+    for (std::size_t i = 0; i < machine.axes().size(); ++i) {
+      axis::Axis& axis = *machine.axes()[i];
+      actions_.emplace_back(onQueue(queues.ofAxis(i), ros::NodeHandle(node, axis.config().name)),
+                            axis, statuses, [this] { poll_.begin(); });
+    }
+  }
+  MoveActions(const MoveActions&) = delete;
+  MoveActions& operator=(const MoveActions&) = delete;
+
+  /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
+  void tellEnded() {
+    for (AxisMoveAction& action : actions_) action.tellEnded();
+  }
+
+ private:
+  bool poll() {
+    bool more = false;
+    for (AxisMoveAction& action : actions_) more = action.poll() || more;
+    return more;
+  }
+
+  std::deque<AxisMoveAction> actions_;
+  PeriodicPoll poll_;
+};
+
+}  // namespace stepdriver::ros_node

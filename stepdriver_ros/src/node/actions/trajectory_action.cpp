@@ -1,0 +1,166 @@
+#include "trajectory_action.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/text.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+using Result = action_msgs::FollowJointTrajectoryResult;
+using Feedback = action_msgs::FollowJointTrajectoryFeedback;
+
+Result resultOf(int error_code, const std::string& error_string) {
+  Result result;
+  result.error_code = error_code;
+  result.error_string = error_string;
+  return result;
+}
+
+int errorCodeOf(BadTrajectory::Kind kind) {
+  switch (kind) {
+    case BadTrajectory::Kind::kJoints:
+      return Result::INVALID_JOINTS;
+    case BadTrajectory::Kind::kOldStamp:
+      return Result::OLD_HEADER_TIMESTAMP;
+    case BadTrajectory::Kind::kInvalid:
+      break;
+  }
+  return Result::INVALID_GOAL;
+}
+
+}  // namespace
+
+TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine,
+                                   CallQueues& queues, ActionStatuses& statuses)
+    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory", statuses,
+                   [this] { poll_.begin(); }),
+      machine_(machine),
+      axes_(axisOfJoint(machine)),
+      poll_(onQueue(queues.trajectories(), node), kPollPeriod, [this] { return poll(); }) {
+  start();
+}
+
+// ---- goals and cancels ----
+
+FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
+  const auto goal = handle.getGoal();
+  Following following;
+  following.handle = handle;
+  following.joints = goal->trajectory.joint_names;
+  following.tolerances = readTolerances(*goal);
+  following.slipped_before = machine_.figures().slipped;
+  following.move = followMessage(machine_, goal->trajectory, axes_);
+  following.goal = goal->trajectory.points.back().positions;
+  following.began = ros::Time::now();
+  return following;
+}
+
+void TrajectoryAction::reject(GoalHandle& handle, const Error& error) {
+  const auto* bad = dynamic_cast<const BadTrajectory*>(&error);
+  const int code = bad != nullptr ? errorCodeOf(bad->kind()) : Result::INVALID_GOAL;
+  handle.setRejected(resultOf(code, error.what()), error.what());
+}
+
+void TrajectoryAction::takeOver(const Following& newer, Following& older) {
+  const bool shared =
+      std::any_of(older.joints.begin(), older.joints.end(), [&newer](const std::string& joint) {
+        return std::find(newer.joints.begin(), newer.joints.end(), joint) != newer.joints.end();
+      });
+  if (shared) older.preempted_by = "a newer goal took over";
+}
+
+// The axes that move together with it stop with it.
+void TrajectoryAction::stop(const Following& following) {
+  try {
+    const auto& first = following.move.members.front();
+    machine_.axis(first.axis).stop(first.move);
+  } catch (const Error& error) {
+    ROS_ERROR_NAMED("trajectory", "follow_joint_trajectory: %s", error.what());
+  }
+}
+
+// ---- what becomes of them ----
+
+void TrajectoryAction::watch(Following& following, bool tell) {
+  const Places places = placesOf(following);
+  keepToPath(following, places);
+  if (tell) publishFeedback(following, places);
+}
+
+bool TrajectoryAction::conclude(Following& following) {
+  const auto result = machine_.result(following.move);
+  if (!result) return false;
+  const bool reached = result->end == axis::MoveEnd::kReached;
+  GoalHandle& handle = following.handle;
+  if (!reached && !following.preempted_by.empty()) {
+    const std::string why = following.preempted_by + "; " + result->message;
+    handle.setCanceled(resultOf(Result::SUCCESSFUL, why), why);
+  } else if (!reached && !following.violated.empty()) {
+    handle.setAborted(resultOf(Result::PATH_TOLERANCE_VIOLATED, following.violated),
+                      following.violated);
+  } else if (const std::string why = shortOfGoal(following, *result); !why.empty()) {
+    handle.setAborted(resultOf(Result::GOAL_TOLERANCE_VIOLATED, why), why);
+  } else {
+    handle.setSucceeded(resultOf(Result::SUCCESSFUL, result->message), result->message);
+  }
+  return true;
+}
+
+std::string TrajectoryAction::shortOfGoal(const Following& following,
+                                          const machine::CoordinatedResult& result) const {
+  // What a stop, a switch or a fault ended stayed on its path, was no bad goal, and isn't
+  // SUCCESSFUL: of the codes that there are, 0 to -5, the goal that it missed says most.
+  if (result.end != axis::MoveEnd::kReached) return result.message;
+  // A motion's duration is its own time, which slips aren't in.
+  const double late = result.duration + machine_.figures().slipped - following.slipped_before -
+                      following.move.duration;
+  if (late > following.tolerances.goal_time) {
+    return "it ended " + roundedText(late) + " s later than planned; goal_time_tolerance is " +
+           roundedText(following.tolerances.goal_time) + " s";
+  }
+  return violation(following.joints, following.tolerances.goal, following.goal, result.positions);
+}
+
+TrajectoryAction::Places TrajectoryAction::placesOf(const Following& following) const {
+  Places places;
+  for (const auto& member : following.move.members) {
+    const axis::AxisState state = machine_.axis(member.axis).state();
+    places.planned.push_back(state.planned);
+    places.actual.push_back(state.position);
+    places.velocities.push_back(state.velocity);
+  }
+  return places;
+}
+
+void TrajectoryAction::keepToPath(Following& following, const Places& places) {
+  if (!following.violated.empty() || !following.preempted_by.empty()) return;
+  following.violated =
+      violation(following.joints, following.tolerances.path, places.planned, places.actual);
+  if (!following.violated.empty()) stop(following);
+}
+
+void TrajectoryAction::publishFeedback(Following& following, const Places& places) {
+  Feedback feedback;
+  feedback.header.stamp = ros::Time::now();
+  feedback.joint_names = following.joints;
+  const ros::Duration time = feedback.header.stamp - following.began;
+  for (auto* point : {&feedback.desired, &feedback.actual, &feedback.error}) {
+    point->time_from_start = time;
+  }
+  feedback.desired.positions = places.planned;
+  feedback.actual.positions = places.actual;
+  // An axis has no velocity but that of its plan.
+  feedback.desired.velocities = feedback.actual.velocities = places.velocities;
+  feedback.error.velocities.resize(places.velocities.size());
+  for (std::size_t i = 0; i < places.planned.size(); ++i) {
+    feedback.error.positions.push_back(places.planned[i] - places.actual[i]);
+  }
+  following.handle.publishFeedback(feedback);
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <string>
+#include <vector>
+
+#include "action_statuses.h"
+#include "follow_joint_trajectory.h"
+#include "motion_action.h"
+#include "node/calls/call_queues.h"
+#include "node/calls/periodic_poll.h"
+#include "node/topics/trajectory_message.h"
+#include "stepdriver_core/machine/machine.h"
+#include "trajectory_tolerances.h"
+
+namespace stepdriver::ros_node {
+
+/// A goal of ~follow_joint_trajectory under way.
+struct FollowingTrajectory {
+  actionlib::ServerGoalHandle<action_msgs::FollowJointTrajectoryAction> handle;
+  machine::CoordinatedMove move;
+  std::vector<std::string> joints;
+  TrajectoryTolerances tolerances;
+  std::vector<double> goal;  // [unit] the last point
+  ros::Time began;
+  double slipped_before = 0.0;  // [s] by the machine's timeline
+  std::string preempted_by;     // a cancel or a newer goal, in words; empty: neither
+  std::string violated;         // a path tolerance, in words; empty: none
+};
+
+/// The action ~follow_joint_trajectory. A goal is judged before it is accepted; one that shares a
+/// joint with a goal under way takes over from it without a stop, others run side by side.
+class TrajectoryAction
+    : public MotionAction<action_msgs::FollowJointTrajectoryAction, FollowingTrajectory> {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues, statuses outlive the action.
+  TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+                   ActionStatuses& statuses);
+
+ private:
+  using Following = FollowingTrajectory;
+
+  /// Where the joints of a goal are, in their order.
+  struct Places {
+    std::vector<double> planned;
+    std::vector<double> actual;
+    std::vector<double> velocities;
+  };
+
+  Following begin(const GoalHandle& handle) override;
+  void reject(GoalHandle& handle, const Error& error) override;
+  void takeOver(const Following& newer, Following& older) override;
+  void stop(const Following& following) override;
+  bool conclude(Following& following) override;
+  void watch(Following& following, bool tell) override;
+
+  /// @return why it isn't a success, in words; empty: it is.
+  std::string shortOfGoal(const Following& following,
+                          const machine::CoordinatedResult& result) const;
+  Places placesOf(const Following& following) const;
+  void keepToPath(Following& following, const Places& places);
+  static void publishFeedback(Following& following, const Places& places);
+
+  machine::Machine& machine_;
+  const AxisOfJoint axes_;
+  PeriodicPoll poll_;
+};
+
+}  // namespace stepdriver::ros_node

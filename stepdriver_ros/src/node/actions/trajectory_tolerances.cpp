@@ -1,0 +1,59 @@
+#include "trajectory_tolerances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/text.h"
+#include "node/topics/trajectory_message.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw BadTrajectory(BadTrajectory::Kind::kInvalid, why);
+}
+
+// 0 is the default and a negative number lifts it; the default is no limit.
+double limitOf(double tolerance) { return tolerance > 0.0 ? tolerance : kNoLimit; }
+
+template <typename Tolerances>
+std::vector<double> limitsOf(const std::vector<std::string>& joints, const Tolerances& tolerances,
+                             const std::string& name) {
+  std::vector<double> limits(joints.size(), kNoLimit);
+  for (const auto& tolerance : tolerances) {
+    const auto joint = std::find(joints.begin(), joints.end(), tolerance.name);
+    if (joint == joints.end()) {
+      refuse(name + " names the joint " + tolerance.name + ", which isn't in the trajectory");
+    }
+    if (std::isnan(tolerance.position)) {
+      refuse(name + " of the joint " + tolerance.name + " isn't a number");
+    }
+    limits[static_cast<std::size_t>(joint - joints.begin())] = limitOf(tolerance.position);
+  }
+  return limits;
+}
+
+}  // namespace
+
+TrajectoryTolerances readTolerances(const action_msgs::FollowJointTrajectoryGoal& goal) {
+  const std::vector<std::string>& joints = goal.trajectory.joint_names;
+  const double time = goal.goal_time_tolerance.toSec();
+  return {limitsOf(joints, goal.path_tolerance, "path_tolerance"),
+          limitsOf(joints, goal.goal_tolerance, "goal_tolerance"), limitOf(time)};
+}
+
+std::string violation(const std::vector<std::string>& joints, const std::vector<double>& limits,
+                      const std::vector<double>& wanted, const std::vector<double>& actual) {
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const double off = std::abs(wanted[i] - actual[i]);
+    if (off <= limits[i]) continue;
+    return joints[i] + " is at " + roundedText(actual[i]) + ", " + roundedText(off) + " from " +
+           roundedText(wanted[i]) + "; the tolerance is " + roundedText(limits[i]);
+  }
+  return {};
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,62 @@
+#include "call_queues.h"
+
+#include <thread>
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr int kControlThreads = 2;
+// One, so that a hold and a stop are taken in their order.
+constexpr int kStopThreads = 1;
+constexpr int kEmergencyThreads = 1;
+constexpr int kTrajectoryThreads = 2;
+constexpr int kSpareLineThreads = 3;
+// Those that are there before anything waits.
+constexpr int kFirstThreads = 2;
+constexpr std::chrono::milliseconds kPoll{5};
+
+}  // namespace
+
+CallQueues::CallQueues(std::size_t axes)
+    : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
+      trajectories_(waiting_pool_, kTrajectoryThreads),
+      control_(control_pool_, kControlThreads),
+      stops_(stop_pool_, kStopThreads),
+      emergency_(emergency_pool_, kEmergencyThreads) {
+  for (std::size_t i = 0; i < axes; ++i) {
+    axes_.emplace_back(waiting_pool_, kThreadsPerAxis);
+    power_.emplace_back(waiting_pool_, kPowerThreadsPerAxis);
+  }
+}
+
+void CallQueues::start() {
+  waiting_pool_.start(kFirstThreads);
+  control_pool_.start(kControlThreads);
+  stop_pool_.start(kStopThreads);
+  emergency_pool_.start(kEmergencyThreads);
+}
+
+void CallQueues::finish(std::chrono::milliseconds bound) {
+  const auto deadline = std::chrono::steady_clock::now() + bound;
+  while (!allAnswered() && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(kPoll);
+  }
+  stop();
+}
+
+void CallQueues::stop() {
+  waiting_pool_.stop();
+  control_pool_.stop();
+  stop_pool_.stop();
+  emergency_pool_.stop();
+}
+
+bool CallQueues::allAnswered() {
+  // A queue is empty when nothing is in it and nothing from it is being called.
+  bool empty = control_.isEmpty() && stops_.isEmpty() && emergency_.isEmpty() && lines_.isEmpty();
+  for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
+  for (ros::CallbackQueue& queue : power_) empty = empty && queue.isEmpty();
+  return empty;
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,92 @@
+#include "axis_diagnostics.h"
+
+#include <string>
+
+#include "common/text.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+using diagnostic_updater::DiagnosticStatusWrapper;
+
+std::string doingOf(const axis::AxisState& state) {
+  if (state.homing != axis::HomingPhase::kNone) {
+    return std::string("is being homed: ") + axis::nameOf(state.homing);
+  }
+  if (state.held) return "held";
+  if (state.moving) return "moves";
+  if (state.idle) return "idle";
+  if (state.asleep) return "asleep";
+  return state.enabled ? "at rest" : "disabled";
+}
+
+void warnNearLimit(const config::AxisConfig& config, double position,
+                   DiagnosticStatusWrapper& status) {
+  const bool both = config.min_position && config.max_position;
+  const double near = both ? (*config.max_position - *config.min_position) * kNearLimit
+                           : 0.5 / config.steps_per_unit;
+  const auto warn = [&](const char* which, double limit) {
+    status.mergeSummary(DiagnosticStatus::WARN, std::string("near the soft limit ") + which + ", " +
+                                                    roundedText(limit) + " " + unitOf(config.kind));
+  };
+  if (config.min_position && position <= *config.min_position + near) {
+    warn("min_position", *config.min_position);
+  }
+  if (config.max_position && position >= *config.max_position - near) {
+    warn("max_position", *config.max_position);
+  }
+}
+
+void addValues(const config::AxisConfig& config, const AxisReading& reading,
+               DiagnosticStatusWrapper& status) {
+  const axis::AxisState& state = reading.state;
+  const axis::AxisLimits& limits = reading.limits;
+  const std::string unit = unitOf(config.kind);
+  const auto add_switch = [&](const char* key, const std::optional<bool>& active) {
+    status.add(key, active ? (*active ? "active" : "inactive") : "none");
+  };
+  status.add("position [" + unit + "]", state.position);
+  status.add("velocity [" + unit + "/s]", state.velocity);
+  status.add("target [" + unit + "]", state.target);
+  status.add("enabled", state.enabled);
+  status.add("homed", state.homed);
+  status.add("position valid", state.position_valid);
+  status.add("microsteps", state.microsteps);
+  add_switch("min endstop", reading.endstops.min);
+  add_switch("max endstop", reading.endstops.max);
+  status.add("max_speed [" + unit + "/s]", limits.max_speed);
+  status.add("acceleration [" + unit + "/s^2]", limits.acceleration);
+  status.add("deceleration [" + unit + "/s^2]", limits.deceleration);
+  status.add("jerk [" + unit + "/s^3]", limits.jerk);
+}
+
+}  // namespace
+
+void reportAxis(const config::AxisConfig& config, const AxisReading& reading,
+                DiagnosticStatusWrapper& status) {
+  const axis::AxisState& state = reading.state;
+  status.summary(DiagnosticStatus::OK, doingOf(state));
+  if (!state.fault.empty()) {
+    status.mergeSummary(DiagnosticStatus::ERROR, state.fault + ": " + state.remedy);
+  }
+  if (!reading.endstop_error.empty()) {
+    status.mergeSummary(DiagnosticStatus::ERROR, reading.endstop_error);
+  }
+  if (!state.position_valid) {
+    status.mergeSummary(DiagnosticStatus::WARN,
+                        "the position is unverified" +
+                            (state.position_note.empty() ? "" : " (" + state.position_note + ")") +
+                            ": home it, or set its position");
+  }
+  if (reading.endstops.min.value_or(false)) {
+    status.mergeSummary(DiagnosticStatus::WARN, "the min endstop is active");
+  }
+  if (reading.endstops.max.value_or(false)) {
+    status.mergeSummary(DiagnosticStatus::WARN, "the max endstop is active");
+  }
+  warnNearLimit(config, state.position, status);
+  addValues(config, reading, status);
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,81 @@
+#include "diagnostics.h"
+
+#include <unistd.h>
+
+#include <array>
+
+#include "axis_diagnostics.h"
+#include "engine_diagnostics.h"
+#include "stepdriver_core/driver/driver_chip.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/step_rates.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+const ros::WallDuration kPeriod(1.0);
+constexpr const char* kEngineName = "pulse engine";
+
+/// Against the limits that hold now, and against the motions under way.
+void readRates(const machine::Machine& machine, EngineReading& reading) {
+  if (!machine.capability()) return;
+  std::vector<config::AxisConfig> axes;
+  std::vector<double> rates;
+  for (const auto& axis : machine.axes()) {
+    axes.push_back(axis->config());
+    axes.back().max_speed = axis->limits().max_speed;
+    rates.push_back(axis->peakRate());
+  }
+  reading.rates = machine::stepRates(axes, *machine.capability()).axes;
+  reading.rates_in_motion = machine::stepRatesInMotion(axes, *machine.capability(), rates).axes;
+}
+
+}  // namespace
+
+Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
+                         const machine::Machine& machine, CallQueues& queues,
+                         const std::string& hardware_id, double max_lateness)
+    : machine_(machine), max_lateness_(max_lateness), updater_(node, private_node) {
+  updater_.setHardwareID(hardware_id);
+  for (const auto& axis : machine.axes()) {
+    updater_.add(axis->config().name, [&axis](Status& status) { tellAxis(*axis, status); });
+  }
+  updater_.add(kEngineName, [this](Status& status) { tellEngine(status); });
+  node.setCallbackQueue(&queues.control());
+  timer_ = node.createSteadyTimer(
+      kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); }, false);
+}
+
+void Diagnostics::tellAxis(const axis::Axis& axis, Status& status) {
+  AxisReading reading;
+  reading.state = axis.state();
+  reading.limits = axis.limits();
+  try {
+    reading.endstops = axis.endstops();
+  } catch (const GpioError& error) {
+    reading.endstop_error = error.what();
+  }
+  reportAxis(axis.config(), reading, status);
+}
+
+void Diagnostics::tellEngine(Status& status) {
+  EngineReading reading;
+  reading.figures = machine_.figures();
+  reading.slips_before = slips_before_;
+  reading.max_lateness = max_lateness_;
+  readRates(machine_, reading);
+  slips_before_ = reading.figures.slips;
+  reportEngine(reading, status);
+}
+
+std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on) {
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  std::string text = std::string(host.data()) + ": ";
+  for (const config::AxisConfig& axis : axes) {
+    text += axis.name + " " + driver::driverChipOf(axis.driver).title + ", ";
+  }
+  return text + "on " + on;
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+#include <ros/steady_timer.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "node/calls/call_queues.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+
+/// The topic /diagnostics at 1 Hz: a status for each axis, and one for the pulse engine.
+class Diagnostics {
+ public:
+  /// @param node, private_node handles of the node, and of its private names.
+  /// @param machine, queues outlive the diagnostics.
+  /// @param hardware_id says which hardware it is.
+  /// @param max_lateness [s] MachineOptions::max_lateness
+  Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
+              const machine::Machine& machine, CallQueues& queues, const std::string& hardware_id,
+              double max_lateness);
+  Diagnostics(const Diagnostics&) = delete;
+  Diagnostics& operator=(const Diagnostics&) = delete;
+
+ private:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+
+  static void tellAxis(const axis::Axis& axis, Status& status);
+  void tellEngine(Status& status);
+
+  const machine::Machine& machine_;
+  const double max_lateness_;
+  std::uint64_t slips_before_ = 0;  // of the timer alone
+  diagnostic_updater::Updater updater_;
+  ros::SteadyTimer timer_;
+};
+
+/// The host and its driver chips: "printer: x A4988, y DRV8825, on the simulated rig".
+///
+/// @param on setup::Hardware::description()
+std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on);
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,216 @@
+#include <pthread.h>
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/node_handle.h>
+
+#include <cstddef>
+#include <deque>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "common/end_requests.h"
+#include "common/node_start.h"
+#include "node/actions/action_statuses.h"
+#include "node/actions/homing_action.h"
+#include "node/actions/move_actions.h"
+#include "node/actions/trajectory_action.h"
+#include "node/calls/call_queues.h"
+#include "node/diagnostics/diagnostics.h"
+#include "node/parameters/read_parameters.h"
+#include "node/services/axis_home_service.h"
+#include "node/services/axis_services.h"
+#include "node/services/machine_home_service.h"
+#include "node/services/machine_services.h"
+#include "node/topics/jog_subscriber.h"
+#include "node/topics/state_publisher.h"
+#include "node/topics/trajectory_command.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/machine/step_rates.h"
+#include "stepdriver_core/setup/hardware.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr int kExitGpio = 2;
+constexpr int kExitTooSlow = 3;
+
+constexpr std::chrono::milliseconds kPoll{1000};
+// For the calls that came in while the axes came to rest.
+constexpr std::chrono::milliseconds kLastAnswers{500};
+
+// Where memory is locked, each thread's stack is in memory as a whole, by default 8 MB.
+constexpr std::size_t kThreadStack = std::size_t{1} << 20;
+
+constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
+
+Drives the axes of the parameter ~axes by services, and publishes where they are.
+Ends on SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill`: decelerates, disables and releases the
+lines.
+
+  services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
+              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
+              ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
+              ~stop  ~emergency_stop  ~recover  ~speed_override  ~home
+              ~move_line  ~hold  ~resume
+              ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
+              (on the simulated rig)
+  topics      joint_states  ~endstops  ~axis_states  /diagnostics  ~jog, ~command (subscribed)
+  actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
+  parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
+              ~state_file  ~hardware_id  ~simulation  robot_description
+
+Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
+3 the machine is too slow for its axes and ~realtime is enforce, 64 wrong usage.
+Start it with: roslaunch stepdriver axis.launch
+)";
+
+/// Refuses new commands, decelerates, disables, and lets every client have its answer.
+///
+/// @return the exit code.
+int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
+             TrajectoryAction& trajectory_action, StatePublisher& publisher) {
+  int exit_code = kExitOk;
+  try {
+    machine.shutdown();
+  } catch (const Error& error) {
+    ROS_ERROR_NAMED("node", "Not all could be disabled: %s", error.what());
+    exit_code = kExitGpio;
+  }
+  move_actions.tellEnded();
+  trajectory_action.tellEnded();
+  queues.finish(kLastAnswers);
+  publisher.stop();
+  return exit_code;
+}
+
+void setThreadStacks() {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  if (pthread_attr_setstacksize(&attributes, kThreadStack) == 0) {
+    pthread_setattr_default_np(&attributes);
+  }
+  pthread_attr_destroy(&attributes);
+}
+
+void warnOfSlowness(const std::vector<config::AxisConfig>& axes,
+                    const pulse::Capability& capability) {
+  if (capability.rights.anyRefused()) {
+    ROS_WARN_NAMED("realtime", "Pulse thread: %s", capability.rights.text().c_str());
+  }
+  for (const std::string& complaint : machine::stepRates(axes, capability).complaints()) {
+    ROS_WARN_NAMED("realtime", "%s. stepdriver_check says more", complaint.c_str());
+  }
+}
+
+void warnOfPositions(const machine::Machine& machine) {
+  for (const auto& axis : machine.axes()) {
+    const std::string note = axis->state().position_note;
+    if (note.empty()) continue;
+    ROS_WARN_NAMED("position", "%s: its position is unverified: %s", axis->config().name.c_str(),
+                   note.c_str());
+  }
+}
+
+/// The node's life, once there is a master.
+///
+/// @return the exit code.
+int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_requests) {
+  const NodeConfig config = readParameters(node, private_node);
+  setup::Hardware hardware(config, private_node.getNamespace());
+  machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), config.options());
+
+  if (machine.emergencyStopped()) {
+    ROS_WARN_NAMED(
+        "emergency_stop",
+        "The emergency stop input is active: no axis is enabled, none moves until recover");
+  }
+  warnOfPositions(machine);
+  if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
+
+  CallQueues queues(machine.axes().size());
+  // Subscribers to latched topics are served by a queue too.
+  node.setCallbackQueue(&queues.control());
+  private_node.setCallbackQueue(&queues.control());
+  StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
+  ActionStatuses statuses(private_node);
+  std::deque<AxisServices> axis_services;
+  for (std::size_t i = 0; i < machine.axes().size(); ++i) {
+    axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
+  }
+  std::deque<AxisHomeService> axis_home_services;
+  std::deque<HomingAction> homing_actions;
+  for (std::size_t i = 0; i < machine.axes().size(); ++i) {
+    axis::Axis& axis = *machine.axes()[i];
+    axis_home_services.emplace_back(private_node, i, axis, queues);
+    homing_actions.emplace_back(
+        onQueue(queues.control(), ros::NodeHandle(private_node, axis.config().name)), axis,
+        statuses);
+  }
+  MoveActions move_actions(private_node, machine, queues, statuses);
+  const MachineHomeService machine_home_service(private_node, machine, queues);
+  MachineServices machine_services(private_node, machine, queues);
+  if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
+  const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
+  const TrajectoryCommand trajectory_command(private_node, machine, queues);
+  TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
+  const std::string description = hardware.description();
+  const Diagnostics diagnostics(
+      node, private_node, machine, queues,
+      config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
+      config.max_lateness);
+  queues.start();
+  publisher.start();
+  ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
+                 machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
+                 machine.figures().realtime.c_str());
+
+  std::string who;
+  while (who.empty()) {
+    who = end_requests.waitFor(kPoll);
+    if (const std::string error = machine.stateFileError(); !error.empty()) {
+      ROS_ERROR_THROTTLE_NAMED(60.0, "state_file", "%s", error.c_str());
+    }
+  }
+  ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
+  return shutDown(machine, queues, move_actions, trajectory_action, publisher);
+}
+
+int runOrExplain(EndRequests& end_requests) {
+  // With the last of its handles roscpp shuts down, and takes the console with it: these live on
+  // until everything has been said.
+  const ros::NodeHandle node;
+  const ros::NodeHandle private_node("~");
+  end_requests.takeOverShutdownCall();
+  try {
+    return run(node, private_node, end_requests);
+  } catch (const ConfigError& error) {
+    explain(error, "Not started, no line was touched");
+    return kExitConfig;
+  } catch (const GpioError& error) {
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
+    return kExitGpio;
+  } catch (const Refused& error) {
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
+    return kExitTooSlow;
+  } catch (const std::exception& error) {
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
+    return kExitConfig;
+  }
+}
+
+}  // namespace
+}  // namespace stepdriver::ros_node
+
+int main(int argc, char** argv) {
+  namespace node = stepdriver::ros_node;
+  node::setThreadStacks();
+  node::EndRequests end_requests;
+  if (const auto code = node::handleArguments(argc, argv, node::kUsage)) return *code;
+  ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
+  if (!node::waitForMaster(end_requests)) return node::kExitOk;
+  const int exit_code = node::runOrExplain(end_requests);
+  ros::shutdown();
+  return exit_code;
+}

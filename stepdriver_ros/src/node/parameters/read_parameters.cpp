@@ -1,0 +1,59 @@
+#include "read_parameters.h"
+
+#include <ros/console.h>
+#include <ros/param.h>
+
+#include <string>
+#include <vector>
+
+#include "common/node_start.h"
+#include "common/xmlrpc_value.h"
+#include "robot_description.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+std::vector<LimitSources> applyDescriptionParameter(const ros::NodeHandle& node,
+                                                    std::vector<config::AxisConfig>& axes,
+                                                    std::vector<ConfigIssue>& issues) {
+  std::string name;
+  XmlRpc::XmlRpcValue value;
+  if (!node.searchParam("robot_description", name) || !ros::param::get(name, value)) {
+    ROS_INFO_NAMED(
+        "limits", "There is no robot_description: the limits are those of the axes' configuration");
+    return std::vector<LimitSources>(axes.size());
+  }
+  const config::ConfigValue description = configValue(value);
+  const auto* urdf = description.as<std::string>();
+  if (urdf == nullptr) {
+    issues.push_back({name, "is " + description.shown() + ", but must be the XML of a URDF"});
+    return {};
+  }
+  return applyRobotDescription(*urdf, name, axes, issues);
+}
+
+}  // namespace
+
+NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node) {
+  std::vector<ConfigIssue> issues;
+  const std::string& name = private_node.getNamespace();
+  const config::ConfigValue tree = privateParameters(private_node);
+  NodeConfig config = readNodeConfig(tree, name, issues);
+  // What depends on the axes can only be judged where they are right.
+  if (!issues.empty()) throw ConfigError(issues);
+  const auto sources = applyDescriptionParameter(node, config.axes, issues);
+  if (issues.empty() && config.backend == setup::GpioBackend::kSimulated) {
+    setup::checkSimulation(config.axes, config.simulation, name + "/simulation", issues);
+  }
+  if (!issues.empty()) throw ConfigError(issues);
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    ROS_INFO_NAMED("limits", "%s", limitsText(config.axes[i], sources[i]).c_str());
+    if (sources[i].limited_though_continuous) {
+      ROS_WARN_NAMED("limits", "%s", continuousJointText(config.axes[i]).c_str());
+    }
+  }
+  return config;
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,183 @@
+#include "robot_description.h"
+
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+
+#include "common/text.h"
+#include "stepdriver_core/config/lowest_limits.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+// Relative, of a number with six digits.
+constexpr double kRounding = 1e-5;
+
+using config::AxisConfig;
+using config::Kind;
+
+const char* typeName(const urdf::Joint& joint) {
+  switch (joint.type) {
+    case urdf::Joint::REVOLUTE:
+      return "revolute";
+    case urdf::Joint::CONTINUOUS:
+      return "continuous";
+    case urdf::Joint::PRISMATIC:
+      return "prismatic";
+    case urdf::Joint::FLOATING:
+      return "floating";
+    case urdf::Joint::PLANAR:
+      return "planar";
+    case urdf::Joint::FIXED:
+      return "fixed";
+    default:
+      return "of an unknown type";
+  }
+}
+
+/// Fits one axis to its joint.
+class JointFitter {
+ public:
+  JointFitter(AxisConfig& axis, std::string name, std::vector<ConfigIssue>& issues)
+      : axis_(axis), name_(std::move(name)), issues_(issues) {}
+
+  LimitSources fit(const urdf::Joint* joint) {
+    if (joint == nullptr) {
+      issue("has no joint \"" + axis_.joint + "\", which is the joint of axis " + axis_.name);
+    } else if (checkType(*joint) && checkLimits(*joint)) {
+      tighten(*joint);
+    }
+    return sources_;
+  }
+
+ private:
+  void issue(const std::string& message) { issues_.push_back({name_, message}); }
+
+  std::string joint() const { return "joint \"" + axis_.joint + "\" of axis " + axis_.name; }
+
+  bool checkType(const urdf::Joint& joint) {
+    const bool linear = joint.type == urdf::Joint::PRISMATIC;
+    const bool rotary =
+        joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS;
+    const std::string is = this->joint() + " is " + typeName(joint) + ", but must be ";
+    if (axis_.kind == Kind::kLinear && !linear) {
+      issue("is wrong: " + is + "prismatic: the axis is configured in mm");
+      return false;
+    }
+    if (axis_.kind == Kind::kRotary && !rotary) {
+      issue("is wrong: " + is + "revolute or continuous: the axis is configured in degrees");
+      return false;
+    }
+    return true;
+  }
+
+  bool checkLimits(const urdf::Joint& joint) {
+    const bool limited = joint.type != urdf::Joint::CONTINUOUS;
+    if (!joint.limits) {
+      if (limited) issue("is wrong: " + this->joint() + " has no <limit>");
+      return !limited;
+    }
+    const urdf::JointLimits& limits = *joint.limits;
+    bool right = true;
+    if (!(limits.velocity > 0.0)) {
+      issue("is wrong: " + this->joint() + " has the velocity limit " +
+            roundedText(limits.velocity) + ", but it must be above 0");
+      right = false;
+    } else if (const double lowest = lowestSpeed(); limits.velocity < lowest) {
+      issue("is wrong: " + this->joint() + " has the velocity limit " +
+            roundedText(limits.velocity) + ", but it must be at least " + roundedText(lowest) +
+            " " + unitOf(axis_.kind) + "/s, which is " + roundedText(config::kLowestRate) +
+            " steps/s");
+      right = false;
+    }
+    if (limited && !(limits.lower < limits.upper)) {
+      issue("is wrong: " + this->joint() + " has lower=" + roundedText(limits.lower) +
+            " and upper=" + roundedText(limits.upper) +
+            ", but lower must be below upper (where one is missing it is 0)");
+      right = false;
+    }
+    return right;
+  }
+
+  /// [unit/s] 0 if the scale of the axis is not known.
+  double lowestSpeed() const {
+    // A value copied from the message, with its six digits, is accepted.
+    return axis_.steps_per_unit > 0.0
+               ? config::kLowestRate / axis_.steps_per_unit * (1.0 - kRounding)
+               : 0.0;
+  }
+
+  void tighten(const urdf::Joint& joint) {
+    const bool continuous = joint.type == urdf::Joint::CONTINUOUS;
+    sources_.limited_though_continuous = continuous && (axis_.min_position || axis_.max_position);
+    if (!joint.limits) return;
+    const urdf::JointLimits& limits = *joint.limits;
+    if (limits.velocity < axis_.max_speed) {
+      axis_.max_speed = limits.velocity;
+      axis_.start_speed = std::min(axis_.start_speed, axis_.max_speed);
+      sources_.max_speed = "joint";
+    }
+    if (continuous) return;
+    if (!axis_.min_position || limits.lower > *axis_.min_position) {
+      axis_.min_position = limits.lower;
+      sources_.min_position = "joint";
+    }
+    if (!axis_.max_position || limits.upper < *axis_.max_position) {
+      axis_.max_position = limits.upper;
+      sources_.max_position = "joint";
+    }
+    if (*axis_.min_position < *axis_.max_position) return;
+    issue("is wrong: " + this->joint() + " goes from " + roundedText(limits.lower) + " to " +
+          roundedText(limits.upper) + " " + unitOf(axis_.kind) +
+          ", which leaves nothing of the axis's own range");
+  }
+
+  AxisConfig& axis_;
+  std::string name_;
+  std::vector<ConfigIssue>& issues_;
+  LimitSources sources_;
+};
+
+std::string positionText(const std::optional<double>& position, Kind kind, const char* source) {
+  if (!position) return "without limit";
+  return roundedText(*position) + " " + unitOf(kind) + " (" + source + ")";
+}
+
+}  // namespace
+
+std::vector<LimitSources> applyRobotDescription(const std::string& urdf, const std::string& name,
+                                                std::vector<AxisConfig>& axes,
+                                                std::vector<ConfigIssue>& issues) {
+  std::vector<LimitSources> sources;
+  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(urdf);
+  if (!model) {
+    issues.push_back(
+        {name,
+         "can't be read as a URDF; what the parser says stands above. A common reason: a prismatic "
+         "or revolute joint without <limit effort=... velocity=...>"});
+    return sources;
+  }
+  sources.reserve(axes.size());
+  for (AxisConfig& axis : axes) {
+    const urdf::JointConstSharedPtr joint = model->getJoint(axis.joint);
+    sources.push_back(JointFitter(axis, name, issues).fit(joint.get()));
+  }
+  return sources;
+}
+
+std::string continuousJointText(const AxisConfig& axis) {
+  return "axis " + axis.name + " has soft limits, but its joint " + axis.joint +
+         " is continuous in the robot description: the limits hold, and whoever plans by the "
+         "description will ask for positions that are refused. Make the joint revolute, or take "
+         "the "
+         "limits away";
+}
+
+std::string limitsText(const AxisConfig& axis, const LimitSources& sources) {
+  return "axis " + axis.name + " (joint " + axis.joint + ") is limited: min position " +
+         positionText(axis.min_position, axis.kind, sources.min_position) + ", max position " +
+         positionText(axis.max_position, axis.kind, sources.max_position) + ", speed " +
+         roundedText(axis.max_speed) + " " + unitOf(axis.kind) + "/s (" + sources.max_speed + ")";
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,184 @@
+#include "axis_services.h"
+
+#include "common/text.h"
+#include "respond.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+/// What differs, in words: "max_speed 0.05 m/s instead of 0.1 m/s".
+std::string changesText(const axis::AxisLimits& before, const axis::AxisLimits& now,
+                        const std::string& unit) {
+  std::string text;
+  const auto compare = [&](const char* what, double was, double is, const char* per) {
+    if (was == is) return;
+    const auto shown = [&](double value) {
+      return value > 0.0 ? roundedText(value) + " " + unit + per : std::string("none");
+    };
+    text += (text.empty() ? "" : ", ") + std::string(what) + " " + shown(is) + " instead of " +
+            shown(was);
+  };
+  compare("max_speed", before.max_speed, now.max_speed, "/s");
+  compare("acceleration", before.acceleration, now.acceleration, "/s^2");
+  compare("deceleration", before.deceleration, now.deceleration, "/s^2");
+  compare("jerk", before.jerk, now.jerk, "/s^3");
+  return text.empty() ? "all limits are as they were" : text;
+}
+
+}  // namespace
+
+template <typename Service>
+void AxisServices::advertise(const std::string& name, Handler<Service> handler,
+                             ros::CallbackQueue& queue) {
+  node_.setCallbackQueue(&queue);
+  servers_.push_back(node_.advertiseService(name, handler, this));
+}
+
+AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
+                           CallQueues& queues)
+    : axis_(axis), node_(node, axis.config().name) {
+  ros::CallbackQueue& own = queues.ofAxis(index);
+  advertise<MoveTo>("move_to", &AxisServices::moveTo, own);
+  advertise<MoveRounds>("move_rounds", &AxisServices::moveRounds, own);
+  advertise<Plan>("plan", &AxisServices::plan, own);
+  advertise<Microstep>("microstep", &AxisServices::microstep, own);
+  advertise<SetLimits>("set_limits", &AxisServices::setLimits, own);
+  advertise<SetPosition>("set_position", &AxisServices::setPosition, own);
+  advertise<std_srvs::SetBool>("enable", &AxisServices::enable, queues.power(index));
+  advertise<std_srvs::SetBool>("sleep", &AxisServices::sleep, own);
+  advertise<std_srvs::Trigger>("reset", &AxisServices::reset, own);
+  advertise<std_srvs::Trigger>("stop", &AxisServices::stop, queues.stops());
+}
+
+bool AxisServices::moveTo(MoveTo::Request& request, MoveTo::Response& response) {
+  response.position = axis_.state().position;
+  return respond(response, [&] {
+    const axis::Move move = axis_.moveTo(request.position, request.relative != 0, request.velocity);
+    respondToMove(move, request.wait != 0, response);
+  });
+}
+
+bool AxisServices::moveRounds(MoveRounds::Request& request, MoveRounds::Response& response) {
+  response.position = axis_.state().position;
+  return respond(response, [&] {
+    const axis::Move move = axis_.moveRounds(request.rounds, request.velocity);
+    respondToMove(move, request.wait != 0, response);
+  });
+}
+
+bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
+  response.position = axis_.state().position;
+  return respond(response, [&] {
+    const axis::MovePlan planned =
+        axis_.plan(request.position, request.relative != 0, request.velocity);
+    response.position = planned.move.target;
+    response.duration = planned.move.duration;
+    response.overshoot = planned.move.overshoot;
+    response.steps_per_unit = planned.steps_per_unit;
+    response.message = axis_.config().name + ": would move " + wayText(planned.move);
+    for (const axis::MovePiece& piece : planned.pieces) {
+      response.pieces.emplace_back();
+      Piece& shown = response.pieces.back();
+      shown.duration = piece.duration;
+      shown.position = piece.position;
+      shown.velocity = piece.velocity;
+      shown.acceleration = piece.acceleration;
+      shown.jerk = piece.jerk;
+    }
+  });
+}
+
+std::string AxisServices::wayText(const axis::Move& move) const {
+  const std::string unit = std::string(" ") + unitOf(axis_.config().kind);
+  std::string text =
+      "to " + roundedText(move.target) + unit + " in " + roundedText(move.duration) + " s";
+  if (move.overshoot > 0.0) {
+    text += "; it can't stop before that, goes " + roundedText(move.overshoot) + unit +
+            " beyond, and comes back";
+  }
+  return text;
+}
+
+template <typename Response>
+void AxisServices::respondToMove(const axis::Move& move, bool wait, Response& response) {
+  if (!wait) {
+    response.position = move.target;
+    response.duration = move.duration;
+    response.message = axis_.config().name + ": moves " + wayText(move);
+    return;
+  }
+  const axis::MoveResult result = axis_.wait(move);
+  response.success = result.end == axis::MoveEnd::kReached;
+  response.message = result.message;
+  response.position = result.position;
+  response.duration = result.duration;
+}
+
+bool AxisServices::microstep(Microstep::Request& request, Microstep::Response& response) {
+  respond(response, [&] {
+    axis_.setMicrosteps(request.microsteps);
+    response.message = axis_.config().name + ": makes " + std::to_string(request.microsteps) +
+                       (request.microsteps == 1 ? " microstep" : " microsteps") + " per full step";
+  });
+  response.microsteps = axis_.state().microsteps;
+  return true;
+}
+
+bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& response) {
+  respond(response, [&] {
+    const axis::AxisLimits before = axis_.limits();
+    axis_.setLimits({request.max_speed, request.acceleration, request.deceleration, request.jerk});
+    response.message = axis_.config().name + ": " +
+                       changesText(before, axis_.limits(), unitOf(axis_.config().kind));
+  });
+  const axis::AxisLimits holding = axis_.limits();
+  response.max_speed = holding.max_speed;
+  response.acceleration = holding.acceleration;
+  response.deceleration = holding.deceleration;
+  response.jerk = holding.jerk;
+  return true;
+}
+
+bool AxisServices::setPosition(SetPosition::Request& request, SetPosition::Response& response) {
+  respond(response, [&] {
+    axis_.setPosition(request.position);
+    response.message = axis_.config().name + ": stands at " + roundedText(request.position) + " " +
+                       unitOf(axis_.config().kind);
+  });
+  response.position = axis_.state().position;
+  return true;
+}
+
+bool AxisServices::enable(std_srvs::SetBool::Request& request,
+                          std_srvs::SetBool::Response& response) {
+  return respond(response, [&] {
+    axis_.enable(request.data != 0);
+    response.message = axis_.config().name + (request.data ? ": enabled" : ": disabled");
+  });
+}
+
+bool AxisServices::sleep(std_srvs::SetBool::Request& request,
+                         std_srvs::SetBool::Response& response) {
+  return respond(response, [&] {
+    axis_.sleep(request.data != 0);
+    response.message = axis_.config().name + (request.data ? ": asleep" : ": awake");
+  });
+}
+
+bool AxisServices::reset(std_srvs::Trigger::Request& /*request*/,
+                         std_srvs::Trigger::Response& response) {
+  return respond(response, [&] {
+    axis_.reset();
+    response.message = axis_.config().name + ": reset";
+  });
+}
+
+bool AxisServices::stop(std_srvs::Trigger::Request& /*request*/,
+                        std_srvs::Trigger::Response& response) {
+  return respond(response, [&] {
+    axis_.stop();
+    response.message = axis_.config().name + ": stops";
+  });
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,61 @@
+#include "machine_home_service.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "respond.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+bool areAllHomed(const std::vector<axis::HomingResult>& results) {
+  return std::all_of(results.begin(), results.end(), [](const axis::HomingResult& result) {
+    return result.end == axis::HomingEnd::kHomed;
+  });
+}
+
+std::string messageOf(const std::vector<axis::HomingResult>& results) {
+  std::string text;
+  for (const axis::HomingResult& result : results) {
+    text += (text.empty() ? "" : "; ") + result.message;
+  }
+  return text;
+}
+
+void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names) {
+  try {
+    ROS_INFO_NAMED("homing", "%s", messageOf(machine.home(names)).c_str());
+  } catch (const std::exception& error) {
+    ROS_ERROR_NAMED("homing", "%s", error.what());
+  }
+}
+
+}  // namespace
+
+// As lines, homings wait in a queue that has a thread for each axis.
+MachineHomeService::MachineHomeService(ros::NodeHandle node, machine::Machine& machine,
+                                       CallQueues& queues)
+    : machine_(machine) {
+  node.setCallbackQueue(&queues.lines());
+  service_ = node.advertiseService("home", &MachineHomeService::home, this);
+}
+
+bool MachineHomeService::home(HomeAxes::Request& request, HomeAxes::Response& response) {
+  return respond(response, [&] {
+    if (request.wait != 0) {
+      const auto results = machine_.home(request.name);
+      response.success = areAllHomed(results);
+      response.message = messageOf(results);
+      return;
+    }
+    task_.start([&] { machine_.checkHoming(request.name); },
+                [this, names = request.name] { homeAndLog(machine_, names); });
+    response.message = "the axes are being homed";
+  });
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,175 @@
+#include "machine_services.h"
+
+#include <ros/console.h>
+#include <std_srvs/SetBool.h>
+#include <stepdriver/MoveLine.h>
+#include <stepdriver/RigReport.h>
+#include <stepdriver/SpeedOverride.h>
+
+#include <exception>
+#include <utility>
+
+#include "common/text.h"
+#include "respond.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+machine::LineRequest lineRequest(const MoveLine::Request& request) {
+  machine::LineRequest line;
+  line.names = request.name;
+  line.positions = request.position;
+  line.relative = request.relative != 0;
+  line.velocity = request.velocity;
+  line.duration = request.duration;
+  return line;
+}
+
+void moveLine(machine::Machine& machine, const MoveLine::Request& request,
+              MoveLine::Response& response) {
+  const machine::CoordinatedMove move = machine.moveLine(lineRequest(request));
+  if (request.wait != 0) {
+    machine::CoordinatedResult result = machine.wait(move);
+    response.success = result.end == axis::MoveEnd::kReached;
+    response.message = std::move(result.message);
+    response.position = std::move(result.positions);
+    response.duration = result.duration;
+    return;
+  }
+  for (const auto& [name, own] : move.members) {
+    const config::Kind kind = machine.axis(name).config().kind;
+    response.message += (response.message.empty() ? "" : ", ") + name + " to " +
+                        roundedText(own.target) + " " + unitOf(kind);
+    response.position.push_back(own.target);
+  }
+  response.message = "a line: " + response.message + " in " + roundedText(move.duration) + " s";
+  response.duration = move.duration;
+}
+
+/// "2 short step high, 1 step while asleep"
+std::string kindsText(const sim::RigAxisReport& report) {
+  std::string text;
+  for (const auto& [violation, count] : report.violations) {
+    if (!text.empty()) text += ", ";
+    text += std::to_string(count) + " " + sim::nameOf(violation);
+  }
+  return text.empty() ? "none" : text;
+}
+
+RigReport::Response reportOf(setup::Simulation& simulation) {
+  simulation.rig().flushTrace();
+  RigReport::Response response;
+  for (const config::AxisConfig& axis : simulation.axes()) {
+    const sim::RigAxisReport report = simulation.rig().report(axis.name);
+    response.name.push_back(axis.name);
+    response.pulses_forward.push_back(report.pulses_forward);
+    response.pulses_backward.push_back(report.pulses_backward);
+    response.carriage.push_back(report.carriage / config::configUnitsPerUnit(axis.kind));
+    response.microsteps.push_back(report.microsteps);
+    response.violations.push_back(report.totalViolations());
+    response.violation_kinds.push_back(kindsText(report));
+  }
+  return response;
+}
+
+}  // namespace
+
+MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& machine,
+                                 CallQueues& queues)
+    : node_(node), queues_(queues) {
+  advertise("stop", queues.stops(), "all axes stop", [&machine] { machine.stop(); });
+  advertise("emergency_stop", queues.emergency(), "all axes are stopped; recover ends that",
+            [&machine] { machine.emergencyStop(); });
+  advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
+  advertise("hold", queues.stops(),
+            "all axes are on hold until resume or stop; those that move come to rest and keep "
+            "their goals",
+            [&machine] { machine.hold(); });
+  advertise("resume", queues.control(), "the hold is over: held motions continue",
+            [&machine] { machine.resume(); });
+  advertiseSpeedOverride(machine);
+  advertiseMoveLine(machine);
+}
+
+void MachineServices::advertiseMoveLine(machine::Machine& machine) {
+  const boost::function<bool(MoveLine::Request&, MoveLine::Response&)> handler =
+      [&machine](MoveLine::Request& request, MoveLine::Response& response) {
+        return respond(response, [&] { moveLine(machine, request, response); });
+      };
+  node_.setCallbackQueue(&queues_.lines());
+  servers_.push_back(node_.advertiseService("move_line", handler));
+}
+
+void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
+  const boost::function<bool(SpeedOverride::Request&, SpeedOverride::Response&)> handler =
+      [&machine](SpeedOverride::Request& request, SpeedOverride::Response& response) {
+        return respond(response, [&] {
+          machine.setSpeedOverride(request.factor);
+          response.message = "all axes move at " + roundedText(request.factor) +
+                             " times the velocity that is commanded, within their maximum";
+        });
+      };
+  node_.setCallbackQueue(&queues_.control());
+  servers_.push_back(node_.advertiseService("speed_override", handler));
+}
+
+void MachineServices::advertise(const std::string& name, ros::CallbackQueue& queue,
+                                const std::string& done, const std::function<void()>& action) {
+  using Service = std_srvs::Trigger;
+  const boost::function<bool(Service::Request&, Service::Response&)> handler =
+      [done, action](Service::Request& /*request*/, Service::Response& response) {
+        return respond(response, [&] {
+          action();
+          response.message = done;
+        });
+      };
+  node_.setCallbackQueue(&queue);
+  servers_.push_back(node_.advertiseService(name, handler));
+}
+
+void MachineServices::advertiseRig(setup::Simulation& simulation) {
+  const boost::function<bool(RigReport::Request&, RigReport::Response&)> handler =
+      [&simulation](RigReport::Request& /*request*/, RigReport::Response& response) {
+        try {
+          response = reportOf(simulation);
+        } catch (const std::exception& error) {
+          ROS_ERROR_NAMED("rig", "%s", error.what());
+          return false;
+        }
+        return true;
+      };
+  node_.setCallbackQueue(&queues_.control());
+  servers_.push_back(node_.advertiseService("rig/report", handler));
+
+  using Press = std_srvs::SetBool;
+  const boost::function<bool(Press::Request&, Press::Response&)> press =
+      [&simulation](Press::Request& request, Press::Response& response) {
+        return respond(response, [&] {
+          simulation.pressEmergencyStop(request.data != 0);
+          response.message = request.data != 0 ? "the button is pressed" : "the button is released";
+        });
+      };
+  servers_.push_back(node_.advertiseService("rig/emergency_stop", press));
+  for (const config::AxisConfig& axis : simulation.axes()) {
+    if (axis.endstop_min) advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMin);
+    if (axis.endstop_max) advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMax);
+  }
+}
+
+void MachineServices::advertiseEndstop(setup::Simulation& simulation, const std::string& axis,
+                                       setup::Simulation::End end) {
+  using Press = std_srvs::SetBool;
+  const std::string name = end == setup::Simulation::End::kMin ? "min" : "max";
+  const boost::function<bool(Press::Request&, Press::Response&)> press =
+      [&simulation, axis, end, name](Press::Request& request, Press::Response& response) {
+        return respond(response, [&] {
+          simulation.pressEndstop(axis, end, request.data != 0);
+          response.message = axis + ": the switch at the " + name + " end is " +
+                             (request.data != 0 ? "pressed" : "let go");
+        });
+      };
+  servers_.push_back(node_.advertiseService("rig/" + axis + "/press_" + name, press));
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/service_server.h>
+#include <std_srvs/Trigger.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "node/calls/call_queues.h"
+#include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/setup/simulation.h"
+
+namespace stepdriver::ros_node {
+
+/// The services of the whole machine. They are called from any thread of their queues.
+class MachineServices {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues outlive the services.
+  MachineServices(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
+
+  /// Adds the services of the simulated rig. @param simulation outlives the services.
+  void advertiseRig(setup::Simulation& simulation);
+
+ private:
+  void advertise(const std::string& name, ros::CallbackQueue& queue, const std::string& done,
+                 const std::function<void()>& action);
+
+  void advertiseEndstop(setup::Simulation& simulation, const std::string& axis,
+                        setup::Simulation::End end);
+  void advertiseSpeedOverride(machine::Machine& machine);
+  void advertiseMoveLine(machine::Machine& machine);
+
+  ros::NodeHandle node_;
+  CallQueues& queues_;
+  std::vector<ros::ServiceServer> servers_;
+};
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,109 @@
+#include "jog_subscriber.h"
+
+#include <ros/console.h>
+#include <ros/transport_hints.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+// A stream of messages: one that is late is of no use when the next has come.
+constexpr std::uint32_t kQueued = 1;
+// The time-out is kept to this part of itself.
+constexpr double kTimeoutPart = 0.05;
+
+}  // namespace
+
+JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
+                             double timeout)
+    : machine_(machine),
+      timeout_(timeout),
+      streams_(machine.axes().size()),
+      heard_(machine.axes().size()),
+      poll_(onQueue(queues.control(), node), ros::WallDuration(timeout * kTimeoutPart),
+            [this] { return endWhatIsOver(); }) {
+  node.setCallbackQueue(&queues.control());
+  subscriber_ = node.subscribe("jog", kQueued, &JogSubscriber::take, this,
+                               ros::TransportHints().tcpNoDelay());
+}
+
+void JogSubscriber::take(const Jog::ConstPtr& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    const std::vector<std::size_t> axes = axesOf(*message);
+    for (std::size_t i = 0; i < axes.size(); ++i) jog(axes[i], message->velocity[i]);
+  } catch (const Refused& refused) {
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", refused.what());
+  }
+}
+
+std::vector<std::size_t> JogSubscriber::axesOf(const Jog& message) const {
+  if (message.name.size() != message.velocity.size()) {
+    throw Refused("there are " + std::to_string(message.name.size()) + " names and " +
+                  std::to_string(message.velocity.size()) +
+                  " velocities; each name must have one velocity");
+  }
+  std::vector<std::size_t> axes;
+  for (std::size_t i = 0; i < message.name.size(); ++i) {
+    const axis::Axis& wanted = machine_.axis(message.name[i]);
+    const auto found = std::find_if(machine_.axes().begin(), machine_.axes().end(),
+                                    [&wanted](const auto& axis) { return axis.get() == &wanted; });
+    const auto index = static_cast<std::size_t>(found - machine_.axes().begin());
+    if (std::find(axes.begin(), axes.end(), index) != axes.end()) {
+      throw Refused("the axis " + message.name[i] + " is named twice");
+    }
+    if (!std::isfinite(message.velocity[i])) {
+      throw Refused(message.name[i] + ": the velocity must be a finite number");
+    }
+    axes.push_back(index);
+  }
+  return axes;
+}
+
+void JogSubscriber::jog(std::size_t axis, double velocity) {
+  if (velocity == 0.0) {
+    streams_[axis] = Stream();
+    return end(axis);
+  }
+  axis::Axis& wanted = *machine_.axes()[axis];
+  Stream& stream = streams_[axis];
+  const bool goes_on = !stream.last.isZero() && ros::SteadyTime::now() - stream.last < timeout_;
+  try {
+    if (!goes_on) stream.stops = wanted.state().stops;
+    wanted.jog(velocity, stream.stops);
+    heard_[axis] = ros::SteadyTime::now();
+    poll_.begin();
+  } catch (const Error& error) {
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
+  }
+  // When it was dealt with: a call that had to wait is no pause of the stream.
+  stream.last = ros::SteadyTime::now();
+}
+
+void JogSubscriber::end(std::size_t axis) {
+  heard_[axis] = ros::SteadyTime();
+  try {
+    machine_.axes()[axis]->jog(0.0);
+  } catch (const Error& error) {
+    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
+  }
+}
+
+bool JogSubscriber::endWhatIsOver() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const ros::SteadyTime now = ros::SteadyTime::now();
+  for (std::size_t axis = 0; axis < heard_.size(); ++axis) {
+    if (heard_[axis].isZero() || now - heard_[axis] < timeout_) continue;
+    ROS_INFO_NAMED("jog", "%s: no jog for %g s, it comes to rest",
+                   machine_.axes()[axis]->config().name.c_str(), timeout_.toSec());
+    end(axis);
+  }
+  return std::any_of(heard_.begin(), heard_.end(),
+                     [](const ros::SteadyTime& heard) { return !heard.isZero(); });
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/subscriber.h>
+#include <ros/time.h>
+#include <stepdriver/Jog.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "node/calls/call_queues.h"
+#include "node/calls/periodic_poll.h"
+#include "stepdriver_core/machine/machine.h"
+
+namespace stepdriver::ros_node {
+
+/// The topic ~jog. A message that can't be understood moves nothing; an axis that refuses its
+/// velocity doesn't keep the others from theirs. Both are logged, at most once a second. A stream
+/// of messages does not run on through a stop of the axis: what follows is refused until the stream
+/// has paused for the timeout or sent 0.
+class JogSubscriber {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues outlive the subscriber.
+  /// @param timeout [s] on the steady clock, after which an axis without a message comes to rest.
+  JogSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
+                double timeout);
+  JogSubscriber(const JogSubscriber&) = delete;
+  JogSubscriber& operator=(const JogSubscriber&) = delete;
+
+ private:
+  /// Messages for one axis that follow one another within the timeout.
+  struct Stream {
+    ros::SteadyTime last;     // its last message, refused or not; zero: there is no stream
+    std::uint64_t stops = 0;  // AxisState::stops when it began
+  };
+
+  void take(const Jog::ConstPtr& message);
+  /// @return the axes that the message names, by their index. @throw Refused
+  std::vector<std::size_t> axesOf(const Jog& message) const;
+  void jog(std::size_t axis, double velocity);
+  void end(std::size_t axis);
+  /// @return whether there are axes that still jog.
+  bool endWhatIsOver();
+
+  machine::Machine& machine_;
+  const ros::WallDuration timeout_;
+  std::mutex mutex_;
+  std::vector<Stream> streams_;  // of each axis
+  // The last message of each axis that was taken; zero: none, or it is over.
+  std::vector<ros::SteadyTime> heard_;
+  PeriodicPoll poll_;
+  ros::Subscriber subscriber_;
+};
+
+}  // namespace stepdriver::ros_node

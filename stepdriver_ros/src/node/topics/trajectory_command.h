@@ -1,0 +1,34 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/subscriber.h>
+#include <trajectory_msgs/JointTrajectory.h>
+
+#include "node/calls/call_queues.h"
+#include "refusal_log.h"
+#include "stepdriver_core/machine/machine.h"
+#include "trajectory_message.h"
+
+namespace stepdriver::ros_node {
+
+/// The topic ~command: a trajectory replaces what its joints do; one without points stops them, or
+/// all axes where it names no joint. What is refused moves nothing and is logged.
+class TrajectoryCommand {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues outlive the subscriber.
+  TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues);
+  TrajectoryCommand(const TrajectoryCommand&) = delete;
+  TrajectoryCommand& operator=(const TrajectoryCommand&) = delete;
+
+ private:
+  void take(const trajectory_msgs::JointTrajectory::ConstPtr& message);
+  void stop(const std::vector<std::string>& joints);
+
+  machine::Machine& machine_;
+  const AxisOfJoint axes_;
+  RefusalLog log_{"command"};
+  ros::Subscriber subscriber_;
+};
+
+}  // namespace stepdriver::ros_node

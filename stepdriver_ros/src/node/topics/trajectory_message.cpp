@@ -1,0 +1,126 @@
+#include "trajectory_message.h"
+
+#include <algorithm>
+
+#include "common/text.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+using Kind = BadTrajectory::Kind;
+
+// [s] What is nearer starts at once: a plan is made for a moment as far ahead as this.
+constexpr double kShortestDelay = 0.001;
+
+std::string namesOf(const AxisOfJoint& axes) {
+  std::string names;
+  for (const auto& [joint, axis] : axes) names += (names.empty() ? "" : ", ") + joint;
+  return names;
+}
+
+/// [s] A point's time after the start of a trajectory that began `late` ago.
+double timeOf(const trajectory_msgs::JointTrajectory& message, std::size_t index, double late) {
+  const double planned = message.points[index].time_from_start.toSec();
+  if (late == 0.0) return planned;
+  const bool tells_where_it_begins = index == 0 && planned == 0.0 && message.points.size() > 1;
+  if (tells_where_it_begins) return 0.0;
+  if (planned <= late) {
+    throw BadTrajectory(Kind::kOldStamp, "point " + std::to_string(index) + ", " +
+                                             roundedText(planned) +
+                                             " s after header.stamp, is in the past by " +
+                                             roundedText(late - planned) + " s");
+  }
+  return planned - late;
+}
+
+machine::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point, double time) {
+  machine::TrajectoryPoint converted;
+  converted.time = time;
+  converted.positions = point.positions;
+  converted.velocities = point.velocities;
+  converted.accelerations = point.accelerations;
+  return converted;
+}
+
+std::vector<double> restingPositions(const machine::Machine& machine,
+                                     const std::vector<std::string>& axes, double delay) {
+  std::vector<double> positions;
+  for (const std::string& axis : axes) {
+    const axis::AxisState state = machine.axis(axis).state();
+    if (state.moving) {
+      throw Refused(axis + ": it moves; a trajectory that starts later, " + roundedText(delay) +
+                    " s from now by its header.stamp, needs its axes at rest");
+    }
+    positions.push_back(state.position);
+  }
+  return positions;
+}
+
+}  // namespace
+
+AxisOfJoint axisOfJoint(const machine::Machine& machine) {
+  AxisOfJoint axes;
+  for (const auto& axis : machine.axes()) axes[axis->config().joint] = axis->config().name;
+  return axes;
+}
+
+std::vector<std::string> axesOf(const std::vector<std::string>& joints, const AxisOfJoint& axes) {
+  if (joints.empty()) {
+    throw BadTrajectory(Kind::kJoints, "it names no joint; there are " + namesOf(axes));
+  }
+  std::vector<std::string> found;
+  for (const std::string& joint : joints) {
+    const auto axis = axes.find(joint);
+    if (axis == axes.end()) {
+      throw BadTrajectory(Kind::kJoints,
+                          "there is no joint " + joint + "; there are " + namesOf(axes));
+    }
+    if (std::find(found.begin(), found.end(), axis->second) != found.end()) {
+      throw BadTrajectory(Kind::kJoints, "the joint " + joint + " is named twice");
+    }
+    found.push_back(axis->second);
+  }
+  return found;
+}
+
+TimedTrajectory timedTrajectory(const trajectory_msgs::JointTrajectory& message,
+                                const AxisOfJoint& axes, ros::Time now) {
+  TimedTrajectory trajectory;
+  trajectory.request.names = axesOf(message.joint_names, axes);
+  if (message.points.empty()) throw BadTrajectory(Kind::kInvalid, "it has no points");
+  const double ahead = message.header.stamp.isZero() ? 0.0 : (message.header.stamp - now).toSec();
+  if (ahead > kShortestDelay) trajectory.delay = ahead;
+  const double late = std::max(0.0, -ahead);
+  for (std::size_t i = 0; i < message.points.size(); ++i) {
+    trajectory.request.points.push_back(pointOf(message.points[i], timeOf(message, i, late)));
+  }
+  return trajectory;
+}
+
+machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
+                                     const std::vector<double>& positions) {
+  machine::TrajectoryRequest request = trajectory.request;
+  auto first_to_come = request.points.begin();
+  if (first_to_come->time == 0.0 && request.points.size() > 1) ++first_to_come;
+  for (auto point = first_to_come; point != request.points.end(); ++point) {
+    point->time += trajectory.delay;
+  }
+  machine::TrajectoryPoint rest;
+  rest.time = trajectory.delay;
+  rest.positions = positions;
+  rest.velocities.resize(positions.size());
+  rest.accelerations.resize(positions.size());
+  request.points.insert(first_to_come, rest);
+  return request;
+}
+
+machine::CoordinatedMove followMessage(machine::Machine& machine,
+                                       const trajectory_msgs::JointTrajectory& message,
+                                       const AxisOfJoint& axes) {
+  const TimedTrajectory trajectory = timedTrajectory(message, axes, ros::Time::now());
+  if (trajectory.delay == 0.0) return machine.followTrajectory(trajectory.request);
+  return machine.followTrajectory(
+      withDelay(trajectory, restingPositions(machine, trajectory.request.names, trajectory.delay)));
+}
+
+}  // namespace stepdriver::ros_node

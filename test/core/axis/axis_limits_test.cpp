@@ -1,0 +1,244 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "stepdriver_core/axis/axis.h"
+#include "support/bench.h"
+#include "support/refusal.h"
+
+// 1000 steps/m, at most 1 m/s and 2 m/s^2, unless it says another.
+
+namespace stepdriver {
+namespace {
+
+using axis::AxisLimits;
+using axis::MoveEnd;
+using test::Bench;
+using test::linearAxis;
+using test::violationsOf;
+
+class AxisLimitsTest : public testing::Test {
+ protected:
+  void build(double jerk = 0.0) {
+    config::AxisConfig config = linearAxis("x");
+    config.steps_per_unit = 1000.0;
+    config.max_speed = 1.0;
+    config.acceleration = 2.0;
+    config.deceleration = 2.0;
+    config.jerk = jerk;
+    config.min_position = -50.0;
+    config.max_position = 50.0;
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
+    specs[0].min_switch->position = -100'000.0;
+    specs[0].max_switch->position = 100'000.0;
+    bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config}, specs);
+  }
+  void SetUp() override { build(); }
+  void TearDown() override { EXPECT_EQ(violationsOf(bench->report()), ""); }
+
+  axis::Axis& x() { return bench->axis(); }
+  void advance(double seconds) { bench->machine->advance(seconds); }
+  double velocity() { return x().state().velocity; }
+
+  std::unique_ptr<Bench> bench;
+};
+
+TEST_F(AxisLimitsTest, TellsTheHighestStepRateOfTheMotionUnderWay) {
+  EXPECT_EQ(x().peakRate(), 0.0);
+  const axis::Move move = x().moveTo(0.08);  // a triangle up to 0.4 m/s
+  advance(0.05);
+  EXPECT_NEAR(x().peakRate(), 400.0, 0.1) << "though it is slow still";
+  EXPECT_LT(velocity(), 0.11);
+  x().wait(move);
+  EXPECT_EQ(x().peakRate(), 0.0);
+}
+
+TEST_F(AxisLimitsTest, MovesWithinThemFromTheNextMotionOn) {
+  EXPECT_NEAR(bench->move(2.0).duration, 2.5, 1e-3);
+  x().setLimits({0.5, 1.0, 0.25, 0.0});
+  // Ramps of 0.5 s and 2 s, 0.625 m; 1.375 m between them.
+  EXPECT_NEAR(bench->move(0.0).duration, 0.5 + 2.0 + 2.75, 1e-3);
+  const AxisLimits holding = x().limits();
+  EXPECT_EQ(holding.max_speed, 0.5);
+  EXPECT_EQ(holding.acceleration, 1.0);
+  EXPECT_EQ(holding.deceleration, 0.25);
+  x().setLimits({});
+  EXPECT_NEAR(bench->move(2.0).duration, 2.5, 1e-3) << "0: as configured";
+}
+
+TEST_F(AxisLimitsTest, TakesAJerkLimitWhereNoneIsConfigured) {
+  x().setLimits({0.0, 0.0, 0.0, 4.0});
+  EXPECT_NEAR(bench->move(2.0).duration, 2.5 + 0.5, 1e-3) << "2 m/s^2 over 4 m/s^3 longer";
+}
+
+TEST_F(AxisLimitsTest, RefusesCommandsBeyondTheLowerSpeed) {
+  x().setLimits({0.5, 0.0, 0.0, 0.0});
+  EXPECT_REFUSED(x().moveTo(1.0, false, 0.6), "above the maximum 0.5 m/s");
+  EXPECT_REFUSED(x().jog(-0.6), "above the maximum");
+}
+
+TEST_F(AxisLimitsTest, SlowsDownAMotionUnderWayAtItsDeceleration) {
+  const axis::Move move = x().moveTo(10.0);
+  advance(2.0);
+  EXPECT_NEAR(velocity(), 1.0, 1e-9);
+  x().setLimits({0.4, 0.0, 0.5, 0.0});
+  advance(0.201);
+  EXPECT_NEAR(velocity(), 0.6, 1e-6) << "by 2 m/s^2, which it began with";
+  advance(0.2);
+  EXPECT_NEAR(velocity(), 0.4, 1e-9);
+  const double before = x().state().time_left;
+  EXPECT_NEAR(before, (10.0 - x().state().position) / 0.4 + 0.1, 0.005);
+  EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses(), 10'000);
+}
+
+TEST_F(AxisLimitsTest, GoesFasterAgainWhereTheLimitIsRaised) {
+  x().setLimits({0.25, 0.0, 0.0, 0.0});
+  x().jog(0.25);
+  advance(1.0);
+  x().setLimits({});
+  advance(1.0);
+  EXPECT_NEAR(velocity(), 0.25, 1e-9) << "as it was asked for";
+  x().jog(1.0);
+  advance(1.0);
+  EXPECT_NEAR(velocity(), 1.0, 1e-9);
+}
+
+// With the lower deceleration it would pass its target, and here the soft limit too.
+TEST_F(AxisLimitsTest, ComesToRestInTimeWhateverIsSetMeanwhile) {
+  const axis::Move move = x().moveTo(50.0);
+  advance(49.8);
+  x().setLimits({0.0, 0.1, 0.1, 0.2});
+  const axis::Move other = x().moveTo(49.99);
+  EXPECT_EQ(x().wait(move).end, MoveEnd::kReplaced);
+  double farthest = 0.0;
+  while (x().state().moving) {
+    advance(0.001);
+    farthest = std::max(farthest, x().state().position);
+  }
+  EXPECT_EQ(x().wait(other).end, MoveEnd::kReached);
+  EXPECT_LE(farthest, 50.0);
+  const axis::Move slow = x().moveTo(49.0);
+  EXPECT_GT(slow.duration, 6.0) << "from rest on they hold: 2 sqrt(0.99 / 0.1)";
+}
+
+TEST_F(AxisLimitsTest, AStopKeepsItsDeceleration) {
+  x().setLimits({0.0, 0.0, 0.1, 0.0});
+  x().jog(1.0);
+  advance(2.0);
+  x().stop();
+  advance(0.002);
+  EXPECT_NEAR(x().state().time_left, 0.499, 1e-4);
+}
+
+TEST_F(AxisLimitsTest, AHeldMoveGoesOnWithinThem) {
+  const axis::Move move = x().moveTo(4.0);
+  advance(1.0);
+  bench->machine->hold();
+  advance(1.0);
+  x().setLimits({0.5, 0.5, 0.5, 0.0});
+  bench->machine->resume();
+  advance(0.501);
+  EXPECT_NEAR(velocity(), 0.25, 1e-6);
+  EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
+}
+
+// From 0.3 m/s with 2 m/s^2 and 20 m/s^3 it takes 0.25 s and less than 80 steps.
+TEST_F(AxisLimitsTest, NoStopTakesLongerThanByTheConfiguredOnes) {
+  const std::vector<std::function<void()>> stops = {
+      [this] { x().stop(); },
+      [this] { bench->machine->stop(); },
+      [this] { bench->machine->hold(); },
+      [this] { x().enable(false); },
+      [this] { bench->machine->shutdown(); },
+  };
+  for (const bool line : {false, true}) {
+    for (std::size_t i = 0; i < stops.size(); ++i) {
+      SCOPED_TRACE(testing::Message() << "stop " << i << (line ? " of a line" : " of a move"));
+      build(20.0);
+      x().setLimits({0.0, 0.0, 0.0, 0.01});
+      if (line) {
+        bench->machine->moveLine({{"x"}, {40.0}});
+      } else {
+        x().moveTo(40.0);
+      }
+      for (int k = 0; k < 1000 && velocity() < 0.3; ++k) advance(0.1);
+      ASSERT_NEAR(velocity(), 0.3, 0.02);
+      const std::int64_t pulses = bench->pulses();
+      const std::int64_t begin = bench->clock.now();
+      stops[i]();
+      for (int k = 0; k < 1000 && x().state().moving; ++k) advance(0.01);
+      EXPECT_LE(static_cast<double>(bench->clock.now() - begin) * 1e-9, 0.30);
+      EXPECT_LE(bench->pulses() - pulses, 80);
+    }
+  }
+}
+
+TEST_F(AxisLimitsTest, RefusesWhatIsBelowTheLowestOfAConfiguration) {
+  build(20.0);
+  struct Bad {
+    AxisLimits limits;
+    const char* words;
+  };
+  for (const Bad& bad : {
+           Bad{{5e-324, 0, 0, 0},
+               "the max_speed 4.94065646e-324 m/s is below the lowest, 1e-06 m/s"},
+           Bad{{0, 5e-324, 0, 0}, "the acceleration 4.94065646e-324 m/s^2 is below the lowest"},
+           Bad{{0, 0, 0.9e-6, 0}, "the deceleration 9e-07 m/s^2 is below the lowest"},
+           Bad{{0, 0, 0, 0.9e-6}, "which is 0.001 steps/s^3"},
+       }) {
+    EXPECT_REFUSED(x().setLimits(bad.limits), bad.words);
+  }
+  EXPECT_EQ(x().limits().max_speed, 1.0);
+  EXPECT_EQ(x().limits().acceleration, 2.0);
+  x().setLimits({1e-6, 1e-6, 1e-6, 1e-6});
+}
+
+TEST_F(AxisLimitsTest, RefusesWhatIsBeyondTheConfiguredOnesAndChangesNothing) {
+  build(4.0);
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  struct Bad {
+    AxisLimits limits;
+    const char* words;
+  };
+  for (const Bad& bad :
+       {Bad{{1.01, 0, 0, 0}, "the max_speed 1.01 m/s is above the configured 1 m/s"},
+        Bad{{0.5, 2.5, 0, 0}, "the acceleration 2.5 m/s^2 is above the configured 2 m/s^2"},
+        Bad{{0.5, 0, 3, 0}, "the deceleration 3 m/s^2 is above the configured 2 m/s^2"},
+        Bad{{0.5, 0, 0, 5}, "the jerk 5 m/s^3 is above the configured 4 m/s^3"},
+        Bad{{-1, 0, 0, 0}, "the max_speed must be a finite number"},
+        Bad{{kNaN, 0, 0, 0}, "the max_speed must be a finite number"},
+        Bad{{0.5, kInfinity, 0, 0}, "the acceleration must be a finite number"},
+        Bad{{0.5, 0, 0, kNaN}, "the jerk must be a finite number"}}) {
+    EXPECT_REFUSED(x().setLimits(bad.limits), bad.words);
+    EXPECT_EQ(x().limits().max_speed, 1.0);
+    EXPECT_EQ(x().limits().acceleration, 2.0);
+    EXPECT_EQ(x().limits().jerk, 4.0);
+  }
+}
+
+TEST_F(AxisLimitsTest, AxesThatMoveTogetherKeepWhatTheyBeganWith) {
+  config::AxisConfig x_config = linearAxis("x");
+  config::AxisConfig y_config = linearAxis("y");
+  bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{x_config, y_config});
+  machine::LineRequest line;
+  line.names = {"x", "y"};
+  line.positions = {0.05, 0.025};
+  const auto move = bench->machine->moveLine(line);
+  advance(0.05);
+  x().setLimits({0.01, 0.1, 0.1, 0.0});
+  const auto result = bench->machine->wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached);
+  EXPECT_NEAR(result.duration, move.duration, 1e-9);
+  EXPECT_NEAR(bench->move(0.049).duration, 0.2, 1e-3) << "0.001 m at 0.01 m/s with 0.1 m/s^2";
+}
+
+}  // namespace
+}  // namespace stepdriver

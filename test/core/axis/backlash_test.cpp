@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "stepdriver_core/axis/axis.h"
+#include "support/bench.h"
+#include "support/refusal.h"
+
+// An axis that loses 30 microsteps at each reversal: 80 microsteps/mm, 1/16.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using test::Bench;
+using test::linearAxis;
+using test::violationsOf;
+
+constexpr std::int64_t kBacklash = 30;
+
+class Backlash : public testing::Test {
+ protected:
+  void SetUp() override {
+    config::AxisConfig config = linearAxis("x");
+    config.backlash = kBacklash / config.steps_per_unit;
+    bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config, linearAxis("y")});
+  }
+
+  axis::Axis& x() { return bench->axis(); }
+  /// Of the motor, as the rig has counted its pulses.
+  std::int64_t motor() { return bench->pulses(); }
+  double position() { return x().state().position; }
+  void moveTo(double position_m) { EXPECT_EQ(bench->move(position_m).end, MoveEnd::kReached); }
+  void expectClean() {
+    EXPECT_EQ(violationsOf(bench->report()), "");
+    EXPECT_EQ(bench->machine->figures().slips, 0U);
+  }
+
+  std::unique_ptr<Bench> bench;
+};
+
+TEST_F(Backlash, IsTakenUpAtEachReversalAndIsNoPartOfThePosition) {
+  moveTo(0.010);
+  EXPECT_EQ(motor(), 800 + kBacklash);
+  EXPECT_DOUBLE_EQ(position(), 0.010);
+  moveTo(0.020);
+  EXPECT_EQ(motor(), 1600 + kBacklash);
+  moveTo(0.005);
+  EXPECT_EQ(motor(), 400);
+  EXPECT_DOUBLE_EQ(position(), 0.005);
+  moveTo(0.005);
+  EXPECT_EQ(motor(), 400);
+  moveTo(-0.001);
+  EXPECT_EQ(motor(), -80);
+  moveTo(0.0);
+  EXPECT_EQ(motor(), kBacklash);
+  expectClean();
+}
+
+TEST_F(Backlash, LetsTheJointStandWhileItIsTakenUp) {
+  x().moveTo(0.010);
+  std::int64_t taken = 0;
+  while (x().state().moving) {
+    bench->machine->advance(1e-4);
+    const std::int64_t now = motor();
+    EXPECT_GE(now, taken);
+    taken = now;
+    EXPECT_DOUBLE_EQ(position() * 80'000.0,
+                     static_cast<double>(std::max<std::int64_t>(0, now - kBacklash)));
+    if (now < kBacklash) {
+      EXPECT_EQ(x().state().velocity, 0.0);
+    }
+  }
+  expectClean();
+}
+
+TEST_F(Backlash, IsThereForATargetThatIsReplacedOnTheWay) {
+  x().moveTo(0.050);
+  bench->machine->advance(0.3);
+  const axis::Move back = x().moveTo(0.010);
+  EXPECT_EQ(x().wait(back).end, MoveEnd::kReached);
+  EXPECT_EQ(motor(), 800);
+  EXPECT_DOUBLE_EQ(position(), 0.010);
+  // One that it can't stop before: it comes back to it from above.
+  x().moveTo(0.050);
+  bench->machine->advance(0.3);
+  const double passing = position() + 0.001;
+  const axis::Move near = x().moveTo(passing);
+  EXPECT_GT(near.overshoot, 0.0);
+  const axis::MoveResult result = x().wait(near);
+  EXPECT_EQ(result.end, MoveEnd::kReached);
+  EXPECT_NEAR(result.position, passing, 0.5 / 80'000.0);
+  EXPECT_EQ(motor(), std::llround(passing * 80'000.0));
+  expectClean();
+}
+
+TEST_F(Backlash, IsTakenUpBeforeALine) {
+  moveTo(0.010);
+  const auto line = bench->machine->moveLine({{"x", "y"}, {0.005, 0.010}});
+  EXPECT_EQ(bench->machine->wait(line).end, MoveEnd::kReached);
+  EXPECT_EQ(motor(), 400);
+  EXPECT_EQ(bench->pulses("y"), 800);
+  EXPECT_DOUBLE_EQ(position(), 0.005);
+  // y waited for it: its first step comes after the last one that x took for the backlash.
+  const auto x_steps = bench->trace->times("x", "step", true);
+  const auto y_steps = bench->trace->times("y", "step", true);
+  EXPECT_GT(y_steps.front(), x_steps[800 + 2 * kBacklash - 1]);
+  expectClean();
+}
+
+TEST_F(Backlash, EndsAJogAtTheSoftLimitOfTheJoint) {
+  config::AxisConfig config = linearAxis("x");
+  config.backlash = kBacklash / config.steps_per_unit;
+  config.max_position = 0.010;
+  bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config});
+  x().jog(0.05);
+  while (x().state().moving) bench->machine->advance(1e-3);
+  EXPECT_DOUBLE_EQ(position(), 0.010);
+  EXPECT_EQ(motor(), 800 + kBacklash);
+  expectClean();
+}
+
+TEST_F(Backlash, KeepsThePositionOverAMicrostepChange) {
+  moveTo(0.010);
+  moveTo(0.0098);  // 784, a full step: none of the backlash is taken up
+  for (const int mode : {8, 16}) {
+    x().setMicrosteps(mode);
+    EXPECT_DOUBLE_EQ(position(), 0.0098);
+  }
+  moveTo(0.010);
+  EXPECT_EQ(motor() - 784, 16 + kBacklash);
+  EXPECT_REFUSED(x().setMicrosteps(4), "1/4 has no position at 0.01 m");
+  expectClean();
+}
+
+}  // namespace
+}  // namespace stepdriver

@@ -1,0 +1,199 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/bench.h"
+#include "support/refusal.h"
+
+// A hold is a state of the machine: moving or not, it lasts until a resume or a stop of the
+// machine.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using test::Bench;
+using test::linearAxis;
+using test::violationsOf;
+
+bool within(const std::function<bool()>& true_now) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  while (!true_now()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+class Hold : public testing::Test {
+ protected:
+  void SetUp() override {
+    bench = std::make_unique<Bench>(
+        std::vector<config::AxisConfig>{linearAxis("x"), linearAxis("y"), linearAxis("z")});
+    for (const auto& axis : machine().axes()) axis->setPosition(0.0);
+  }
+  void TearDown() override {
+    for (const char* name : {"x", "y", "z"}) EXPECT_EQ(violationsOf(bench->report(name)), "");
+  }
+
+  machine::Machine& machine() { return *bench->machine; }
+  axis::Axis& axis(const std::string& name) { return bench->axis(name); }
+
+  void expectHeld() {
+    for (const char* name : {"x", "y", "z"}) {
+      EXPECT_TRUE(axis(name).state().held) << name;
+      EXPECT_REFUSED(axis(name).moveTo(0.01), "held; resume or stop it first");
+      EXPECT_REFUSED(axis(name).jog(0.01), "held; resume or stop it first");
+    }
+    EXPECT_REFUSED(machine().moveLine({{"x", "y"}, {0.01, 0.01}}), "held; resume or stop it first");
+    EXPECT_REFUSED(machine().followTrajectory({{"x"}, {{1.0, {0.01}, {}, {}}}}),
+                   "held; resume or stop it first");
+  }
+  void expectFree() {
+    for (const char* name : {"x", "y", "z"}) {
+      EXPECT_FALSE(axis(name).state().held) << name;
+      EXPECT_EQ(bench->move(0.01, name).end, MoveEnd::kReached);
+      EXPECT_EQ(bench->pulses(name), 800);
+    }
+  }
+
+  std::unique_ptr<Bench> bench;
+};
+
+TEST_F(Hold, OfAMachineAtRestLastsUntilAResumeOrAStop) {
+  for (const bool resume : {true, false}) {
+    SetUp();
+    machine().hold();
+    machine().advance(1.0);
+    expectHeld();
+    EXPECT_EQ(bench->pulses("x"), 0);
+    resume ? machine().resume() : machine().stop();
+    expectFree();
+  }
+}
+
+TEST_F(Hold, OfOneMovingAxisHoldsAllAndKeepsTheGoal) {
+  const axis::Move move = axis("x").moveTo(0.05);
+  machine().advance(0.3);
+  machine().hold();
+  machine().advance(1.0);
+  expectHeld();
+  EXPECT_FALSE(axis("x").result(move).has_value());
+  machine().resume();
+  EXPECT_EQ(axis("x").wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 4000);
+  expectFree();
+}
+
+TEST_F(Hold, OutlastsWhatDropsTheGoalThatItKeeps) {
+  const std::vector<std::function<void()>> drops = {
+      [this] { axis("x").stop(); },
+      [this] {
+        axis("x").enable(false);
+        axis("x").enable(true);
+      },
+      [this] {
+        machine().emergencyStop();
+        machine().recover();
+      },
+  };
+  for (std::size_t i = 0; i < drops.size(); ++i) {
+    SCOPED_TRACE(i);
+    SetUp();
+    const axis::Move move = axis("x").moveTo(0.05);
+    machine().advance(0.3);
+    machine().hold();
+    machine().advance(1.0);
+    drops[i]();
+    ASSERT_TRUE(axis("x").result(move).has_value());
+    EXPECT_NE(axis("x").result(move)->end, MoveEnd::kReached);
+    expectHeld();
+    const std::int64_t pulses = bench->pulses("x");
+    machine().resume();
+    machine().advance(1.0);
+    EXPECT_EQ(bench->pulses("x"), pulses) << "there is no goal any more";
+    EXPECT_FALSE(axis("x").state().held);
+    EXPECT_EQ(axis("x").wait(axis("x").moveTo(0.001, true)).end, MoveEnd::kReached);
+  }
+}
+
+TEST_F(Hold, OfAJogEndsItAndLasts) {
+  axis("y").jog(0.05);
+  machine().advance(0.3);
+  machine().hold();
+  machine().advance(1.0);
+  expectHeld();
+  const std::int64_t pulses = bench->pulses("y");
+  machine().resume();
+  machine().advance(1.0);
+  EXPECT_EQ(bench->pulses("y"), pulses);
+}
+
+TEST_F(Hold, OfOneAxisAmongOthersDropsOnlyTheGoalThatIsStopped) {
+  const axis::Move x = axis("x").moveTo(0.05);
+  const axis::Move y = axis("y").moveTo(0.05);
+  machine().advance(0.3);
+  machine().hold();
+  machine().advance(1.0);
+  axis("x").stop();
+  ASSERT_TRUE(axis("x").result(x).has_value());
+  EXPECT_EQ(axis("x").result(x)->end, MoveEnd::kStopped);
+  EXPECT_FALSE(axis("y").result(y).has_value());
+  expectHeld();
+  machine().resume();
+  EXPECT_EQ(axis("y").wait(y).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("y"), 4000);
+  EXPECT_LT(bench->pulses("x"), 4000);
+}
+
+// The clock stands while the line is accepted and the hold comes: x is being stopped then.
+TEST(HoldOfAWaitingLine, LetsItBeginAfterTheResume) {
+  Bench bench({linearAxis("x"), linearAxis("y")}, true, 1.0);
+  for (const auto& axis : bench.machine->axes()) axis->setPosition(0.0);
+  axis::Axis& x = bench.axis("x");
+  const axis::Move move = x.moveTo(0.08, false, 0.01);  // 8 s
+  ASSERT_TRUE(within([&] { return bench.pulses("x") > 20; }));
+  bench.clock.hold();
+  auto line = std::async(std::launch::async, [&] {
+    return bench.machine->wait(bench.machine->moveLine({{"x", "y"}, {0.001, 0.002}, true}));
+  });
+  const bool stopping = within([&] { return x.state().target < 0.079; });
+  bench.machine->hold();
+  bench.clock.release();
+  EXPECT_TRUE(stopping);
+  EXPECT_EQ(x.wait(move).end, MoveEnd::kStopped);
+  EXPECT_TRUE(bench.axis("y").state().held);
+  EXPECT_EQ(bench.pulses("y"), 0);
+  bench.machine->resume();
+  EXPECT_EQ(line.get().end, MoveEnd::kReached);
+  EXPECT_EQ(bench.pulses("x"), 6480) << "0.081 m";
+  EXPECT_EQ(bench.pulses("y"), 160);
+}
+
+TEST_F(Hold, RefusesWhatMovesNothingOnlyToAnAxisThatKeepsAGoal) {
+  axis("y").moveTo(0.05);
+  machine().advance(0.3);
+  machine().hold();
+  machine().advance(1.0);
+  EXPECT_REFUSED(axis("y").setPosition(0.0), "held; resume or stop it first");
+  EXPECT_REFUSED(axis("y").sleep(true), "held; resume or stop it first");
+  axis("x").setPosition(0.002);
+  axis("x").sleep(true);
+  axis("x").sleep(false);
+  axis("x").enable(false);
+  axis("x").enable(true);
+  machine().setSpeedOverride(0.5);
+  axis("x").setLimits({0.05, 0.0, 0.0, 0.0});
+  expectHeld();
+  EXPECT_EQ(bench->pulses("x"), 0);
+}
+
+}  // namespace
+}  // namespace stepdriver

@@ -1,0 +1,249 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/machine/machine.h"
+#include "support/bench.h"
+#include "support/motion_trace.h"
+
+// The motions of docs/motion.md: what it says of them is held against the edges here, and
+// scripts/motion_pictures.sh draws its pictures from the same edges. 1000 steps/m.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using test::Bench;
+using test::linearAxis;
+using test::MotionTrace;
+
+/// 1000 steps/s, 2000 steps/s^2, no limits of position.
+config::AxisConfig config(const std::string& name = "x") {
+  config::AxisConfig config = linearAxis(name, 1000.0, 1.0, 2.0);
+  config.endstop_min.reset();
+  config.endstop_max.reset();
+  return config;
+}
+
+class MotionPictures : public testing::Test {
+ protected:
+  void build(const std::vector<config::AxisConfig>& axes) {
+    bench = std::make_unique<Bench>(axes);
+    trace = std::make_unique<MotionTrace>(*bench);
+  }
+
+  axis::Axis& x() { return bench->axis("x"); }
+  void advance(double seconds) { bench->machine->advance(seconds); }
+  void advanceTo(double time) { advance(time - trace->now()); }
+  void awaitRest() {
+    for (const auto& axis : bench->machine->axes()) {
+      while (axis->state().moving) advance(1e-4);
+    }
+  }
+  void holdDuring(double begin, double end) {
+    advanceTo(begin);
+    trace->mark("hold");
+    bench->machine->hold();
+    awaitRest();
+    advanceTo(end);
+    trace->mark("resume");
+    bench->machine->resume();
+  }
+  double takes(double position) {
+    const axis::Move move = x().moveTo(position);
+    const axis::MoveResult result = x().wait(move);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    EXPECT_NEAR(result.duration, move.duration, 1e-8);
+    return result.duration;
+  }
+  /// From the step before which the speed was this one to the step after which it is that one.
+  double timeOfChange(double from, double to) const {
+    constexpr double kSame = 1e-3;
+    const std::vector<MotionTrace::Step> all = trace->steps("x");
+    double begin = 0.0;
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      const double speed = 1.0 / (all[i].time - all[i - 1].time);
+      if (std::abs(speed - from) < kSame) begin = all[i].time;
+      if (begin > 0.0 && std::abs(speed - to) < kSame) return all[i - 1].time - begin;
+    }
+    return -1.0;
+  }
+
+  std::unique_ptr<Bench> bench;
+  std::unique_ptr<MotionTrace> trace;
+};
+
+TEST_F(MotionPictures, HalfStepLines) {
+  build({config()});
+  const double took = takes(0.008);
+  EXPECT_NEAR(took, 2.0 * std::sqrt(8.0 / 2000.0), 1e-9);
+  const std::vector<MotionTrace::Step> steps = trace->steps("x");
+  ASSERT_EQ(steps.size(), 8U);
+  const double begin = steps[0].time - std::sqrt(2.0 * 0.5 / 2000.0);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double at = std::sqrt(2.0 * (static_cast<double>(k) + 0.5) / 2000.0);
+    EXPECT_NEAR(steps[k].time - begin, at, 2e-9) << k;
+    EXPECT_NEAR(steps[7 - k].time - begin, took - at, 2e-9) << 7 - k;
+  }
+  trace->keep("half_steps");
+}
+
+TEST_F(MotionPictures, Trapezoid) {
+  config::AxisConfig with_start_speed = config();
+  with_start_speed.start_speed = 0.1;
+  with_start_speed.deceleration = 4.0;
+  build({with_start_speed});
+  EXPECT_NEAR(takes(1.0), 0.45 + 0.62875 + 0.225, 1e-8);
+  EXPECT_NEAR(trace->speedAt("x", 0.8), 1000.0, 1e-2);
+  trace->keep("trapezoid");
+}
+
+TEST_F(MotionPictures, Triangle) {
+  config::AxisConfig with_start_speed = config();
+  with_start_speed.start_speed = 0.1;
+  with_start_speed.deceleration = 4.0;
+  build({with_start_speed});
+  const double peak = std::sqrt(100.0 * 100.0 + 2.0 * 200.0 / (1.0 / 2000.0 + 1.0 / 4000.0));
+  EXPECT_NEAR(takes(0.2), (peak - 100.0) / 2000.0 + (peak - 100.0) / 4000.0, 1e-8);
+  trace->keep("triangle");
+}
+
+TEST_F(MotionPictures, SCurve) {
+  config::AxisConfig smooth = config();
+  smooth.jerk = 20.0;
+  build({smooth});
+  EXPECT_NEAR(takes(1.0), 1.6, 1e-8);
+  EXPECT_NEAR(trace->speedAt("x", 0.8), 1000.0, 1e-2);
+  trace->keep("s_curve");
+  // Shorter ones, back again: too short for the speed, and for the acceleration too.
+  EXPECT_NEAR(takes(0.75), 2.0 * ((std::sqrt(0.51) - 0.1) / 2.0 + 0.1), 1e-8);
+  EXPECT_NEAR(takes(0.73), 4.0 * std::cbrt(20.0 / (2.0 * 20'000.0)), 1e-8);
+}
+
+TEST_F(MotionPictures, SpeedOverride) {
+  build({config()});
+  const axis::Move move = x().moveTo(2.0);
+  advanceTo(1.0);
+  trace->mark("override 0.25");
+  bench->machine->setSpeedOverride(0.25);
+  advanceTo(2.0);
+  trace->mark("override 1");
+  bench->machine->setSpeedOverride(1.0);
+  EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
+  // A change begins and ends between two steps.
+  EXPECT_NEAR(timeOfChange(1000.0, 250.0), 0.375, 0.005);
+  EXPECT_NEAR(timeOfChange(250.0, 1000.0), 0.375, 0.005);
+  trace->keep("speed_override");
+}
+
+TEST_F(MotionPictures, NewTargetBehind) {
+  build({config()});
+  x().moveTo(5.0);
+  advanceTo(1.001);
+  trace->mark("target 900");
+  const axis::Move back = x().moveTo(0.9);
+  EXPECT_NEAR(back.overshoot, 0.101, 1e-6);
+  EXPECT_EQ(x().wait(back).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->report().pulses_forward, 1001);
+  EXPECT_EQ(bench->report().pulses_backward, 101);
+  trace->keep("new_target");
+}
+
+TEST_F(MotionPictures, Stop) {
+  config::AxisConfig stopping = config();
+  stopping.stop_deceleration = 4.0;
+  build({stopping});
+  const axis::Move move = x().moveTo(5.0);
+  advanceTo(1.0);
+  trace->mark("stop");
+  x().stop();
+  const axis::MoveResult result = x().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kStopped);
+  // At 750 steps when the stop begins, a millisecond later; 1000^2/(2 4000) = 125 to rest.
+  EXPECT_NEAR(result.position, 0.875, 0.0015);
+  EXPECT_NEAR(trace->steps("x").back().time, 1.001 + 0.25, 0.03);
+  trace->keep("stop");
+}
+
+TEST_F(MotionPictures, Jog) {
+  config::AxisConfig smooth = config();
+  smooth.jerk = 20.0;
+  build({smooth});
+  const std::vector<std::pair<double, double>> jogs{
+      {0.0, 0.6}, {0.9, 1.0}, {1.8, -0.6}, {3.1, 0.0}};
+  for (const auto& [time, velocity] : jogs) {
+    advanceTo(time);
+    const auto steps = static_cast<int>(std::lround(velocity * 1000.0));
+    trace->mark("jog " + std::to_string(steps));
+    x().jog(velocity);
+  }
+  awaitRest();
+  EXPECT_NEAR(trace->speedAt("x", 0.85), 600.0, 1e-2);
+  EXPECT_NEAR(trace->speedAt("x", 1.75), 1000.0, 1e-2);
+  EXPECT_NEAR(trace->speedAt("x", 3.05), -600.0, 1e-2);
+  trace->keep("jog");
+}
+
+TEST_F(MotionPictures, LineWithHold) {
+  build({config("x"), config("y")});
+  const auto line = bench->machine->moveLine({{"x", "y"}, {1.0, 0.4}});
+  holdDuring(0.7, 1.6);
+  EXPECT_EQ(bench->machine->wait(line).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 1000);
+  EXPECT_EQ(bench->pulses("y"), 400);
+  EXPECT_NEAR(trace->speedAt("x", 0.65), 1000.0, 1e-2);
+  EXPECT_NEAR(trace->speedAt("y", 0.65), 400.0, 1e-2);
+  // Where y steps, x is at 2.5 times as much, but for the half step that each may be off.
+  const std::vector<MotionTrace::Step> of_x = trace->steps("x");
+  for (const MotionTrace::Step& step : trace->steps("y")) {
+    std::int64_t count = 0;
+    for (const MotionTrace::Step& other : of_x) {
+      if (other.time <= step.time) count = other.count;
+    }
+    ASSERT_NEAR(static_cast<double>(count), 2.5 * (static_cast<double>(step.count) - 0.5), 0.51);
+  }
+  trace->keep("line");
+}
+
+/// Two points; with accelerations the segments are quintics, without them cubics.
+machine::TrajectoryRequest points(bool with_accelerations) {
+  machine::TrajectoryRequest request{{"x"}, {{1.0, {0.4}, {0.6}, {}}, {2.0, {0.8}, {0.0}, {}}}};
+  if (with_accelerations) {
+    for (machine::TrajectoryPoint& point : request.points) point.accelerations = {0.0};
+  }
+  return request;
+}
+
+TEST_F(MotionPictures, Splines) {
+  for (const bool with_accelerations : {false, true}) {
+    config::AxisConfig fast = config();
+    fast.acceleration = fast.deceleration = 10.0;
+    build({fast});
+    const auto move = bench->machine->followTrajectory(points(with_accelerations));
+    EXPECT_NEAR(move.duration, 2.0, 1e-9);
+    EXPECT_EQ(bench->machine->wait(move).end, MoveEnd::kReached);
+    EXPECT_EQ(bench->pulses("x"), 800);
+    trace->keep(with_accelerations ? "quintics" : "cubics");
+  }
+}
+
+TEST_F(MotionPictures, TrajectoryWithHold) {
+  std::vector<config::AxisConfig> axes{config("x"), config("y")};
+  for (config::AxisConfig& axis : axes) axis.acceleration = axis.deceleration = 10.0;
+  build(axes);
+  const auto move = bench->machine->followTrajectory(
+      {{"x", "y"}, {{1.0, {0.4, 0.3}, {0.6, 0.0}, {}}, {2.0, {0.8, 0.0}, {0.0, 0.0}, {}}}});
+  holdDuring(0.8, 1.5);
+  EXPECT_EQ(bench->machine->wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 800);
+  EXPECT_EQ(bench->pulses("y"), 0);
+  trace->keep("trajectory_hold");
+}
+
+}  // namespace
+}  // namespace stepdriver

@@ -1,0 +1,176 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+#include "support/bench.h"
+
+// A GPIO chip whose writes hang. Each axis has a chip of its own.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using test::Bench;
+using test::linearAxis;
+using test::violationsOf;
+
+constexpr std::chrono::seconds kBound{60};
+
+/// Writes of one line wait until they are let go.
+class Gate {
+ public:
+  explicit Gate(std::string line) : line_(std::move(line)) {}
+
+  void close() { closed_ = true; }
+  void open() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = false;
+    opened_.notify_all();
+  }
+  void pass(const std::string& line) {
+    if (line != line_ || !closed_) return;
+    std::unique_lock<std::mutex> lock(mutex_);
+    ++waiting_;
+    opened_.wait(lock, [this] { return !closed_.load(); });
+  }
+  int waited() const { return waiting_; }
+
+ private:
+  const std::string line_;
+  std::atomic<bool> closed_{false};
+  std::atomic<int> waiting_{0};
+  std::mutex mutex_;
+  std::condition_variable opened_;
+};
+
+class GatedLines : public gpio::Lines {
+ public:
+  GatedLines(std::unique_ptr<gpio::Lines> lines, Gate& gate)
+      : lines_(std::move(lines)), gate_(gate) {}
+
+  int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
+    for (std::size_t i = 0; i < count; ++i) gate_.pass(outputName(writes[i].output));
+    return lines_->write(writes, count);
+  }
+  int read(int input) noexcept override { return lines_->read(input); }
+  int waitForEdges(std::int64_t timeout_ns, gpio::EdgeEvent* events,
+                   std::size_t capacity) noexcept override {
+    return lines_->waitForEdges(timeout_ns, events, capacity);
+  }
+  void interrupt() noexcept override { lines_->interrupt(); }
+  const std::string& outputName(int output) const override { return lines_->outputName(output); }
+  const std::string& inputName(int input) const override { return lines_->inputName(input); }
+  std::size_t outputChip(int output) const override {
+    return static_cast<std::size_t>(outputName(output).front());
+  }
+
+ private:
+  std::unique_ptr<gpio::Lines> lines_;
+  Gate& gate_;
+};
+
+class GatedBackend : public gpio::Backend {
+ public:
+  GatedBackend(gpio::Backend& backend, Gate& gate) : backend_(backend), gate_(gate) {}
+  std::unique_ptr<gpio::Lines> request(const std::vector<gpio::OutputRequest>& outputs,
+                                       const std::vector<gpio::InputRequest>& inputs) override {
+    return std::make_unique<GatedLines>(backend_.request(outputs, inputs), gate_);
+  }
+
+ private:
+  gpio::Backend& backend_;
+  Gate& gate_;
+};
+
+class SlowLines : public testing::Test {
+ protected:
+  SlowLines()
+      : axes_{linearAxis("x"), linearAxis("y")},
+        rig_(Bench::rigAxes(axes_)),
+        lines_(rig_, [this] { return clock_.now(); }),
+        backend_(lines_, gate_) {
+    machine::MachineOptions options;
+    options.write_timeout = 0.2;
+    machine_ = std::make_unique<machine::Machine>(axes_, backend_, clock_, options);
+  }
+  ~SlowLines() override { gate_.open(); }
+
+  axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
+
+  std::vector<config::AxisConfig> axes_;
+  pulse::VirtualClock clock_{1.0};
+  sim::Rig rig_;
+  gpio::SimulatedBackend lines_;
+  Gate gate_{"y.enable"};
+  GatedBackend backend_;
+  std::unique_ptr<machine::Machine> machine_;
+};
+
+TEST_F(SlowLines, AHungWriteIsAFaultThatNamesTheLineAndDelaysNoOtherAxis) {
+  gate_.close();
+  auto disabled = std::async(std::launch::async, [this]() -> std::string {
+    try {
+      axis("y").enable(false);
+      return "disabled";
+    } catch (const GpioError& error) {
+      return error.what();
+    }
+  });
+  while (gate_.waited() == 0) std::this_thread::yield();
+  // While it hangs everything else is answered, and x moves.
+  auto others = std::async(std::launch::async, [this] {
+    const axis::MoveResult result = axis("x").wait(axis("x").moveTo(0.002));
+    axis("x").stop();
+    axis("y").stop();
+    machine_->setSpeedOverride(0.5);
+    return result.end;
+  });
+  ASSERT_EQ(others.wait_for(kBound), std::future_status::ready);
+  EXPECT_EQ(others.get(), MoveEnd::kReached);
+  ASSERT_EQ(disabled.wait_for(kBound), std::future_status::ready);
+  EXPECT_EQ(
+      disabled.get(),
+      "y: the ENABLE line y.enable can't be written: ETIMEDOUT, the chip doesn't answer; check "
+      "the cable and the supply of its chip");
+  EXPECT_NE(axis("y").state().fault.find("y.enable"), std::string::npos);
+  EXPECT_EQ(axis("x").state().fault, "");
+  EXPECT_TRUE(axis("y").state().enabled) << "nobody knows that it is not";
+  // The chip is back.
+  gate_.open();
+  machine_->recover();
+  axis("y").enable(false);
+  EXPECT_FALSE(rig_.report("y").energized);
+  EXPECT_EQ(violationsOf(rig_.report("x")) + violationsOf(rig_.report("y")), "");
+}
+
+TEST_F(SlowLines, AnEmergencyStopIsServedWhileAWriteHangs) {
+  gate_.close();
+  auto disabled = std::async(std::launch::async, [this] {
+    try {
+      axis("y").enable(false);
+    } catch (const Error&) {
+      return false;
+    }
+    return true;
+  });
+  while (gate_.waited() == 0) std::this_thread::yield();
+  const axis::Move move = axis("x").moveTo(0.08);
+  machine_->emergencyStop();
+  EXPECT_EQ(axis("x").wait(move).end, MoveEnd::kEmergencyStop);
+  ASSERT_EQ(disabled.wait_for(kBound), std::future_status::ready);
+  EXPECT_FALSE(disabled.get());
+}
+
+}  // namespace
+}  // namespace stepdriver

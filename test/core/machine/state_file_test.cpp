@@ -1,0 +1,243 @@
+#include "stepdriver_core/machine/state_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "support/bench.h"
+
+// Positions over a restart: 80 microsteps/mm, 1/16, so the translator is at Home every 0.8 mm.
+
+namespace stepdriver {
+namespace {
+
+using test::Bench;
+using test::linearAxis;
+
+class StateFileTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    char name[] = "/tmp/stepdriver_state_XXXXXX";
+    ASSERT_NE(mkdtemp(name), nullptr);
+    directory_ = name;
+    file_ = directory_ + "/state";
+    config_.holds_position_unpowered = true;
+  }
+  void TearDown() override {
+    bench_.reset();
+    for (const char* end : {"", ".lock", ".new"}) std::remove((file_ + end).c_str());
+    rmdir(directory_.c_str());
+  }
+
+  void start(bool threaded = false) {
+    bench_.reset();
+    machine::MachineOptions options;
+    options.state_file = file_;
+    bench_ = makeBench(options, threaded);
+  }
+  std::unique_ptr<Bench> makeBench(const machine::MachineOptions& options, bool threaded) const {
+    const std::vector<config::AxisConfig> axes{config_};
+    return std::make_unique<Bench>(axes, Bench::rigAxes(axes), threaded, 0.0, options);
+  }
+  // As a loss of power leaves it.
+  void crash() {
+    const std::string kept = text();
+    bench_.reset();
+    std::ofstream(file_) << kept;
+  }
+  axis::Axis& x() { return bench_->axis(); }
+  axis::AxisState state() { return x().state(); }
+  void standAt(double position) {
+    x().setPosition(0.0);
+    ASSERT_EQ(bench_->move(position).end, axis::MoveEnd::kReached);
+    bench_->machine->advance(0.001);
+  }
+  std::string text() const {
+    std::ostringstream all;
+    all << std::ifstream(file_).rdbuf();
+    return all.str();
+  }
+  std::string whyNot() {
+    try {
+      start();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  config::AxisConfig config_ = linearAxis("x");
+  std::string directory_;
+  std::string file_;
+  std::unique_ptr<Bench> bench_;
+};
+
+TEST_F(StateFileTest, BringsAPositionBackAfterACleanEnd) {
+  start();
+  EXPECT_EQ(state().position_note, "the state file " + file_ + " wasn't there yet");
+  EXPECT_FALSE(state().position_valid);
+  standAt(0.008);
+  EXPECT_EQ(state().position_note, "");
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.008);
+  EXPECT_TRUE(state().position_valid);
+  EXPECT_EQ(state().position_note, "");
+  EXPECT_EQ(bench_->move(0.0).end, axis::MoveEnd::kReached);
+  EXPECT_EQ(bench_->pulses(), -640);
+}
+
+TEST_F(StateFileTest, DoesNotTrustThePositionOfANodeThatWasNotShutDown) {
+  start();
+  standAt(0.008);
+  crash();
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.008);
+  EXPECT_FALSE(state().position_valid);
+  EXPECT_EQ(state().position_note, "the node that kept this position wasn't shut down");
+  // And not after a clean end either, until somebody says where it stands.
+  start();
+  EXPECT_EQ(state().position_note, "the position couldn't be trusted when it was kept");
+  x().setPosition(0.0);
+  start();
+  EXPECT_TRUE(state().position_valid);
+}
+
+TEST_F(StateFileTest, IsOneOfARunningMachineWhileItMoves) {
+  start();
+  standAt(0.008);
+  x().moveTo(0.050);
+  bench_->machine->advance(0.2);
+  ASSERT_TRUE(state().moving);
+  crash();
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.008);  // where it rested last
+  EXPECT_FALSE(state().position_valid);
+}
+
+TEST_F(StateFileTest, DoesNotTrustAMotorThatNothingHeld) {
+  config_.holds_position_unpowered = false;
+  start();
+  standAt(0.008);
+  start();
+  EXPECT_FALSE(state().position_valid);
+  EXPECT_EQ(state().position_note,
+            "the motor had no current in between, and holds_position_unpowered isn't set");
+}
+
+TEST_F(StateFileTest, DoesNotTrustAChipThatBeganElsewhere) {
+  start();
+  standAt(0.0081);
+  start();
+  EXPECT_NEAR(state().position, 0.0081, 1e-12);
+  EXPECT_FALSE(state().position_valid);
+  EXPECT_NE(state().position_note.find("up to two full steps off"), std::string::npos);
+}
+
+TEST_F(StateFileTest, IsNotForAnotherAxis) {
+  start();
+  standAt(0.008);
+  config_.steps_per_unit = 40'000.0;
+  start();
+  EXPECT_EQ(state().position, 0.0);
+  EXPECT_EQ(state().position_note, "the position was kept for another axis, of 80000 steps per m");
+  bench_.reset();
+  config_.name = "z";
+  start();
+  EXPECT_EQ(bench_->axis("z").state().position_note,
+            "the state file " + file_ + " doesn't know this axis");
+}
+
+TEST_F(StateFileTest, KeepsWhatIsTakenUpOfABacklash) {
+  config_.backlash = 30 / config_.steps_per_unit;
+  start();
+  x().setPosition(0.0);
+  bench_->move(0.008 - config_.backlash);
+  bench_->machine->advance(0.001);
+  ASSERT_EQ(bench_->pulses(), 640);
+  start();
+  EXPECT_NEAR(state().position, 0.008 - config_.backlash, 1e-12);
+  EXPECT_TRUE(state().position_valid);
+  bench_->move(0.016 - config_.backlash);  // on in the same direction: nothing to take up
+  EXPECT_EQ(bench_->pulses(), 640);
+}
+
+TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
+  const std::string head = "stepdriver state 1\nclean\n";
+  const std::string line = "x linear 80000 0.008 0 1 0 1\n";
+  const std::string twice = head + line + line;
+  for (const auto& [content, where] : std::vector<std::pair<std::string, std::string>>{
+           {"", "line 1"},
+           {"stepdriver state 2\nclean\n", "line 1"},
+           {"stepdriver state 1\nfine\n", "line 2"},
+           {head + "x linear 80000 nan 0 1 0 1\n", "line 3"},
+           {head + "x linear 80000 0.008 0 1\n", "line 3"},
+           {head + "x linear 80000 0.008 0 1 0 1 7\n", "line 3"},
+           {head + "x linear -1 0.008 0 1 0 1\n", "line 3"},
+           {head + "x crooked 80000 0.008 0 1 0 1\n", "line 3"},
+           {twice, "line 4"}}) {
+    SCOPED_TRACE(content);
+    bench_.reset();
+    std::ofstream(file_) << content;
+    start();
+    const std::string place = "is broken in " + where;
+    EXPECT_NE(state().position_note.find(place), std::string::npos) << state().position_note;
+    EXPECT_FALSE(state().position_valid);
+    EXPECT_EQ(state().position, 0.0);
+  }
+  bench_.reset();
+  std::ofstream(file_) << head + line;
+  start();
+  EXPECT_TRUE(state().position_valid);
+}
+
+TEST_F(StateFileTest, IsForOneProgramAtATime) {
+  start();
+  machine::MachineOptions options;
+  options.state_file = file_;
+  try {
+    makeBench(options, false);
+    FAIL() << "two have it";
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "the state file " + file_ + " is used by another program: each node needs its own");
+  }
+}
+
+TEST_F(StateFileTest, RefusesToStartWhereItCannotBeWritten) {
+  file_ = directory_ + "/nowhere/state";
+  EXPECT_EQ(whyNot(), "the state file " + file_ + " can't be written: No such file or directory");
+  file_ = directory_ + "/state";
+}
+
+TEST_F(StateFileTest, SaysWhereItCannotBeWrittenLater) {
+  start();
+  x().setPosition(0.0);
+  mkdir((file_ + ".new").c_str(), 0755);  // in the way, for root too
+  bench_->move(0.008);
+  bench_->machine->advance(0.001);
+  EXPECT_EQ(bench_->machine->stateFileError(),
+            "the state file " + file_ + ".new can't be written: Is a directory");
+  EXPECT_THROW(bench_->machine->shutdown(), Error);
+  rmdir((file_ + ".new").c_str());
+}
+
+TEST_F(StateFileTest, IsKeptByAThreadOfItsOwn) {
+  start(true);
+  x().setPosition(0.0);
+  bench_->move(0.008);
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.008);
+  EXPECT_TRUE(state().position_valid);
+}
+
+}  // namespace
+}  // namespace stepdriver

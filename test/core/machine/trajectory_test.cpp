@@ -1,0 +1,183 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+#include "support/refusal.h"
+#include "support/trajectory_bench.h"
+
+// Trajectories of several axes. In steps: 1000 steps/m, 2 m/s, 10 m/s^2.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using machine::CoordinatedMove;
+using machine::CoordinatedResult;
+using machine::TrajectoryRequest;
+using test::refusal;
+using test::trajectoryAxis;
+
+class Trajectory : public test::TrajectoryBench {};
+
+// The cubic s^2 (3 - 2 s) over 2 s, with s = t/2; for y half of it backwards.
+TrajectoryRequest cubic() { return {{"x", "y"}, {{2.0, {1.0, -0.5}, {0.0, 0.0}, {}}}}; }
+double cubicAt(double t) { return t * t / 4.0 * (3.0 - t); }
+
+TEST_F(Trajectory, FollowsACubicToTheStep) {
+  const CoordinatedMove move = follow(cubic());
+  EXPECT_NEAR(move.duration, 2.0, 1e-9);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.positions, (std::vector<double>{1.0, -0.5}));
+  const auto x = bench->trace->times("x", "step", true);
+  ASSERT_EQ(x.size(), 1000U);
+  // Each edge is where the curve crosses its half-step line: the begin is found from one of them.
+  double low = 0.0;
+  double high = 2.0;
+  for (int i = 0; i < 100; ++i) {
+    const double middle = (low + high) / 2.0;
+    (cubicAt(middle) * 1000.0 < 499.5 ? low : high) = middle;
+  }
+  const double begin = static_cast<double>(x[499]) * 1e-9 - low;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double at = cubicAt(static_cast<double>(x[k]) * 1e-9 - begin) * 1000.0;
+    EXPECT_NEAR(at, static_cast<double>(k) + 0.5, 1e-5) << k;
+  }
+  expectClean();
+}
+
+TEST_F(Trajectory, IsReplacedByAnotherWithoutAJump) {
+  const CoordinatedMove first = follow(cubic());
+  advance(1.001);
+  const double velocity = state("x").velocity;
+  EXPECT_NEAR(velocity, 0.75, 1e-3);
+  const CoordinatedMove second = follow({{"x", "y"}, {{2.0, {0.2, 0.2}, {0.0, 0.0}, {0.0, 0.0}}}});
+  EXPECT_EQ(machine().wait(first).end, MoveEnd::kReplaced);
+  EXPECT_NEAR(state("x").velocity, velocity, 0.02);
+  EXPECT_EQ(machine().wait(second).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 200);
+  EXPECT_EQ(bench->pulses("y"), 200);
+  expectClean();
+}
+
+TEST_F(Trajectory, IsHeldOnItsCurveAndResumed) {
+  const CoordinatedMove move = follow(cubic());
+  advance(0.9);
+  machine().hold();
+  awaitRest();
+  EXPECT_TRUE(state("x").held);
+  // Both at the same place of the curve: y is half of x, backwards.
+  EXPECT_NEAR(state("y").position, -0.5 * state("x").position, 0.0016);
+  EXPECT_GT(state("x").position, cubicAt(0.9));
+  advance(3.0);
+  machine().resume();
+  advance(0.2);
+  EXPECT_NEAR(state("y").position, -0.5 * state("x").position, 0.0016);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(bench->pulses("x"), 1000);
+  EXPECT_EQ(bench->pulses("y"), -500);
+  expectClean();
+}
+
+TEST_F(Trajectory, StopsOnItsCurveWithinTheAccelerations) {
+  const CoordinatedMove move = follow(cubic());
+  advance(1.0);
+  bench->axis("y").stop();
+  double highest = 0.0;
+  double before = state("x").velocity;
+  while (state("x").moving) {
+    advance(1e-3);
+    const double now = state("x").velocity;
+    highest = std::max(highest, std::abs(now - before) / 1e-3);
+    before = now;
+  }
+  // From 0.75 m/s, at most at 10 m/s^2, and not much more gently than that.
+  EXPECT_LT(highest, 10.01);
+  EXPECT_GT(highest, 5.0);
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
+  EXPECT_NEAR(state("y").position, -0.5 * state("x").position, 0.0016);
+  EXPECT_LT(state("x").position, 0.6);
+  expectClean();
+}
+
+TEST_F(Trajectory, RunsMoreSlowlyAtASpeedOverride) {
+  const CoordinatedMove move = follow(cubic());
+  advance(1.0);
+  machine().setSpeedOverride(0.5);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached);
+  EXPECT_NEAR(result.duration, 3.0, 0.1);
+  EXPECT_EQ(bench->pulses("x"), 1000);
+  expectClean();
+}
+
+TEST_F(Trajectory, GoesThroughQuinticsCubicsAndLines) {
+  const CoordinatedMove move = follow({{"y", "x"},
+                                       {{0.0, {0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}},
+                                        {1.0, {0.5, 0.1}, {0.5, 0.0}, {0.0, 0.0}},
+                                        {2.0, {0.9, 0.1}, {0.0, 0.0}, {}}}});
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("y"), 900);
+  EXPECT_EQ(bench->pulses("x"), 100);
+  expectClean();
+}
+
+TEST_F(Trajectory, TakesLinesWithinTheStartSpeed) {
+  std::vector<config::AxisConfig> axes{trajectoryAxis("x"), trajectoryAxis("y")};
+  for (config::AxisConfig& axis : axes) axis.start_speed = 0.2;
+  build(axes);
+  const CoordinatedMove move = follow({{"x", "y"}, {{5.0, {0.5, -0.9}, {}, {}}}});
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("y"), -900);
+  expectClean();
+  EXPECT_NE(refusal([&] {
+              follow({{"x", "y"}, {{1.0, {0.0, 0.0}, {}, {}}}});
+            }).find("jump of the velocity is"),
+            std::string::npos);
+}
+
+TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto why = [&](const std::vector<axis::CoursePoint>& points) {
+    return refusal([&] { follow({{"x", "y"}, points}); });
+  };
+  EXPECT_EQ(why({}), "x: the trajectory has no points");
+  EXPECT_EQ(why({{1.0, {0.1}, {}, {}}}),
+            "x: point 0 of the trajectory has 1 positions, but must have 2");
+  EXPECT_EQ(why({{1.0, {0.1, 0.1}, {0.0}, {}}}),
+            "x: point 0 of the trajectory has 1 velocities, but must have 2 or none");
+  EXPECT_EQ(why({{1.0, {0.1, kNan}, {}, {}}}),
+            "y: point 0 of the trajectory has nan among its positions, but they must be finite");
+  EXPECT_EQ(why({{2.0, {0.1, 0.1}, {0.0, 0.0}, {}}, {1.0, {0.2, 0.2}, {0.0, 0.0}, {}}}),
+            "x: point 1 of the trajectory is at 1 s, but must be later than the one before it, at "
+            "2 s");
+  EXPECT_EQ(why({{-1.0, {0.1, 0.1}, {}, {}}}).substr(0, 39),
+            "x: point 0 of the trajectory is at -1 s");
+  EXPECT_NE(why({{9.0, {0.1, -6.0}, {0.0, 0.0}, {}}}).find("below the soft limit"),
+            std::string::npos);
+  EXPECT_EQ(why({{0.5, {1.0, 0.0}, {0.0, 0.0}, {}}}),
+            "x: the trajectory's velocity is 3 m/s 0.25 s after its start, but the axis has 2 m/s");
+  EXPECT_EQ(why({{0.6, {0.72, 0.0}, {0.0, 0.0}, {}}}),
+            "x: the trajectory's acceleration is 12 m/s^2 0 s after its start, but the axis has "
+            "10 m/s^2");
+  EXPECT_EQ(why({{0.0, {0.5, 0.0}, {0.0, 0.0}, {}}, {2.0, {1.0, 0.0}, {0.0, 0.0}, {}}}),
+            "x: the trajectory begins at 0.5 m, but the axis stands at 0 m; they may differ by one "
+            "full step");
+  // A cubic that leaves the limits between its points.
+  EXPECT_NE(why({{4.0, {-4.9, 0.0}, {-1.0, 0.0}, {}}, {6.0, {-4.9, 0.0}, {0.0, 0.0}, {}}})
+                .find("below the soft limit"),
+            std::string::npos);
+  advance(1.0);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  EXPECT_EQ(bench->pulses("y"), 0);
+}
+
+}  // namespace
+}  // namespace stepdriver

@@ -1,0 +1,123 @@
+#include <cerrno>
+#include <stdexcept>
+
+#include "search/participants.h"
+
+/// What a script is made of.
+namespace stepdriver::search {
+namespace {
+
+constexpr std::size_t kX = 0;
+constexpr std::size_t kY = 1;
+constexpr std::size_t kZ = 2;
+
+Meaning about(const std::vector<std::size_t>& axes) {
+  Meaning meaning;
+  for (const std::size_t axis : axes) meaning.axes[axis] = true;
+  return meaning;
+}
+
+Meaning moving(const std::vector<std::size_t>& axes) {
+  Meaning meaning = about(axes);
+  meaning.moves = true;
+  return meaning;
+}
+
+Meaning quiet(Meaning::Quiet kind, const std::vector<std::size_t>& axes) {
+  Meaning meaning = about(axes);
+  meaning.quiet = kind;
+  return meaning;
+}
+
+Act request(const std::string& name, const machine::Request& wanted, const Meaning& meaning) {
+  return {name, [=](Participants& all, int client) { all.post(client, name, wanted, meaning); }};
+}
+
+std::vector<Act> makeActs() {
+  using Quiet = Meaning::Quiet;
+  const std::vector<std::size_t> every = {kX, kY, kZ};
+  Meaning resumes = about(every);
+  resumes.resumes = true;
+  Meaning recovers = about(every);
+  recovers.recovers = true;
+  axis::AxisLimits slow;
+  slow.max_speed = 0.03;
+  slow.acceleration = slow.deceleration = 1.0;
+  return {
+      request("move x to 8 mm", machine::MoveTo{kX, 0.008, false, 0.0}, moving({kX})),
+      request("move x by -6 mm", machine::MoveTo{kX, -0.006, true, 0.0}, moving({kX})),
+      request("move y by 7 mm", machine::MoveTo{kY, 0.007, true, 0.0}, moving({kY})),
+      request("move y to -5 mm", machine::MoveTo{kY, -0.005, false, 0.06}, moving({kY})),
+      request("move z to 6 mm", machine::MoveTo{kZ, 0.006, false, 0.0}, moving({kZ})),
+      request("move x by a round", machine::MoveRounds{kX, 1.0, 0.0}, moving({kX})),
+      request("line of x and y", machine::MoveLine{{kX, kY}, {0.006, 0.005}, false, 0.0, 0.0},
+              moving({kX, kY})),
+      request("line of y and z by", machine::MoveLine{{kY, kZ}, {-0.005, 0.005}, true, 0.0, 0.0},
+              moving({kY, kZ})),
+      {"trajectory of x and y",
+       [](Participants& all, int client) {
+         all.postTrajectory(client, {kX, kY}, 0.008);
+       }},
+      {"trajectory of x and z",
+       [](Participants& all, int client) {
+         all.postTrajectory(client, {kX, kZ}, 0.006);
+       }},
+      request("jog x", machine::Jog{kX, 0.05, {}}, moving({kX})),
+      request("jog z back", machine::Jog{kZ, -0.05, {}}, moving({kZ})),
+      request("end the jog of x", machine::Jog{kX, 0.0, {}}, {}),
+      request("home x", machine::Home{{kX}, false}, moving({kX})),
+      {"cancel homing", [](Participants& all, int client) { all.cancelHomings(client); }},
+      request("plan x", machine::PlanMove{{kX, 0.004, true, 0.0}}, {}),
+      request("microsteps of x", machine::SetMicrosteps{kX, 8}, moving({kX})),
+      request("microsteps of y", machine::SetMicrosteps{kY, 1}, moving({kY})),
+      request("disable x", machine::Enable{kX, false}, quiet(Quiet::kAtRest, {kX})),
+      request("enable x", machine::Enable{kX, true}, {}),
+      request("disable y", machine::Enable{kY, false}, quiet(Quiet::kAtRest, {kY})),
+      request("disable z", machine::Enable{kZ, false}, quiet(Quiet::kAtRest, {kZ})),
+      request("enable z", machine::Enable{kZ, true}, {}),
+      request("sleep x", machine::Sleep{kX, true}, quiet(Quiet::kAtRest, {kX})),
+      request("wake x", machine::Sleep{kX, false}, {}),
+      request("sleep z", machine::Sleep{kZ, true}, quiet(Quiet::kAtRest, {kZ})),
+      request("reset x", machine::Reset{kX}, {}),
+      request("stop", machine::StopAll{}, quiet(Quiet::kSlowsDown, every)),
+      request("stop x", machine::StopAxis{kX}, quiet(Quiet::kSlowsDown, {kX})),
+      {"stop the last move of x",
+       [](Participants& all, int client) { all.stopLastMove(client, kX); }},
+      request("hold", machine::Hold{}, quiet(Quiet::kHeld, every)),
+      request("resume", machine::Resume{}, resumes),
+      request("override 0.4", machine::SetSpeedOverride{0.4}, {}),
+      request("override 1.7", machine::SetSpeedOverride{1.7}, {}),
+      request("limits of x", machine::SetLimits{kX, slow}, {}),
+      request("position of x", machine::SetPosition{kX, 0.001}, {}),
+      {"emergency stop", [](Participants& all, int client) { all.emergencyStop(client); }},
+      request("recover", machine::Recover{}, recovers),
+      {"press x", [](Participants& all, int) { all.pressSwitch(kX, true); }},
+      {"release x", [](Participants& all, int) { all.pressSwitch(kX, false); }},
+      {"press x, edge lost",
+       [](Participants& all, int) {
+         all.loseEdges();
+         all.pressSwitch(kX, true);
+       }},
+      {"chip fault of x", [](Participants& all, int) { all.breakChip(kX); }},
+      {"a pin fails", [](Participants& all, int) { all.failNextPin(EIO); }},
+      {"a pin hangs", [](Participants& all, int) { all.hangNextPin(600'000'000); }},
+      {"a pin is slow", [](Participants& all, int) { all.hangNextPin(20'000'000); }},
+      {"shut down", [](Participants& all, int client) { all.shutDown(client); }},
+  };
+}
+
+}  // namespace
+
+const std::vector<Act>& acts() {
+  static const std::vector<Act> all = makeActs();
+  return all;
+}
+
+std::size_t actNamed(const std::string& name) {
+  for (std::size_t i = 0; i < acts().size(); ++i) {
+    if (acts()[i].name == name) return i;
+  }
+  throw std::out_of_range("there is no act " + name);
+}
+
+}  // namespace stepdriver::search

@@ -1,0 +1,40 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "search/participants.h"
+
+/// Schedules that the search has found to break a promise.
+namespace stepdriver::search {
+namespace {
+
+Item does(int client, std::size_t after, const std::string& act) {
+  return {actNamed(act), client, after};
+}
+
+void expectGood(const Schedule& schedule) {
+  EXPECT_EQ(Participants(schedule).run(), std::vector<std::string>());
+}
+
+TEST(FoundSchedules, AMoveThatComesWhileAnAxisIsPutToSleepDoesNotStep) {
+  expectGood({1, {does(0, 0, "sleep x"), does(1, 1, "move x by a round")}, {{3, Who::kNews, 40}}});
+  expectGood({1, {does(0, 0, "sleep x"), does(1, 1, "move x to 8 mm")}, {{3, Who::kWriter, 10}}});
+}
+
+TEST(FoundSchedules, AChipFaultIsNotRecoveredFromByPuttingTheChipToSleep) {
+  expectGood(
+      {1,
+       {does(1, 0, "chip fault of x"), does(1, 4, "move x by a round"), does(0, 200, "sleep x")},
+       {}});
+}
+
+TEST(FoundSchedules, RecoverComesRightAfterAChipFault) {
+  expectGood({1,
+              {does(1, 8, "chip fault of x"), does(0, 2, "jog x"), does(1, 4, "a pin hangs"),
+               does(0, 16, "recover")},
+              {}});
+}
+
+}  // namespace
+}  // namespace stepdriver::search

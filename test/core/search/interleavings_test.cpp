@@ -1,0 +1,177 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <iostream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "search/participants.h"
+
+namespace stepdriver::search {
+namespace {
+
+/// Steps after which the second request comes: from at once to a long way into a motion.
+constexpr std::array<std::size_t, 9> kAfter = {0, 1, 2, 4, 8, 16, 60, 200, 500};
+constexpr std::size_t kVariants = 2;
+constexpr std::size_t kShards = 16;
+
+std::string textOf(const Schedule& schedule) {
+  std::string text = "variant " + std::to_string(schedule.variant) + "\n";
+  for (const Item& item : schedule.items) {
+    text += "  client " + std::string(item.client == 0 ? "A" : "B") + ", after " +
+            std::to_string(item.after) + " steps: " + acts()[item.act].name + "\n";
+  }
+  for (const Deviation& deviation : schedule.deviations) {
+    text += "  from step " + std::to_string(deviation.from) + " on " + nameOf(deviation.who) +
+            " waits for " + std::to_string(deviation.steps) + " steps\n";
+  }
+  return text;
+}
+
+std::vector<std::string> play(const Schedule& schedule) { return Participants(schedule).run(); }
+
+/// What it is about, whatever the numbers.
+std::string kindOf(const std::vector<std::string>& wrong) {
+  std::string kind = wrong.empty() ? "" : wrong.front();
+  kind.erase(std::remove_if(kind.begin(), kind.end(),
+                            [](char letter) { return letter >= '0' && letter <= '9'; }),
+             kind.end());
+  return kind;
+}
+
+/// Leaves out what isn't needed for it to fail in the same way.
+Schedule shrink(Schedule failing, const std::string& kind) {
+  for (bool smaller = true; smaller;) {
+    smaller = false;
+    const auto take = [&](const Schedule& candidate) {
+      if (smaller || kindOf(play(candidate)) != kind) return;
+      failing = candidate;
+      smaller = true;
+    };
+    for (std::size_t i = 0; i < failing.deviations.size() && !smaller; ++i) {
+      Schedule candidate = failing;
+      candidate.deviations.erase(candidate.deviations.begin() + static_cast<std::ptrdiff_t>(i));
+      take(candidate);
+    }
+    for (std::size_t i = 0; i < failing.items.size() && !smaller; ++i) {
+      Schedule candidate = failing;
+      candidate.items.erase(candidate.items.begin() + static_cast<std::ptrdiff_t>(i));
+      take(candidate);
+    }
+  }
+  return failing;
+}
+
+std::size_t any(std::mt19937_64& random, std::size_t count) {
+  return static_cast<std::size_t>(random() % count);
+}
+
+void deviate(Schedule& schedule, std::mt19937_64& random) {
+  const std::size_t count = 1 + any(random, 3);
+  for (std::size_t i = 0; i < count; ++i) {
+    static constexpr std::array<std::size_t, 6> steps = {1, 2, 4, 10, 40, 200};
+    static constexpr std::array<std::size_t, 4> reach = {10, 30, 120, 600};
+    schedule.deviations.push_back({any(random, reach[any(random, reach.size())]),
+                                   static_cast<Who>(any(random, kParticipants)),
+                                   steps[any(random, steps.size())]});
+  }
+}
+
+std::size_t pairs() { return acts().size() * acts().size() * kAfter.size() * kVariants; }
+
+/// Each pair of acts, each time between them, each variant: by one number.
+Schedule pairOf(std::size_t number) {
+  const auto take = [&number](std::size_t count) {
+    const std::size_t digit = number % count;
+    number /= count;
+    return digit;
+  };
+  Schedule schedule;
+  schedule.variant = static_cast<int>(take(kVariants));
+  const std::size_t after = kAfter[take(kAfter.size())];
+  const std::size_t second = take(acts().size());
+  schedule.items = {{take(acts().size()), 0, 0}, {second, 1, after}};
+  return schedule;
+}
+
+Schedule tripleOf(std::mt19937_64& random) {
+  Schedule schedule;
+  schedule.variant = static_cast<int>(any(random, kVariants));
+  for (std::size_t i = 0; i < 3 + any(random, 2); ++i) {
+    schedule.items.push_back({any(random, acts().size()), static_cast<int>(any(random, 2)),
+                              kAfter[any(random, kAfter.size())]});
+  }
+  return schedule;
+}
+
+/// About 118,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is how many are
+/// played of each kind that is sampled, STEPDRIVER_FAILURES after how many failures a test ends.
+/// Seeds mean the same schedules whatever these are.
+class Interleavings : public testing::TestWithParam<std::size_t> {
+ protected:
+  /// @return whether to go on.
+  bool expectGood(const Schedule& schedule, const std::string& seed) {
+    ++played_;
+    const std::vector<std::string> wrong = play(schedule);
+    if (wrong.empty()) return true;
+    const Schedule smaller = shrink(schedule, kindOf(wrong));
+    Participants again(smaller);
+    again.keepLog();
+    std::string text;
+    for (const std::string& line : again.run()) text += line + "\n";
+    text += textOf(smaller);
+    for (const std::string& line : again.log()) text += "    " + line + "\n";
+    ADD_FAILURE() << seed << "\n" << text;
+    return ++failed_ < mostFailures();
+  }
+  static std::size_t mostFailures() {
+    const char* wanted = std::getenv("STEPDRIVER_FAILURES");
+    return wanted != nullptr ? std::strtoull(wanted, nullptr, 10) : 3;
+  }
+  /// How many are played in all shards together of what is sampled.
+  static std::size_t sampled(std::size_t usual) {
+    const char* wanted = std::getenv("STEPDRIVER_SCHEDULES");
+    const std::size_t all = wanted != nullptr ? std::strtoull(wanted, nullptr, 10) : usual;
+    return (all + kShards - 1) / kShards;
+  }
+  void TearDown() override { std::cout << played_ << " schedules\n"; }
+
+  std::size_t played_ = 0;
+  std::size_t failed_ = 0;
+};
+
+TEST_P(Interleavings, KeepThePromisesForEachPairOfRequests) {
+  for (std::size_t number = GetParam(); number < pairs(); number += kShards) {
+    if (!expectGood(pairOf(number), "pair " + std::to_string(number))) return;
+  }
+}
+
+TEST_P(Interleavings, KeepThePromisesForPairsOutOfTurn) {
+  for (std::size_t i = 0; i < sampled(40'000); ++i) {
+    const std::uint64_t seed = i * kShards + GetParam();
+    std::mt19937_64 random(seed);
+    Schedule schedule = pairOf(any(random, pairs()));
+    deviate(schedule, random);
+    if (!expectGood(schedule, "pair, seed " + std::to_string(seed))) return;
+  }
+}
+
+TEST_P(Interleavings, KeepThePromisesForSeveralRequests) {
+  for (std::size_t i = 0; i < sampled(40'000); ++i) {
+    const std::uint64_t seed = i * kShards + GetParam();
+    std::mt19937_64 random(seed);
+    Schedule schedule = tripleOf(random);
+    if (any(random, 2) == 0) deviate(schedule, random);
+    if (!expectGood(schedule, "several, seed " + std::to_string(seed))) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shards, Interleavings, testing::Range<std::size_t>(0, kShards));
+
+}  // namespace
+}  // namespace stepdriver::search

@@ -1,0 +1,154 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "machine/requests.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::search {
+
+constexpr std::size_t kAxes = 3;
+
+/// What a call means for the pulses of the axes.
+struct Meaning {
+  enum class Quiet { kNone, kAtRest, kSlowsDown, kHeld, kEmergency };
+  Quiet quiet = Quiet::kNone;  ///< that its answer promises
+  bool moves = false;          ///< it may begin a motion
+  bool resumes = false;        ///< it may go on with what is held
+  bool recovers = false;
+  std::array<bool, kAxes> axes{};  ///< that it is about
+};
+
+/// Judges pulses by the answers that clients got: after the answer of a stop no pulse goes out that
+/// isn't of a later motion.
+class Oracle {
+ public:
+  /// @param slowing the longest deceleration, with what is added to it.
+  /// @param slipped motion time is clock time less this.
+  Oracle(pulse::Nanoseconds slowing, std::function<pulse::Nanoseconds()> slipped)
+      : slowing_(slowing), slipped_(std::move(slipped)) {}
+
+  std::vector<std::string> complaints;
+
+  /// The controller was handed a call.
+  void served(std::uint64_t call, const std::string& name, const Meaning& meaning) {
+    calls_[call] = {++order_, name, meaning};
+    if (meaning.moves || meaning.resumes || meaning.recovers) open_.push_back(call);
+  }
+
+  void answered(std::uint64_t call, bool success, pulse::Nanoseconds now) {
+    const auto found = calls_.find(call);
+    if (found == calls_.end()) return;
+    const Call& ended = found->second;
+    open_.erase(std::remove(open_.begin(), open_.end(), call), open_.end());
+    if (!success) return;
+    const Meaning& meaning = ended.meaning;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      if (!meaning.axes[axis]) continue;
+      // A recover may have ended the fault of this axis while it still waits for another one.
+      for (Quiet& quiet : quiets_[axis]) {
+        const bool recovered =
+            meaning.recovers || (meaning.moves && isRecoveredFrom(quiet.order, ended.order));
+        if (recovered && quiet.kind == Meaning::Quiet::kEmergency) {
+          quiet.kind = Meaning::Quiet::kAtRest;
+        }
+      }
+      if (ends(meaning)) endQuiet(axis, ended.order, meaning);
+      if (meaning.quiet == Meaning::Quiet::kNone) continue;
+      Quiet quiet;
+      quiet.order = ended.order;
+      quiet.kind = meaning.quiet;
+      quiet.name = ended.name;
+      const bool slows =
+          meaning.quiet == Meaning::Quiet::kSlowsDown || meaning.quiet == Meaning::Quiet::kHeld;
+      quiet.since = now + (slows ? slowing_ : 0);
+      // A motion that was handed over after the stop, and accepted before its answer.
+      if (last_motion_[axis] > ended.order) continue;
+      quiets_[axis].push_back(quiet);
+    }
+  }
+
+  void emergencyStopped(pulse::Nanoseconds now) {
+    for (auto& quiets : quiets_) {
+      quiets.push_back({++order_, Meaning::Quiet::kEmergency, "emergency stop", now, false});
+    }
+  }
+
+  void rose(std::size_t axis, pulse::Nanoseconds time) {
+    for (const Quiet& quiet : quiets_[axis]) {
+      // A late pulse slides what is left of a motion, its deceleration too.
+      if (time - (quiet.slows ? slipped_() : 0) < quiet.since || mayHaveBegun(axis, quiet))
+        continue;
+      complain("axis " + std::to_string(axis) + " steps at " + std::to_string(time) +
+               " ns, but must not from " + std::to_string(quiet.since) + " ns on: " + quiet.name);
+    }
+  }
+
+  void complain(const std::string& what) {
+    if (complaints.size() < 8) complaints.push_back(what);
+  }
+
+ private:
+  struct Call {
+    std::uint64_t order = 0;
+    std::string name;
+    Meaning meaning;
+  };
+  struct Quiet {
+    std::uint64_t order = 0;
+    Meaning::Quiet kind = Meaning::Quiet::kNone;
+    std::string name;
+    pulse::Nanoseconds since = 0;  // if it slows down, motion time; else clock time
+    bool slows = false;
+  };
+
+  static bool ends(const Meaning& meaning) { return meaning.moves || meaning.resumes; }
+  static bool ends(const Meaning& meaning, const Quiet& quiet) {
+    if (quiet.kind == Meaning::Quiet::kEmergency) return false;
+    return meaning.moves || (meaning.resumes && quiet.kind == Meaning::Quiet::kHeld);
+  }
+
+  /// A recover that came after one and before the other is under way.
+  bool isRecoveredFrom(std::uint64_t stop, std::uint64_t motion) const {
+    return std::any_of(open_.begin(), open_.end(), [&](std::uint64_t call) {
+      const Call& open = calls_.at(call);
+      return open.meaning.recovers && open.order > stop && open.order < motion;
+    });
+  }
+
+  void endQuiet(std::size_t axis, std::uint64_t order, const Meaning& meaning) {
+    if (meaning.moves) last_motion_[axis] = std::max(last_motion_[axis], order);
+    auto& quiets = quiets_[axis];
+    quiets.erase(std::remove_if(quiets.begin(), quiets.end(),
+                                [&](const Quiet& quiet) {
+                                  return quiet.order < order && ends(meaning, quiet);
+                                }),
+                 quiets.end());
+  }
+
+  // A later motion that isn't answered yet may be under way already.
+  bool mayHaveBegun(std::size_t axis, const Quiet& quiet) const {
+    return std::any_of(open_.begin(), open_.end(), [&](std::uint64_t id) {
+      const Call& call = calls_.at(id);
+      return call.order > quiet.order && call.meaning.axes[axis] && ends(call.meaning, quiet);
+    });
+  }
+
+  const pulse::Nanoseconds slowing_;
+  const std::function<pulse::Nanoseconds()> slipped_;
+  std::uint64_t order_ = 0;
+  std::map<std::uint64_t, Call> calls_;
+  std::vector<std::uint64_t> open_;
+  std::array<std::vector<Quiet>, kAxes> quiets_;
+  std::array<std::uint64_t, kAxes> last_motion_{};
+};
+
+}  // namespace stepdriver::search

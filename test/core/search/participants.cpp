@@ -1,0 +1,750 @@
+#include "search/participants.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+
+#include "stepdriver_core/error.h"
+#include "support/bench.h"
+
+namespace stepdriver::search {
+namespace {
+
+constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
+constexpr pulse::Nanoseconds kSecond = 1'000 * kMillisecond;
+constexpr pulse::Nanoseconds kWriteTimeout = 500 * kMillisecond;
+constexpr pulse::Nanoseconds kInputPeriod = 100 * kMillisecond;
+constexpr pulse::Nanoseconds kMaxLateness = 5 * kMillisecond;
+/// That the engine is late at the most; more than it can make good.
+constexpr pulse::Nanoseconds kLatestPass = 8 * kMillisecond;
+/// From the answer of a stop to the beginning of the deceleration; and if the engine is late, with
+/// what its late steps slide the timeline by while it decelerates.
+constexpr pulse::Nanoseconds kLead = 2 * kMillisecond;
+constexpr pulse::Nanoseconds kLongestLead = 500 * kMillisecond;
+constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
+constexpr pulse::Nanoseconds kQuietIsWatched = 250 * kMillisecond;
+constexpr std::size_t kMostSteps = 200'000;
+
+std::vector<config::AxisConfig> configsOf(int variant) {
+  std::vector<config::AxisConfig> configs;
+  for (const char* name : {"x", "y", "z"}) {
+    config::AxisConfig config = test::linearAxis(name, 20'000.0, 0.1, 2.0);
+    config.steps_per_round = 100.0;
+    config.fault = config::FaultPin{config.name + ".fault"};
+    configs.push_back(config);
+  }
+  config::HomingConfig homing;
+  homing.seek_speed = 0.05;
+  homing.latch_speed = 0.02;
+  homing.pull_off = 0.001;
+  homing.offset = -0.009;
+  homing.max_travel = 0.04;
+  configs[0].homing = homing;
+  configs[1].backlash = 0.0004;
+  configs[1].align_on_microstep_change = true;
+  configs[2].jerk = 50.0;
+  configs[2].idle_timeout = 0.03;
+  if (variant == 0) configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
+  return configs;
+}
+
+std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& configs) {
+  std::vector<sim::RigAxisSpec> specs;
+  for (const config::AxisConfig& config : configs) {
+    specs.push_back(test::rigAxis(config));
+    specs.back().min_switch->position = -9.0;
+    specs.back().max_switch->position = 16.0;
+  }
+  return specs;
+}
+
+std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs) {
+  std::vector<std::string> names;
+  for (const config::AxisConfig& config : configs) names.push_back(config.name);
+  return names;
+}
+
+/// From the fastest motion of any axis, the most that a deceleration takes, and 10 %.
+pulse::Nanoseconds slowingOf(const std::vector<config::AxisConfig>& configs,
+                             const Schedule& schedule) {
+  const bool late =
+      std::any_of(schedule.deviations.begin(), schedule.deviations.end(),
+                  [](const Deviation& deviation) { return deviation.who == Who::kEngine; });
+  double longest = 0.0;
+  for (const config::AxisConfig& config : configs) {
+    const double deceleration = config.stop_deceleration.value_or(config.deceleration);
+    double time = config.max_speed / deceleration;
+    if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
+    longest = std::max(longest, time);
+  }
+  return std::llround(1.1 * longest * 1e9) + (late ? kLongestLead : kLead);
+}
+
+}  // namespace
+
+const char* nameOf(Who who) {
+  static const std::array<const char*, kParticipants> names = {
+      "news",   "pin done", "input",    "request",  "timer", "engine",
+      "writer", "watcher",  "client A", "client B", "clock"};
+  return names.at(static_cast<std::size_t>(who));
+}
+
+Participants::Participants(const Schedule& schedule)
+    : schedule_(schedule),
+      configs_(configsOf(schedule.variant)),
+      oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
+      clock_(0.0),
+      trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
+      rig_(rigOf(configs_), trace_),
+      backend_(rig_, [this] { return clock_.now(); }),
+      wiring_(configs_),
+      lines_(backend_.request(wiring_.outputs, wiring_.inputs)) {
+  axis::LineNames names;
+  for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
+  for (const gpio::InputRequest& input : wiring_.inputs) names.inputs.push_back(input.line);
+  engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness);
+  controller_ = std::make_unique<machine::Controller>(configs_, wiring_.motor_lines,
+                                                      std::move(names), std::nullopt);
+  engine_->listen(news_);
+  levels_.assign(wiring_.inputs.size(), 0);
+  watched_ = readInputs();
+  reads_.assign(watched_.begin(), watched_.end());
+  trace_->rose = [this](std::size_t axis, std::int64_t time) { oracle_.rose(axis, time); };
+}
+
+// ---- the shell ----
+
+void Participants::handle(decltype(machine::Input::what) what) {
+  activity::Outputs out;
+  machine::Input input;
+  input.now = clock_.now();
+  input.slipped = engine_->state().slipped;
+  input.stops_asked = engine_->stopsAsked();
+  input.what = std::move(what);
+  controller_->handle(input, out);
+  carryOut(out);
+}
+
+void Participants::carryOut(activity::Outputs& out) {
+  for (auto& [call, reply] : out.answers) answer(call, std::move(reply));
+  if (out.clear_stops != 0) {
+    engine_->clearEmergencyStop(out.clear_stops);
+    engine_->inputsChanged();
+    engine_called_ = true;
+  }
+  outbox_.insert(outbox_.end(), out.commands.begin(), out.commands.end());
+  postCommands();
+  for (const activity::PinJob& job : out.pin_jobs) {
+    Job written;
+    written.job = job;
+    written.deadline = clock_.now() + kWriteTimeout;
+    written.returns = clock_.now() + std::exchange(next_pin_hang_, 0);
+    written.error = std::exchange(next_pin_error_, 0);
+    jobs_.push_back(written);
+  }
+}
+
+void Participants::postCommands() {
+  while (!outbox_.empty() && engine_->post(outbox_.front())) {
+    outbox_.pop_front();
+    engine_called_ = true;
+  }
+}
+
+void Participants::answer(std::uint64_t call, activity::Reply reply) {
+  const auto found = open_.find(call);
+  if (found == open_.end()) {
+    oracle_.complain("call " + std::to_string(call) + " (" + answered_[call] +
+                     ") is answered twice");
+    return;
+  }
+  const Ask asked = std::move(found->second);
+  open_.erase(found);
+  answered_[call] = asked.name;
+  note("answer of " + asked.name +
+       (reply.failure ? ": " + reply.failure->text : std::string(": done")));
+  oracle_.answered(call, !reply.failure, clock_.now());
+  const auto* moves = std::get_if<std::vector<axis::Move>>(&reply.value);
+  if (moves != nullptr && !reply.failure) {
+    for (const axis::Move& move : *moves) {
+      moves_.emplace_back(asked.name, move);
+      if (!move.outcome) oracle_.complain(asked.name + " has no outcome");
+    }
+    std::size_t next = 0;
+    for (std::size_t axis = 0; axis < kAxes && next < moves->size(); ++axis) {
+      if (asked.meaning.axes[axis]) last_move_[axis] = (*moves)[next++].id;
+    }
+  }
+  if (const auto* homing = std::get_if<activity::AcceptedHoming>(&reply.value)) {
+    homings_.push_back(*homing);
+  }
+  Client& client = clients_.at(static_cast<std::size_t>(asked.client));
+  if (client.waits_for != call) return;
+  client.waits_for = 0;
+  if (client.on_answer) std::exchange(client.on_answer, nullptr)(reply);
+}
+
+std::vector<machine::InputRead> Participants::readInputs() {
+  std::vector<machine::InputRead> reads;
+  for (int input = 0; input < static_cast<int>(wiring_.inputs.size()); ++input) {
+    reads.push_back({input, lines_->read(input)});
+  }
+  return reads;
+}
+
+void Participants::takeRead(const machine::InputRead& read) {
+  int& known = levels_[static_cast<std::size_t>(read.input)];
+  if (std::exchange(known, read.level) != read.level) handle(read);
+}
+
+// ---- steps ----
+
+bool Participants::canGo(Who who) {
+  const auto hasNext = [this](std::size_t client) {
+    if (clients_[client].next) return true;
+    return script_ && itemReady() && schedule_.items[next_item_].client == static_cast<int>(client);
+  };
+  switch (who) {
+    case Who::kNews:
+      return news_.any;
+    case Who::kPinDone:
+      return !pins_done_.empty();
+    case Who::kInput:
+      return !reads_.empty() || !edges_.empty();
+    case Who::kRequest:
+      return !requests_.empty();
+    case Who::kTimer:
+      return clock_.now() >= controller_->due();
+    case Who::kEngine:
+      return engine_called_ || clock_.now() >= engine_due_;
+    case Who::kWriter:
+      return !jobs_.empty() && (jobs_.front().returns <= clock_.now() ||
+                                std::any_of(jobs_.begin(), jobs_.end(), [this](const Job& job) {
+                                  return !job.told && job.deadline <= clock_.now();
+                                }));
+    case Who::kWatcher: {
+      if (watch_due_ != pulse::kNever) return clock_.now() >= watch_due_;
+      const std::vector<machine::InputRead> reads = readInputs();
+      return !std::equal(reads.begin(), reads.end(), watched_.begin(),
+                         [](const auto& a, const auto& b) { return a.level == b.level; });
+    }
+    case Who::kClientA:
+      return hasNext(0);
+    case Who::kClientB:
+      return hasNext(1);
+    case Who::kClock:
+      return nextDue() != pulse::kNever;
+  }
+  return false;
+}
+
+bool Participants::isDelayed(Who who) const {
+  if (!script_) return false;
+  const std::size_t at = steps_ - script_began_;
+  return std::any_of(schedule_.deviations.begin(), schedule_.deviations.end(),
+                     [&](const Deviation& deviation) {
+                       return deviation.who == who && at >= deviation.from &&
+                              at - deviation.from < deviation.steps;
+                     });
+}
+
+bool Participants::step() {
+  std::optional<Who> late;
+  for (std::size_t i = 0; i < kParticipants; ++i) {
+    const Who who = static_cast<Who>(i);
+    if (!canGo(who)) continue;
+    if (isDelayed(who)) {
+      if (!late) late = who;
+      continue;
+    }
+    go(who);
+    return true;
+  }
+  if (!late && script_ && next_item_ < schedule_.items.size() &&
+      clients_[static_cast<std::size_t>(schedule_.items[next_item_].client)].idle()) {
+    beginItem();  // nothing happens any more that it could wait for
+    return true;
+  }
+  if (!late) return false;
+  go(*late);
+  return true;
+}
+
+void Participants::go(Who who) {
+  ++steps_;
+  if (log_ && who != Who::kEngine && who != Who::kClock) note(nameOf(who));
+  switch (who) {
+    case Who::kNews: {
+      news_.any = false;
+      machine::EngineNews news;
+      news.stops_served = engine_->stopsServed();
+      news.input_stops = engine_->inputStops();
+      for (std::size_t i = 0; i < kAxes; ++i) {
+        news.channels.push_back(engine_->channel(static_cast<int>(i)));
+      }
+      handle(std::move(news));
+      postCommands();
+      for (Client& client : clients_) {
+        if (!client.waits_for_stops) continue;
+        if (controller_->snapshot()->stops_handled < *client.waits_for_stops) continue;
+        client.waits_for_stops.reset();
+        note("answer of emergency stop");
+        oracle_.emergencyStopped(clock_.now());
+      }
+      return;
+    }
+    case Who::kPinDone: {
+      const activity::PinDone done = pins_done_.front();
+      pins_done_.pop_front();
+      return handle(done);
+    }
+    case Who::kInput: {
+      if (!edges_.empty()) {
+        const machine::InputEdge edge{edges_.front()};
+        edges_.pop_front();
+        return handle(edge);
+      }
+      const machine::InputRead read = reads_.front();
+      reads_.pop_front();
+      return takeRead(read);
+    }
+    case Who::kRequest: {
+      // What was seen before the request was handed over comes before it.
+      for (; !edges_.empty(); edges_.pop_front()) handle(machine::InputEdge{edges_.front()});
+      for (; !reads_.empty(); reads_.pop_front()) takeRead(reads_.front());
+      Ask asked = std::move(requests_.front());
+      requests_.pop_front();
+      for (const machine::InputRead& read : asked.reads) takeRead(read);
+      oracle_.served(asked.id, asked.name, asked.meaning);
+      return handle(machine::Requested{asked.id, std::move(asked.request)});
+    }
+    case Who::kTimer:
+      return handle(machine::TimerDue{});
+    case Who::kEngine:
+      engine_called_ = false;
+      engine_waits_since_ = pulse::kNever;
+      engine_due_ = engine_->serve();
+      return postCommands();
+    case Who::kWriter:
+      return write();
+    case Who::kWatcher:
+      return watch();
+    case Who::kClientA:
+    case Who::kClientB: {
+      Client& client = clients_[who == Who::kClientA ? 0 : 1];
+      if (client.next) return std::exchange(client.next, nullptr)();
+      return beginItem();
+    }
+    case Who::kClock:
+      return advanceTo(nextDue());
+  }
+}
+
+void Participants::write() {
+  if (jobs_.front().returns <= clock_.now()) {
+    const Job job = jobs_.front();
+    jobs_.pop_front();
+    // What has waited behind one that hung isn't wanted any more; what hung is done late.
+    const bool hung = job.told && job.returns > job.deadline;
+    int error = job.error;
+    const gpio::LineWrite line{job.job.output, job.job.level};
+    if (error == 0 && (!job.told || hung)) error = lines_->write(&line, 1);
+    if (!job.told) pins_done_.push_back({job.job.id, error});
+    // Those behind it begin now.
+    if (!jobs_.empty()) jobs_.front().returns = std::max(jobs_.front().returns, clock_.now());
+    return;
+  }
+  for (Job& job : jobs_) {
+    if (job.told || job.deadline > clock_.now()) continue;
+    job.told = true;
+    pins_done_.push_back({job.job.id, ETIMEDOUT});
+  }
+}
+
+void Participants::watch() {
+  std::array<gpio::EdgeEvent, 16> events{};
+  const int count = lines_->waitForEdges(0, events.data(), events.size());
+  if (loses_edges_) {
+    loses_edges_ = false;
+    watch_due_ = clock_.now() + kInputPeriod;
+    return;
+  }
+  watch_due_ = pulse::kNever;
+  engine_->inputsChanged();
+  engine_called_ = true;
+  watched_ = readInputs();
+  for (int i = 0; i < count; ++i) edges_.push_back(events.at(static_cast<std::size_t>(i)));
+  reads_.insert(reads_.end(), watched_.begin(), watched_.end());
+}
+
+pulse::Nanoseconds Participants::nextDue() {
+  const pulse::Nanoseconds now = clock_.now();
+  const bool engine_waits = engine_called_ || engine_due_ <= now;
+  if (!engine_waits) engine_waits_since_ = pulse::kNever;
+  if (engine_waits) engine_waits_since_ = std::min(engine_waits_since_, now);
+  pulse::Nanoseconds due = pulse::kNever;
+  const auto look = [&](pulse::Nanoseconds time) {
+    if (time > now) due = std::min(due, time);
+  };
+  look(engine_due_);
+  look(controller_->due());
+  look(watch_due_);
+  if (!jobs_.empty()) look(jobs_.front().returns);
+  for (const Job& job : jobs_) {
+    if (!job.told) look(job.deadline);
+  }
+  if (!engine_waits) return due;
+  const pulse::Nanoseconds latest = engine_waits_since_ + kLatestPass;
+  return now < latest ? std::min(due, latest) : pulse::kNever;
+}
+
+void Participants::advanceTo(pulse::Nanoseconds time) {
+  while (clock_.now() < time) clock_.waitUntil(time);
+}
+
+void Participants::note(const std::string& what) {
+  if (log_) {
+    lines_of_log_.push_back(std::to_string(steps_ - script_began_) + " " +
+                            std::to_string(clock_.now()) + " ns: " + what);
+  }
+}
+
+// ---- clients ----
+
+bool Participants::itemReady() const {
+  if (next_item_ >= schedule_.items.size()) return false;
+  const Item& item = schedule_.items[next_item_];
+  return clients_[static_cast<std::size_t>(item.client)].idle() &&
+         steps_ - item_step_ >= item.after;
+}
+
+void Participants::beginItem() {
+  const Item item = schedule_.items[next_item_++];
+  item_step_ = steps_;
+  note("begin " + acts()[item.act].name);
+  acts()[item.act].begin(*this, item.client);
+}
+
+void Participants::post(int client, const std::string& name, machine::Request request,
+                        const Meaning& meaning) {
+  Ask asked;
+  asked.id = ++calls_;
+  asked.client = client;
+  asked.name = name;
+  asked.request = std::move(request);
+  asked.meaning = meaning;
+  asked.reads = readInputs();
+  asked.posted = clock_.now();
+  asked.posted_step = steps_;
+  open_[asked.id] = asked;
+  open_[asked.id].request = machine::StopAll{};
+  clients_[static_cast<std::size_t>(client)].waits_for = asked.id;
+  requests_.push_back(std::move(asked));
+  if (std::holds_alternative<machine::SetPosition>(requests_.back().request) ||
+      std::holds_alternative<machine::Home>(requests_.back().request)) {
+    position_changed_ = true;
+  }
+}
+
+void Participants::postTrajectory(int client, std::vector<std::size_t> axes, double size) {
+  const auto snapshot = controller_->snapshot();
+  std::vector<std::uint64_t> stops;
+  for (const std::size_t axis : axes) stops.push_back(snapshot->axes.at(axis).state.stops);
+  clients_[static_cast<std::size_t>(client)].next = [this, client, axes = std::move(axes), size,
+                                                     stops = std::move(stops)] {
+    prepareAndPost(client, axes, size, stops, 0);
+  };
+}
+
+void Participants::prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
+                                  std::vector<std::uint64_t> stops, int tries) {
+  const auto snapshot = controller_->snapshot();
+  std::vector<axis::PathAxis> facts;
+  Meaning meaning;
+  meaning.moves = true;
+  for (const std::size_t axis : axes) {
+    facts.push_back(snapshot->axes.at(axis).path_axis);
+    meaning.axes[axis] = true;
+  }
+  std::vector<axis::CoursePoint> points(3);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].time = 0.25 * static_cast<double>(i + 1);
+    points[i].positions.assign(axes.size(),
+                               i == 1 ? 0.4 * size : size / (3.0 - static_cast<double>(i)));
+  }
+  std::shared_ptr<const axis::PreparedTrajectory> prepared;
+  try {
+    prepared = std::make_shared<const axis::PreparedTrajectory>(facts, points);
+  } catch (const Refused& refused) {
+    note(std::string("the trajectory is refused: ") + refused.what());
+    return;
+  }
+  // Posting it is a step of its own.
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.next = [this, client, axes, size, stops, tries, prepared, meaning] {
+    post(client, "follow trajectory", machine::FollowTrajectory{axes, prepared, stops}, meaning);
+    clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
+      const bool outdated =
+          reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
+      if (!outdated || tries >= 8) return;
+      clients_[static_cast<std::size_t>(client)].next = [=] {
+        prepareAndPost(client, axes, size, stops, tries + 1);
+      };
+    };
+  };
+}
+
+void Participants::emergencyStop(int client) {
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.waits_for_stops = engine_->emergencyStop();
+  who.since = clock_.now();
+  engine_called_ = true;
+}
+
+void Participants::shutDown(int client) {
+  closed_ = true;
+  Meaning all;
+  all.axes.fill(true);
+  all.quiet = Meaning::Quiet::kSlowsDown;
+  post(client, "close", machine::Close{"the machine was shut down"}, all);
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.on_answer = [this, client, all](const activity::Reply&) {
+    Meaning rest = all;
+    rest.quiet = Meaning::Quiet::kAtRest;
+    post(client, "await rest", machine::AwaitRest{}, rest);
+    clients_[static_cast<std::size_t>(client)].on_answer = [this, client,
+                                                            rest](const activity::Reply&) {
+      post(client, "power down", machine::PowerDown{}, rest);
+    };
+  };
+}
+
+void Participants::stopLastMove(int client, std::size_t axis) {
+  post(client, "stop the last move", machine::StopMove{axis, last_move_[axis]}, {});
+}
+
+void Participants::cancelHomings(int client) {
+  machine::CancelHoming cancel;
+  for (const activity::AcceptedHoming& homing : homings_) {
+    cancel.ids.insert(cancel.ids.end(), homing.ids.begin(), homing.ids.end());
+  }
+  post(client, "cancel homing", cancel, {});
+}
+
+void Participants::pressSwitch(std::size_t axis, bool pressed) {
+  sim::RigFaults faults;
+  if (pressed) faults.max_stuck = true;
+  rig_.setFaults(configs_[axis].name, faults);
+}
+
+void Participants::breakChip(std::size_t axis) {
+  sim::RigFaults faults;
+  faults.chip_fault_after = 5;
+  rig_.setFaults(configs_[axis].name, faults);
+}
+
+// ---- the whole ----
+
+bool Participants::playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest) {
+  const std::size_t began = steps_;
+  const pulse::Nanoseconds end = clock_.now() + longest;
+  while (!ready()) {
+    if (steps_ - began > kMostSteps || clock_.now() > end || !step()) return ready();
+    if (!oracle_.complaints.empty()) return true;
+  }
+  return true;
+}
+
+activity::Reply Participants::ask(const std::string& name, machine::Request request,
+                                  const Meaning& meaning) {
+  activity::Reply got;
+  bool answered = false;
+  post(kProbe, name, std::move(request), meaning);
+  clients_[kProbe].on_answer = [&](const activity::Reply& reply) {
+    got = reply;
+    answered = true;
+  };
+  if (!playUntil([&] { return answered; }, kLongestCall)) {
+    oracle_.complain(name + " isn't answered");
+    clients_[kProbe].on_answer = nullptr;
+  }
+  return got;
+}
+
+bool Participants::atRest() {
+  if (!open_.empty() || !requests_.empty() || !jobs_.empty() || !pins_done_.empty()) return false;
+  if (news_.any || engine_called_ || !outbox_.empty()) return false;
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    if (engine_->channel(static_cast<int>(i)).following != 0) return false;
+  }
+  const auto snapshot = controller_->snapshot();
+  if (std::any_of(snapshot->axes.begin(), snapshot->axes.end(), [](const auto& axis) {
+        return axis.state.moving || axis.state.homing != axis::HomingPhase::kNone;
+      })) {
+    return false;
+  }
+  return std::all_of(moves_.begin(), moves_.end(),
+                     [](const auto& move) { return move.second.outcome->get().has_value(); });
+}
+
+void Participants::checkCounts(const std::string& when) {
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    const std::string& name = configs_[i].name;
+    const pulse::ChannelState state = engine_->channel(static_cast<int>(i));
+    const sim::RigAxisReport report = rig_.report(name);
+    const std::int64_t pulses = report.pulses_forward + report.pulses_backward;
+    if (static_cast<std::int64_t>(state.pulses) != pulses) {
+      oracle_.complain(name + " " + when + ": the engine counts " + std::to_string(state.pulses) +
+                       " pulses, the rig " + std::to_string(pulses));
+    }
+    const std::int64_t count = report.pulses_forward - report.pulses_backward;
+    if (state.epoch == 0 && state.count != count) {
+      oracle_.complain(name + " " + when + ": the engine stands at " + std::to_string(state.count) +
+                       ", the rig at " + std::to_string(count));
+    }
+    const std::string violations = test::violationsOf(report);
+    if (!violations.empty()) oracle_.complain(name + " " + when + ": " + violations);
+  }
+}
+
+// A position that is said to be valid is where the carriage is.
+void Participants::checkRest() {
+  if (position_changed_) return;
+  const auto snapshot = controller_->snapshot();
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    const machine::AxisSnapshot& axis = snapshot->axes[i];
+    if (!axis.state.position_valid) continue;
+    const pulse::ChannelState live = engine_->channel(static_cast<int>(i));
+    const axis::AxisState state = machine::stateOf(axis, live, clock_.now(), clock_.now());
+    const double carriage = rig_.report(configs_[i].name).carriage / 1000.0;
+    const double reached = (static_cast<double>(axis.backlash) + 1.01) / axis.steps_per_unit;
+    if (std::abs(state.position - carriage) > reached) {
+      oracle_.complain(configs_[i].name + " says that it is at " + std::to_string(state.position) +
+                       " m, but its carriage is at " + std::to_string(carriage) + " m");
+    }
+  }
+}
+
+void Participants::checkOutcomes() {
+  for (const auto& [name, move] : moves_) {
+    const auto result = move.outcome->get();
+    if (!result) {
+      oracle_.complain("the outcome of " + name + " is not set");
+    } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
+               std::abs(result->position - move.target) > 0.51 / 20'000.0 * 16.0) {
+      oracle_.complain(name + " has reached " + std::to_string(result->position) +
+                       " m, but its target is " + std::to_string(move.target) + " m");
+    }
+  }
+  for (const activity::AcceptedHoming& homing : homings_) {
+    for (const auto& outcome : homing.outcomes) {
+      if (!outcome->get()) oracle_.complain("the outcome of a homing is not set");
+    }
+  }
+}
+
+void Participants::probe() {
+  Meaning all;
+  all.axes.fill(true);
+  if (closed_) {
+    Meaning rest = all;
+    rest.quiet = Meaning::Quiet::kAtRest;
+    ask("await rest", machine::AwaitRest{}, rest);
+    return;
+  }
+  Meaning recovers = all;
+  recovers.recovers = true;
+  activity::Reply recovered = ask("recover", machine::Recover{}, recovers);
+  if (recovered.failure) recovered = ask("recover", machine::Recover{}, recovers);
+  if (recovered.failure) oracle_.complain("recover: " + recovered.failure->text);
+  for (std::size_t i = 0; i < kAxes && oracle_.complaints.empty(); ++i) {
+    const std::string& name = configs_[i].name;
+    const auto must = [&](const std::string& what, machine::Request request, bool moves = false) {
+      Meaning meaning;
+      meaning.axes[i] = true;
+      meaning.moves = moves;
+      activity::Reply reply = ask(what, std::move(request), meaning);
+      if (reply.failure) oracle_.complain(name + ": " + what + ": " + reply.failure->text);
+      return reply;
+    };
+    must("wake", machine::Sleep{i, false});
+    must("enable", machine::Enable{i, true});
+    const double before = rig_.report(name).carriage;
+    const double way = before > 3.0 ? -0.002 : 0.002;
+    const std::size_t moves = moves_.size();
+    must("move", machine::MoveTo{i, way, true, 0.0}, true);
+    if (moves_.size() == moves) continue;
+    const axis::Move move = moves_.back().second;
+    playUntil([&] { return move.outcome->get().has_value(); }, kLongestCall);
+    const auto result = move.outcome->get();
+    if (!result || result->end != axis::MoveEnd::kReached) {
+      oracle_.complain(name + " doesn't reach its target in the end: " +
+                       (result ? result->message : "it takes too long"));
+      continue;
+    }
+    const double moved = std::abs(rig_.report(name).carriage - before);
+    if (std::abs(moved - 2.0) > 1.3) {
+      oracle_.complain(name + " was to move 2 mm, but its carriage has moved " +
+                       std::to_string(moved) + " mm");
+    }
+  }
+}
+
+std::vector<std::string> Participants::run() {
+  Meaning none;
+  const activity::Reply up = ask("bring up", machine::BringUp{}, none);
+  if (up.failure) oracle_.complain("bring up: " + up.failure->text);
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    ask("set position", machine::SetPosition{i, 0.0}, none);
+  }
+  playUntil([this] { return atRest(); }, kLongestCall);
+  position_changed_ = false;
+  script_began_ = item_step_ = steps_;
+  script_ = true;
+  lines_of_log_.clear();
+  const auto played = [this] {
+    return next_item_ == schedule_.items.size() && clients_[0].idle() && clients_[1].idle();
+  };
+  // What is held is answered when it goes on, or is stopped.
+  const auto held = [this] {
+    return !clients_[0].waits_for_stops && !clients_[1].waits_for_stops &&
+           controller_->snapshot()->axes.front().state.held;
+  };
+  if (!playUntil(played, kLongestCall) && !held()) {
+    for (const auto& [id, asked] : open_) oracle_.complain(asked.name + " isn't answered");
+    for (const Client& client : clients_) {
+      if (client.waits_for_stops) oracle_.complain("the emergency stop isn't answered");
+    }
+    if (oracle_.complaints.empty()) oracle_.complain("the script doesn't come to its end");
+  }
+  // What the last answers promise has to be true for a while.
+  const pulse::Nanoseconds later = clock_.now() + kQuietIsWatched;
+  if (oracle_.complaints.empty()) {
+    playUntil([&] { return clock_.now() >= later; }, kLongestCall);
+  }
+  script_ = false;
+  if (oracle_.complaints.empty()) {
+    for (std::size_t i = 0; i < kAxes; ++i) rig_.setFaults(configs_[i].name, {});
+    next_pin_error_ = 0;
+    next_pin_hang_ = 0;
+    Meaning stops;
+    stops.axes.fill(true);
+    stops.quiet = Meaning::Quiet::kSlowsDown;
+    note("stop all in the end");
+    ask("stop", machine::StopAll{}, stops);
+    if (!playUntil([this] { return atRest(); }, kLongestCall)) {
+      oracle_.complain("the axes don't come to rest, or an outcome isn't set");
+    }
+  }
+  if (oracle_.complaints.empty()) checkOutcomes();
+  if (oracle_.complaints.empty()) checkCounts("at rest");
+  if (oracle_.complaints.empty()) checkRest();
+  if (oracle_.complaints.empty()) {
+    note("probe");
+    probe();
+  }
+  if (oracle_.complaints.empty()) checkCounts("in the end");
+  return oracle_.complaints;
+}
+
+}  // namespace stepdriver::search

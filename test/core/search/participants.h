@@ -1,0 +1,220 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "axis/prepared_trajectory.h"
+#include "machine/controller.h"
+#include "machine/wiring.h"
+#include "search/oracle.h"
+#include "search/rise_watch.h"
+#include "stepdriver_core/gpio/simulated_lines.h"
+#include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/pulse/pulse_engine.h"
+#include "stepdriver_core/sim/rig.h"
+
+namespace stepdriver::search {
+
+/// Who can go next.
+enum class Who {
+  kNews,     ///< the controller takes what the engine has done
+  kPinDone,  ///< the controller takes a pin that was written, or failed
+  kInput,    ///< the controller takes a level or an edge
+  kRequest,  ///< the controller takes a request, and the levels that its caller has read
+  kTimer,    ///< the controller is told that time has passed
+  kEngine,   ///< a pass of the engine
+  kWriter,   ///< whoever writes the slow lines
+  kWatcher,  ///< whoever watches the inputs
+  kClientA,
+  kClientB,
+  kClock,
+};
+constexpr std::size_t kParticipants = 11;
+const char* nameOf(Who who);
+
+/// From the n-th step after the script's first request on, a participant has to wait for some
+/// steps.
+struct Deviation {
+  std::size_t from = 0;
+  Who who = Who::kNews;
+  std::size_t steps = 0;
+};
+
+/// A line of a script: what a client does, or what happens to the machine.
+struct Item {
+  std::size_t act = 0;    ///< by its index in acts()
+  int client = 0;         ///< 0 or 1
+  std::size_t after = 0;  ///< steps after the item before it
+};
+
+/// All that decides what happens.
+struct Schedule {
+  int variant = 0;
+  std::vector<Item> items;
+  std::vector<Deviation> deviations;
+};
+
+class Participants;
+
+/// Something that can be done.
+struct Act {
+  std::string name;
+  std::function<void(Participants&, int client)> begin;
+};
+const std::vector<Act>& acts();
+/// @return its index. @throw std::out_of_range
+std::size_t actNamed(const std::string& name);
+
+/// A controller, an engine and a rig, without threads: one step of one participant at a time, in
+/// the order that the schedule says.
+class Participants {
+ public:
+  explicit Participants(const Schedule& schedule);
+
+  /// Plays the whole schedule, ends what is left over, and tries whether all axes move again.
+  /// @return what was wrong; empty: nothing.
+  std::vector<std::string> run();
+
+  std::size_t steps() const { return steps_; }
+  /// Writes down each step from now on.
+  void keepLog() { log_ = true; }
+  const std::vector<std::string>& log() const { return lines_of_log_; }
+
+  /// @name What acts do
+  /// @{
+  void post(int client, const std::string& name, machine::Request request, const Meaning& meaning);
+  void postTrajectory(int client, std::vector<std::size_t> axes, double size);
+  void emergencyStop(int client);
+  void shutDown(int client);
+  void stopLastMove(int client, std::size_t axis);
+  void cancelHomings(int client);
+  void pressSwitch(std::size_t axis, bool pressed);
+  void breakChip(std::size_t axis);
+  void failNextPin(int error) { next_pin_error_ = error; }
+  void hangNextPin(pulse::Nanoseconds time) { next_pin_hang_ = time; }
+  void loseEdges() { loses_edges_ = true; }
+  /// @}
+
+ private:
+  struct Ask {
+    std::uint64_t id = 0;
+    int client = 0;
+    std::string name;
+    machine::Request request;
+    Meaning meaning;
+    std::vector<machine::InputRead> reads;
+    pulse::Nanoseconds posted = 0;
+    std::size_t posted_step = 0;
+  };
+  struct Job {
+    activity::PinJob job;
+    pulse::Nanoseconds deadline = 0;
+    pulse::Nanoseconds returns = 0;
+    int error = 0;
+    bool told = false;
+  };
+  struct Client {
+    std::uint64_t waits_for = 0;  // a call; 0: none
+    std::optional<std::uint64_t> waits_for_stops;
+    std::function<void()> next;  // its next step
+    std::function<void(const activity::Reply&)> on_answer;
+    pulse::Nanoseconds since = 0;
+    bool idle() const { return waits_for == 0 && !waits_for_stops && !next; }
+  };
+  class News : public pulse::NewsListener {
+   public:
+    void onNews() noexcept override { any = true; }
+    bool any = true;
+  };
+
+  bool step();
+  bool canGo(Who who);
+  void go(Who who);
+  bool isDelayed(Who who) const;
+  void handle(decltype(machine::Input::what) what);
+  void carryOut(activity::Outputs& out);
+  void postCommands();
+  void answer(std::uint64_t call, activity::Reply reply);
+  void note(const std::string& what);
+  void watch();
+  void write();
+  void beginItem();
+  bool itemReady() const;
+  pulse::Nanoseconds nextDue();
+  void advanceTo(pulse::Nanoseconds time);
+  std::vector<machine::InputRead> readInputs();
+  void takeRead(const machine::InputRead& read);
+  void prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
+                      std::vector<std::uint64_t> stops, int tries);
+  activity::Reply ask(const std::string& name, machine::Request request, const Meaning& meaning);
+  /// Plays on until this is so. @return false if it takes too long.
+  bool playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest);
+  bool atRest();
+  void checkCounts(const std::string& when);
+  void checkRest();
+  void checkOutcomes();
+  void probe();
+  void judgeDone();
+
+  const Schedule schedule_;
+  std::vector<config::AxisConfig> configs_;
+  Oracle oracle_;
+  pulse::VirtualClock clock_;
+  std::shared_ptr<RiseWatch> trace_;
+  sim::Rig rig_;
+  gpio::SimulatedBackend backend_;
+  machine::Wiring wiring_;
+  std::shared_ptr<gpio::Lines> lines_;
+  std::unique_ptr<pulse::PulseEngine> engine_;
+  std::unique_ptr<machine::Controller> controller_;
+  News news_;
+
+  // Of the shell.
+  std::deque<Ask> requests_;
+  std::deque<machine::InputRead> reads_;
+  std::deque<gpio::EdgeEvent> edges_;
+  std::vector<int> levels_;
+  std::deque<activity::PinDone> pins_done_;
+  std::deque<Job> jobs_;
+  std::deque<pulse::Command> outbox_;
+  bool engine_called_ = true;
+  pulse::Nanoseconds engine_due_ = 0;
+  pulse::Nanoseconds engine_waits_since_ = pulse::kNever;
+  std::vector<machine::InputRead> watched_;
+  pulse::Nanoseconds watch_due_ = pulse::kNever;
+  bool loses_edges_ = false;
+  int next_pin_error_ = 0;
+  pulse::Nanoseconds next_pin_hang_ = 0;
+
+  // Of the clients.
+  // The two of the script, and one that begins and ends the whole.
+  static constexpr int kProbe = 2;
+  std::array<Client, 3> clients_;
+  std::map<std::uint64_t, Ask> open_;
+  std::map<std::uint64_t, std::string> answered_;
+  std::uint64_t calls_ = 0;
+  std::size_t next_item_ = 0;
+  std::size_t item_step_ = 0;
+  bool closed_ = false;
+  std::vector<std::pair<std::string, axis::Move>> moves_;
+  std::array<std::uint64_t, kAxes> last_move_{};
+  std::vector<activity::AcceptedHoming> homings_;
+  bool position_changed_ = false;
+
+  std::size_t steps_ = 0;
+  std::size_t script_began_ = 0;
+  bool script_ = false;
+  bool log_ = false;
+  std::vector<std::string> lines_of_log_;
+};
+
+}  // namespace stepdriver::search

@@ -1,0 +1,169 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/sim/rig.h"
+#include "support/hand_rig.h"
+
+namespace stepdriver::sim {
+namespace {
+
+using driver::Model;
+using test::HandRig;
+using test::plainAxis;
+
+constexpr double kTravel = 0.2;  // [mm] a full step, as plainAxis() has it
+
+/// A max switch at 1 mm and a min switch at -1 mm: 5 full steps either way.
+RigAxisSpec axisWithSwitches() {
+  RigAxisSpec spec = plainAxis(Model::kTb6600);
+  spec.max_switch.emplace();
+  spec.max_switch->line = "x.max";
+  spec.max_switch->active_level = true;
+  spec.max_switch->position = 1.0;
+  spec.min_switch.emplace();
+  spec.min_switch->line = "x.min";
+  spec.min_switch->position = -1.0;
+  return spec;
+}
+
+TEST(RigSwitch, IsPressedFromItsPositionOnOutwards) {
+  HandRig bench(axisWithSwitches());
+  bench.ready().pulse(4);
+  EXPECT_FALSE(bench.report().max_pressed) << bench.report().carriage;
+  bench.pulse();
+  EXPECT_TRUE(bench.report().max_pressed) << bench.report().carriage;
+  EXPECT_TRUE(bench.reads("x.max"));
+  bench.direction(false).pulse();
+  EXPECT_FALSE(bench.report().max_pressed) << bench.report().carriage;
+  bench.pulse(8);
+  EXPECT_FALSE(bench.report().min_pressed) << bench.report().carriage;
+  EXPECT_TRUE(bench.reads("x.min")) << "its line is low while it is pressed";
+  bench.pulse();
+  EXPECT_TRUE(bench.report().min_pressed) << bench.report().carriage;
+  EXPECT_FALSE(bench.reads("x.min"));
+}
+
+TEST(RigSwitch, IsReleasedFurtherInside) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.max_switch->hysteresis = 0.4;
+  HandRig bench(spec);
+  bench.ready().pulse(6).direction(false);
+  for (const int full_steps : {5, 4, 3}) {
+    bench.pulse();
+    EXPECT_TRUE(bench.report().max_pressed) << full_steps * kTravel << " mm";
+  }
+  bench.pulse();
+  EXPECT_FALSE(bench.report().max_pressed) << 2 * kTravel << " mm";
+  bench.direction(true).pulse(2);
+  EXPECT_FALSE(bench.report().max_pressed) << 4 * kTravel << " mm, from inside";
+}
+
+TEST(RigSwitch, MayBePressedFromTheStart) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.start = -1.0;
+  HandRig bench(spec);
+  EXPECT_TRUE(bench.report().min_pressed);
+  EXPECT_FALSE(bench.reads("x.min"));
+}
+
+TEST(RigSwitch, BouncesAfterEachChangeAndSettles) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.max_switch->bounces = 2;
+  spec.max_switch->bounce_ns = 100;
+  HandRig bench(spec);
+  bench.ready().pulse(4).set("x.step", true);
+  const std::int64_t hit = bench.now;
+  std::string levels;
+  for (const std::int64_t after : {0, 99, 100, 199, 200, 299, 300, 399, 400, 5'000}) {
+    levels += bench.rig.inputLevel(bench.line("x.max"), hit + after) ? '1' : '0';
+  }
+  EXPECT_EQ(levels, "1100110011");
+  EXPECT_EQ(bench.trace->times("x", "endstop_max", true),
+            (std::vector<std::int64_t>{hit, hit + 200, hit + 400}));
+  EXPECT_EQ(bench.trace->times("x", "endstop_max", false),
+            (std::vector<std::int64_t>{hit + 100, hit + 300}));
+}
+
+TEST(RigSwitch, StartsToBounceAnewWhenItChangesWhileBouncing) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.max_switch->bounces = 3;
+  spec.max_switch->bounce_ns = 1'000;
+  HandRig bench(spec);
+  bench.ready();
+  bench.set("x.enable", true);
+  bench.rig.placeCarriage("x", 1.0, bench.now);
+  const std::int64_t pressed = bench.now;
+  bench.wait(2'500);
+  bench.rig.placeCarriage("x", 0.0, bench.now);
+  EXPECT_FALSE(bench.reads("x.max"));
+  bench.wait(20'000);
+  EXPECT_FALSE(bench.reads("x.max"));
+  EXPECT_EQ(bench.trace->times("x", "endstop_max", true),
+            (std::vector<std::int64_t>{pressed, pressed + 2'000, pressed + 3'500, pressed + 5'500,
+                                       pressed + 7'500}));
+}
+
+TEST(RigSwitch, StaysStuckWhateverTheCarriageDoes) {
+  HandRig bench(axisWithSwitches());
+  RigFaults faults;
+  faults.max_stuck = false;
+  faults.min_stuck = true;
+  bench.rig.setFaults("x", faults);
+  bench.ready().pulse(10);
+  EXPECT_FALSE(bench.reads("x.max"));
+  EXPECT_FALSE(bench.reads("x.min")) << "stuck active, and that is low";
+  EXPECT_TRUE(bench.report().min_pressed);
+  EXPECT_EQ(bench.report().totalViolations(), 0) << "a switch that says nothing isn't run into";
+  bench.rig.setFaults("x", {});
+  EXPECT_TRUE(bench.reads("x.max"));
+  EXPECT_TRUE(bench.reads("x.min"));
+}
+
+TEST(RigSwitch, CountsStepsTowardsItWhileItReadsActive) {
+  HandRig bench(axisWithSwitches());
+  bench.ready().pulse(5);
+  EXPECT_EQ(bench.report().totalViolations(), 0) << "the step that presses it is none";
+  bench.pulse(2);
+  EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 2}}));
+  bench.direction(false).pulse(12);
+  EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 2}}))
+      << "away from it is free; " << bench.report().carriage << " mm";
+  bench.pulse();
+  EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 3}}))
+      << "the min switch blocks the other direction; " << bench.report().carriage << " mm";
+}
+
+TEST(RigSwitch, SharesALineWithAnother) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.min_switch->line = spec.max_switch->line = "x.both";
+  spec.min_switch->active_level = spec.max_switch->active_level = false;
+  HandRig bench(spec);
+  EXPECT_TRUE(bench.ready().reads("x.both"));
+  EXPECT_FALSE(bench.pulse(5).reads("x.both"));
+  EXPECT_TRUE(bench.direction(false).pulse(5).reads("x.both"));
+  EXPECT_FALSE(bench.pulse(5).reads("x.both"));
+}
+
+TEST(RigSwitch, TellsWhoWatchesItsLineOfEachChangeOnce) {
+  RigAxisSpec spec = axisWithSwitches();
+  spec.max_switch->bounces = 3;
+  spec.max_switch->bounce_ns = 1'000'000'000;
+  HandRig bench(spec);
+  bench.ready().pulse(4);
+  std::vector<bool> told;
+  bench.rig.watchInput(bench.line("x.max"),
+                       [&](bool level, std::int64_t) { told.push_back(level); });
+  EXPECT_EQ(told, std::vector<bool>{}) << "nothing has changed yet";
+  bench.pulse(3);
+  EXPECT_EQ(told, std::vector<bool>{true}) << "of the press, and not of the bounces after it";
+  bench.direction(false).pulse(3);
+  EXPECT_EQ(told, (std::vector<bool>{true, false}));
+  bench.rig.watchInput(bench.line("x.max"), nullptr);
+  bench.direction(true).pulse(3);
+  EXPECT_EQ(told.size(), 2U) << "told after the watch has ended";
+}
+
+}  // namespace
+}  // namespace stepdriver::sim

@@ -1,0 +1,148 @@
+#include "stepdriver_core/sim/vcd_trace.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/sim/rig.h"
+#include "support/hand_rig.h"
+
+namespace stepdriver::sim {
+namespace {
+
+class VcdTraceTest : public testing::Test {
+ public:
+  VcdTraceTest()
+      : path_(testing::TempDir() + "stepdriver_" +
+              testing::UnitTest::GetInstance()->current_test_info()->name() + ".vcd") {}
+  ~VcdTraceTest() override { std::remove(path_.c_str()); }
+
+ protected:
+  std::string text() const {
+    std::ifstream file(path_);
+    std::ostringstream all;
+    all << file.rdbuf();
+    return all.str();
+  }
+
+  const std::string path_;
+};
+
+TEST_F(VcdTraceTest, WritesWhatViewersRead) {
+  {
+    VcdTrace trace(path_);
+    trace.begin({{"x", "step"}, {"x", "dir"}, {"y", "step"}}, {false, true, false}, 5'000);
+    trace.edge(0, true, 5'000);
+    trace.edge(0, false, 6'500);
+    trace.edge(2, true, 6'500);
+    trace.edge(1, false, 1'000'000'005'001);
+  }
+  EXPECT_EQ(text(),
+            "$version stepdriver $end\n"
+            "$timescale 1 ns $end\n"
+            "$scope module x $end\n"
+            "$var wire 1 a step $end\n"
+            "$var wire 1 b dir $end\n"
+            "$upscope $end\n"
+            "$scope module y $end\n"
+            "$var wire 1 c step $end\n"
+            "$upscope $end\n"
+            "$enddefinitions $end\n"
+            "#0\n"
+            "$dumpvars\n"
+            "0a\n"
+            "1b\n"
+            "0c\n"
+            "$end\n"
+            "1a\n"
+            "#1500\n"
+            "0a\n"
+            "1c\n"
+            "#1000000000001\n"
+            "0b\n"
+            "#1000000001001\n");
+}
+
+TEST_F(VcdTraceTest, IsReadableWhileItGrowsAfterAFlush) {
+  VcdTrace trace(path_);
+  trace.begin({{"x", "step"}}, {false}, 0);
+  trace.edge(0, true, 70);
+  trace.flush();
+  const std::string so_far = text();
+  EXPECT_NE(so_far.find("#70\n1a\n"), std::string::npos) << so_far;
+}
+
+TEST_F(VcdTraceTest, KeepsEveryEdgeOfALongTrace) {
+  constexpr int kEdges = 100'000;
+  {
+    VcdTrace trace(path_);
+    trace.begin({{"x", "step"}}, {false}, 0);
+    for (int i = 1; i <= kEdges; ++i) trace.edge(0, i % 2 == 1, std::int64_t{10} * i);
+  }
+  std::istringstream lines(text());
+  int edges = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line == "0a" || line == "1a") ++edges;
+  }
+  EXPECT_EQ(edges, kEdges + 1) << "with the level at the beginning";
+}
+
+TEST_F(VcdTraceTest, HasAnIdentifierOfItsOwnForEachOfManyPins) {
+  constexpr std::size_t kPins = 200;
+  {
+    VcdTrace trace(path_);
+    trace.begin(std::vector<TracePin>(kPins, {"x", "step"}), std::vector<bool>(kPins, false), 0);
+  }
+  std::set<std::string> identifiers;
+  std::istringstream words(text());
+  for (std::string word; words >> word;) {
+    if (word != "$var") continue;
+    std::string identifier;
+    words >> word >> word >> identifier;
+    identifiers.insert(identifier);
+  }
+  EXPECT_EQ(identifiers.size(), kPins);
+}
+
+TEST_F(VcdTraceTest, HasNoBlanksOrSeparatorsInNames) {
+  { VcdTrace(path_).begin({{"my axis:1", "step"}}, {false}, 0); }
+  EXPECT_NE(text().find("$scope module my_axis_1 $end"), std::string::npos) << text();
+  EXPECT_NE(text().find(" step $end"), std::string::npos) << text();
+}
+
+TEST_F(VcdTraceTest, IsTheSameForTheSameEdges) {
+  const auto run = [&] {
+    const auto trace = std::make_shared<VcdTrace>(path_);
+    Rig rig({test::plainAxis(driver::Model::kA4988)}, trace);
+    const int step = rig.lineIndex("x.step");
+    rig.onRequest(step, false, 42);
+    for (int i = 0; i < 10; ++i) rig.onEdge(step, i % 2 == 0, 42 + 1'000 * i);
+    rig.flushTrace();
+    return text();
+  };
+  const std::string first = run();
+  EXPECT_EQ(run(), first);
+  EXPECT_NE(first.find("#9000\n0a\n"), std::string::npos) << first;
+}
+
+TEST_F(VcdTraceTest, RefusesAFileThatItCannotWrite) {
+  EXPECT_THROW(VcdTrace("/nowhere/at/all.vcd"), Error);
+}
+
+TEST_F(VcdTraceTest, SaysAtAFlushThatTheFileIsIncomplete) {
+  std::ifstream full("/dev/full");
+  if (!full) GTEST_SKIP() << "no /dev/full here";
+  VcdTrace trace("/dev/full");
+  trace.begin({{"x", "step"}}, {false}, 0);
+  EXPECT_THROW(trace.flush(), Error);
+}
+
+}  // namespace
+}  // namespace stepdriver::sim

@@ -1,0 +1,306 @@
+#include "storm/driver_calls.h"
+
+#include <actionlib_msgs/GoalID.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/Home.h>
+#include <stepdriver/HomeAxes.h>
+#include <stepdriver/Jog.h>
+#include <stepdriver/Microstep.h>
+#include <stepdriver/MoveActionGoal.h>
+#include <stepdriver/MoveLine.h>
+#include <stepdriver/MoveRounds.h>
+#include <stepdriver/MoveTo.h>
+#include <stepdriver/SetLimits.h>
+#include <stepdriver/SetPosition.h>
+#include <stepdriver/SpeedOverride.h>
+#include <trajectory_msgs/JointTrajectory.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <type_traits>
+#include <utility>
+
+#include "storm/storm_machine.h"
+#include "support/control_msgs_client.h"
+
+namespace stepdriver::storm {
+namespace {
+
+using TrajectoryGoal = node_test::action_msgs::FollowJointTrajectoryActionGoal;
+
+std::string shown(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.5g", number);
+  return text;
+}
+
+std::string shown(const std::vector<std::size_t>& axes, const std::vector<double>& positions) {
+  std::string text;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    text += " " + kAxisNames.at(axes[i]) + " " + shown(positions[i]);
+  }
+  return text;
+}
+
+AxisSet setOf(const std::vector<std::size_t>& axes) {
+  AxisSet set = 0;
+  for (const std::size_t axis : axes) set |= 1U << axis;
+  return set;
+}
+
+trajectory_msgs::JointTrajectory trajectoryOf(const std::vector<std::size_t>& axes,
+                                              const std::vector<double>& positions,
+                                              double duration) {
+  trajectory_msgs::JointTrajectory trajectory;
+  for (const std::size_t axis : axes) {
+    trajectory.joint_names.push_back(kAxisNames.at(axis) + "_joint");
+  }
+  trajectory_msgs::JointTrajectoryPoint point;
+  point.positions = positions;
+  point.velocities.assign(axes.size(), 0.0);
+  point.accelerations.assign(axes.size(), 0.0);
+  point.time_from_start = ros::Duration(duration);
+  trajectory.points.push_back(point);
+  return trajectory;
+}
+
+Request motionOf(int client, AxisSet axes, const std::string& text) {
+  Request request;
+  request.client = client;
+  request.kind = Kind::kMotion;
+  request.axes = axes;
+  request.text = text;
+  return request;
+}
+
+Request messageOf(int client, AxisSet axes, const std::string& text) {
+  Request request = motionOf(client, axes, text);
+  request.has_answer = false;
+  return request;
+}
+
+Request requestOf(Kind kind, AxisSet axes, const std::string& text, bool wait = false) {
+  Request request;
+  request.kind = kind;
+  request.axes = axes;
+  request.text = text + (wait ? " and wait" : "");
+  request.waits = wait;
+  return request;
+}
+
+}  // namespace
+
+const std::vector<std::string> kAxisNames{"x", "y", "z"};
+
+DriverTopics::DriverTopics(std::string node, RequestLog& log) : log_(log) {
+  ros::NodeHandle handle(std::move(node));
+  jog_ = handle.advertise<Jog>("jog", 100);
+  command_ = handle.advertise<trajectory_msgs::JointTrajectory>("command", 100);
+  trajectory_goal_ = handle.advertise<TrajectoryGoal>("follow_joint_trajectory/goal", 100);
+  trajectory_cancel_ =
+      handle.advertise<actionlib_msgs::GoalID>("follow_joint_trajectory/cancel", 100);
+  for (const std::string& axis : kAxisNames) {
+    move_goals_.push_back(handle.advertise<MoveActionGoal>(axis + "/move/goal", 100));
+    move_cancels_.push_back(handle.advertise<actionlib_msgs::GoalID>(axis + "/move/cancel", 100));
+  }
+}
+
+bool DriverTopics::connected() const {
+  const auto heard = [](const ros::Publisher& topic) { return topic.getNumSubscribers() > 0; };
+  return heard(jog_) && heard(command_) && heard(trajectory_goal_) && heard(trajectory_cancel_) &&
+         std::all_of(move_goals_.begin(), move_goals_.end(), heard) &&
+         std::all_of(move_cancels_.begin(), move_cancels_.end(), heard);
+}
+
+void DriverTopics::jog(int client, std::size_t axis, double velocity) {
+  stepdriver::Jog jog;
+  jog.name = {kAxisNames.at(axis)};
+  jog.velocity = {velocity};
+  JogMessage message;
+  // The order of messages in the log is that on the topic.
+  const std::lock_guard<std::mutex> lock(mutex_);
+  JogMessage& last = jogs_[axis];
+  message.at = steadyNow();
+  message.moves = velocity != 0.0;
+  const bool begins = !last.moves || message.at - last.at > std::llround(kJogTimeout * 0.4e9);
+  if (message.moves && begins) {
+    Request request =
+        messageOf(client, 1U << axis, kAxisNames.at(axis) + ": jog " + shown(velocity));
+    request.kind = Kind::kJog;
+    log_.begin(request);
+  }
+  last = message;
+  jog_.publish(jog);
+}
+
+void DriverTopics::command(int client, const std::vector<std::size_t>& axes,
+                           const std::vector<double>& positions, double duration) {
+  Request request = messageOf(client, setOf(axes),
+                              "command" + shown(axes, positions) + " in " + shown(duration) + " s");
+  request.is_trajectory = true;
+  log_.begin(request);
+  command_.publish(trajectoryOf(axes, positions, duration));
+}
+
+void DriverTopics::followTrajectory(int client, const std::vector<std::size_t>& axes,
+                                    const std::vector<double>& positions, double duration) {
+  TrajectoryGoal goal;
+  goal.goal.trajectory = trajectoryOf(axes, positions, duration);
+  Request request = messageOf(
+      client, setOf(axes),
+      "follow_joint_trajectory" + shown(axes, positions) + " in " + shown(duration) + " s");
+  request.is_trajectory = true;
+  goal.goal_id.id = std::to_string(log_.begin(request));
+  trajectory_goal_.publish(goal);
+}
+
+void DriverTopics::cancelTrajectories() { trajectory_cancel_.publish(actionlib_msgs::GoalID()); }
+
+void DriverTopics::moveByAction(int client, std::size_t axis, double position, bool relative) {
+  MoveActionGoal goal;
+  goal.goal.position = position;
+  goal.goal.relative = relative;
+  goal.goal_id.id = std::to_string(log_.begin(
+      messageOf(client, 1U << axis,
+                kAxisNames.at(axis) + "/move " + (relative ? "by " : "to ") + shown(position))));
+  move_goals_.at(axis).publish(goal);
+}
+
+void DriverTopics::cancelMove(std::size_t axis) {
+  move_cancels_.at(axis).publish(actionlib_msgs::GoalID());
+}
+
+template <typename Service, typename Arrivals>
+bool DriverCalls::call(Request request, const std::string& service, Service& call,
+                       const Arrivals& arrivals) {
+  request.client = client_;
+  const std::size_t index = log_.begin(std::move(request));
+  ros::ServiceClient& client = clients_[service];
+  if (!client.isValid()) {
+    client = ros::NodeHandle(node_).serviceClient<Service>(service, true);
+  }
+  // A node that has died gives no answer.
+  if (!client.call(call)) return false;
+  const bool success = call.response.success != 0;
+  log_.end(index, success, call.response.message,
+           success ? arrivals(call.response) : std::vector<Arrival>());
+  return success;
+}
+
+template <typename Service>
+bool DriverCalls::call(Request request, const std::string& service, Service& call) {
+  return this->call(std::move(request), service, call,
+                    [](const auto& /*response*/) { return std::vector<Arrival>(); });
+}
+
+bool DriverCalls::moveTo(std::size_t axis, double position, bool relative, bool wait) {
+  MoveTo service;
+  service.request.position = position;
+  service.request.relative = relative;
+  service.request.wait = wait;
+  const std::string name = kAxisNames.at(axis) + "/move_to";
+  return call(requestOf(Kind::kMotion, 1U << axis,
+                        name + (relative ? " by " : " ") + shown(position), wait),
+              name, service, [&](const MoveTo::Response& response) {
+                if (relative || !wait) return std::vector<Arrival>();
+                return std::vector<Arrival>{{axis, position, response.position}};
+              });
+}
+
+bool DriverCalls::moveRounds(std::size_t axis, double rounds, bool wait) {
+  MoveRounds service;
+  service.request.rounds = rounds;
+  service.request.wait = wait;
+  const std::string name = kAxisNames.at(axis) + "/move_rounds";
+  return call(requestOf(Kind::kMotion, 1U << axis, name + " " + shown(rounds), wait), name,
+              service);
+}
+
+bool DriverCalls::moveLine(const std::vector<std::size_t>& axes,
+                           const std::vector<double>& positions, bool relative, double duration,
+                           bool wait) {
+  MoveLine service;
+  for (const std::size_t axis : axes) service.request.name.push_back(kAxisNames.at(axis));
+  service.request.position = positions;
+  service.request.relative = relative;
+  service.request.duration = duration;
+  service.request.wait = wait;
+  return call(
+      requestOf(Kind::kMotion, setOf(axes),
+                std::string("move_line") + (relative ? " by" : "") + shown(axes, positions) +
+                    (duration > 0.0 ? " in " + shown(duration) + " s" : ""),
+                wait),
+      "move_line", service, [&](const MoveLine::Response& response) {
+        std::vector<Arrival> arrivals;
+        if (relative || !wait) return arrivals;
+        for (std::size_t i = 0; i < axes.size(); ++i) {
+          arrivals.push_back({axes[i], positions[i], response.position.at(i)});
+        }
+        return arrivals;
+      });
+}
+
+bool DriverCalls::home(std::size_t axis, bool wait) {
+  Home service;
+  service.request.wait = wait;
+  const std::string name = kAxisNames.at(axis) + "/home";
+  return call(requestOf(Kind::kHoming, 1U << axis, name, wait), name, service);
+}
+
+bool DriverCalls::homeAll(bool wait) {
+  HomeAxes service;
+  service.request.wait = wait;
+  // Only x has a homing.
+  return call(requestOf(Kind::kHoming, 1U, "home", wait), "home", service);
+}
+
+bool DriverCalls::microstep(std::size_t axis, int microsteps) {
+  Microstep service;
+  service.request.microsteps = microsteps;
+  const std::string name = kAxisNames.at(axis) + "/microstep";
+  // It may move to a position that both modes have, and answers after that.
+  return call(requestOf(Kind::kMotion, 1U << axis, name + " " + std::to_string(microsteps), true),
+              name, service);
+}
+
+bool DriverCalls::setLimits(std::size_t axis, double max_speed, double acceleration, double jerk) {
+  SetLimits service;
+  service.request.max_speed = max_speed;
+  service.request.acceleration = acceleration;
+  service.request.deceleration = acceleration;
+  service.request.jerk = jerk;
+  const std::string name = kAxisNames.at(axis) + "/set_limits";
+  return call(
+      requestOf(Kind::kOther, 1U << axis,
+                name + " " + shown(max_speed) + " " + shown(acceleration) + " " + shown(jerk)),
+      name, service);
+}
+
+bool DriverCalls::setPosition(std::size_t axis, double position) {
+  SetPosition service;
+  service.request.position = position;
+  const std::string name = kAxisNames.at(axis) + "/set_position";
+  return call(requestOf(Kind::kSetPosition, 1U << axis, name + " " + shown(position)), name,
+              service);
+}
+
+bool DriverCalls::speedOverride(double factor) {
+  SpeedOverride service;
+  service.request.factor = factor;
+  return call(requestOf(Kind::kOther, kAllAxes, "speed_override " + shown(factor)),
+              "speed_override", service);
+}
+
+bool DriverCalls::set(Kind kind, std::size_t axis, const std::string& service, bool data) {
+  std_srvs::SetBool message;
+  message.request.data = data;
+  return call(requestOf(kind, 1U << axis, service + (data ? " true" : " false")), service, message);
+}
+
+bool DriverCalls::trigger(Kind kind, AxisSet axes, const std::string& service) {
+  std_srvs::Trigger message;
+  return call(requestOf(kind, axes, service), service, message);
+}
+
+}  // namespace stepdriver::storm

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/service_client.h>
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "storm/request_log.h"
+
+namespace stepdriver::storm {
+
+/// The topics of the driver that clients send to, shared by all of them. Safe from any thread.
+class DriverTopics {
+ public:
+  DriverTopics(std::string node, RequestLog& log);
+
+  /// A message of a jog. Only one that may begin a jog, after a pause or a 0, is a request.
+  void jog(int client, std::size_t axis, double velocity);
+  void command(int client, const std::vector<std::size_t>& axes,
+               const std::vector<double>& positions, double duration);
+  void followTrajectory(int client, const std::vector<std::size_t>& axes,
+                        const std::vector<double>& positions, double duration);
+  void cancelTrajectories();
+  void moveByAction(int client, std::size_t axis, double position, bool relative);
+  void cancelMove(std::size_t axis);
+
+  /// Whether the node listens to all of them.
+  bool connected() const;
+
+ private:
+  struct JogMessage {
+    std::int64_t at = 0;
+    bool moves = false;
+  };
+
+  RequestLog& log_;
+  mutable std::mutex mutex_;
+  ros::Publisher jog_;
+  ros::Publisher command_;
+  ros::Publisher trajectory_goal_;
+  ros::Publisher trajectory_cancel_;
+  std::vector<ros::Publisher> move_goals_;
+  std::vector<ros::Publisher> move_cancels_;
+  std::map<std::size_t, JogMessage> jogs_;  // the last message of each axis
+};
+
+/// The driver's services, as one client thread calls them: over connections that it keeps. Each
+/// call goes to the log.
+class DriverCalls {
+ public:
+  DriverCalls(std::string node, int client, RequestLog& log)
+      : node_(std::move(node)), client_(client), log_(log) {}
+
+  bool moveTo(std::size_t axis, double position, bool relative, bool wait);
+  bool moveRounds(std::size_t axis, double rounds, bool wait);
+  bool moveLine(const std::vector<std::size_t>& axes, const std::vector<double>& positions,
+                bool relative, double duration, bool wait);
+  bool home(std::size_t axis, bool wait);
+  bool homeAll(bool wait);
+  bool microstep(std::size_t axis, int microsteps);
+  bool setLimits(std::size_t axis, double max_speed, double acceleration, double jerk);
+  bool setPosition(std::size_t axis, double position);
+  bool speedOverride(double factor);
+  /// Those of std_srvs/SetBool below an axis: enable, sleep; press_min and press_max of the rig.
+  bool set(Kind kind, std::size_t axis, const std::string& service, bool data);
+  /// Those of std_srvs/Trigger.
+  bool trigger(Kind kind, AxisSet axes, const std::string& service);
+
+ private:
+  /// @param arrivals says of an answer where the axes are that were to be somewhere.
+  template <typename Service, typename Arrivals>
+  bool call(Request request, const std::string& service, Service& call, const Arrivals& arrivals);
+  template <typename Service>
+  bool call(Request request, const std::string& service, Service& call);
+
+  std::string node_;
+  int client_;
+  RequestLog& log_;
+  std::map<std::string, ros::ServiceClient> clients_;
+};
+
+extern const std::vector<std::string> kAxisNames;
+constexpr AxisSet kAllAxes = 7;
+
+}  // namespace stepdriver::storm

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "storm/request_log.h"
+
+namespace stepdriver::storm {
+
+/// What the oracle knows of an axis.
+struct AxisFacts {
+  std::string name;
+  double longest_stop = 0.0;     ///< [s] from its maximum speed and its maximum acceleration
+  double steps_per_metre = 0.0;  ///< in 1/16 steps
+  double backlash = 0.0;         ///< [m]
+};
+
+/// A pulse that the rig saw.
+struct Pulse {
+  std::int64_t time = 0;   ///< [ns] on the rig's clock
+  std::int64_t count = 0;  ///< [1/16 steps] forward less backward, with this pulse
+};
+
+/// A moment at which every axis was at rest, and what the node said then.
+struct RestPoint {
+  std::int64_t time = 0;          ///< [ns] of CLOCK_MONOTONIC
+  std::vector<double> positions;  ///< [m] of each axis
+};
+
+/// A time in which this computer didn't run what was ready to run.
+struct Stall {
+  std::int64_t begin = 0;
+  std::int64_t end = 0;
+};
+
+/// What happened. The rig's clock is never ahead of CLOCK_MONOTONIC less `clock_offset`; it may
+/// fall behind for as long as the node plans or the computer stalls, and then catches up.
+struct Observation {
+  std::vector<AxisFacts> axes;
+  std::vector<Request> requests;
+  std::vector<std::vector<Pulse>> pulses;  ///< of each axis
+  std::vector<RestPoint> rests;
+  std::vector<Stall> stalls;
+  std::int64_t clock_offset = 0;
+};
+
+/// Holds an observation against what the node promises:
+///
+/// - no pulse after the answer of an emergency stop, a disable or a sleep, and none after that of a
+///   stop or a hold beyond the longest deceleration and 10 %, until a newer motion can have begun:
+///   one that was asked later and that nothing forbids any more;
+/// - what an answer says to have been reached was reached;
+/// - the reported position is the count of the pulses.
+///
+/// Requests that were under way at the same time may have been handled in either order, and so
+/// neither is held against the other.
+///
+/// @return each broken promise in words.
+std::vector<std::string> brokenPromises(const Observation& observation);
+
+/// The last requests that were sent between two times, a line for each, with times from `origin`
+/// on.
+std::string requestsText(const std::vector<Request>& requests, std::int64_t begin, std::int64_t end,
+                         std::int64_t origin);
+
+}  // namespace stepdriver::storm

@@ -1,0 +1,184 @@
+#include "storm/oracle.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+// Each promise of the oracle's, kept and broken. Times are in milliseconds; the rig's clock began
+// at 1000.
+
+namespace stepdriver::storm {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kOffset = 1000;
+constexpr double kStepsPerMetre = 20'000.0;
+
+Request requestOf(Kind kind, std::int64_t sent, std::int64_t answered) {
+  Request request;
+  request.kind = kind;
+  request.axes = 1;
+  request.text = "request";
+  request.sent = sent * kMs;
+  request.answered = answered * kMs;
+  request.success = true;
+  return request;
+}
+
+/// One axis that needs 200 ms to stop, and a pulse each millisecond of the rig's clock in [begin,
+/// end).
+class OneAxis {
+ public:
+  OneAxis() {
+    AxisFacts facts;
+    facts.name = "x";
+    facts.longest_stop = 0.2;
+    facts.steps_per_metre = kStepsPerMetre;
+    seen_.axes = {facts};
+    seen_.pulses.resize(1);
+    seen_.clock_offset = kOffset * kMs;
+  }
+
+  void move(std::int64_t begin, std::int64_t end) {
+    for (std::int64_t time = begin; time < end; ++time) {
+      seen_.pulses[0].push_back(
+          {time * kMs, static_cast<std::int64_t>(seen_.pulses[0].size()) + 1});
+    }
+  }
+  void ask(const Request& request) { seen_.requests.push_back(request); }
+  void rest(std::int64_t time, double position) { seen_.rests.push_back({time * kMs, {position}}); }
+  void stall(std::int64_t begin, std::int64_t end) {
+    seen_.stalls.push_back({begin * kMs, end * kMs});
+  }
+  std::size_t broken() const { return brokenPromises(seen_).size(); }
+
+ private:
+  Observation seen_;
+};
+
+/// A move that is under way, and an ending at 3000 that is answered at 3010.
+OneAxis endedBy(Kind kind, std::int64_t last_pulse) {
+  OneAxis axis;
+  axis.ask(requestOf(Kind::kMotion, 2000, 2005));
+  axis.move(1005, last_pulse);
+  axis.ask(requestOf(kind, 3000, 3010));
+  return axis;
+}
+
+TEST(Oracle, LetsAStopDecelerate) {
+  EXPECT_EQ(endedBy(Kind::kStop, 2220).broken(), 0U);
+  EXPECT_EQ(endedBy(Kind::kStop, 2240).broken(), 1U);
+  EXPECT_EQ(endedBy(Kind::kHold, 2220).broken(), 0U);
+  EXPECT_EQ(endedBy(Kind::kHold, 2240).broken(), 1U);
+}
+
+TEST(Oracle, LetsNoPulseFollowADisableOrAnEmergencyStop) {
+  for (const Kind kind : {Kind::kDisable, Kind::kSleep, Kind::kEmergencyStop}) {
+    EXPECT_EQ(endedBy(kind, 2010).broken(), 0U);
+    EXPECT_EQ(endedBy(kind, 2015).broken(), 1U);
+  }
+}
+
+TEST(Oracle, LetsANewerMotionFollowAStop) {
+  OneAxis axis = endedBy(Kind::kStop, 2200);
+  axis.ask(requestOf(Kind::kMotion, 4000, 4005));
+  axis.move(3005, 3500);
+  EXPECT_EQ(axis.broken(), 0U);
+}
+
+TEST(Oracle, HoldsBothOrdersOfRequestsAtOneTimeForPossible) {
+  OneAxis axis = endedBy(Kind::kStop, 2200);
+  axis.ask(requestOf(Kind::kMotion, 2990, 3005));
+  axis.move(2500, 2600);
+  EXPECT_EQ(axis.broken(), 0U);
+}
+
+TEST(Oracle, KnowsThatALineThatCameLongBeforeAStopIsOlder) {
+  OneAxis axis = endedBy(Kind::kStop, 2200);
+  axis.ask(requestOf(Kind::kMotion, 2600, 3100));  // it waited for its axes to rest
+  axis.move(2500, 2600);
+  EXPECT_EQ(axis.broken(), 1U);
+}
+
+TEST(Oracle, DoesNotTrustTheOrderWhileTheComputerStalls) {
+  OneAxis axis = endedBy(Kind::kStop, 2200);
+  axis.ask(requestOf(Kind::kMotion, 2600, 3100));
+  axis.stall(2650, 2950);
+  axis.move(2500, 2600);
+  EXPECT_EQ(axis.broken(), 0U);
+}
+
+TEST(Oracle, LetsNoMotionFollowUntilItIsAllowedAgain) {
+  for (const auto& [end, again] :
+       std::vector<std::pair<Kind, Kind>>{{Kind::kDisable, Kind::kEnable},
+                                          {Kind::kSleep, Kind::kWake},
+                                          {Kind::kHold, Kind::kResume},
+                                          {Kind::kEmergencyStop, Kind::kRecover}}) {
+    OneAxis forbidden = endedBy(end, 2000);
+    forbidden.ask(requestOf(Kind::kMotion, 4000, 4005));
+    forbidden.move(3005, 3500);
+    EXPECT_EQ(forbidden.broken(), 1U);
+
+    OneAxis allowed = endedBy(end, 2000);
+    allowed.ask(requestOf(again, 3800, 3810));
+    allowed.ask(requestOf(Kind::kMotion, 4000, 4005));
+    allowed.move(3005, 3500);
+    EXPECT_EQ(allowed.broken(), 0U);
+  }
+}
+
+TEST(Oracle, TakesAJogForOneRequestFromItsBeginOn) {
+  OneAxis axis = endedBy(Kind::kStop, 2200);
+  Request jog = requestOf(Kind::kJog, 2000, 0);
+  jog.answered.reset();
+  jog.has_answer = false;
+  axis.ask(jog);
+  axis.move(2800, 3000);
+  EXPECT_EQ(axis.broken(), 1U);
+}
+
+TEST(Oracle, LetsALineThatFailsTakeUpBacklashBeforeItsAnswerAndNoMore) {
+  for (const std::int64_t last : {3220, 3300}) {
+    OneAxis axis = endedBy(Kind::kStop, 2200);
+    Request failed = requestOf(Kind::kMotion, 4000, 4005);
+    failed.success = false;
+    axis.ask(failed);
+    axis.move(3002, last);
+    EXPECT_EQ(axis.broken(), last == 3220 ? 0U : 1U);
+  }
+}
+
+TEST(Oracle, HoldsASuccessAgainstTheTarget) {
+  for (const double told : {0.05, 0.044}) {
+    OneAxis axis;
+    Request line = requestOf(Kind::kMotion, 2000, 2600);
+    line.waits = true;
+    line.arrivals = {{0, 0.05, told}};
+    axis.ask(line);
+    EXPECT_EQ(axis.broken(), told == 0.05 ? 0U : 1U);
+  }
+}
+
+TEST(Oracle, HoldsPositionsAgainstTheCountOfThePulses) {
+  for (const double position : {0.015, 0.01505}) {
+    OneAxis axis;
+    axis.ask(requestOf(Kind::kMotion, 2000, 2005));
+    axis.rest(1500, 0.01);
+    axis.move(1005, 1105);
+    axis.rest(2500, position);
+    EXPECT_EQ(axis.broken(), position == 0.015 ? 0U : 1U);
+  }
+}
+
+TEST(Oracle, LetsAPositionBeSet) {
+  OneAxis axis;
+  axis.rest(1500, 0.01);
+  axis.ask(requestOf(Kind::kSetPosition, 1600, 1605));
+  axis.rest(2500, 0.05);
+  EXPECT_EQ(axis.broken(), 0U);
+}
+
+}  // namespace
+}  // namespace stepdriver::storm

@@ -1,0 +1,67 @@
+#include "storm/pulses.h"
+
+#include <array>
+#include <stdexcept>
+
+namespace stepdriver::storm {
+namespace {
+
+/// The level of a waveform at times that never fall.
+class Level {
+ public:
+  explicit Level(const node_test::Waveform& waveform) : edges_(waveform.edges) {}
+
+  bool at(std::int64_t time) {
+    while (next_ < edges_.size() && edges_[next_].time_ns <= time) ++next_;
+    return next_ > 0 && edges_[next_ - 1].level;
+  }
+
+ private:
+  const std::vector<node_test::Waveform::Edge>& edges_;
+  std::size_t next_ = 0;
+};
+
+/// How many 1/16 steps a pulse makes, by the levels of MS1 to MS3: the table of the A4988's
+/// datasheet.
+int sixteenths(bool ms1, bool ms2, bool ms3) {
+  switch ((ms1 ? 1 : 0) + (ms2 ? 2 : 0) + (ms3 ? 4 : 0)) {
+    case 0:
+      return 16;
+    case 1:
+      return 8;
+    case 2:
+      return 4;
+    case 3:
+      return 2;
+    case 7:
+      return 1;
+    default:
+      throw std::runtime_error("a pulse with undefined microstep pins");
+  }
+}
+
+}  // namespace
+
+std::vector<Pulse> pulsesOf(const std::map<std::string, node_test::Waveform>& trace,
+                            const std::string& axis) {
+  const auto waveform = [&](const char* pin) -> const node_test::Waveform& {
+    return trace.at(axis + "/" + pin);
+  };
+  Level dir(waveform("dir"));
+  Level ms1(waveform("ms1"));
+  Level ms2(waveform("ms2"));
+  Level ms3(waveform("ms3"));
+  std::vector<Pulse> pulses;
+  std::int64_t count = 0;
+  const auto& step = waveform("step").edges;
+  for (std::size_t i = 1; i < step.size(); ++i) {
+    if (!step[i].level) continue;
+    const std::int64_t time = step[i].time_ns;
+    const int size = sixteenths(ms1.at(time), ms2.at(time), ms3.at(time));
+    count += dir.at(time) ? size : -size;
+    pulses.push_back({time, count});
+  }
+  return pulses;
+}
+
+}  // namespace stepdriver::storm

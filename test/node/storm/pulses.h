@@ -1,0 +1,16 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "storm/oracle.h"
+#include "support/vcd_reader.h"
+
+namespace stepdriver::storm {
+
+/// The pulses of an A4988 with microstep pins, as its trace has them.
+std::vector<Pulse> pulsesOf(const std::map<std::string, node_test::Waveform>& trace,
+                            const std::string& axis);
+
+}  // namespace stepdriver::storm

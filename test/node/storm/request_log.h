@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace stepdriver::storm {
+
+/// What a request may do to an axis, as far as the oracle needs to know it.
+enum class Kind {
+  kMotion,  ///< begins a motion of its axes
+  kHoming,  ///< the same, and it changes what their positions are counted from
+  kJog,     ///< the first message of a jog, after a pause or a 0
+  kStop,
+  kHold,
+  kResume,
+  kEnable,
+  kDisable,
+  kSleep,
+  kWake,
+  kEmergencyStop,
+  kRecover,
+  kSetPosition,
+  kOther,
+};
+
+/// Bit i stands for axis i.
+using AxisSet = unsigned;
+
+/// Where an answer says that an axis is, and where it was sent.
+struct Arrival {
+  std::size_t axis = 0;
+  double wanted = 0.0;  ///< [m]
+  double told = 0.0;    ///< [m]
+};
+
+/// A request and what became of it. Times are in nanoseconds of CLOCK_MONOTONIC.
+struct Request {
+  int client = 0;
+  Kind kind = Kind::kOther;
+  AxisSet axes = 0;
+  std::string text;            ///< as a person would write it
+  bool has_answer = true;      ///< false: a message of a topic or an action, which nobody answers
+  bool waits = false;          ///< it is answered when its motion has ended
+  bool is_trajectory = false;  ///< its axes may stop more slowly
+  std::int64_t sent = 0;
+  std::optional<std::int64_t> answered;
+  bool success = false;
+  std::string message;
+  std::vector<Arrival> arrivals;
+};
+
+std::int64_t steadyNow();
+
+/// All requests in the order in which they were sent. Safe from any thread.
+class RequestLog {
+ public:
+  /// @return what end() takes.
+  std::size_t begin(Request request);
+  void end(std::size_t index, bool success, std::string message, std::vector<Arrival> arrivals);
+
+  std::vector<Request> requests() const;
+  std::size_t count() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<Request> requests_;
+};
+
+}  // namespace stepdriver::storm

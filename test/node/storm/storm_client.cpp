@@ -1,0 +1,205 @@
+#include "storm/storm_client.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <numeric>
+#include <thread>
+
+namespace stepdriver::storm {
+namespace {
+
+constexpr double kWaits = 0.3;
+constexpr double kLongestPause = 0.08;  // [s]
+constexpr double kJogPeriod = 0.04;     // [s]
+// Moves are short, so that there are many of them.
+constexpr double kLowest = 0.0;      // [m]
+constexpr double kHighest = 0.06;    // [m]
+constexpr double kFarthest = 0.012;  // [m] of a relative move
+
+void sleepFor(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+}  // namespace
+
+StormClient::StormClient(const std::string& node, int number, std::uint64_t seed,
+                         DriverTopics& topics, RequestLog& log, const std::atomic<Weather>& weather)
+    : number_(number),
+      random_(seed * 1000 + static_cast<std::uint64_t>(number)),
+      calls_(node, number, log),
+      topics_(topics),
+      weather_(weather) {}
+
+void StormClient::run() {
+  while (weather_ != Weather::kOver) {
+    if (!storms()) {
+      sleepFor(0.002);
+      continue;
+    }
+    idle_ = false;
+    if (storms()) sendAnything();
+    idle_ = true;
+    pause(kLongestPause);
+  }
+}
+
+void StormClient::sendAnything() {
+  const double what = between(0.0, 1.0);
+  if (what < 0.55) {
+    sendMotion();
+  } else if (what < 0.72) {
+    sendSetting();
+  } else if (what < 0.85) {
+    sendPower();
+  } else {
+    sendEnding();
+  }
+}
+
+void StormClient::sendMotion() {
+  const std::size_t axis = anyAxis();
+  const bool wait = chance(kWaits);
+  const std::vector<std::function<void()>> motions{
+      [&] { calls_.moveTo(axis, anyPosition(), false, wait); },
+      [&] { calls_.moveTo(axis, between(-kFarthest, kFarthest), true, wait); },
+      [&] { calls_.moveRounds(axis, between(-0.08, 0.08), wait); },
+      [&] {
+        const auto axes = someAxes();
+        std::vector<double> positions;
+        for (std::size_t i = 0; i < axes.size(); ++i) positions.push_back(anyPosition());
+        calls_.moveLine(axes, positions, false, chance(0.3) ? between(0.3, 2.0) : 0.0, wait);
+      },
+      [&] {
+        const auto axes = someAxes();
+        std::vector<double> ways;
+        for (std::size_t i = 0; i < axes.size(); ++i) {
+          ways.push_back(between(-kFarthest, kFarthest));
+        }
+        calls_.moveLine(axes, ways, true, 0.0, wait);
+      },
+      [&] { topics_.moveByAction(number_, axis, anyPosition(), false); },
+      [&] { topics_.moveByAction(number_, axis, between(-kFarthest, kFarthest), true); },
+      [&] {
+        const auto axes = someAxes();
+        std::vector<double> positions;
+        for (std::size_t i = 0; i < axes.size(); ++i) positions.push_back(anyPosition());
+        const double duration = between(2.5, 5.0);
+        if (chance(0.5)) {
+          topics_.command(number_, axes, positions, duration);
+        } else {
+          topics_.followTrajectory(number_, axes, positions, duration);
+        }
+      },
+      [&] { jog(); },
+      [&] {
+        // A homing takes its time.
+        if (!chance(0.2)) return;
+        chance(0.5) ? calls_.home(0, wait) : calls_.homeAll(wait);
+      },
+  };
+  motions[std::uniform_int_distribution<std::size_t>(0, motions.size() - 1)(random_)]();
+}
+
+void StormClient::sendSetting() {
+  const std::size_t axis = anyAxis();
+  const double what = between(0.0, 1.0);
+  if (what < 0.25) {
+    calls_.speedOverride(chance(0.3) ? 1.0 : between(0.2, 2.0));
+  } else if (what < 0.55) {
+    const auto orConfigured = [&](double low, double high) {
+      return chance(0.4) ? 0.0 : between(low, high);
+    };
+    calls_.setLimits(axis, orConfigured(0.01, 0.04), orConfigured(0.02, 0.2),
+                     orConfigured(0.05, 3.0));
+  } else if (what < 0.7) {
+    calls_.setPosition(axis, anyPosition());
+  } else if (what < 0.85) {
+    calls_.microstep(chance(0.5) ? 0 : 2, chance(0.5) ? 16 : 8);
+  } else {
+    pressSwitch();
+  }
+}
+
+void StormClient::sendPower() {
+  const std::size_t axis = anyAxis();
+  const std::string below = kAxisNames.at(axis) + "/";
+  const double what = between(0.0, 1.0);
+  if (what < 0.45) {
+    calls_.set(Kind::kEnable, axis, below + "enable", true);
+  } else if (what < 0.6) {
+    calls_.set(Kind::kDisable, axis, below + "enable", false);
+  } else if (what < 0.7) {
+    calls_.set(Kind::kSleep, axis, below + "sleep", true);
+  } else if (what < 0.85) {
+    calls_.set(Kind::kWake, axis, below + "sleep", false);
+  } else {
+    calls_.trigger(Kind::kOther, 1U << axis, below + "reset");
+  }
+}
+
+void StormClient::sendEnding() {
+  const std::size_t axis = anyAxis();
+  const double what = between(0.0, 1.0);
+  if (what < 0.25) {
+    calls_.trigger(Kind::kStop, 1U << axis, kAxisNames.at(axis) + "/stop");
+  } else if (what < 0.4) {
+    calls_.trigger(Kind::kStop, kAllAxes, "stop");
+  } else if (what < 0.5) {
+    calls_.trigger(Kind::kHold, kAllAxes, "hold");
+  } else if (what < 0.7) {
+    calls_.trigger(Kind::kResume, kAllAxes, "resume");
+  } else if (what < 0.73) {
+    calls_.trigger(Kind::kEmergencyStop, kAllAxes, "emergency_stop");
+  } else if (what < 0.85) {
+    calls_.trigger(Kind::kRecover, kAllAxes, "recover");
+  } else if (what < 0.92) {
+    topics_.cancelMove(axis);
+  } else {
+    topics_.cancelTrajectories();
+  }
+}
+
+// A stream that runs on through a calm is no new jog.
+void StormClient::jog() {
+  const std::size_t axis = anyAxis();
+  const double velocity = between(-0.04, 0.04);
+  const bool stubborn = chance(0.3);
+  const int messages = std::uniform_int_distribution<int>(1, 30)(random_);
+  for (int i = 0; i < messages && (storms() || stubborn); ++i) {
+    topics_.jog(number_, axis, velocity);
+    sleepFor(kJogPeriod);
+  }
+  if (chance(0.5)) topics_.jog(number_, axis, 0.0);
+}
+
+void StormClient::pressSwitch() {
+  const std::string service = chance(0.5) ? "rig/x/press_min" : "rig/x/press_max";
+  calls_.set(Kind::kOther, 0, service, true);
+  pause(kLongestPause);
+  calls_.set(Kind::kOther, 0, service, false);
+}
+
+bool StormClient::chance(double probability) { return between(0.0, 1.0) < probability; }
+
+double StormClient::between(double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random_);
+}
+
+std::size_t StormClient::anyAxis() {
+  return std::uniform_int_distribution<std::size_t>(0, kAxisNames.size() - 1)(random_);
+}
+
+std::vector<std::size_t> StormClient::someAxes() {
+  std::vector<std::size_t> axes(kAxisNames.size());
+  std::iota(axes.begin(), axes.end(), 0);
+  std::shuffle(axes.begin(), axes.end(), random_);
+  axes.resize(chance(0.6) ? 2 : 3);
+  return axes;
+}
+
+double StormClient::anyPosition() { return between(kLowest, kHighest); }
+
+void StormClient::pause(double longest) { sleepFor(between(0.0, longest)); }
+
+}  // namespace stepdriver::storm

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "storm/driver_calls.h"
+#include "storm/request_log.h"
+
+namespace stepdriver::storm {
+
+/// What the clients of a storm do now.
+enum class Weather {
+  kStorm,  ///< they send whatever comes to their mind
+  kCalm,   ///< they send nothing that could begin a motion, and wait for their answers
+  kOver,   ///< they end
+};
+
+/// A client that sends random requests of every kind, one after the other. The same seed makes the
+/// same requests, but what they meet depends on the other clients and on the computer.
+class StormClient {
+ public:
+  StormClient(const std::string& node, int number, std::uint64_t seed, DriverTopics& topics,
+              RequestLog& log, const std::atomic<Weather>& weather);
+
+  /// Until the weather is over.
+  void run();
+
+  /// Whether no request of it is under way.
+  bool isIdle() const { return idle_; }
+
+ private:
+  void sendAnything();
+  void sendMotion();
+  void sendSetting();
+  void sendPower();
+  void sendEnding();
+  void jog();
+  void pressSwitch();
+
+  bool storms() const { return weather_ == Weather::kStorm; }
+  bool chance(double probability);
+  double between(double low, double high);
+  std::size_t anyAxis();
+  std::vector<std::size_t> someAxes();
+  double anyPosition();
+  void pause(double longest);
+
+  const int number_;
+  std::mt19937_64 random_;
+  DriverCalls calls_;
+  DriverTopics& topics_;
+  const std::atomic<Weather>& weather_;
+  std::atomic<bool> idle_{true};
+};
+
+}  // namespace stepdriver::storm

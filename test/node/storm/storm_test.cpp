@@ -1,0 +1,324 @@
+#include <gtest/gtest.h>
+#include <ros/node_handle.h>
+#include <ros/param.h>
+#include <ros/subscriber.h>
+#include <stepdriver/AxisStates.h>
+#include <stepdriver/RigReport.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <deque>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "storm/driver_calls.h"
+#include "storm/oracle.h"
+#include "storm/pulses.h"
+#include "storm/request_log.h"
+#include "storm/stall_watch.h"
+#include "storm/storm_client.h"
+#include "storm/storm_machine.h"
+#include "support/node_under_test.h"
+#include "support/vcd_reader.h"
+#include "support/wait.h"
+
+// Four clients call everything at once for `~seconds`, from `~seed`. Each few seconds there is a
+// calm: nobody asks for a motion any more, then a request ends what still moves, and nothing else
+// explains the pulses that come after it.
+
+namespace stepdriver::storm {
+namespace {
+
+using node_test::kBound;
+using node_test::NodeUnderTest;
+using node_test::waitUntil;
+
+constexpr int kClients = 4;
+constexpr int kResets = 20;
+constexpr double kLongestStorm = 2.5;       // [s] between two calms
+constexpr double kLongestBackground = 0.8;  // [s] from the last motion that is asked for to its end
+constexpr double kMostGrowth = 8.0;  // [MB] of the node, from the first quarter of the storm on
+constexpr std::size_t kMostReported = 10;
+
+void sleepFor(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+/// The last states of the axes that the node has published.
+class LatestStates {
+ public:
+  explicit LatestStates(const std::string& topic)
+      : subscriber_(ros::NodeHandle().subscribe<AxisStates>(
+            topic, 100, [this](const AxisStates::ConstPtr& states) {
+              const std::lock_guard<std::mutex> lock(mutex_);
+              latest_ = *states;
+              ++count_;
+            })) {}
+  ~LatestStates() { subscriber_.shutdown(); }
+  LatestStates(const LatestStates&) = delete;
+  LatestStates& operator=(const LatestStates&) = delete;
+
+  AxisStates latest() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return latest_;
+  }
+  int count() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return count_;
+  }
+  /// Whether no axis moved, and nothing was held, when they were published.
+  bool atRest() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto none = [](const auto& flags) {
+      return std::none_of(flags.begin(), flags.end(), [](auto flag) { return flag != 0; });
+    };
+    return none(latest_.moving) && none(latest_.held);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  AxisStates latest_;
+  int count_ = 0;
+  ros::Subscriber subscriber_;
+};
+
+class Storm : public testing::Test {
+ protected:
+  Storm() : seed_(static_cast<std::uint64_t>(ros::param::param("~seed", 1))), random_(seed_) {}
+
+  void SetUp() override {
+    seen_.axes = setUpMachine(node_);
+    trace_ = node_.traced();
+    node_.start();
+    topics_.emplace(node_.name(), log_);
+    states_.emplace(node_.full("axis_states"));
+    ender_.emplace(node_.name(), kClients, log_);
+    ASSERT_TRUE(waitUntil([&] { return topics_->connected() && states_->count() > 0; }));
+    for (int i = 0; i < kClients; ++i) {
+      clients_.emplace_back(node_.name(), i, seed_, *topics_, log_, weather_);
+    }
+    for (StormClient& client : clients_) threads_.emplace_back([&client] { client.run(); });
+  }
+
+  void TearDown() override {
+    weather_ = Weather::kOver;
+    // A call that a node never answers would not return.
+    if (failed_) node_.process().signal(SIGKILL);
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+  void resetForOffset();
+  void storm();
+  /// Ends all motions and lets every call have its answer.
+  void calm();
+  void endMotions();
+  void stopAll();
+  void repair();
+  void noteRest();
+  void end();
+  void judge();
+
+  bool chance(double probability) { return between(0.0, 1.0) < probability; }
+  double between(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
+  bool isAlive() { return !node_.process().waitForExit(std::chrono::seconds(0)); }
+  void fail(const std::string& what) {
+    failed_ = true;
+    ADD_FAILURE() << what << " (seed " << seed_ << ")";
+  }
+  std::string unanswered() const;
+
+  const std::uint64_t seed_;
+  std::mt19937_64 random_;
+  NodeUnderTest node_;
+  StallWatch stall_watch_;
+  std::string trace_;
+  RequestLog log_;
+  std::optional<DriverTopics> topics_;
+  std::optional<LatestStates> states_;
+  std::optional<DriverCalls> ender_;
+  std::atomic<Weather> weather_{Weather::kCalm};
+  std::deque<StormClient> clients_;
+  std::deque<std::thread> threads_;
+  std::vector<std::int64_t> resets_;  // when x was asked to reset, to compare the clocks
+  std::vector<double> memory_;        // [MB] of the node at each calm
+  Observation seen_;
+  bool failed_ = false;
+};
+
+/// The rig stamps the first edge of RESET at a time after this one.
+void Storm::resetForOffset() {
+  resets_.push_back(steadyNow());
+  ASSERT_TRUE(ender_->trigger(Kind::kOther, 1, "x/reset"));
+}
+
+void Storm::storm() {
+  weather_ = Weather::kStorm;
+  sleepFor(between(0.3, kLongestStorm));
+  weather_ = Weather::kCalm;
+  sleepFor(between(0.0, kLongestBackground));
+}
+
+void Storm::endMotions() {
+  const double what = between(0.0, 1.0);
+  if (what < 0.25) {
+    ender_->trigger(Kind::kStop, kAllAxes, "stop");
+  } else if (what < 0.4) {
+    for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
+      ender_->trigger(Kind::kStop, 1U << axis, kAxisNames[axis] + "/stop");
+    }
+  } else if (what < 0.65) {
+    ender_->trigger(Kind::kHold, kAllAxes, "hold");
+    const auto axis = static_cast<std::size_t>(between(0.0, 2.999));
+    if (chance(0.5)) ender_->moveTo(axis, between(0.0, 0.06), false, false);
+  } else if (what < 0.8) {
+    for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
+      ender_->set(Kind::kDisable, axis, kAxisNames[axis] + "/enable", false);
+    }
+  } else {
+    ender_->trigger(Kind::kEmergencyStop, kAllAxes, "emergency_stop");
+    if (chance(0.6)) ender_->trigger(Kind::kRecover, kAllAxes, "recover");
+  }
+}
+
+void Storm::stopAll() {
+  ender_->trigger(Kind::kStop, kAllAxes, "stop");
+  const bool idle = waitUntil([&] {
+    return !isAlive() || std::all_of(clients_.begin(), clients_.end(),
+                                     [](const StormClient& client) { return client.isIdle(); });
+  });
+  if (!idle) fail("calls have no answer after a stop: " + unanswered());
+}
+
+void Storm::calm() {
+  endMotions();
+  double longest = 0.0;
+  for (const AxisFacts& axis : seen_.axes) longest = std::max(longest, axis.longest_stop);
+  // Longer than a stop may take, and than a forgotten stream of jogs that begins anew.
+  sleepFor(2.0 * longest + 0.5);
+  if (!isAlive()) return;
+  stopAll();
+}
+
+void Storm::repair() {
+  ender_->trigger(Kind::kRecover, kAllAxes, "recover");
+  for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
+    if (chance(0.9)) {
+      ender_->set(Kind::kWake, axis, kAxisNames[axis] + "/sleep", false);
+      ender_->set(Kind::kEnable, axis, kAxisNames[axis] + "/enable", true);
+    }
+    if (chance(0.5)) ender_->setLimits(axis, 0.0, 0.0, 0.0);
+  }
+  if (chance(0.5)) ender_->speedOverride(1.0);
+}
+
+void Storm::noteRest() {
+  if (!waitUntil([&] { return !isAlive() || states_->atRest(); })) {
+    fail("the axes don't come to rest after a stop");
+    return;
+  }
+  // States that are read from here on are those of rest.
+  const int before = states_->count();
+  if (!waitUntil([&] { return !isAlive() || states_->count() > before + 1; })) {
+    fail("axis_states doesn't come any more");
+    return;
+  }
+  seen_.rests.push_back({steadyNow(), states_->latest().position});
+  memory_.push_back(static_cast<double>(node_.process().kilobytes("VmRSS")) / 1024.0);
+}
+
+void Storm::end() {
+  weather_ = Weather::kOver;
+  const auto report = node_.rig();
+  for (std::size_t axis = 0; axis < report.name.size(); ++axis) {
+    if (report.violations[axis] == 0) continue;
+    fail(report.name[axis] + ": " + report.violation_kinds[axis]);
+  }
+  node_.process().signal(SIGTERM);
+  const auto code = node_.process().waitForExit(kBound);
+  if (code != 0) fail("the node ended with " + (code ? std::to_string(*code) : "nothing"));
+}
+
+void Storm::judge() {
+  const auto trace = node_test::readVcd(trace_);
+  for (const AxisFacts& axis : seen_.axes) seen_.pulses.push_back(pulsesOf(trace, axis.name));
+  // RESET is active low; each call makes one falling edge.
+  std::vector<std::int64_t> begins;
+  for (const auto& edge : trace.at("x/reset").edges) {
+    if (!edge.level && edge.time_ns > 0) begins.push_back(edge.time_ns);
+  }
+  ASSERT_GE(begins.size(), resets_.size());
+  seen_.clock_offset = std::numeric_limits<std::int64_t>::max();
+  for (std::size_t i = 0; i < resets_.size(); ++i) {
+    seen_.clock_offset = std::min(seen_.clock_offset, resets_[i] - begins[i]);
+  }
+  seen_.requests = log_.requests();
+  seen_.stalls = stall_watch_.stalls();
+  std::size_t pulses = 0;
+  for (const auto& each : seen_.pulses) pulses += each.size();
+  std::printf(
+      "storm: seed %llu, %zu requests, %zu pulses, %zu calms, %zu stalls, %.1f to %.1f MB\n",
+      static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, seen_.rests.size(),
+      seen_.stalls.size(), *std::min_element(memory_.begin(), memory_.end()),
+      *std::max_element(memory_.begin(), memory_.end()));
+  const auto broken = brokenPromises(seen_);
+  for (std::size_t i = 0; i < std::min(broken.size(), kMostReported); ++i) fail(broken[i]);
+  if (broken.size() > kMostReported) {
+    fail(std::to_string(broken.size() - kMostReported) + " more of the kind");
+  }
+}
+
+std::string Storm::unanswered() const {
+  constexpr std::int64_t kBefore = 15'000'000'000;
+  std::string text;
+  std::int64_t first = steadyNow();
+  const auto requests = log_.requests();
+  for (const Request& request : requests) {
+    if (!request.has_answer || request.answered) continue;
+    first = std::min(first, request.sent);
+    text += "\n    " + request.text;
+  }
+  const AxisStates states = states_->latest();
+  for (std::size_t i = 0; i < states.name.size(); ++i) {
+    text += "\n  " + states.name[i] + (states.moving[i] != 0 ? " moves" : " is at rest") + " at " +
+            std::to_string(states.position[i]) + " m, " + std::to_string(states.velocity[i]) +
+            " m/s, target " + std::to_string(states.target[i]) +
+            (states.held[i] != 0 ? ", held" : "") + (states.enabled[i] != 0 ? "" : ", disabled") +
+            ", fault: " + states.fault[i];
+  }
+  return text + "\n  requests:" + requestsText(requests, first - kBefore, steadyNow(), first);
+}
+
+TEST_F(Storm, KeepsThePromises) {
+  for (int i = 0; i < kResets; ++i) resetForOffset();
+  const auto end_time = std::chrono::steady_clock::now() +
+                        std::chrono::duration<double>(ros::param::param("~seconds", 25.0));
+  while (std::chrono::steady_clock::now() < end_time && isAlive() && !failed_) {
+    repair();
+    storm();
+    calm();
+    if (isAlive() && !failed_) noteRest();
+  }
+  if (!isAlive()) {
+    fail("the node has ended with " + std::to_string(node_.process().waitForExit(kBound).value()) +
+         " while these had no answer: " + unanswered());
+  }
+  if (failed_) return;
+  end();
+  judge();
+  const std::size_t quarter = memory_.size() / 4;
+  EXPECT_LT(memory_.back() - memory_.at(quarter), kMostGrowth) << "[MB]";
+}
+
+}  // namespace
+}  // namespace stepdriver::storm

@@ -1,0 +1,8 @@
+# How test programs are compiled, those of the core and those of the node: with all warnings, and as
+# fast as they still run well. What they test is compiled as it is installed.
+function(stepdriver_test_options target)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  set_target_properties(${target} PROPERTIES CXX_STANDARD 17 CXX_EXTENSIONS OFF)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow
+    $<$<CONFIG:RelWithDebInfo>:-O1> $<$<CONFIG:RelWithDebInfo>:-g1>)
+endfunction()
