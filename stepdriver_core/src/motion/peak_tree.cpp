@@ -39,13 +39,13 @@ Highest PeakTree::between(DoubleDouble from, DoubleDouble to) const {
   std::size_t last = profile_.pieceAt(to);
   if (first < last && !((profile_.pieceStart(first + 1) - from).hi > kNoTime)) ++first;
   if (first < last && !((to - profile_.pieceStart(last)).hi > kNoTime)) --last;
-  const auto ofPart = [&](std::size_t index) {
+  const auto of_part = [&](std::size_t index) {
     const DoubleDouble begin = std::max(from, profile_.pieceStart(index));
     const DoubleDouble end = std::min(to, profile_.pieceStart(index + 1));
     const DoubleDouble after = begin - profile_.pieceStart(index);
     return highestOf(partOf(profile_.pieces()[index], after, end - begin));
   };
-  const Highest ends = larger(ofPart(first), ofPart(last));
+  const Highest ends = larger(of_part(first), of_part(last));
   return first + 1 < last ? larger(ends, ofPieces(first + 1, last)) : ends;
 }
 

@@ -77,9 +77,9 @@ TEST(Disposer, FreesAllThatSeveralThreadsHandOver) {
   std::atomic<int> count{0};
   {
     Disposer disposer(true);
-    std::vector<std::thread> users;
-    for (int i = 0; i < 4; ++i) {
-      users.emplace_back([&] {
+    std::vector<std::thread> users(4);
+    for (std::thread& user : users) {
+      user = std::thread([&] {
         for (int k = 0; k < 2000; ++k) {
           disposer.keep(std::shared_ptr<const Counted>(std::make_shared<const Counted>(count)));
         }

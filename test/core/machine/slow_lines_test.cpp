@@ -94,7 +94,7 @@ class GatedBackend : public gpio::Backend {
 };
 
 class SlowLines : public testing::Test {
- protected:
+ public:
   SlowLines()
       : axes_{linearAxis("x"), linearAxis("y")},
         rig_(Bench::rigAxes(axes_)),
@@ -106,6 +106,7 @@ class SlowLines : public testing::Test {
   }
   ~SlowLines() override { gate_.open(); }
 
+ protected:
   axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
 
   std::vector<config::AxisConfig> axes_;

@@ -43,7 +43,7 @@ std::vector<Waypoint> randomWaypoints(Random& random, int count) {
     const bool rests = random.below(4) == 0;
     position += rests ? random.within(-0.4, 0.4) : random.within(-60.0, 60.0);
     const double velocity = rests ? 0.0 : random.within(-200.0, 200.0);
-    Waypoint waypoint{i * 200'000'000, position, velocity, {}};
+    Waypoint waypoint{i * std::int64_t{200'000'000}, position, velocity, {}};
     if (random.below(2) == 0) waypoint.acceleration = random.within(-500.0, 500.0);
     waypoints.push_back(waypoint);
   }

@@ -16,7 +16,8 @@ Profile randomCurve(std::mt19937& random, int points) {
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   std::vector<Waypoint> waypoints;
   for (int i = 1; i <= points; ++i) {
-    waypoints.push_back({i * 10'000'000, 50.0 * any(random), 900.0 * any(random), {}});
+    waypoints.push_back(
+        {i * std::int64_t{10'000'000}, 50.0 * any(random), 900.0 * any(random), {}});
   }
   return planSpline(0, {}, waypoints);
 }

@@ -24,7 +24,7 @@ Shared randomCourse(std::mt19937& random, int points) {
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   std::vector<Waypoint> waypoints;
   for (int i = 1; i <= points; ++i) {
-    Waypoint waypoint{i * 20'000'000, 90.0 * any(random), 900.0 * any(random), {}};
+    Waypoint waypoint{i * std::int64_t{20'000'000}, 90.0 * any(random), 900.0 * any(random), {}};
     if (random() % 2 == 0) waypoint.acceleration = 9'000.0 * any(random);
     waypoints.push_back(waypoint);
   }

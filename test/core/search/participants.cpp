@@ -60,6 +60,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
 
 std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs) {
   std::vector<std::string> names;
+  names.reserve(configs.size());
   for (const config::AxisConfig& config : configs) names.push_back(config.name);
   return names;
 }
@@ -186,6 +187,7 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
 
 std::vector<machine::InputRead> Participants::readInputs() {
   std::vector<machine::InputRead> reads;
+  reads.reserve(wiring_.inputs.size());
   for (int input = 0; input < static_cast<int>(wiring_.inputs.size()); ++input) {
     reads.push_back({input, lines_->read(input)});
   }
@@ -200,7 +202,7 @@ void Participants::takeRead(const machine::InputRead& read) {
 // ---- steps ----
 
 bool Participants::canGo(Who who) {
-  const auto hasNext = [this](std::size_t client) {
+  const auto has_next = [this](std::size_t client) {
     if (clients_[client].next) return true;
     return script_ && itemReady() && schedule_.items[next_item_].client == static_cast<int>(client);
   };
@@ -229,9 +231,9 @@ bool Participants::canGo(Who who) {
                          [](const auto& a, const auto& b) { return a.level == b.level; });
     }
     case Who::kClientA:
-      return hasNext(0);
+      return has_next(0);
     case Who::kClientB:
-      return hasNext(1);
+      return has_next(1);
     case Who::kClock:
       return nextDue() != pulse::kNever;
   }
@@ -449,6 +451,7 @@ void Participants::post(int client, const std::string& name, machine::Request re
 void Participants::postTrajectory(int client, std::vector<std::size_t> axes, double size) {
   const auto snapshot = controller_->snapshot();
   std::vector<std::uint64_t> stops;
+  stops.reserve(axes.size());
   for (const std::size_t axis : axes) stops.push_back(snapshot->axes.at(axis).state.stops);
   clients_[static_cast<std::size_t>(client)].next = [this, client, axes = std::move(axes), size,
                                                      stops = std::move(stops)] {
@@ -457,7 +460,7 @@ void Participants::postTrajectory(int client, std::vector<std::size_t> axes, dou
 }
 
 void Participants::prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
-                                  std::vector<std::uint64_t> stops, int tries) {
+                                  const std::vector<std::uint64_t>& stops, int tries) {
   const auto snapshot = controller_->snapshot();
   std::vector<axis::PathAxis> facts;
   Meaning meaning;
@@ -588,23 +591,25 @@ bool Participants::atRest() {
 }
 
 void Participants::checkCounts(const std::string& when) {
-  for (std::size_t i = 0; i < kAxes; ++i) {
-    const std::string& name = configs_[i].name;
-    const pulse::ChannelState state = engine_->channel(static_cast<int>(i));
-    const sim::RigAxisReport report = rig_.report(name);
-    const std::int64_t pulses = report.pulses_forward + report.pulses_backward;
-    if (static_cast<std::int64_t>(state.pulses) != pulses) {
-      oracle_.complain(name + " " + when + ": the engine counts " + std::to_string(state.pulses) +
-                       " pulses, the rig " + std::to_string(pulses));
-    }
-    const std::int64_t count = report.pulses_forward - report.pulses_backward;
-    if (state.epoch == 0 && state.count != count) {
-      oracle_.complain(name + " " + when + ": the engine stands at " + std::to_string(state.count) +
-                       ", the rig at " + std::to_string(count));
-    }
-    const std::string violations = test::violationsOf(report);
-    if (!violations.empty()) oracle_.complain(name + " " + when + ": " + violations);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) checkCount(axis, when);
+}
+
+void Participants::checkCount(std::size_t axis, const std::string& when) {
+  const std::string who = configs_[axis].name + " " + when;
+  const pulse::ChannelState state = engine_->channel(static_cast<int>(axis));
+  const sim::RigAxisReport report = rig_.report(configs_[axis].name);
+  const std::int64_t pulses = report.pulses_forward + report.pulses_backward;
+  if (static_cast<std::int64_t>(state.pulses) != pulses) {
+    oracle_.complain(who + ": the engine counts " + std::to_string(state.pulses) +
+                     " pulses, the rig " + std::to_string(pulses));
   }
+  const std::int64_t count = report.pulses_forward - report.pulses_backward;
+  if (state.epoch == 0 && state.count != count) {
+    oracle_.complain(who + ": the engine stands at " + std::to_string(state.count) +
+                     ", the rig at " + std::to_string(count));
+  }
+  const std::string violations = test::violationsOf(report);
+  if (!violations.empty()) oracle_.complain(who + ": " + violations);
 }
 
 // A position that is said to be valid is where the carriage is.
@@ -657,36 +662,37 @@ void Participants::probe() {
   activity::Reply recovered = ask("recover", machine::Recover{}, recovers);
   if (recovered.failure) recovered = ask("recover", machine::Recover{}, recovers);
   if (recovered.failure) oracle_.complain("recover: " + recovered.failure->text);
-  for (std::size_t i = 0; i < kAxes && oracle_.complaints.empty(); ++i) {
-    const std::string& name = configs_[i].name;
-    const auto must = [&](const std::string& what, machine::Request request, bool moves = false) {
-      Meaning meaning;
-      meaning.axes[i] = true;
-      meaning.moves = moves;
-      activity::Reply reply = ask(what, std::move(request), meaning);
-      if (reply.failure) oracle_.complain(name + ": " + what + ": " + reply.failure->text);
-      return reply;
-    };
-    must("wake", machine::Sleep{i, false});
-    must("enable", machine::Enable{i, true});
-    const double before = rig_.report(name).carriage;
-    const double way = before > 3.0 ? -0.002 : 0.002;
-    const std::size_t moves = moves_.size();
-    must("move", machine::MoveTo{i, way, true, 0.0}, true);
-    if (moves_.size() == moves) continue;
-    const axis::Move move = moves_.back().second;
-    playUntil([&] { return move.outcome->get().has_value(); }, kLongestCall);
-    const auto result = move.outcome->get();
-    if (!result || result->end != axis::MoveEnd::kReached) {
-      oracle_.complain(name + " doesn't reach its target in the end: " +
-                       (result ? result->message : "it takes too long"));
-      continue;
-    }
-    const double moved = std::abs(rig_.report(name).carriage - before);
-    if (std::abs(moved - 2.0) > 1.3) {
-      oracle_.complain(name + " was to move 2 mm, but its carriage has moved " +
-                       std::to_string(moved) + " mm");
-    }
+  for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) probeAxis(axis);
+}
+
+void Participants::probeAxis(std::size_t axis) {
+  const std::string& name = configs_[axis].name;
+  const auto must = [&](const std::string& what, machine::Request request, bool moves = false) {
+    Meaning meaning;
+    meaning.axes[axis] = true;
+    meaning.moves = moves;
+    const activity::Reply reply = ask(what, std::move(request), meaning);
+    if (reply.failure) oracle_.complain(name + ": " + what + ": " + reply.failure->text);
+  };
+  must("wake", machine::Sleep{axis, false});
+  must("enable", machine::Enable{axis, true});
+  const double before = rig_.report(name).carriage;
+  const double way = before > 3.0 ? -0.002 : 0.002;
+  const std::size_t moves = moves_.size();
+  must("move", machine::MoveTo{axis, way, true, 0.0}, true);
+  if (moves_.size() == moves) return;
+  const axis::Move move = moves_.back().second;
+  playUntil([&] { return move.outcome->get().has_value(); }, kLongestCall);
+  const auto result = move.outcome->get();
+  if (!result || result->end != axis::MoveEnd::kReached) {
+    oracle_.complain(name + " doesn't reach its target in the end: " +
+                     (result ? result->message : "it takes too long"));
+    return;
+  }
+  const double moved = std::abs(rig_.report(name).carriage - before);
+  if (std::abs(moved - 2.0) > 1.3) {
+    oracle_.complain(name + " was to move 2 mm, but its carriage has moved " +
+                     std::to_string(moved) + " mm");
   }
 }
 

@@ -154,15 +154,17 @@ class Participants {
   std::vector<machine::InputRead> readInputs();
   void takeRead(const machine::InputRead& read);
   void prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
-                      std::vector<std::uint64_t> stops, int tries);
+                      const std::vector<std::uint64_t>& stops, int tries);
   activity::Reply ask(const std::string& name, machine::Request request, const Meaning& meaning);
   /// Plays on until this is so. @return false if it takes too long.
   bool playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest);
   bool atRest();
   void checkCounts(const std::string& when);
+  void checkCount(std::size_t axis, const std::string& when);
   void checkRest();
   void checkOutcomes();
   void probe();
+  void probeAxis(std::size_t axis);
   void judgeDone();
 
   const Schedule schedule_;

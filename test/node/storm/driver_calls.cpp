@@ -93,8 +93,8 @@ Request requestOf(Kind kind, AxisSet axes, const std::string& text, bool wait = 
 
 const std::vector<std::string> kAxisNames{"x", "y", "z"};
 
-DriverTopics::DriverTopics(std::string node, RequestLog& log) : log_(log) {
-  ros::NodeHandle handle(std::move(node));
+DriverTopics::DriverTopics(const std::string& node, RequestLog& log) : log_(log) {
+  ros::NodeHandle handle(node);
   jog_ = handle.advertise<Jog>("jog", 100);
   command_ = handle.advertise<trajectory_msgs::JointTrajectory>("command", 100);
   trajectory_goal_ = handle.advertise<TrajectoryGoal>("follow_joint_trajectory/goal", 100);

@@ -16,7 +16,7 @@ namespace stepdriver::storm {
 /// The topics of the driver that clients send to, shared by all of them. Safe from any thread.
 class DriverTopics {
  public:
-  DriverTopics(std::string node, RequestLog& log);
+  DriverTopics(const std::string& node, RequestLog& log);
 
   /// A message of a jog. Only one that may begin a jog, after a pause or a 0, is a request.
   void jog(int client, std::size_t axis, double velocity);

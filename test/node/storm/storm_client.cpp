@@ -107,11 +107,11 @@ void StormClient::sendSetting() {
   if (what < 0.25) {
     calls_.speedOverride(chance(0.3) ? 1.0 : between(0.2, 2.0));
   } else if (what < 0.55) {
-    const auto orConfigured = [&](double low, double high) {
+    const auto or_configured = [&](double low, double high) {
       return chance(0.4) ? 0.0 : between(low, high);
     };
-    calls_.setLimits(axis, orConfigured(0.01, 0.04), orConfigured(0.02, 0.2),
-                     orConfigured(0.05, 3.0));
+    calls_.setLimits(axis, or_configured(0.01, 0.04), or_configured(0.02, 0.2),
+                     or_configured(0.05, 3.0));
   } else if (what < 0.7) {
     calls_.setPosition(axis, anyPosition());
   } else if (what < 0.85) {
