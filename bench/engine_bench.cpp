@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "stepdriver_core/motion/planner.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
+#include "motion/planner.h"
+#include "pulse/pulse_engine.h"
 #include "support/free_hardware.h"
 
 namespace stepdriver::bench {

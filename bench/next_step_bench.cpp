@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "stepdriver_core/motion/compose.h"
-#include "stepdriver_core/motion/spline.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/compose.h"
+#include "motion/spline.h"
+#include "motion/step_finder.h"
 #include "support/exact_steps.h"
 #include "support/plan_from_rest.h"
 #include "support/reference_steps.h"

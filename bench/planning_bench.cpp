@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "stepdriver_core/motion/planner.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/planner.h"
+#include "motion/step_finder.h"
 #include "support/allocations.h"
 
 // What planning a move costs, in time and in memory.

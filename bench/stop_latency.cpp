@@ -85,7 +85,7 @@ machine::TrajectoryRequest waveOf(int points) {
   request.points.reserve(static_cast<std::size_t>(points));
   const double duration = kPeriod * points;
   for (int i = 1; i <= points; ++i) {
-    machine::TrajectoryPoint point;
+    axis::TrajectoryPoint point;
     point.time = kPeriod * i;
     const double speed =
         (waveAt(point.time + 1e-4, duration) - waveAt(point.time - 1e-4, duration)) / 2e-4;

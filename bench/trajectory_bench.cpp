@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "axis/prepared_trajectory.h"
-#include "stepdriver_core/axis/disposer.h"
+#include "machine/disposer.h"
 #include "support/allocations.h"
 
 // What a long trajectory costs: to prepare, in the thread of the one who wants it; and to join, to
@@ -15,11 +15,11 @@
 namespace stepdriver::bench {
 namespace {
 
-using axis::CoursePoint;
 using axis::PathAxis;
 using axis::PathStart;
 using axis::PreparedTrajectory;
 using axis::TrajectoryPath;
+using axis::TrajectoryPoint;
 
 constexpr double kPointEvery = 0.010;  // s
 
@@ -47,12 +47,12 @@ std::vector<PathAxis> axesOf(std::size_t count, double backlash) {
 
 /// Each axis swings, as the third power of a sine, which begins and ends at rest; the second and
 /// the third one more slowly.
-std::vector<CoursePoint> pointsFor(std::size_t axes, int count) {
+std::vector<TrajectoryPoint> pointsFor(std::size_t axes, int count) {
   const double pi = std::acos(-1.0);
   const double duration = kPointEvery * count;
-  std::vector<CoursePoint> points;
+  std::vector<TrajectoryPoint> points;
   for (int i = 1; i <= count; ++i) {
-    CoursePoint point;
+    TrajectoryPoint point;
     point.time = kPointEvery * i;
     for (std::size_t k = 0; k < axes; ++k) {
       const double rounds = std::round(duration / (4.0 + static_cast<double>(k)));
@@ -76,7 +76,7 @@ std::shared_ptr<const PreparedTrajectory> prepared(std::size_t axes, int count, 
 
 void prepare(benchmark::State& state, std::size_t axes, double backlash) {
   const int count = static_cast<int>(state.range(0));
-  const std::vector<CoursePoint> points = pointsFor(axes, count);
+  const std::vector<TrajectoryPoint> points = pointsFor(axes, count);
   for (auto round : state) {
     PreparedTrajectory trajectory(axesOf(axes, backlash), points);
     benchmark::DoNotOptimize(&trajectory);

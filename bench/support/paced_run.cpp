@@ -14,12 +14,12 @@
 #include <string>
 #include <thread>
 
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/motion/step_finder.h"
-#include "stepdriver_core/pulse/cpu_latency.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
-#include "stepdriver_core/pulse/pulse_thread.h"
-#include "stepdriver_core/pulse/realtime.h"
+#include "motion/profile.h"
+#include "motion/step_finder.h"
+#include "pulse/cpu_latency.h"
+#include "pulse/pulse_engine.h"
+#include "pulse/pulse_thread.h"
+#include "pulse/realtime.h"
 #include "support/free_hardware.h"
 
 namespace stepdriver::bench {

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "kernel_trace.h"
+#include "motion/planner.h"
+#include "motion/step_finder.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/motion/planner.h"
-#include "stepdriver_core/motion/step_finder.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "support/gpio_sim.h"
 #include "waveform.h"

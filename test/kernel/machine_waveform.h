@@ -10,8 +10,8 @@
 
 #include "kernel_bench.h"
 #include "kernel_trace.h"
+#include "motion/step_finder.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/motion/step_finder.h"
 #include "waveform.h"
 
 /// What the kernel's lines did while whole machines moved, held against the plan and the chips.

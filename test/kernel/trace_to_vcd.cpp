@@ -2,8 +2,8 @@
 #include <vector>
 
 #include "kernel_trace.h"
+#include "sim/vcd_trace.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/sim/vcd_trace.h"
 #include "trace_program.h"
 
 namespace {

@@ -78,7 +78,7 @@ TEST(ReadingTrajectories, TakesAllThatAPointHas) {
   given.points[0].accelerations = {-2.0};
   const TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
   ASSERT_EQ(read.request.points.size(), 1U);
-  const machine::TrajectoryPoint& point = read.request.points[0];
+  const axis::TrajectoryPoint& point = read.request.points[0];
   EXPECT_EQ(point.time, 0.5);
   EXPECT_EQ(point.positions, std::vector<double>{0.05});
   EXPECT_EQ(point.velocities, std::vector<double>{0.25});

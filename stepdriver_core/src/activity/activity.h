@@ -7,7 +7,7 @@
 
 #include "context.h"
 #include "goal.h"
-#include "stepdriver_core/axis/homing.h"
+#include "stepdriver_core/axis/axis_state.h"
 
 namespace stepdriver::activity {
 

@@ -8,8 +8,6 @@
 #include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/axis/homing.h"
-#include "stepdriver_core/axis/outcome.h"
 
 namespace stepdriver::activity {
 

@@ -10,8 +10,8 @@
 
 #include "axis/axis_model.h"
 #include "call.h"
+#include "pulse/command.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/command.h"
 
 namespace stepdriver::activity {
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "axis/axis_memory.h"
 #include "script.h"
 #include "steps.h"
 

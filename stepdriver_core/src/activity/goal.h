@@ -10,7 +10,7 @@
 #include "axis/axis_model.h"
 #include "axis/shared_path.h"
 #include "call.h"
-#include "stepdriver_core/axis/outcome.h"
+#include "stepdriver_core/axis/axis_state.h"
 
 namespace stepdriver::activity {
 

@@ -8,9 +8,9 @@
 
 #include "activity.h"
 #include "manoeuvre.h"
+#include "motion/profile.h"
 #include "script.h"
-#include "stepdriver_core/axis/homing.h"
-#include "stepdriver_core/motion/profile.h"
+#include "stepdriver_core/axis/axis_state.h"
 
 namespace stepdriver::activity {
 

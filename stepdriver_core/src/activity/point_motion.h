@@ -4,7 +4,7 @@
 
 #include "context.h"
 #include "goal.h"
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 
 namespace stepdriver::activity {
 

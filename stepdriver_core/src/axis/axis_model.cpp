@@ -7,7 +7,7 @@
 #include "config/restart_speed.h"
 #include "message_text.h"
 #include "scale.h"
-#include "stepdriver_core/config/lowest_limits.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
 

@@ -4,19 +4,19 @@
 #include <optional>
 #include <string>
 
+#include "axis/axis_memory.h"
 #include "fault.h"
 #include "input_levels.h"
 #include "line_failure.h"
 #include "line_names.h"
 #include "machine_mode.h"
+#include "motion/limits.h"
+#include "motion/profile.h"
 #include "motor/motor.h"
 #include "path_axis.h"
 #include "position.h"
-#include "stepdriver_core/axis/axis_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
 
 namespace stepdriver::axis {
 

@@ -4,7 +4,7 @@
 
 #include "line_names.h"
 #include "motor/motor_lines.h"
-#include "stepdriver_core/pulse/channel.h"
+#include "pulse/channel.h"
 
 namespace stepdriver::axis {
 

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "message_text.h"
+#include "motion/compose.h"
+#include "motion/planner.h"
 #include "motion/root.h"
-#include "stepdriver_core/motion/compose.h"
-#include "stepdriver_core/motion/planner.h"
 
 namespace stepdriver::axis {
 

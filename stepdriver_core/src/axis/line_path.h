@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "motion/limits.h"
 #include "path_axis.h"
 #include "shared_path.h"
-#include "stepdriver_core/motion/limits.h"
 
 namespace stepdriver::axis {
 

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
+#include "motion/limits.h"
+#include "motion/profile.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
 
 namespace stepdriver::axis {
 

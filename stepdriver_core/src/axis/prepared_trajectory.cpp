@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "message_text.h"
-#include "stepdriver_core/motion/profile_parts.h"
+#include "motion/profile_parts.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -103,7 +103,7 @@ double endVelocity(const Profile& profile) {
 }  // namespace
 
 PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
-                                       const std::vector<CoursePoint>& points)
+                                       const std::vector<TrajectoryPoint>& points)
     : axes_(std::move(axes)) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   parts_.reserve(axes_.size());
@@ -114,7 +114,7 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
 }
 
 motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t index,
-                                                const CoursePoint& point,
+                                                const TrajectoryPoint& point,
                                                 const std::vector<motion::Waypoint>& before) const {
   const PathAxis& axis = axes_[member];
   // Made for a refusal only: there are many points.
@@ -162,8 +162,8 @@ motion::MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {
   return limits;
 }
 
-PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
-                                                     const std::vector<CoursePoint>& points) const {
+PreparedTrajectory::Part PreparedTrajectory::prepare(
+    std::size_t member, const std::vector<TrajectoryPoint>& points) const {
   const PathAxis& axis = axes_[member];
   std::vector<motion::Waypoint> waypoints;
   waypoints.reserve(points.size());

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "motion/backlash.h"
+#include "motion/compose.h"
+#include "motion/profile_peaks.h"
+#include "motion/spline.h"
 #include "path_axis.h"
-#include "stepdriver_core/axis/course_point.h"
-#include "stepdriver_core/motion/backlash.h"
-#include "stepdriver_core/motion/compose.h"
-#include "stepdriver_core/motion/profile_peaks.h"
-#include "stepdriver_core/motion/spline.h"
+#include "stepdriver_core/axis/axis_state.h"
 #include "trajectory_path.h"
 
 namespace stepdriver::axis {
@@ -27,7 +27,7 @@ class PreparedTrajectory {
  public:
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
   ///   first segment.
-  PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<CoursePoint>& points);
+  PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points);
   PreparedTrajectory(const PreparedTrajectory&) = delete;
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
@@ -56,8 +56,8 @@ class PreparedTrajectory {
     motion::MotorBounds bounds;                      // that the tail comes to
   };
 
-  Part prepare(std::size_t member, const std::vector<CoursePoint>& points) const;
-  motion::Waypoint waypointOf(std::size_t member, std::size_t index, const CoursePoint& point,
+  Part prepare(std::size_t member, const std::vector<TrajectoryPoint>& points) const;
+  motion::Waypoint waypointOf(std::size_t member, std::size_t index, const TrajectoryPoint& point,
                               const std::vector<motion::Waypoint>& before) const;
   TrajectoryPath::Member joinMember(const std::shared_ptr<const PreparedTrajectory>& own,
                                     std::size_t member, const PathStart& start) const;

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "stepdriver_core/motion/profile_parts.h"
+#include "motion/profile_parts.h"
 
 namespace stepdriver::axis {
 namespace {

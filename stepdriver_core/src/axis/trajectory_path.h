@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
+#include "motion/compose.h"
+#include "motion/rate.h"
 #include "shared_path.h"
-#include "stepdriver_core/motion/compose.h"
-#include "stepdriver_core/motion/rate.h"
 
 namespace stepdriver::axis {
 

@@ -1,3 +1,5 @@
+#include "config/read_axes.h"
+
 #include <array>
 #include <cmath>
 #include <cstdint>

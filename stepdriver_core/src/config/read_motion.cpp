@@ -8,7 +8,7 @@
 #include "message_text.h"
 #include "motion_keys.h"
 #include "read_scale.h"
-#include "stepdriver_core/config/lowest_limits.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::config {
 namespace {

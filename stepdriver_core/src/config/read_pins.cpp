@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 
+#include "config/read_axes.h"
 #include "message_text.h"
 
 namespace stepdriver::config {

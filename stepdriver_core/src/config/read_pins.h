@@ -1,7 +1,7 @@
 #pragma once
 
+#include "config/used_lines.h"
 #include "stepdriver_core/config/config_reader.h"
-#include "stepdriver_core/config/used_lines.h"
 
 namespace stepdriver::config {
 

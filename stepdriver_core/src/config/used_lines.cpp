@@ -1,4 +1,4 @@
-#include "stepdriver_core/config/used_lines.h"
+#include "config/used_lines.h"
 
 namespace stepdriver::config {
 

@@ -9,14 +9,15 @@
 #include <utility>
 
 #include "controller.h"
+#include "machine/disposer.h"
 #include "machine_axis.h"
 #include "nanoseconds.h"
+#include "pulse/measure.h"
+#include "pulse/pulse_engine.h"
 #include "shell.h"
 #include "state_keeper.h"
-#include "stepdriver_core/axis/disposer.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
 #include "wiring.h"
 
 namespace stepdriver::machine {

@@ -10,11 +10,11 @@
 
 #include "activity/call.h"
 #include "activity/context.h"
+#include "axis/axis_memory.h"
 #include "axis/prepared_trajectory.h"
-#include "stepdriver_core/axis/axis_limits.h"
+#include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/pulse/channel.h"
 
 namespace stepdriver::machine {
 

@@ -15,12 +15,12 @@
 
 #include "controller.h"
 #include "gpio/line_writers.h"
+#include "pulse/pulse_engine.h"
+#include "pulse/pulse_thread.h"
 #include "requests.h"
 #include "snapshot.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
-#include "stepdriver_core/pulse/pulse_thread.h"
 
 namespace stepdriver::machine {
 

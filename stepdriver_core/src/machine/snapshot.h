@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "axis/axis_memory.h"
 #include "axis/path_axis.h"
-#include "stepdriver_core/axis/axis_limits.h"
+#include "motion/profile.h"
+#include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/pulse/channel.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::machine {

@@ -1,4 +1,4 @@
-#include "stepdriver_core/machine/state_file.h"
+#include "machine/state_file.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

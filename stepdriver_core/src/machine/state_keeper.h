@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "stepdriver_core/machine/state_file.h"
+#include "machine/state_file.h"
 
 namespace stepdriver::machine {
 

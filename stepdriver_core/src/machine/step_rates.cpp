@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <limits>
 
-#include "stepdriver_core/pulse/hybrid_wait.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
+#include "pulse/hybrid_wait.h"
+#include "pulse/pulse_engine.h"
 
 namespace stepdriver::machine {
 namespace {

@@ -1,5 +1,6 @@
 #include "wiring.h"
 
+#include "pulse/measure.h"
 #include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::machine {

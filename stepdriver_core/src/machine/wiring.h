@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "motor/motor_lines.h"
+#include "pulse/pulse_engine.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::machine {
 

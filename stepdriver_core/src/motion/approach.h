@@ -1,7 +1,7 @@
 #pragma once
 
+#include "motion/limits.h"
 #include "path.h"
-#include "stepdriver_core/motion/limits.h"
 
 namespace stepdriver::motion {
 

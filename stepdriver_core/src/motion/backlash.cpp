@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/backlash.h"
+#include "motion/backlash.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "motion/planner.h"
+#include "motion/profile_parts.h"
 #include "nanoseconds.h"
 #include "peak_tree.h"
-#include "stepdriver_core/motion/planner.h"
-#include "stepdriver_core/motion/profile_parts.h"
 
 namespace stepdriver::motion {
 namespace {

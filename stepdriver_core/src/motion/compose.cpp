@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/compose.h"
+#include "motion/compose.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/double_double.h"
+#include "motion/double_double.h"
 
 #include <cmath>
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "approach.h"
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
+#include "motion/limits.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 
-#include "stepdriver_core/motion/double_double.h"
-#include "stepdriver_core/motion/profile.h"
+#include "motion/double_double.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stepdriver_core/motion/profile_parts.h"
+#include "motion/profile_parts.h"
 
 namespace stepdriver::motion {
 namespace {

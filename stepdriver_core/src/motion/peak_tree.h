@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "stepdriver_core/motion/profile.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

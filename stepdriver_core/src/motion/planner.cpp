@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 
 #include <algorithm>
 #include <cmath>

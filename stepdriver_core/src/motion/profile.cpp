@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/profile.h"
+#include "motion/profile.h"
 
 #include <algorithm>
 #include <cmath>

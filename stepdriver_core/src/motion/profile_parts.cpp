@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/profile_parts.h"
+#include "motion/profile_parts.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/profile_peaks.h"
+#include "motion/profile_peaks.h"
 
 #include <cmath>
 #include <cstddef>

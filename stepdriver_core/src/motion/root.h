@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "stepdriver_core/motion/double_double.h"
+#include "motion/double_double.h"
 
 namespace stepdriver::motion {
 

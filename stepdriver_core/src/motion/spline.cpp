@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/spline.h"
+#include "motion/spline.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "stepdriver_core/motion/spline.h"
+#include "motion/spline.h"
 
 namespace stepdriver::motion {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "stepdriver_core/motion/spline.h"
+#include "motion/spline.h"
 
 namespace stepdriver::motion {
 

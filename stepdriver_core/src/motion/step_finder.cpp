@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/step_finder.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/pulse/channel.h"
+#include "motion/profile.h"
+#include "pulse/channel.h"
 
 namespace stepdriver::motor {
 

@@ -4,12 +4,12 @@
 #include <cstdint>
 
 #include "driver_pins.h"
+#include "motion/profile.h"
 #include "motions.h"
 #include "motor_lines.h"
 #include "power.h"
+#include "pulse/channel.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/pulse/channel.h"
 #include "translator.h"
 
 namespace stepdriver::motor {

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "enable_line.h"
+#include "pulse/channel.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/pulse/channel.h"
 
 namespace stepdriver::motor {
 

@@ -8,10 +8,12 @@
 #include <thread>
 #include <utility>
 
+#include "pulse/channel.h"
+#include "pulse/cpu_latency.h"
+#include "pulse/measure.h"
+#include "pulse/realtime.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
-#include "stepdriver_core/pulse/channel.h"
-#include "stepdriver_core/pulse/realtime.h"
 
 namespace stepdriver::pulse {
 namespace {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <ctime>
 
-#include "stepdriver_core/pulse/hybrid_wait.h"
+#include "pulse/hybrid_wait.h"
 
 namespace stepdriver::pulse {
 namespace {

@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/cpu_latency.h"
+#include "pulse/cpu_latency.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <optional>
 
-#include "stepdriver_core/motion/step_finder.h"
-#include "stepdriver_core/pulse/channel.h"
-#include "stepdriver_core/pulse/command.h"
-#include "stepdriver_core/pulse/snapshot.h"
+#include "motion/step_finder.h"
+#include "pulse/channel.h"
+#include "pulse/command.h"
+#include "pulse/snapshot.h"
 #include "successors.h"
 
 namespace stepdriver::pulse {

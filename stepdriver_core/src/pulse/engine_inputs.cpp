@@ -1,5 +1,5 @@
 #include "engine_channel.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
+#include "pulse/pulse_engine.h"
 
 namespace stepdriver::pulse {
 

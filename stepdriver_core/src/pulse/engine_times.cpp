@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "engine_channel.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
+#include "pulse/pulse_engine.h"
 
 namespace stepdriver::pulse {
 

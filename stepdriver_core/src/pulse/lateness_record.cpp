@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/lateness_record.h"
+#include "pulse/lateness_record.h"
 
 #include <algorithm>
 #include <cmath>

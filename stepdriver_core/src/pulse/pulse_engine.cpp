@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/pulse_engine.h"
+#include "pulse/pulse_engine.h"
 
 #include "engine_channel.h"
 

@@ -1,10 +1,10 @@
-#include "stepdriver_core/pulse/pulse_thread.h"
+#include "pulse/pulse_thread.h"
 
 #include <pthread.h>
 
 #include <algorithm>
 
-#include "stepdriver_core/pulse/realtime.h"
+#include "pulse/realtime.h"
 
 namespace stepdriver::pulse {
 

@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/realtime.h"
+#include "pulse/realtime.h"
 
 #include <link.h>
 #include <pthread.h>
@@ -13,8 +13,8 @@
 #include <cstddef>
 #include <cstring>
 
+#include "pulse/cpu_latency.h"
 #include "stepdriver_core/pulse/capability.h"
-#include "stepdriver_core/pulse/cpu_latency.h"
 
 namespace stepdriver::pulse {
 namespace {
@@ -22,7 +22,7 @@ namespace {
 std::string latencyText(int error) {
   if (error < 0) return "";
   if (error == 0) return "; processors kept awake";
-  std::string text = std::string("; processors not kept awake: ") + CpuLatencyHold::kDevice;
+  std::string text = std::string("; processors not kept awake: ") + kCpuLatencyDevice;
   if (error == EACCES || error == EPERM) {
     return text +
            " is closed to this user: config/udev/60-stepdriver-gpio.rules opens it to the "

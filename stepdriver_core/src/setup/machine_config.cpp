@@ -2,8 +2,9 @@
 
 #include <utility>
 
+#include "config/read_axes.h"
+#include "pulse/cpu_latency.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
-#include "stepdriver_core/pulse/cpu_latency.h"
 #include "stepdriver_core/setup/simulation.h"
 
 namespace stepdriver::setup {
@@ -56,7 +57,7 @@ machine::MachineOptions MachineConfig::options() const {
   options.enforce = enforce_realtime;
   options.emergency_stop = emergency_stop;
   options.state_file = state_file;
-  options.latency_device = keep_cpus_awake ? pulse::CpuLatencyHold::kDevice : "";
+  options.latency_device = keep_cpus_awake ? pulse::kCpuLatencyDevice : "";
   return options;
 }
 

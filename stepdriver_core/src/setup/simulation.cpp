@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "message_text.h"
+#include "sim/vcd_trace.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/sim/vcd_trace.h"
 
 namespace stepdriver::setup {
 namespace {

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "pulse/pulse_engine.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
 #include "support/bench.h"
 #include "support/recording_lines.h"
 #include "support/refusal.h"

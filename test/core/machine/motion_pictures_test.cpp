@@ -214,7 +214,7 @@ TEST_F(MotionPictures, LineWithHold) {
 machine::TrajectoryRequest points(bool with_accelerations) {
   machine::TrajectoryRequest request{{"x"}, {{1.0, {0.4}, {0.6}, {}}, {2.0, {0.8}, {0.0}, {}}}};
   if (with_accelerations) {
-    for (machine::TrajectoryPoint& point : request.points) point.accelerations = {0.0};
+    for (axis::TrajectoryPoint& point : request.points) point.accelerations = {0.0};
   }
   return request;
 }

@@ -1,4 +1,4 @@
-#include "stepdriver_core/machine/state_file.h"
+#include "machine/state_file.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

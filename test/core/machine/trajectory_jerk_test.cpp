@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "motion/spline.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/motion/spline.h"
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
@@ -17,8 +17,8 @@
 namespace stepdriver {
 namespace {
 
-using axis::CoursePoint;
 using axis::MoveEnd;
+using axis::TrajectoryPoint;
 using machine::CoordinatedMove;
 using machine::TrajectoryRequest;
 using test::trajectoryAxis;
@@ -116,9 +116,9 @@ TEST_F(TrajectoryWithJerkLimit, StopsAndChangesItsSpeedWithinIt) {
 class TrajectoryAtItsLimits : public test::TrajectoryBench {};
 
 // Up to 1 m/s at 10 m/s^2, and down to 0.2 m/s at as much, where it goes on for seconds.
-std::vector<CoursePoint> brakingHard() {
+std::vector<TrajectoryPoint> brakingHard() {
   const auto point = [](double time, double position, double velocity) {
-    return CoursePoint{time, {position, 0.0}, {velocity, 0.0}, {}};
+    return TrajectoryPoint{time, {position, 0.0}, {velocity, 0.0}, {}};
   };
   return {point(0.1, 0.05, 1.0), point(0.2, 0.15, 1.0), point(0.28, 0.198, 0.2),
           point(3.0, 0.742, 0.2), point(3.02, 0.744, 0.0)};

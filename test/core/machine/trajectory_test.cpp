@@ -145,7 +145,7 @@ TEST_F(Trajectory, TakesLinesWithinTheStartSpeed) {
 
 TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  const auto why = [&](const std::vector<axis::CoursePoint>& points) {
+  const auto why = [&](const std::vector<axis::TrajectoryPoint>& points) {
     return refusal([&] { follow({{"x", "y"}, points}); });
   };
   EXPECT_EQ(why({}), "x: the trajectory has no points");

@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/compose.h"
+#include "motion/compose.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "stepdriver_core/motion/spline.h"
+#include "motion/spline.h"
 
 namespace stepdriver {
 namespace {

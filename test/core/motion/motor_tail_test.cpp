@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/motion/backlash.h"
-#include "stepdriver_core/motion/profile_peaks.h"
-#include "stepdriver_core/motion/spline.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/backlash.h"
+#include "motion/profile_peaks.h"
+#include "motion/spline.h"
+#include "motion/step_finder.h"
 
 // A trajectory whose tail is prepared before its head is known is the trajectory that is planned at
 // once.

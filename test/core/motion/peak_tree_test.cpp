@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "stepdriver_core/motion/profile_parts.h"
-#include "stepdriver_core/motion/spline.h"
+#include "motion/profile_parts.h"
+#include "motion/spline.h"
 
 namespace stepdriver::motion {
 namespace {

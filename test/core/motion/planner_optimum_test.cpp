@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 #include "support/random_motion.h"
 
 namespace stepdriver::motion {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 #include "support/profile_check.h"
 #include "support/random_motion.h"
 

@@ -1,11 +1,11 @@
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/step_finder.h"
 #include "support/profile_check.h"
 
 namespace stepdriver::motion {

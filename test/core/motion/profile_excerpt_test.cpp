@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/motion/compose.h"
-#include "stepdriver_core/motion/rate.h"
-#include "stepdriver_core/motion/spline.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/compose.h"
+#include "motion/rate.h"
+#include "motion/spline.h"
+#include "motion/step_finder.h"
 
 // Excerpts compute their pieces when they are asked for. Here the same pieces are made beforehand.
 

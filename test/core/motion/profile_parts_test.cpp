@@ -1,11 +1,11 @@
-#include "stepdriver_core/motion/profile_parts.h"
+#include "motion/profile_parts.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdint>
 
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 
 namespace stepdriver::motion {
 namespace {

@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/rate.h"
+#include "motion/rate.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "stepdriver_core/motion/planner.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/planner.h"
+#include "motion/step_finder.h"
 #include "support/profile_check.h"
 #include "support/random_motion.h"
 

@@ -1,4 +1,4 @@
-#include "stepdriver_core/motion/spline.h"
+#include "motion/spline.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/motion/profile_peaks.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/profile_peaks.h"
+#include "motion/step_finder.h"
 
 namespace stepdriver::motion {
 namespace {

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/step_finder.h"
 #include "support/plan_from_rest.h"
 
 namespace stepdriver::motion {

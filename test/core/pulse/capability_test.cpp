@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pulse/measure.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "support/bench.h"

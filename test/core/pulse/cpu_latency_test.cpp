@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/cpu_latency.h"
+#include "pulse/cpu_latency.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "pulse/pulse_thread.h"
 #include "stepdriver_core/pulse/capability.h"
-#include "stepdriver_core/pulse/pulse_thread.h"
 #include "support/fake_hardware.h"
 #include "support/recording_lines.h"
 

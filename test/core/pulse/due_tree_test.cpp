@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/due_tree.h"
+#include "pulse/due_tree.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/hybrid_wait.h"
+#include "pulse/hybrid_wait.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "stepdriver_core/pulse/pulse_engine.h"
+#include "pulse/pulse_engine.h"
 #include "support/plan_from_rest.h"
 #include "support/recording_lines.h"
 

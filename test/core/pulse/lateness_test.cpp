@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "stepdriver_core/pulse/lateness_record.h"
+#include "pulse/lateness_record.h"
 
 namespace stepdriver::pulse {
 namespace {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/motion/compose.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/compose.h"
+#include "motion/step_finder.h"
 #include "support/pulse_engine_bench.h"
 
 namespace stepdriver::pulse {

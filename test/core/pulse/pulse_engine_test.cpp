@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <map>
 
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/step_finder.h"
 #include "support/pulse_engine_bench.h"
 
 namespace stepdriver::pulse {

@@ -19,7 +19,7 @@
 #include <thread>
 #include <vector>
 
-#include "stepdriver_core/pulse/pulse_thread.h"
+#include "pulse/pulse_thread.h"
 #include "support/plan_from_rest.h"
 #include "support/watched_thread.h"
 

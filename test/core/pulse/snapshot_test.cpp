@@ -1,4 +1,4 @@
-#include "stepdriver_core/pulse/snapshot.h"
+#include "pulse/snapshot.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <thread>
 
-#include "stepdriver_core/pulse/mailbox.h"
+#include "pulse/mailbox.h"
 
 namespace stepdriver::pulse {
 namespace {

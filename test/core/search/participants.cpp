@@ -469,7 +469,7 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
   }
-  std::vector<axis::CoursePoint> points(3);
+  std::vector<axis::TrajectoryPoint> points(3);
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].time = 0.25 * static_cast<double>(i + 1);
     points[i].positions.assign(axes.size(),

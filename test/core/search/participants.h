@@ -15,11 +15,11 @@
 #include "axis/prepared_trajectory.h"
 #include "machine/controller.h"
 #include "machine/wiring.h"
+#include "pulse/pulse_engine.h"
 #include "search/oracle.h"
 #include "search/rise_watch.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::search {

@@ -1,4 +1,4 @@
-#include "stepdriver_core/sim/vcd_trace.h"
+#include "sim/vcd_trace.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "stepdriver_core/motion/planner.h"
+#include "motion/planner.h"
 
 namespace stepdriver::motion {
 

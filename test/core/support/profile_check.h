@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/motion/step_finder.h"
+#include "motion/limits.h"
+#include "motion/profile.h"
+#include "motion/step_finder.h"
 
 namespace stepdriver::motion {
 

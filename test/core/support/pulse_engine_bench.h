@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "plan_from_rest.h"
+#include "pulse/pulse_engine.h"
 #include "recording_lines.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::pulse {
 

@@ -6,8 +6,8 @@
 #include <ostream>
 #include <random>
 
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
+#include "motion/limits.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

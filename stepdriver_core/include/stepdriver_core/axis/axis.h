@@ -4,9 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include "stepdriver_core/axis/axis_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/axis/homing.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::axis {

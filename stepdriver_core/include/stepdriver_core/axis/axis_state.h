@@ -2,15 +2,69 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "stepdriver_core/axis/homing.h"
-#include "stepdriver_core/axis/outcome.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::axis {
+
+/// How something ended that takes time: empty while it is under way, set once when it is over. Any
+/// thread may read it, for as long as it keeps it.
+template <typename Result>
+class Outcome {
+ public:
+  std::optional<Result> get() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return result_;
+  }
+
+  /// The first result counts.
+  void set(Result result) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!result_) result_ = std::move(result);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<Result> result_;
+};
+
+/// What the motions of an axis keep to. A unit is m on a linear axis, rad on a rotary one.
+struct AxisLimits {
+  double max_speed = 0.0;     ///< [unit/s]
+  double acceleration = 0.0;  ///< [unit/s^2]
+  double deceleration = 0.0;  ///< [unit/s^2] of a stop it is AxisConfig's
+  double jerk = 0.0;          ///< [unit/s^3] 0: none, the acceleration may jump
+};
+
+/// What a homing does at one time.
+enum class HomingPhase {
+  kNone,
+  kLeaving,     ///< off the switch that it stood on at the beginning
+  kSeeking,     ///< towards the switch
+  kBackingOff,  ///< off the switch, until it is open
+  kLatching,    ///< slowly towards the switch: where it closes now is the trigger point
+  kPullingOff,  ///< to where the axis stands at the end
+  kStopping,    ///< it has failed, and comes to rest
+};
+
+/// In words, as in messages: `seeking`.
+const char* nameOf(HomingPhase phase);
+
+/// How a homing ended.
+enum class HomingEnd { kHomed, kCancelled, kFailed };
+
+/// How and where the homing of an axis ended.
+struct HomingResult {
+  std::string axis;
+  HomingEnd end = HomingEnd::kFailed;
+  std::string message;    ///< a sentence that says how it ended and where
+  double position = 0.0;  ///< [unit] where the axis stands
+};
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
 struct AxisState {
@@ -42,23 +96,6 @@ struct AxisState {
   /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
   /// none.
   std::string position_note;
-};
-
-/// What of an axis outlasts the program; see machine::StateFile.
-struct AxisMemory {
-  config::Kind kind = config::Kind::kLinear;
-  double steps_per_unit = 0.0;  ///< [steps/unit] as configured
-  double position = 0.0;        ///< [unit] at rest
-  double slack = 0.0;           ///< [unit] what is taken up of the backlash
-  bool valid = false;           ///< the position could be trusted
-  bool homed = false;
-  bool at_home = false;  ///< the chip's translator was where it begins after a reset
-
-  bool operator==(const AxisMemory& other) const {
-    return kind == other.kind && steps_per_unit == other.steps_per_unit &&
-           position == other.position && slack == other.slack && valid == other.valid &&
-           homed == other.homed && at_home == other.at_home;
-  }
 };
 
 /// Levels of the switches as their lines read now, true where active. None where there is none.
@@ -114,5 +151,16 @@ struct MovePlan {
   double steps_per_unit = 0.0;    ///< [microsteps/unit] in the microstep mode of now
   std::vector<MovePiece> pieces;  ///< none where nothing would move
 };
+
+/// What a trajectory wants of its axes at one time; one number for each axis, in their units.
+struct TrajectoryPoint {
+  double time = 0.0;  ///< [s] after the start
+  std::vector<double> positions;
+  std::vector<double> velocities;     ///< or none
+  std::vector<double> accelerations;  ///< or none
+};
+
+/// Relative. A curve between points that keep to a limit may go beyond it by so much.
+constexpr double kTrajectoryTolerance = 0.01;
 
 }  // namespace stepdriver::axis

@@ -4,10 +4,15 @@
 #include <string>
 
 #include "stepdriver_core/bias.h"
-#include "stepdriver_core/config/homing_config.h"
 #include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::config {
+
+/// The lowest limits that an axis may have, whoever gives them. Far below any machine, and well
+/// inside what the motion can count and time in 64 bits.
+constexpr double kLowestRate = 1e-3;          ///< [steps/s]
+constexpr double kLowestAcceleration = 1e-3;  ///< [steps/s^2]
+constexpr double kLowestJerk = 1e-3;          ///< [steps/s^3]
 
 /// What an axis moves along, and so its units.
 enum class Kind {
@@ -51,6 +56,20 @@ struct FaultPin {
 
 /// How the motor's current is taken away at rest.
 enum class IdleAction { kDisable, kSleep };
+
+/// How an axis finds its zero: by the place where one of its endstop switches closes. A unit is m
+/// on a linear axis, rad on a rotary one.
+struct HomingConfig {
+  bool at_max = false;       ///< the switch is the max endstop; else the min endstop
+  double seek_speed = 0.0;   ///< [unit/s] towards the switch at first
+  double latch_speed = 0.0;  ///< [unit/s] off the switch, and back to the place that counts
+  double pull_off = 0.0;     ///< [unit] from the trigger point to where it stands at the end
+  double offset = 0.0;       ///< [unit] position of the trigger point
+  double max_travel = 0.0;   ///< [unit] that each stroke takes at most to reach or leave the switch
+  double timeout = 60.0;     ///< [s] for all of it
+  double debounce = 0.005;   ///< [s] that a level of the switch must last to count
+  int order = 0;             ///< of several axes the lowest is first, the same are at once
+};
 
 /// All that an axis needs to know, checked by readAxes(). A unit is m on a linear axis, rad on a
 /// rotary one; a step is a microstep of the configured mode.

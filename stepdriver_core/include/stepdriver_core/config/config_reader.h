@@ -8,7 +8,6 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/config_value.h"
-#include "stepdriver_core/config/used_lines.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::config {
@@ -163,17 +162,8 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///
 /// @param name full name of the map, as `/stepdriver/axes`.
 /// @param issues everything that is wrong is added here.
-/// @param used the lines of the axes are added here, for what else names lines.
-/// @return the axes in the order of their names; to be used only where no issue was added.
-std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
-                                 std::vector<ConfigIssue>& issues, UsedLines& used);
+/// @return the axes in the order of their names; to be used only if no issue was added.
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues);
-
-/// Reads `{pin: "gpiochip0:25", active_level: high, bias: as_is}`; bias is optional.
-///
-/// @return none where the key is missing.
-std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
-                                           UsedLines& used);
 
 }  // namespace stepdriver::config

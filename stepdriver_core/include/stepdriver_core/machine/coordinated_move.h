@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/axis/course_point.h"
 
 namespace stepdriver::machine {
 
@@ -21,13 +20,10 @@ struct LineRequest {
   double duration = 0.0;
 };
 
-/// Where a trajectory wants its axes to be at one time.
-using TrajectoryPoint = axis::CoursePoint;
-
 /// A trajectory of several axes, as Machine::followTrajectory() takes it.
 struct TrajectoryRequest {
   std::vector<std::string> names;  ///< of the axes, each once; need not be all
-  std::vector<TrajectoryPoint> points;
+  std::vector<axis::TrajectoryPoint> points;
 };
 
 /// A motion of several axes that was accepted.

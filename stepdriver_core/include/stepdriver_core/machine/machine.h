@@ -13,8 +13,6 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/cpu_latency.h"
-#include "stepdriver_core/pulse/lateness.h"
 
 namespace stepdriver::machine {
 
@@ -39,8 +37,8 @@ struct MachineOptions {
   /// machine::StateFile.
   std::string state_file{};
   /// On a clock that is real, held open to keep the processors awake; empty: they may sleep. See
-  /// pulse::CpuLatencyHold.
-  std::string latency_device = pulse::CpuLatencyHold::kDevice;
+  /// pulse::kCpuLatencyDevice.
+  std::string latency_device = pulse::kCpuLatencyDevice;
 };
 
 /// What the pulse engine has done since the start.

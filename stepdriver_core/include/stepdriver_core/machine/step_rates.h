@@ -75,6 +75,6 @@ std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
 /// @throw GpioError where a line can't be had, written or read; none is held then.
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                           pulse::Clock& clock,
-                          const std::string& latency_device = pulse::CpuLatencyHold::kDevice);
+                          const std::string& latency_device = pulse::kCpuLatencyDevice);
 
 }  // namespace stepdriver::machine

@@ -1,16 +1,17 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/cpu_latency.h"
 
 namespace stepdriver::pulse {
 
-struct ChannelConfig;
+/// While a program holds it open with a latency of 0, the kernel keeps all processors out of idle
+/// states that take time to wake from. It costs power.
+constexpr const char* kCpuLatencyDevice = "/dev/cpu_dma_latency";
 
 /// How measured times are spread: half of them are at most the median, and so on.
 struct Spread {
@@ -21,8 +22,15 @@ struct Spread {
   std::size_t count = 0;  ///< of the samples
 };
 
-/// @param samples not empty.
-Spread spreadOf(std::vector<Nanoseconds> samples);
+/// How late pulses were: half of them by at most p50, and so on. The percentiles are rounded up, by
+/// at most a sixteenth.
+struct LatenessFigures {
+  std::uint64_t count = 0;  ///< of the pulses
+  Nanoseconds p50 = 0;      ///< the median
+  Nanoseconds p99 = 0;
+  Nanoseconds p999 = 0;
+  Nanoseconds max = 0;  ///< exact
+};
 
 /// What the calls of one channel cost.
 struct CallCosts {
@@ -34,7 +42,7 @@ struct CallCosts {
 struct RealtimeRights {
   int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not asked for
   int memory_error = -1;     ///< of the request to lock the memory
-  int latency_error = -1;    ///< of that to keep the processors awake, see CpuLatencyHold
+  int latency_error = -1;    ///< of that to keep the processors awake, see kCpuLatencyDevice
 
   /// Without them pulses may be late by any time. What sleeping processors cost is measured with
   /// the wake-ups, and some machines have no such states.
@@ -54,25 +62,12 @@ struct Capability {
   RealtimeRights rights;
 };
 
-constexpr int kMeasuredWakeUps = 300;  // a millisecond each
-constexpr int kMeasuredSleeps = 100;   // a millisecond each
-constexpr int kMeasuredCalls = 200;    // of each line; fewer where they take more than 20 ms
-
-/// Measures in a thread with the rights of the pulse thread; takes about 0.4 s of the clock, on a
-/// machine that stalls up to 2 s, and what the calls cost. Nothing moves: STEP lines are written
-/// the level that they have, and no other line is.
+/// Measures the wake-ups of this machine alone, in a thread with the rights of the pulse thread.
+/// Takes about 0.4 s of the clock, up to 2 s if the machine stalls.
 ///
-/// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
-///   inactive level.
-/// @param clock not waited on by anyone else meanwhile.
-/// @param latency_device as the PulseDriver's.
-/// @throw GpioError where a line can't be written or read.
-Capability measureCapability(gpio::Lines& lines, Clock& clock,
-                             const std::vector<ChannelConfig>& channels,
-                             const std::string& latency_device = CpuLatencyHold::kDevice);
-
-/// The same without lines: of a machine alone. There are no channels in it.
-Capability measureWakeUps(Clock& clock,
-                          const std::string& latency_device = CpuLatencyHold::kDevice);
+/// @param clock must not be waited on by anyone else meanwhile.
+/// @param latency_device see kCpuLatencyDevice; empty: the processors may sleep.
+/// @return without channels.
+Capability measureWakeUps(Clock& clock, const std::string& latency_device = kCpuLatencyDevice);
 
 }  // namespace stepdriver::pulse

@@ -49,10 +49,10 @@ struct MachineConfig {
 ///                                # don't start
 ///   max_lateness_ms: 5.0
 ///   keep_cpus_awake: true        # with libgpiod; false: they may sleep, and wake late
-/// emergency_stop:                # optional; see config::readInputSwitch()
+/// emergency_stop:                # optional; so is its bias: as_is, pull_up, pull_down or disabled
 ///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
-/// state_file: ""                 # absolute path of a file that keeps the positions; empty: no
-/// file simulation: {...}              # see readSimulation(); only a simulated machine heeds it
+/// state_file: ""                 # absolute path of the file that keeps positions; empty: no file
+/// simulation: {...}              # see readSimulation(); only a simulated machine reads it
 /// axes: {...}                    # see config::readAxes()
 /// @endcode
 ///

@@ -51,8 +51,7 @@ struct SimulationConfig {
 /// simulation:
 ///   speed: 1.0                   # seconds of the rig per second; 0: as fast as it goes
 ///   trace: /tmp/axis.vcd         # where the pin trace goes; default: nowhere
-///   emergency_stop: false        # true: the button of the emergency-stop input is pressed at
-///   first
+///   emergency_stop: false        # true: the emergency-stop button is pressed at the start
 ///   axes:
 ///     x:                         # `deg` in place of `mm` on a rotary axis
 ///       start_mm: 0.0            # where the carriage stands at first

@@ -2,7 +2,6 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include "stepdriver_core/axis/axis_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/config/axis_config.h"
 

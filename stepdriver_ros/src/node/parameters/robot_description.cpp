@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "common/text.h"
-#include "stepdriver_core/config/lowest_limits.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::ros_node {
 namespace {

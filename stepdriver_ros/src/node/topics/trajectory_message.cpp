@@ -33,8 +33,8 @@ double timeOf(const trajectory_msgs::JointTrajectory& message, std::size_t index
   return planned - late;
 }
 
-machine::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point, double time) {
-  machine::TrajectoryPoint converted;
+axis::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point, double time) {
+  axis::TrajectoryPoint converted;
   converted.time = time;
   converted.positions = point.positions;
   converted.velocities = point.velocities;
@@ -105,7 +105,7 @@ machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
   for (auto point = first_to_come; point != request.points.end(); ++point) {
     point->time += trajectory.delay;
   }
-  machine::TrajectoryPoint rest;
+  axis::TrajectoryPoint rest;
   rest.time = trajectory.delay;
   rest.positions = positions;
   rest.velocities.resize(positions.size());

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
+#include "motion/limits.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "stepdriver_core/axis/axis_state.h"
+#include "axis/axis_memory.h"
 
 namespace stepdriver::machine {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "stepdriver_core/motion/profile.h"
+#include "motion/profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "stepdriver_core/motion/profile.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "stepdriver_core/motion/double_double.h"
+#include "motion/double_double.h"
 
 namespace stepdriver::motion {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stepdriver_core/motion/profile.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

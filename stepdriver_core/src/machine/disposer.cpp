@@ -1,4 +1,4 @@
-#include "stepdriver_core/axis/disposer.h"
+#include "machine/disposer.h"
 
 #include <pthread.h>
 #include <sched.h>

@@ -5,10 +5,10 @@
 #include <string>
 #include <thread>
 
+#include "pulse/cpu_latency.h"
+#include "pulse/pulse_engine.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/cpu_latency.h"
-#include "stepdriver_core/pulse/pulse_engine.h"
 
 namespace stepdriver::pulse {
 
@@ -22,7 +22,7 @@ class PulseThread {
   ///   nullptr: nobody.
   /// @param latency_device see CpuLatencyHold; empty: the processors may sleep.
   PulseThread(PulseEngine& engine, Clock& clock, NewsListener* listener = nullptr,
-              const std::string& latency_device = CpuLatencyHold::kDevice);
+              const std::string& latency_device = kCpuLatencyDevice);
 
   /// stop(), if that wasn't called.
   ~PulseThread();

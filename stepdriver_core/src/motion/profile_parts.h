@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stepdriver_core/motion/profile.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "stepdriver_core/motion/profile.h"
-#include "stepdriver_core/motion/profile_peaks.h"
+#include "motion/profile.h"
+#include "motion/profile_peaks.h"
 
 namespace stepdriver::motion {
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "stepdriver_core/motion/limits.h"
-#include "stepdriver_core/motion/profile.h"
+#include "motion/limits.h"
+#include "motion/profile.h"
 
 namespace stepdriver::motion {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <optional>
 
+#include "pulse/guard_learner.h"
+#include "pulse/running_share.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/guard_learner.h"
-#include "stepdriver_core/pulse/running_share.h"
 
 namespace stepdriver::pulse {
 

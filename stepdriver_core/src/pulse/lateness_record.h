@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/lateness.h"
 
 namespace stepdriver::pulse {
 

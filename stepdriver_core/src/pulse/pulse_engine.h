@@ -6,14 +6,14 @@
 #include <optional>
 #include <vector>
 
+#include "pulse/channel.h"
+#include "pulse/command.h"
+#include "pulse/due_tree.h"
+#include "pulse/lateness_record.h"
+#include "pulse/mailbox.h"
+#include "pulse/snapshot.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/pulse/channel.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/pulse/command.h"
-#include "stepdriver_core/pulse/due_tree.h"
-#include "stepdriver_core/pulse/lateness_record.h"
-#include "stepdriver_core/pulse/mailbox.h"
-#include "stepdriver_core/pulse/snapshot.h"
 
 namespace stepdriver::pulse {
 

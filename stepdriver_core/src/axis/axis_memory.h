@@ -1,0 +1,24 @@
+#pragma once
+
+#include "stepdriver_core/config/axis_config.h"
+
+namespace stepdriver::axis {
+
+/// What of an axis outlasts the program; see machine::StateFile.
+struct AxisMemory {
+  config::Kind kind = config::Kind::kLinear;
+  double steps_per_unit = 0.0;  ///< [steps/unit] as configured
+  double position = 0.0;        ///< [unit] at rest
+  double slack = 0.0;           ///< [unit] what is taken up of the backlash
+  bool valid = false;           ///< the position could be trusted
+  bool homed = false;
+  bool at_home = false;  ///< the chip's translator was where it begins after a reset
+
+  bool operator==(const AxisMemory& other) const {
+    return kind == other.kind && steps_per_unit == other.steps_per_unit &&
+           position == other.position && slack == other.slack && valid == other.valid &&
+           homed == other.homed && at_home == other.at_home;
+  }
+};
+
+}  // namespace stepdriver::axis

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/used_lines.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/config_reader.h"
+
+namespace stepdriver::config {
+
+/// As readAxes() without `used`.
+///
+/// @param used the lines of the axes are added here, for other keys that name lines.
+std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
+                                 std::vector<ConfigIssue>& issues, UsedLines& used);
+
+/// Reads `{pin: "gpiochip0:25", active_level: high, bias: as_is}`; bias is optional.
+///
+/// @return empty if the key is missing.
+std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
+                                           UsedLines& used);
+
+}  // namespace stepdriver::config

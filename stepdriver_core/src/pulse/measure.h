@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pulse/channel.h"
+#include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/pulse/capability.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::pulse {
+
+/// @param samples not empty.
+Spread spreadOf(std::vector<Nanoseconds> samples);
+
+constexpr int kMeasuredWakeUps = 300;  // a millisecond each
+constexpr int kMeasuredSleeps = 100;   // a millisecond each
+constexpr int kMeasuredCalls = 200;    // of each line; fewer if they take more than 20 ms
+
+/// Measures like measureWakeUps(), and what the calls cost. Nothing moves: STEP lines are written
+/// the level that they have, and no other line is written.
+///
+/// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
+/// inactive
+///   level.
+/// @throw GpioError if a line can't be written or read.
+Capability measureCapability(gpio::Lines& lines, Clock& clock,
+                             const std::vector<ChannelConfig>& channels,
+                             const std::string& latency_device = kCpuLatencyDevice);
+
+}  // namespace stepdriver::pulse
