@@ -1,5 +1,7 @@
 #include "stepdriver_core/config/config_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,8 +21,8 @@ std::string boundsText(const Range& range) {
   const std::string min = numberText(range.min);
   const std::string max = numberText(range.max);
   if (has_min && has_max) {
-    return range.min_excluded ? "above " + min + " and at most " + max
-                              : "from " + min + " to " + max;
+    return range.min_excluded ? fmt::format("above {} and at most {}", min, max)
+                              : fmt::format("from {} to {}", min, max);
   }
   if (has_min) return range.min_excluded ? "above " + min : min + " or more";
   return has_max ? "at most " + max : "";
@@ -47,7 +49,7 @@ const ConfigValue::Map* mapOrIssue(const ConfigValue& value, const std::string& 
                                    std::vector<ConfigIssue>& issues) {
   const auto* map = value.as<ConfigValue::Map>();
   if (map == nullptr)
-    issues.push_back({name, "is " + shownWithType(value) + ", but must be a map"});
+    issues.push_back({name, fmt::format("is {}, but must be a map", shownWithType(value))});
   return map;
 }
 
@@ -196,7 +198,7 @@ std::optional<std::string> ConfigReader::findOneOf(const std::string& key,
   auto text = findText(key, presence, wanted);
   if (!text || std::find(allowed.begin(), allowed.end(), *text) != allowed.end()) return text;
   const std::string* meant = nearest(*text, allowed);
-  wrong(key, shown(key), wanted + (meant ? "; did you mean " + *meant + "?" : ""));
+  wrong(key, shown(key), meant ? fmt::format("{}; did you mean {}?", wanted, *meant) : wanted);
   return {};
 }
 
@@ -220,9 +222,9 @@ void ConfigReader::rejectUnknown() {
     const std::string& key = entry.first;
     if (known_.count(key) > 0) continue;
     const std::string* meant = nearest(key, known);
-    issue(key, "is not known; " + (meant != nullptr ? "did you mean " + *meant + "?"
-                                   : known.empty()  ? std::string("nothing is allowed here")
-                                                    : "known here: " + listText(known, "and")));
+    issue(key, meant != nullptr ? fmt::format("is not known; did you mean {}?", *meant)
+               : known.empty()  ? "is not known; nothing is allowed here"
+                                : "is not known; known here: " + listText(known, "and"));
   }
 }
 
@@ -237,7 +239,7 @@ const ConfigValue* ConfigReader::find(const std::string& key, Presence presence,
 }
 
 void ConfigReader::wrong(const std::string& key, const std::string& is, const std::string& wanted) {
-  issue(key, "is " + is + ", but must be " + wanted);
+  issue(key, fmt::format("is {}, but must be {}", is, wanted));
 }
 
 }  // namespace stepdriver::config

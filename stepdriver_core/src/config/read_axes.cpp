@@ -1,5 +1,7 @@
 #include "config/read_axes.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -123,9 +125,9 @@ class AxesReader {
     }
     const auto [user, is_new] = joints_.emplace(joint, axis.fullName(""));
     if (!is_new) {
-      axis.issue("joint", "is \"" + joint + "\"" + (given ? "" : ", the axis's name") +
-                              ", but must be another: it is the joint of " + user->second +
-                              " already");
+      axis.issue("joint",
+                 fmt::format("is \"{}\"{}, but must be another: it is the joint of {} already",
+                             joint, given ? "" : ", the axis's name", user->second));
     }
     return joint;
   }
@@ -139,9 +141,9 @@ class AxesReader {
 
 void checkAxisName(const std::string& name, ConfigReader& axis) {
   if (isAxisName(name)) return;
-  axis.issue("", "has the name \"" + name +
-                     "\", but an axis's name must begin with a letter and go on with letters, "
-                     "digits and _ only");
+  axis.issue("", fmt::format("has the name \"{}\", but an axis's name must begin with a letter and "
+                             "go on with letters, digits and _ only",
+                             name));
 }
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,

@@ -1,5 +1,7 @@
 #include "read_homing.h"
 
+#include <fmt/format.h>
+
 #include <string>
 #include <vector>
 
@@ -40,8 +42,8 @@ class HomingReader {
   std::string inUnit(const char* key) const {
     return std::string(key) + (keys_.kind == Kind::kLinear ? "_mm" : "_deg");
   }
-  std::string is(const std::string& key) const {
-    return "is " + homing_.shown(key) + ", but must be ";
+  void mustBe(const std::string& key, const std::string& wanted) {
+    homing_.issue(key, fmt::format("is {}, but must be {}", homing_.shown(key), wanted));
   }
 
   /// @return whether it is right.
@@ -51,34 +53,31 @@ class HomingReader {
     if (!which) return false;
     homing.at_max = *which == "max";
     if (homing.at_max ? config_.endstop_max : config_.endstop_min) return true;
-    homing_.issue("switch",
-                  is("switch") + "a switch that the axis has: endstops/" + *which + " is missing");
+    mustBe("switch", fmt::format("a switch that the axis has: endstops/{} is missing", *which));
     return false;
   }
 
   std::optional<double> readSpeed(const std::string& key, double highest, const std::string& what) {
     const auto speed = homing_.findNumber(key, Range::positive(), Presence::kRequired);
-    if (speed && highest > 0.0 && *speed > highest * kSlack) {
-      homing_.issue(key, is(key) + "at most " + what);
-    }
+    if (speed && highest > 0.0 && *speed > highest * kSlack) mustBe(key, "at most " + what);
     return speed;
   }
 
   void readSpeeds(HomingConfig& homing) {
     const std::string seek_key = inUnit("seek_speed") + "_s";
     const std::string latch_key = inUnit("latch_speed") + "_s";
-    const auto seek = readSpeed(seek_key, units(config_.max_speed),
-                                keys_.max_speed + ", which is " + axis_.shown(keys_.max_speed));
+    const auto seek =
+        readSpeed(seek_key, units(config_.max_speed),
+                  fmt::format("{}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
     // Only at a speed from which the motor stops at once does the count stay true at the switch.
     const bool known = config_.steps_per_unit > 0.0 && config_.acceleration > 0.0;
     const double restart = known ? units(restartSpeed(config_)) : 0.0;
     const auto latch = readSpeed(latch_key, restart,
-                                 upperBoundText(restart) +
-                                     ", the speed that the motor stops from without a ramp (" +
-                                     keys_.min_speed + ", or that after one full step)");
+                                 fmt::format("{}, the speed that the motor stops from without a "
+                                             "ramp ({}, or that after one full step)",
+                                             upperBoundText(restart), keys_.min_speed));
     if (seek && latch && *latch > *seek) {
-      homing_.issue(latch_key, is(latch_key) + "at most " + seek_key + ", which is " +
-                                   homing_.shown(seek_key));
+      mustBe(latch_key, fmt::format("at most {}, which is {}", seek_key, homing_.shown(seek_key)));
     }
     homing.seek_speed = si(seek.value_or(0.0));
     homing.latch_speed = si(latch.value_or(0.0));
@@ -90,15 +89,15 @@ class HomingReader {
     const auto travel = homing_.findNumber(travel_key, Range::positive(), Presence::kRequired);
     const double steps = config_.steps_per_unit / units(1.0);
     if (travel && steps > 0.0 && *travel * steps > kFarthest) {
-      homing_.issue(travel_key, is(travel_key) + "at most " + upperBoundText(kFarthest / steps) +
-                                    ", which is 2^40 steps");
+      mustBe(travel_key,
+             fmt::format("at most {}, which is 2^40 steps", upperBoundText(kFarthest / steps)));
     }
     const auto pull_off =
         homing_.findNumber(pull_off_key, Range::notNegative(), Presence::kRequired);
     const bool too_far = travel && pull_off && *pull_off > *travel;
     if (too_far) {
-      homing_.issue(pull_off_key, is(pull_off_key) + "at most " + travel_key + ", which is " +
-                                      homing_.shown(travel_key));
+      mustBe(pull_off_key,
+             fmt::format("at most {}, which is {}", travel_key, homing_.shown(travel_key)));
     }
     const std::string offset_key = inUnit("offset");
     const auto offset = homing_.findNumber(offset_key, Range{}, Presence::kOptional);
@@ -117,9 +116,10 @@ class HomingReader {
     const auto check = [&](const std::optional<double>& limit, bool beyond, const char* word,
                            const std::string& key) {
       if (!limit || !beyond) return;
-      homing_.issue(offset_key, stands + ", so that the axis stands at " + roughText(units(rest)) +
-                                    " when it is homed, but that must be " + word + " " + key +
-                                    ", which is " + axis_.shown(key));
+      homing_.issue(offset_key,
+                    fmt::format("{}, so that the axis stands at {} when it is homed, but that must "
+                                "be {} {}, which is {}",
+                                stands, roughText(units(rest)), word, key, axis_.shown(key)));
     };
     const double tolerance = config_.steps_per_unit > 0.0 ? 1.0 / config_.steps_per_unit : 0.0;
     check(config_.min_position, rest < config_.min_position.value_or(0.0) - tolerance, "at least",

@@ -1,5 +1,7 @@
 #include "read_motion.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <optional>
 #include <string>
@@ -32,9 +34,9 @@ std::optional<Kind> readKind(ConfigReader& axis) {
   const std::string linear = firstGiven(axis, motionKeys(Kind::kLinear));
   const std::string rotary = firstGiven(axis, motionKeys(Kind::kRotary));
   if (!linear.empty() && !rotary.empty()) {
-    axis.issue("", "has " + linear + " and " + rotary +
-                       ", but must be either linear, with all of it in mm, or rotary, with all of "
-                       "it in degrees");
+    axis.issue("", fmt::format("has {} and {}, but must be either linear, with all of it in mm, or "
+                               "rotary, with all of it in degrees",
+                               linear, rotary));
     return {};
   }
   if (!linear.empty()) return Kind::kLinear;
@@ -73,16 +75,16 @@ class MotionReader {
  private:
   double si(double units) const { return static_cast<double>(units / keys_.units_per_si_unit); }
 
-  std::string is(const std::string& key) const {
-    return "is " + axis_.shown(key) + ", but must be ";
+  void mustBe(const std::string& key, const std::string& wanted) {
+    axis_.issue(key, fmt::format("is {}, but must be {}", axis_.shown(key), wanted));
   }
 
   void readSpeeds(AxisConfig& config) {
     const auto max = axis_.findNumber(keys_.max_speed, Range::positive(), presence_);
     const auto min = axis_.findNumber(keys_.min_speed, Range::notNegative(), Presence::kOptional);
     if (min && max && *min > *max) {
-      axis_.issue(keys_.min_speed, is(keys_.min_speed) + "at most " + keys_.max_speed +
-                                       ", which is " + axis_.shown(keys_.max_speed));
+      mustBe(keys_.min_speed,
+             fmt::format("at most {}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
     }
     if (max) checkRate(*max);
     config.max_speed = si(max.value_or(0.0));
@@ -93,21 +95,21 @@ class MotionReader {
     if (!steps_per_unit_) return;
     const double rate = max_speed * *steps_per_unit_;
     if (rate * kSlack < kLowestRate) {
-      axis_.issue(keys_.max_speed, is(keys_.max_speed) + "at least " +
-                                       lowerBoundText(kLowestRate / *steps_per_unit_) +
-                                       ", which is " + numberText(kLowestRate) + " steps/s");
+      mustBe(keys_.max_speed,
+             fmt::format("at least {}, which is {} steps/s",
+                         lowerBoundText(kLowestRate / *steps_per_unit_), numberText(kLowestRate)));
     }
     if (!context_.timing) return;
     const double high_us = static_cast<double>(context_.timing->step_high_ns) / 1e3;
     const double low_us = static_cast<double>(context_.timing->step_low_ns) / 1e3;
     const double highest = 1e6 / (high_us + low_us);
     if (rate <= highest * kSlack) return;
-    axis_.issue(keys_.max_speed,
-                is(keys_.max_speed) + "at most " + upperBoundText(highest / *steps_per_unit_) +
-                    ": it is " + roughText(rate) + " steps/s (at " + roughText(*steps_per_unit_) +
-                    " steps per " + keys_.unit + "), and the " + context_.chip_title +
-                    " takes at most " + upperBoundText(highest) + " steps/s (" +
-                    numberText(high_us) + " us high, " + numberText(low_us) + " us low)");
+    mustBe(keys_.max_speed,
+           fmt::format("at most {}: it is {} steps/s (at {} steps per {}), and the {} takes at "
+                       "most {} steps/s ({} us high, {} us low)",
+                       upperBoundText(highest / *steps_per_unit_), roughText(rate),
+                       roughText(*steps_per_unit_), keys_.unit, context_.chip_title,
+                       upperBoundText(highest), numberText(high_us), numberText(low_us)));
   }
 
   void readAccelerations(AxisConfig& config) {
@@ -121,9 +123,9 @@ class MotionReader {
     const auto& slowest = down ? down : up;
     if (stop && slowest && *stop < *slowest) {
       const std::string& key = down ? keys_.deceleration : keys_.acceleration;
-      axis_.issue(keys_.stop_deceleration, is(keys_.stop_deceleration) + "at least " + key +
-                                               ", which is " + axis_.shown(key) +
-                                               ": a stop must not end beyond what it stops");
+      mustBe(keys_.stop_deceleration,
+             fmt::format("at least {}, which is {}: a stop must not end beyond what it stops", key,
+                         axis_.shown(key)));
     }
     config.acceleration = si(up.value_or(0.0));
     config.deceleration = down ? si(*down) : config.acceleration;
@@ -137,11 +139,10 @@ class MotionReader {
     if (!steps_per_unit_ || jerk == 0.0) return;
     const double steps = jerk * *steps_per_unit_;
     if (steps * kSlack >= kLowestJerk && steps <= kHighestJerk * kSlack) return;
-    axis_.issue(keys_.jerk, is(keys_.jerk) + "0 for none, or from " +
-                                lowerBoundText(kLowestJerk / *steps_per_unit_) + " to " +
-                                upperBoundText(kHighestJerk / *steps_per_unit_) + ", which is " +
-                                numberText(kLowestJerk) + " to " + numberText(kHighestJerk) +
-                                " steps/s^3");
+    mustBe(keys_.jerk, fmt::format("0 for none, or from {} to {}, which is {} to {} steps/s^3",
+                                   lowerBoundText(kLowestJerk / *steps_per_unit_),
+                                   upperBoundText(kHighestJerk / *steps_per_unit_),
+                                   numberText(kLowestJerk), numberText(kHighestJerk)));
   }
 
   void readBacklash(AxisConfig& config) {
@@ -149,27 +150,27 @@ class MotionReader {
         axis_.findNumber(keys_.backlash, Range::notNegative(), Presence::kOptional).value_or(0.0);
     config.backlash = si(backlash);
     if (!steps_per_unit_ || backlash * *steps_per_unit_ <= kMostBacklash) return;
-    axis_.issue(keys_.backlash, is(keys_.backlash) + "at most " +
-                                    upperBoundText(kMostBacklash / *steps_per_unit_) +
-                                    ", which is " + numberText(kMostBacklash) + " steps");
+    mustBe(keys_.backlash, fmt::format("at most {}, which is {} steps",
+                                       upperBoundText(kMostBacklash / *steps_per_unit_),
+                                       numberText(kMostBacklash)));
   }
 
   void checkAcceleration(const std::string& key, double acceleration) {
     if (!steps_per_unit_) return;
     const double steps = acceleration * *steps_per_unit_;
     if (steps * kSlack >= kLowestAcceleration && steps <= kHighestAcceleration * kSlack) return;
-    axis_.issue(key, is(key) + "from " + lowerBoundText(kLowestAcceleration / *steps_per_unit_) +
-                         " to " + upperBoundText(kHighestAcceleration / *steps_per_unit_) +
-                         ", which is " + numberText(kLowestAcceleration) + " to " +
-                         numberText(kHighestAcceleration) + " steps/s^2");
+    mustBe(key, fmt::format("from {} to {}, which is {} to {} steps/s^2",
+                            lowerBoundText(kLowestAcceleration / *steps_per_unit_),
+                            upperBoundText(kHighestAcceleration / *steps_per_unit_),
+                            numberText(kLowestAcceleration), numberText(kHighestAcceleration)));
   }
 
   void readPositions(AxisConfig& config) {
     const auto min = readPosition(keys_.min_position);
     const auto max = readPosition(keys_.max_position);
     if (min && max && *min >= *max) {
-      axis_.issue(keys_.min_position, is(keys_.min_position) + "below " + keys_.max_position +
-                                          ", which is " + axis_.shown(keys_.max_position));
+      mustBe(keys_.min_position, fmt::format("below {}, which is {}", keys_.max_position,
+                                             axis_.shown(keys_.max_position)));
     }
     if (min) config.min_position = si(*min);
     if (max) config.max_position = si(*max);
@@ -178,9 +179,8 @@ class MotionReader {
   std::optional<double> readPosition(const std::string& key) {
     const auto position = axis_.findNumber(key, Range{}, Presence::kOptional);
     if (position && steps_per_unit_ && std::abs(*position) * *steps_per_unit_ > kFarthestStep) {
-      const std::string bound = upperBoundText(kFarthestStep / *steps_per_unit_);
-      axis_.issue(key, is(key) + "from -" + bound + " to " + bound +
-                           ", which is as far as steps are counted");
+      mustBe(key, fmt::format("from -{0} to {0}, which is as far as steps are counted",
+                              upperBoundText(kFarthestStep / *steps_per_unit_)));
     }
     return position;
   }

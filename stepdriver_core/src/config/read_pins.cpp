@@ -1,5 +1,7 @@
 #include "read_pins.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <optional>
 
@@ -45,7 +47,7 @@ std::optional<std::string> readLineName(ConfigReader& reader, const std::string&
   auto line = reader.findText(key, presence, kWantedLine);
   if (!line) return {};
   if (!isLine(*line)) {
-    reader.issue(key, "is " + reader.shown(key) + ", but must be " + kWantedLine);
+    reader.issue(key, fmt::format("is {}, but must be {}", reader.shown(key), kWantedLine));
     return {};
   }
   return line;
@@ -116,9 +118,9 @@ class PinsReader {
     }
     const bool alias = name.drv8825_key != nullptr && reader_.has(name.drv8825_key);
     if (alias && !takesAliases()) {
-      reader_.issue(name.drv8825_key, "is " + reader_.shown(name.drv8825_key) +
-                                          ", but that is a name on the DRV8825; on the " +
-                                          chip_->title + " the pin is " + name.key);
+      reader_.issue(name.drv8825_key,
+                    fmt::format("is {}, but that is a name on the DRV8825; on the {} the pin is {}",
+                                reader_.shown(name.drv8825_key), chip_->title, name.key));
       return;
     }
     if (alias && reader_.has(name.key)) {
@@ -140,13 +142,13 @@ class PinsReader {
     if (!reader_.has("fault")) {
       if (axis_.has("fault_bias")) {
         axis_.issue("fault_bias",
-                    "is " + axis_.shown("fault_bias") + ", but pins/fault is missing");
+                    fmt::format("is {}, but pins/fault is missing", axis_.shown("fault_bias")));
       }
       return;
     }
     if (chip_ != nullptr && !chip_->has_fault) {
-      reader_.issue("fault", "is " + reader_.shown("fault") + ", but the " + chip_->title +
-                                 " has no fault pin");
+      reader_.issue("fault", fmt::format("is {}, but the {} has no fault pin",
+                                         reader_.shown("fault"), chip_->title));
       return;
     }
     if (const auto line = readLine(reader_, "fault", Presence::kOptional, used_)) {
@@ -157,13 +159,14 @@ class PinsReader {
   void refuse(const PinName& name, const std::string& why) {
     for (const char* key : {name.key, name.drv8825_key}) {
       if (key == nullptr || !reader_.has(key)) continue;
-      reader_.issue(key, "is " + reader_.shown(key) + ", but " + why);
+      reader_.issue(key, fmt::format("is {}, but {}", reader_.shown(key), why));
     }
   }
 
   static void refuseSecondName(ConfigReader& reader, const PinName& name) {
-    reader.issue(name.drv8825_key, "is " + reader.shown(name.drv8825_key) + ", but " + name.key +
-                                       ", the same pin, is given too; give one");
+    reader.issue(name.drv8825_key,
+                 fmt::format("is {}, but {}, the same pin, is given too; give one",
+                             reader.shown(name.drv8825_key), name.key));
   }
 
   void checkMicrostepPins() {
@@ -178,17 +181,18 @@ class PinsReader {
     }
     if (named.empty() || missing.empty()) return;
     reader_.issue(missing.front(),
-                  "is missing; wire all three microstep pins, or none where the "
-                  "board is strapped to `microsteps` (wired: " +
-                      listText(named, "and") + ")");
+                  fmt::format("is missing; wire all three microstep pins, or none where the board "
+                              "is strapped to `microsteps` (wired: {})",
+                              listText(named, "and")));
   }
 
   bool readCommonAnode() {
     if (!axis_.boolean("common_anode", false)) return false;
     if (chip_ == nullptr || chip_->model == driver::Model::kTb6600) return true;
-    axis_.issue("common_anode", "is true, but must be false on the " + chip_->title +
-                                    ": only a tb6600 has inputs to be wired so; for single pins "
-                                    "there is invert");
+    axis_.issue("common_anode",
+                fmt::format("is true, but must be false on the {}: only a tb6600 has inputs to be "
+                            "wired so; for single pins there is invert",
+                            chip_->title));
     return false;
   }
 
@@ -217,14 +221,14 @@ class PinsReader {
     if (!inverted) return;
     if (!isNamed(name)) {
       if (isRequired(name) || !reader_.isMap()) return;
-      invert.issue(key, "is " + invert.shown(key) + ", but only a wired pin may be named here; " +
-                            reader_.fullName(key) + " is missing");
+      invert.issue(key, fmt::format("is {}, but only a wired pin may be named here; {} is missing",
+                                    invert.shown(key), reader_.fullName(key)));
       return;
     }
     if (common_anode && (name.pin == &Pins::step || name.pin == &Pins::enable)) {
-      invert.issue(key, "is " + invert.shown(key) +
-                            ", but common_anode inverts it already; with common_anode only dir may "
-                            "be named here, to turn the direction round");
+      invert.issue(key, fmt::format("is {}, but common_anode inverts it already; with common_anode "
+                                    "only dir may be named here, to turn the direction round",
+                                    invert.shown(key)));
       return;
     }
     Pin& pin = pins_.*name.pin;

@@ -1,5 +1,7 @@
 #include "read_power.h"
 
+#include <fmt/format.h>
+
 namespace stepdriver::config {
 namespace {
 
@@ -19,8 +21,9 @@ void readPower(ConfigReader& axis, bool pins_are_right, AxisConfig& config) {
   const bool sleeps = config.idle_action == IdleAction::kSleep;
   if ((sleeps ? config.pins.sleep : config.pins.enable).wired()) return;
   const std::string pin = axis.fullName(sleeps ? "pins/sleep" : "pins/enable");
-  axis.issue("idle_timeout_s", "is " + axis.shown("idle_timeout_s") + ", but with idle_action " +
-                                   action + " that needs " + pin + ", which isn't wired");
+  axis.issue("idle_timeout_s",
+             fmt::format("is {}, but with idle_action {} that needs {}, which isn't wired",
+                         axis.shown("idle_timeout_s"), action, pin));
 }
 
 }  // namespace stepdriver::config

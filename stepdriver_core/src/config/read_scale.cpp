@@ -1,5 +1,7 @@
 #include "read_scale.h"
 
+#include <fmt/format.h>
+
 #include <limits>
 #include <string>
 #include <vector>
@@ -46,10 +48,9 @@ class ScaleReader {
          {std::string(kGear), keys_.per_round, keys_.wheel_diameter, keys_.steps_per_unit}) {
       if (scaleIsGivenBy(other)) key = other;
     }
-    axis_.issue(key, "is " + axis_.shown(key) + ", which makes " +
-                         roughText(static_cast<double>(scale)) + " steps per " + keys_.unit +
-                         ", but must make from " + numberText(kLowestScale) + " to " +
-                         numberText(kHighestScale));
+    axis_.issue(key, fmt::format("is {}, which makes {} steps per {}, but must make from {} to {}",
+                                 axis_.shown(key), roughText(static_cast<double>(scale)),
+                                 keys_.unit, numberText(kLowestScale), numberText(kHighestScale)));
     return false;
   }
 
@@ -72,17 +73,18 @@ class ScaleReader {
     const bool by_wheel = axis_.has(keys_.wheel_diameter);
     const bool by_travel = axis_.has(keys_.per_round);
     if (!by_wheel && !by_travel && presence == Presence::kRequired) {
-      axis_.issue(keys_.per_round, "is missing; it must be a number above 0, or else " +
-                                       keys_.wheel_diameter + " must be given");
+      axis_.issue(keys_.per_round,
+                  fmt::format("is missing; it must be a number above 0, or else {} must be given",
+                              keys_.wheel_diameter));
     }
     const auto travel = axis_.findNumber(keys_.per_round, Range::positive(), Presence::kOptional);
     const auto diameter =
         axis_.findNumber(keys_.wheel_diameter, Range::positive(), Presence::kOptional);
     if (by_wheel && by_travel) {
       axis_.issue(keys_.wheel_diameter,
-                  "is " + axis_.shown(keys_.wheel_diameter) + ", but " + keys_.per_round +
-                      " must not be given with it: a round travels either that or pi times the "
-                      "diameter");
+                  fmt::format("is {}, but {} must not be given with it: a round travels either "
+                              "that or pi times the diameter",
+                              axis_.shown(keys_.wheel_diameter), keys_.per_round));
       return {};
     }
     if (diameter) return kPi * static_cast<long double>(*diameter);
@@ -94,21 +96,22 @@ class ScaleReader {
     const std::string& key = keys_.steps_per_unit;
     if (!axis_.has(key)) {
       if (presence_ == Presence::kRequired) {
-        const std::string travel = keys_.per_round.empty()
-                                       ? ""
-                                       : " and " + keys_.per_round + " or " + keys_.wheel_diameter;
-        axis_.issue(key, "is missing; it must be a number above 0, or else " +
-                             std::string(kFullSteps) + travel + " must be given");
+        const std::string travel =
+            keys_.per_round.empty()
+                ? ""
+                : fmt::format(" and {} or {}", keys_.per_round, keys_.wheel_diameter);
+        axis_.issue(
+            key, fmt::format("is missing; it must be a number above 0, or else {}{} must be given",
+                             kFullSteps, travel));
       }
       return {};
     }
     const auto scale = axis_.findNumber(key, Range::positive(), presence_);
     if (by_rounds.empty()) return scale;
     readTravel(Presence::kOptional);
-    axis_.issue(key, "is " + axis_.shown(key) + ", but " + listText(by_rounds, "and") +
-                         " must not be given with it: the axis is scaled by either (the motor's "
-                         "own steps can be given as " +
-                         kStepsPerRound + ")");
+    axis_.issue(key, fmt::format("is {}, but {} must not be given with it: the axis is scaled by "
+                                 "either (the motor's own steps can be given as {})",
+                                 axis_.shown(key), listText(by_rounds, "and"), kStepsPerRound));
     return {};
   }
 
@@ -122,17 +125,16 @@ double readStepsPerRound(ConfigReader& axis, std::optional<int> full_steps,
                          std::optional<int> microsteps) {
   const auto steps =
       axis.findInteger(kStepsPerRound, 1, std::numeric_limits<int>::max(), Presence::kOptional);
-  const std::string is = "is " + axis.shown(kStepsPerRound) + ", but must be ";
   const bool by_full_steps = full_steps && microsteps;
   const int product = by_full_steps ? *full_steps * *microsteps : 0;
   if (steps && by_full_steps && *steps != product) {
-    axis.issue(kStepsPerRound, is + std::to_string(product) + ": " + kFullSteps + " (" +
-                                   std::to_string(*full_steps) + ") times microsteps (" +
-                                   std::to_string(*microsteps) + ")");
+    axis.issue(kStepsPerRound, fmt::format("is {}, but must be {}: {} ({}) times microsteps ({})",
+                                           axis.shown(kStepsPerRound), product, kFullSteps,
+                                           *full_steps, *microsteps));
   } else if (steps && microsteps && *steps % *microsteps != 0) {
-    axis.issue(kStepsPerRound, is + "a multiple of microsteps, which is " +
-                                   std::to_string(*microsteps) +
-                                   ": it counts the microsteps of whole full steps");
+    axis.issue(kStepsPerRound, fmt::format("is {}, but must be a multiple of microsteps, which is "
+                                           "{}: it counts the microsteps of whole full steps",
+                                           axis.shown(kStepsPerRound), *microsteps));
   }
   return steps.value_or(product);
 }

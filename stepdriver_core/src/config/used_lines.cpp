@@ -1,5 +1,7 @@
 #include "config/used_lines.h"
 
+#include <fmt/format.h>
+
 namespace stepdriver::config {
 
 void UsedLines::add(const std::string& key, const std::string& line) {
@@ -13,16 +15,17 @@ void UsedLines::addEnable(const std::string& key, const std::string& line, std::
   const User& user = found->second;
   if (!user.enables) return refuse(key, line, user);
   if (!on || !user.on || *on == *user.on) return;
-  const auto name = [](bool level) { return std::string(level ? "high" : "low"); };
-  issues_.push_back({key, "is \"" + line + "\", which is " + user.key +
-                              " too, but its axis is enabled by " + name(*on) +
-                              " and the other by " + name(*user.on) +
-                              "; axes that share a line need the same level"});
+  const auto name = [](bool level) { return level ? "high" : "low"; };
+  issues_.push_back(
+      {key, fmt::format("is \"{}\", which is {} too, but its axis is enabled by {} "
+                        "and the other by {}; axes that share a line need the same level",
+                        line, user.key, name(*on), name(*user.on))});
 }
 
 void UsedLines::refuse(const std::string& key, const std::string& line, const User& user) {
-  issues_.push_back({key, "is \"" + line + "\", which is used twice: it is " + user.key +
-                              " already, and each pin needs a line of its own"});
+  issues_.push_back({key, fmt::format("is \"{}\", which is used twice: it is {} already, "
+                                      "and each pin needs a line of its own",
+                                      line, user.key)});
 }
 
 }  // namespace stepdriver::config
