@@ -68,6 +68,12 @@ std::string roughText(double number) {
   return numberText(roughly(number, [](double scaled) { return std::round(scaled); }));
 }
 
+std::string millisecondsText(std::int64_t nanoseconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g ms", static_cast<double>(nanoseconds) * 1e-6);
+  return text;
+}
+
 // The slack keeps a bound that is a round number but for its last bit.
 std::string lowerBoundText(double bound) {
   return numberText(roughly(bound, [](double scaled) { return std::ceil(scaled - 1e-5); }));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,9 @@ std::string numberText(double number);
 
 /// The same with six digits, which are enough for what was computed.
 std::string roughText(double number);
+
+/// A time with three digits: "2.5 ms".
+std::string millisecondsText(std::int64_t nanoseconds);
 
 /// A positive bound with six digits, rounded to the side that is allowed: whoever writes what a
 /// message names must not get another message.

@@ -43,7 +43,6 @@ class Activities {
   void forEach(const std::function<void(Activity&)>& action) const;
   pulse::Nanoseconds due() const;
   bool watchInputs() const;
-  bool empty() const { return all_.empty(); }
 
  private:
   void takeOver(std::unique_ptr<Activity> activity);

@@ -25,6 +25,14 @@ class Activity {
     kAfterRest,  ///< it waits until what its axes do has come to rest
   };
 
+  /// What it does to its axes: that decides what a command that needs them is told.
+  enum class Work {
+    kMoves,
+    kWritesPins,
+    kDisables,           ///< writes pins, and the motor has no current afterwards
+    kChangesMicrosteps,  ///< may move before it writes pins
+  };
+
   Activity(Context& context, std::vector<axis::AxisModel*> axes, Handover handover)
       : context_(context), axes_(std::move(axes)), handover_(handover) {}
   virtual ~Activity() = default;
@@ -61,8 +69,10 @@ class Activity {
   virtual void resume(const Ack& /*call*/) {}
   /// The speed override or the limits have changed.
   virtual void speedChanged(const Ack& /*call*/) {}
-  /// The call that began it doesn't wait any more.
-  virtual void cancel() {}
+  /// The caller of these homings doesn't wait any more.
+  virtual void cancelHomings(const std::vector<std::uint64_t>& /*ids*/) {}
+  /// @return false if it does not disable its axis; else this call waits for that too.
+  virtual bool joinDisable(const Ack& /*call*/) { return false; }
 
   /// Clock time at which look() has something to do at the latest.
   virtual pulse::Nanoseconds due() const { return pulse::kNever; }
@@ -71,6 +81,7 @@ class Activity {
 
   /// @name What a reader of the state is shown
   /// @{
+  virtual Work work() const { return Work::kMoves; }
   virtual axis::HomingPhase homingPhase() const { return axis::HomingPhase::kNone; }
   /// The motion that it makes, or that is held; nullptr if it makes none now.
   virtual const Manoeuvre* motion() const { return nullptr; }

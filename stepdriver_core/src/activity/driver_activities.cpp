@@ -5,7 +5,6 @@
 #include <string>
 #include <utility>
 
-#include "axis/scale.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::activity {
@@ -204,7 +203,7 @@ PinsStep::Writes ChangeMicrosteps::writes() {
   const pulse::ChannelState& state = axis.motor.state();
   const auto change = axis.motor.translator().changeTo(wanted_, state.count);
   const double kept = axis.positionNow();
-  const double per_unit = axis::stepsPerUnit(axis.config, wanted_);
+  const double per_unit = axis.stepsPerUnit(wanted_);
   const std::int64_t play = std::llround(axis.config.backlash * per_unit);
   const double scale = static_cast<double>(wanted_) / axis.motor.microsteps();
   const std::int64_t slack =

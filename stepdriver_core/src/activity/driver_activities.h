@@ -15,6 +15,7 @@ class PinScript : public Script {
  public:
   PinScript(Context& context, axis::AxisModel& axis, Ack call)
       : Script(context, {&axis}, Handover::kAfterRest, std::move(call)) {}
+  Work work() const override { return Work::kWritesPins; }
 
  protected:
   void onEnd(const Why& /*why*/, const Ack& /*call*/) override {}
@@ -24,8 +25,7 @@ class PinScript : public Script {
 /// Wakes a chip, ends its reset, and enables it if the configuration says so.
 class BringUp : public PinScript {
  public:
-  BringUp(Context& context, axis::AxisModel& axis, Ack call)
-      : PinScript(context, axis, std::move(call)) {}
+  using PinScript::PinScript;
 
  protected:
   Steps plan() override;
@@ -34,8 +34,7 @@ class BringUp : public PinScript {
 /// Energizes the motor.
 class Enable : public PinScript {
  public:
-  Enable(Context& context, axis::AxisModel& axis, Ack call)
-      : PinScript(context, axis, std::move(call)) {}
+  using PinScript::PinScript;
 
  protected:
   Steps plan() override;
@@ -44,11 +43,12 @@ class Enable : public PinScript {
 /// Takes the motor's current away when the axis has come to rest.
 class Disable : public PinScript {
  public:
-  Disable(Context& context, axis::AxisModel& axis, Ack call)
-      : PinScript(context, axis, std::move(call)) {}
-
-  /// Another call waits for it too.
-  void join(Ack call) { joined_.push_back(std::move(call)); }
+  using PinScript::PinScript;
+  Work work() const override { return Work::kDisables; }
+  bool joinDisable(const Ack& call) override {
+    joined_.push_back(call);
+    return true;
+  }
 
  protected:
   Steps plan() override;
@@ -73,8 +73,7 @@ class Sleep : public PinScript {
 /// Pulses RESET.
 class Reset : public PinScript {
  public:
-  Reset(Context& context, axis::AxisModel& axis, Ack call)
-      : PinScript(context, axis, std::move(call)) {}
+  using PinScript::PinScript;
 
  protected:
   Steps plan() override;
@@ -93,8 +92,7 @@ class GoIdle : public PinScript {
 /// Ends a fault: restores the pins if a write had failed, and resets a chip that reports one.
 class Recover : public PinScript {
  public:
-  Recover(Context& context, axis::AxisModel& axis, Ack call)
-      : PinScript(context, axis, std::move(call)) {}
+  using PinScript::PinScript;
   bool watchesInputs() const override { return true; }
 
  protected:
@@ -112,6 +110,7 @@ class ChangeMicrosteps : public Script {
  public:
   ChangeMicrosteps(Context& context, axis::AxisModel& axis, int wanted, Ack call)
       : Script(context, {&axis}, Handover::kAfterRest, std::move(call)), wanted_(wanted) {}
+  Work work() const override { return Work::kChangesMicrosteps; }
 
  protected:
   Steps plan() override;

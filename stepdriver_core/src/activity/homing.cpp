@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "message_text.h"
@@ -44,12 +43,6 @@ using axis::HomingPhase;
 constexpr int kMostDebounces = 50;
 // While a switch settles it is looked at so often.
 constexpr pulse::Nanoseconds kSamplePeriod = 1'000'000;
-
-std::string inMilliseconds(pulse::Nanoseconds time) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g ms", static_cast<double>(time) * 1e-6);
-  return text;
-}
 
 }  // namespace
 
@@ -94,7 +87,8 @@ void Homing::onEnd(const Why& why, const Ack& call) {
   onLook();
 }
 
-void Homing::cancel() {
+void Homing::cancelHomings(const std::vector<std::uint64_t>& ids) {
+  if (std::find(ids.begin(), ids.end(), id_) == ids.end()) return;
   fail("it was cancelled", HomingEnd::kCancelled);
   look();
 }
@@ -257,8 +251,9 @@ void Homing::sample() {
   }
   if (context().now - steady_since_ >= debounce_) return settled();
   if (context().now - settle_began_ > kMostDebounces * debounce_) {
-    fail(switch_ + " bounces without end: after " + inMilliseconds(context().now - settle_began_) +
-         " it still hasn't been at rest for debounce_ms, " + inMilliseconds(debounce_));
+    fail(switch_ + " bounces without end: after " +
+         millisecondsText(context().now - settle_began_) +
+         " it still hasn't been at rest for debounce_ms, " + millisecondsText(debounce_));
     onLook();
   }
 }

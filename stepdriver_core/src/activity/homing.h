@@ -27,14 +27,12 @@ class Homing : public Activity {
   /// Why an axis can't be homed now. @throw Refused
   static void refuseUnlessReady(const axis::AxisModel& axis);
 
-  std::uint64_t id() const { return id_; }
-
   bool canHandOver() const override { return stroke_ != nullptr; }
   std::vector<Predecessor> handOver(const std::string& by) override;
   void hold(const Ack& call) override;
   void resume(const Ack& call) override;
   void speedChanged(const Ack& call) override;
-  void cancel() override;
+  void cancelHomings(const std::vector<std::uint64_t>& ids) override;
   pulse::Nanoseconds due() const override;
   bool watchesInputs() const override { return true; }
   axis::HomingPhase homingPhase() const override { return phase_; }

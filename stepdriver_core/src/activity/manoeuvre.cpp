@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
+#include "message_text.h"
 #include "point_motion.h"
 #include "stepdriver_core/error.h"
 
@@ -13,12 +13,6 @@ namespace stepdriver::activity {
 namespace {
 
 constexpr pulse::Nanoseconds kLongestLead = 2'000'000'000;
-
-std::string inMilliseconds(pulse::Nanoseconds time) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g ms", static_cast<double>(time) * 1e-6);
-  return text;
-}
 
 double secondsSince(std::int64_t began_ns, std::int64_t end_ns) {
   return std::max(0.0, static_cast<double>(end_ns - began_ns) * 1e-9);
@@ -334,7 +328,7 @@ void Manoeuvre::tryAgain() {
     return fail({Failure::Kind::kRefused,
                  orders_.front().axis->name() +
                      ": the pulse thread doesn't keep up: it took a plan later than " +
-                     inMilliseconds(lead_) + " after it was made"});
+                     millisecondsText(lead_) + " after it was made"});
   }
   lead_ *= 2;
   try {
@@ -394,10 +388,8 @@ void Manoeuvre::rested() {
 }
 
 void Manoeuvre::concludeGoals() {
-  reached_ = true;
   for (const Order& order : orders_) {
     const axis::MoveResult result = resultOf(order);
-    reached_ = reached_ && result.end == axis::MoveEnd::kReached;
     if (&order == &orders_.front()) result_ = result;
     activity::conclude(order.goal, result);
   }

@@ -36,8 +36,6 @@ class Manoeuvre {
   /// The engine has said something, or time has passed. @return whether all is over.
   bool look();
   bool isOver() const { return over_; }
-  /// All axes have reached their targets. @pre isOver()
-  bool hasReached() const { return reached_; }
   /// How the first axis's goal ended. @pre isOver()
   const axis::MoveResult& result() const { return result_; }
   /// Why it was not begun after all; none if it was.
@@ -62,8 +60,6 @@ class Manoeuvre {
   /// Tells how a goal ended that nobody has taken over from.
   static void conclude(const Predecessor& ended);
   bool slowsDown() const { return mode_ != Mode::kRun; }
-  /// The engine has not yet taken the first order.
-  bool isBeginning() const { return !started_; }
 
  private:
   enum class Mode { kRun, kStop, kHold };
@@ -122,7 +118,6 @@ class Manoeuvre {
   bool started_ = false;   // the engine has taken one
   bool held_ = false;
   bool over_ = false;
-  bool reached_ = false;
   axis::MoveResult result_;
   std::optional<Failure> failure_;
   pulse::Nanoseconds lead_;

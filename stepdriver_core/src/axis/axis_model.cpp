@@ -6,7 +6,6 @@
 
 #include "config/restart_speed.h"
 #include "message_text.h"
-#include "scale.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
@@ -25,7 +24,9 @@ AxisModel::AxisModel(config::AxisConfig axis_config, const motor::MotorLines& mo
 
 // ---- scales ----
 
-double AxisModel::stepsPerUnit() const { return axis::stepsPerUnit(config, motor.microsteps()); }
+double AxisModel::stepsPerUnit(int microsteps) const {
+  return config.steps_per_unit * microsteps / config.microsteps;
+}
 
 std::int64_t AxisModel::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
 

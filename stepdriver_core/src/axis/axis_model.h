@@ -45,7 +45,8 @@ class AxisModel {
 
   /// @name Scales, in the microstep mode of now
   /// @{
-  double stepsPerUnit() const;  ///< [microsteps/unit]
+  double stepsPerUnit() const { return stepsPerUnit(motor.microsteps()); }  ///< [microsteps/unit]
+  double stepsPerUnit(int microsteps) const;  ///< [microsteps/unit] in that mode
   double positionOf(double count) const { return position.origin() + count / stepsPerUnit(); }
   double countOf(double at) const { return (at - position.origin()) * stepsPerUnit(); }
   std::int64_t backlash() const;  ///< [microsteps]

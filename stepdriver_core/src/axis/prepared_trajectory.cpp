@@ -8,6 +8,7 @@
 
 #include "message_text.h"
 #include "motion/profile_parts.h"
+#include "nanoseconds.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -139,7 +140,7 @@ motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t 
                 numberText(kLongest) + " s");
   }
   motion::Waypoint waypoint;
-  waypoint.time_ns = std::llround(point.time * 1e9);
+  waypoint.time_ns = nanoseconds(point.time);
   if (!before.empty() && waypoint.time_ns <= before.back().time_ns) {
     axis.refuse(name() + "is at " + numberText(point.time) +
                 " s, but must be later than the one before it, at " +

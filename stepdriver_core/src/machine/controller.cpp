@@ -10,6 +10,7 @@
 #include "activity/homing.h"
 #include "activity/point_motion.h"
 #include "message_text.h"
+#include "nanoseconds.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
 
@@ -31,12 +32,6 @@ constexpr const char* kChipRemedy =
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check tells what it holds), call "
     "recover, and home it or set its position";
-
-std::string inMilliseconds(pulse::Nanoseconds time) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g ms", static_cast<double>(time) * 1e-6);
-  return text;
-}
 
 void refuseBadNumber(const axis::AxisModel& axis, const std::string& what, double value) {
   if (std::isfinite(value) && value >= 0.0) return;
@@ -114,7 +109,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     axis.rest_since = std::min(context_.now, state.end_time + context_.slipped);
     if (state.end == pulse::EndReason::kEmergencyStop) axis.fault.latchEmergencyStop(false);
     if (state.end == pulse::EndReason::kTooLate) {
-      axis.fault.latch("a pulse was " + inMilliseconds(state.end_lateness) +
+      axis.fault.latch("a pulse was " + millisecondsText(state.end_lateness) +
                            " late, more than the motor can go on from at this speed",
                        kLateRemedy);
       axis.position.distrust();
@@ -144,7 +139,7 @@ pulse::Nanoseconds Controller::idleDue(const axis::AxisModel& axis) const {
                      power.wantsSleep() || axis.fault || !context_.mode.closed.empty() ||
                      context_.mode.held || !activities_.isFree(axis);
   if (stays) return pulse::kNever;
-  return axis.rest_since + std::llround(axis.config.idle_timeout * 1e9);
+  return axis.rest_since + nanoseconds(axis.config.idle_timeout);
 }
 
 void Controller::superviseIdle(axis::AxisModel& axis) {
@@ -172,7 +167,8 @@ void Controller::refuseUnlessFree(const axis::AxisModel& axis, const std::string
   if (axis.moving()) axis.refuse("busy: it moves; " + what + " at rest");
   for (const Activity* busy : {owner, static_cast<const Activity*>(activities_.heir(axis))}) {
     if (busy == nullptr || busy->isInBackground()) continue;
-    const bool pins = dynamic_cast<const activity::PinScript*>(busy) != nullptr;
+    const bool pins =
+        busy->work() == Activity::Work::kWritesPins || busy->work() == Activity::Work::kDisables;
     if (!pins) axis.refuseWhileHeld();  // what is held is to go on from here
     axis.refuse(pins ? "busy: its driver's pins are being written; " + what + " when that is done"
                      : "busy: it is about to move; " + what + " at rest");
@@ -183,11 +179,8 @@ void Controller::refuseUnlessReadyToMove(const axis::AxisModel& axis) const {
   axis.refuseUnlessReady();
   for (const Activity* busy : {activities_.owner(axis), activities_.heir(axis)}) {
     if (busy == nullptr || busy->isInBackground() || busy->canHandOver()) continue;
-    if (dynamic_cast<const activity::Disable*>(busy) != nullptr) {
-      axis.refuse("disabled; enable it first");
-    }
-    if (dynamic_cast<const activity::PinScript*>(busy) != nullptr ||
-        dynamic_cast<const activity::ChangeMicrosteps*>(busy) != nullptr) {
+    if (busy->work() == Activity::Work::kDisables) axis.refuse("disabled; enable it first");
+    if (busy->work() != Activity::Work::kMoves) {
       axis.refuse("busy: its driver's pins are being written");
     }
   }
@@ -462,12 +455,7 @@ void Controller::serve(const Home& wanted, const Ack& call) {
 }
 
 void Controller::serve(const CancelHoming& wanted, const Ack& /*call*/) {
-  activities_.forEach([&](Activity& activity) {
-    const auto* homing = dynamic_cast<activity::Homing*>(&activity);
-    if (homing == nullptr) return;
-    const auto& ids = wanted.ids;
-    if (std::find(ids.begin(), ids.end(), homing->id()) != ids.end()) activity.cancel();
-  });
+  activities_.forEach([&](Activity& activity) { activity.cancelHomings(wanted.ids); });
 }
 
 // ---- the driver chip ----
@@ -480,10 +468,11 @@ void Controller::serve(const Enable& wanted, const Ack& call) {
   }
   if (!wanted.on) return disable(changed, {axis::MoveEnd::kStopped, "it was disabled"}, call);
   if (changed.fault) changed.refuse("at fault: " + changed.fault.what() + "; call recover first");
-  const bool disabling =
-      dynamic_cast<const activity::Disable*>(activities_.heir(changed)) != nullptr ||
-      dynamic_cast<const activity::Disable*>(activities_.owner(changed)) != nullptr;
-  if (disabling) changed.refuse("busy: it is being disabled");
+  for (const Activity* busy : {activities_.owner(changed), activities_.heir(changed)}) {
+    if (busy != nullptr && busy->work() == Activity::Work::kDisables) {
+      changed.refuse("busy: it is being disabled");
+    }
+  }
   const motor::Power& power = changed.motor.power();
   const Activity* owner = activities_.owner(changed);
   if (power.wantsEnabled() && !power.isIdle() && (owner == nullptr || !owner->isInBackground())) {
@@ -497,9 +486,7 @@ void Controller::serve(const Enable& wanted, const Ack& call) {
 void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call) {
   ++axis.stops;
   for (Activity* at : {activities_.owner(axis), activities_.heir(axis)}) {
-    if (auto* disabling = dynamic_cast<activity::Disable*>(at)) {
-      return disabling->join(call);
-    }
+    if (at != nullptr && at->joinDisable(call)) return;
   }
   activities_.begin(std::make_unique<activity::Disable>(context_, axis, call), why);
 }

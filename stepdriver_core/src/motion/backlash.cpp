@@ -109,8 +109,6 @@ std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const Mo
   return std::nullopt;
 }
 
-DoubleDouble secondsOf(std::int64_t time_ns) { return fromInteger(time_ns) / DoubleDouble(1e9); }
-
 // What is taken up of the backlash, as it is moved to at one turn after the other.
 class TakeUps {
  public:

@@ -77,6 +77,10 @@ Split split(DoubleDouble value) {
           ((value.hi - static_cast<double>(high)) - carry) + value.lo};
 }
 
+DoubleDouble secondsOf(std::int64_t nanoseconds) {
+  return fromInteger(nanoseconds) / DoubleDouble(1e9);
+}
+
 Split splitNanoseconds(DoubleDouble seconds) { return split(seconds * DoubleDouble(1e9)); }
 
 }  // namespace stepdriver::motion

@@ -43,6 +43,9 @@ struct Split {
 /// @pre |value| < 2^62
 Split split(DoubleDouble value);
 
+/// Nanoseconds in seconds.
+DoubleDouble secondsOf(std::int64_t nanoseconds);
+
 /// Seconds as whole nanoseconds and the fraction of one that is left.
 Split splitNanoseconds(DoubleDouble seconds);
 

@@ -220,7 +220,7 @@ MotionState Profile::stateAt(std::int64_t time_ns) const {
     return {start_position_, first.v0, first.a};
   }
   if (time_ns >= end_ns_) return {end_position_, 0.0, 0.0};
-  const DoubleDouble since = fromInteger(time_ns - start_ns_) / DoubleDouble(1e9);
+  const DoubleDouble since = secondsOf(time_ns - start_ns_);
   const std::size_t index = pieceAt(since);
   const Piece now = piece(index);
   const DoubleDouble t = since - pieceStart(index);

@@ -34,9 +34,7 @@ SegmentKind Segment::kind() const {
   return begin.acceleration && end.acceleration ? SegmentKind::kQuintic : SegmentKind::kCubic;
 }
 
-DoubleDouble Segment::duration() const {
-  return fromInteger(end.time_ns - begin.time_ns) / DoubleDouble(1e9);
-}
+DoubleDouble Segment::duration() const { return secondsOf(end.time_ns - begin.time_ns); }
 
 Quintic Segment::quintic() const {
   const DoubleDouble time = duration();

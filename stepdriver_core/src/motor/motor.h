@@ -34,7 +34,6 @@ class Motor {
   void ordered(Motion motion) { motions_.add(std::move(motion)); }
   /// Of an order to the engine.
   std::uint64_t nextSerial() { return ++serial_; }
-  std::uint64_t lastSerial() const { return serial_; }
 
   /// [microsteps] Where the motor will be at a motion time.
   motion::MotionState stateAt(std::int64_t at) const;
