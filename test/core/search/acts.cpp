@@ -36,6 +36,8 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
 std::vector<Act> makeActs() {
   using Quiet = Meaning::Quiet;
   const std::vector<std::size_t> every = {kX, kY, kZ};
+  Meaning stops = quiet(Quiet::kSlowsDown, every);
+  stops.ends_hold = true;
   Meaning resumes = about(every);
   resumes.resumes = true;
   Meaning recovers = about(every);
@@ -43,6 +45,11 @@ std::vector<Act> makeActs() {
   axis::AxisLimits slow;
   slow.max_speed = 0.03;
   slow.acceleration = slow.deceleration = 1.0;
+  axis::AxisLimits gentle;
+  gentle.acceleration = gentle.deceleration = 0.3;
+  gentle.jerk = 5.0;
+  axis::AxisLimits too_low;
+  too_low.acceleration = 1e-9;
   return {
       request("move x to 8 mm", machine::MoveTo{kX, 0.008, false, 0.0}, moving({kX})),
       request("move x by -6 mm", machine::MoveTo{kX, -0.006, true, 0.0}, moving({kX})),
@@ -65,6 +72,7 @@ std::vector<Act> makeActs() {
       request("jog x", machine::Jog{kX, 0.05, {}}, moving({kX})),
       request("jog z back", machine::Jog{kZ, -0.05, {}}, moving({kZ})),
       request("end the jog of x", machine::Jog{kX, 0.0, {}}, {}),
+      {"stream a jog of x", [](Participants& all, int client) { all.streamJog(client, kX); }},
       request("home x", machine::Home{{kX}, false}, moving({kX})),
       {"cancel homing", [](Participants& all, int client) { all.cancelHomings(client); }},
       request("plan x", machine::PlanMove{{kX, 0.004, true, 0.0}}, {}),
@@ -79,7 +87,7 @@ std::vector<Act> makeActs() {
       request("wake x", machine::Sleep{kX, false}, {}),
       request("sleep z", machine::Sleep{kZ, true}, quiet(Quiet::kAtRest, {kZ})),
       request("reset x", machine::Reset{kX}, {}),
-      request("stop", machine::StopAll{}, quiet(Quiet::kSlowsDown, every)),
+      request("stop", machine::StopAll{}, stops),
       request("stop x", machine::StopAxis{kX}, quiet(Quiet::kSlowsDown, {kX})),
       {"stop the last move of x",
        [](Participants& all, int client) { all.stopLastMove(client, kX); }},
@@ -88,9 +96,14 @@ std::vector<Act> makeActs() {
       request("override 0.4", machine::SetSpeedOverride{0.4}, {}),
       request("override 1.7", machine::SetSpeedOverride{1.7}, {}),
       request("limits of x", machine::SetLimits{kX, slow}, {}),
+      request("gentle limits of x", machine::SetLimits{kX, gentle}, {}),
+      request("gentle limits of y", machine::SetLimits{kY, gentle}, {}),
+      request("too low limits of y", machine::SetLimits{kY, too_low}, {}),
       request("position of x", machine::SetPosition{kX, 0.001}, {}),
       {"emergency stop", [](Participants& all, int client) { all.emergencyStop(client); }},
       request("recover", machine::Recover{}, recovers),
+      {"press the emergency stop", [](Participants& all, int) { all.pressEmergencyStop(true); }},
+      {"release the emergency stop", [](Participants& all, int) { all.pressEmergencyStop(false); }},
       {"press x", [](Participants& all, int) { all.pressSwitch(kX, true); }},
       {"release x", [](Participants& all, int) { all.pressSwitch(kX, false); }},
       {"press x, edge lost",
@@ -99,6 +112,11 @@ std::vector<Act> makeActs() {
          all.pressSwitch(kX, true);
        }},
       {"chip fault of x", [](Participants& all, int) { all.breakChip(kX); }},
+      {"steps of x fail", [](Participants& all, int) { all.failSteps(kX); }},
+      {"turns of y fail", [](Participants& all, int) { all.failTurns(kY); }},
+      {"switch of x can't be read", [](Participants& all, int) { all.failSwitch(kX); }},
+      {"emergency stop can't be read", [](Participants& all, int) { all.failEmergencyStop(); }},
+      {"lines work again", [](Participants& all, int) { all.mendLines(); }},
       {"a pin fails", [](Participants& all, int) { all.failNextPin(EIO); }},
       {"a pin hangs", [](Participants& all, int) { all.hangNextPin(600'000'000); }},
       {"a pin is slow", [](Participants& all, int) { all.hangNextPin(20'000'000); }},

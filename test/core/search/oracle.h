@@ -24,6 +24,8 @@ struct Meaning {
   bool moves = false;          ///< it may begin a motion
   bool resumes = false;        ///< it may go on with what is held
   bool recovers = false;
+  bool ends_hold = false;   ///< whatever its answer, motions may begin after a hold before it
+  std::uint64_t as_of = 0;  ///< nothing must have stopped it since this Oracle::moment(); 0: any
   std::array<bool, kAxes> axes{};  ///< that it is about
 };
 
@@ -31,17 +33,20 @@ struct Meaning {
 /// isn't of a later motion.
 class Oracle {
  public:
-  /// @param slowing the longest deceleration, with what is added to it.
+  /// @param slowing the longest deceleration of each axis alone, with what is added to it.
   /// @param slipped motion time is clock time less this.
-  Oracle(pulse::Nanoseconds slowing, std::function<pulse::Nanoseconds()> slipped)
+  Oracle(const std::array<pulse::Nanoseconds, kAxes>& slowing,
+         std::function<pulse::Nanoseconds()> slipped)
       : slowing_(slowing), slipped_(std::move(slipped)) {}
 
   std::vector<std::string> complaints;
 
   /// The controller was handed a call.
   void served(std::uint64_t call, const std::string& name, const Meaning& meaning) {
-    calls_[call] = {++order_, name, meaning};
+    calls_[call] = {meaning.as_of != 0 ? meaning.as_of : moment(), name, meaning};
     if (meaning.moves || meaning.resumes || meaning.recovers) open_.push_back(call);
+    if (meaning.moves) moveTogether(meaning);
+    if (meaning.ends_hold) endHolds();
   }
 
   void answered(std::uint64_t call, bool success, pulse::Nanoseconds now) {
@@ -55,8 +60,8 @@ class Oracle {
       if (!meaning.axes[axis]) continue;
       // A recover may have ended the fault of this axis while it still waits for another one.
       for (Quiet& quiet : quiets_[axis]) {
-        const bool recovered =
-            meaning.recovers || (meaning.moves && isRecoveredFrom(quiet.order, ended.order));
+        const bool recovered = (meaning.recovers && quiet.order < ended.order) ||
+                               (meaning.moves && isRecoveredFrom(quiet.order, ended.order));
         if (recovered && quiet.kind == Meaning::Quiet::kEmergency) {
           quiet.kind = Meaning::Quiet::kAtRest;
         }
@@ -66,21 +71,38 @@ class Oracle {
       Quiet quiet;
       quiet.order = ended.order;
       quiet.kind = meaning.quiet;
+      if (quiet.kind == Meaning::Quiet::kHeld && ended.order < hold_ended_) {
+        quiet.kind = Meaning::Quiet::kSlowsDown;
+      }
       quiet.name = ended.name;
-      const bool slows =
+      quiet.slows =
           meaning.quiet == Meaning::Quiet::kSlowsDown || meaning.quiet == Meaning::Quiet::kHeld;
-      quiet.since = now + (slows ? slowing_ : 0);
+      quiet.since = now + (quiet.slows ? slowing_[axis] - slipped_() : 0);
       // A motion that was handed over after the stop, and accepted before its answer.
       if (last_motion_[axis] > ended.order) continue;
       quiets_[axis].push_back(quiet);
     }
   }
 
+  /// After the answer of this call: nothing later may move the axis.
+  bool isLatest(std::uint64_t call, std::size_t axis) const {
+    const std::uint64_t order = calls_.at(call).order;
+    return last_motion_[axis] <= order &&
+           std::none_of(open_.begin(), open_.end(), [&](std::uint64_t id) {
+             const Call& open = calls_.at(id);
+             return open.order > order && open.meaning.axes[axis] && ends(open.meaning);
+           });
+  }
+
+  /// One was asked for: from then on no pulse begins.
   void emergencyStopped(pulse::Nanoseconds now) {
     for (auto& quiets : quiets_) {
-      quiets.push_back({++order_, Meaning::Quiet::kEmergency, "emergency stop", now, false});
+      quiets.push_back({moment(), Meaning::Quiet::kEmergency, "emergency stop", now, false});
     }
   }
+
+  /// Later than all that was served until now.
+  std::uint64_t moment() { return ++order_; }
 
   void rose(std::size_t axis, pulse::Nanoseconds time) {
     for (const Quiet& quiet : quiets_[axis]) {
@@ -113,7 +135,28 @@ class Oracle {
   static bool ends(const Meaning& meaning) { return meaning.moves || meaning.resumes; }
   static bool ends(const Meaning& meaning, const Quiet& quiet) {
     if (quiet.kind == Meaning::Quiet::kEmergency) return false;
-    return meaning.moves || (meaning.resumes && quiet.kind == Meaning::Quiet::kHeld);
+    return quiet.kind == Meaning::Quiet::kHeld ? meaning.resumes : meaning.moves;
+  }
+
+  // From now on motions may begin again.
+  void endHolds() {
+    hold_ended_ = order_;
+    for (auto& quiets : quiets_) {
+      for (Quiet& quiet : quiets) {
+        if (quiet.kind == Meaning::Quiet::kHeld) quiet.kind = Meaning::Quiet::kSlowsDown;
+      }
+    }
+  }
+
+  // Axes that share a path take as long as the slowest of them.
+  void moveTogether(const Meaning& meaning) {
+    pulse::Nanoseconds longest = 0;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      if (meaning.axes[axis]) longest = std::max(longest, slowing_[axis]);
+    }
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      if (meaning.axes[axis]) slowing_[axis] = longest;
+    }
   }
 
   /// A recover that came after one and before the other is under way.
@@ -142,9 +185,10 @@ class Oracle {
     });
   }
 
-  const pulse::Nanoseconds slowing_;
+  std::array<pulse::Nanoseconds, kAxes> slowing_;
   const std::function<pulse::Nanoseconds()> slipped_;
   std::uint64_t order_ = 0;
+  std::uint64_t hold_ended_ = 0;
   std::map<std::uint64_t, Call> calls_;
   std::vector<std::uint64_t> open_;
   std::array<std::vector<Quiet>, kAxes> quiets_;

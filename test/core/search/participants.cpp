@@ -17,10 +17,14 @@ constexpr pulse::Nanoseconds kInputPeriod = 100 * kMillisecond;
 constexpr pulse::Nanoseconds kMaxLateness = 5 * kMillisecond;
 /// That the engine is late at the most; more than it can make good.
 constexpr pulse::Nanoseconds kLatestPass = 8 * kMillisecond;
-/// From the answer of a stop to the beginning of the deceleration; and if the engine is late, with
-/// what its late steps slide the timeline by while it decelerates.
+/// From the answer of a stop to the beginning of the deceleration; and if the engine is late and
+/// refuses plans.
 constexpr pulse::Nanoseconds kLead = 2 * kMillisecond;
-constexpr pulse::Nanoseconds kLongestLead = 500 * kMillisecond;
+constexpr pulse::Nanoseconds kLongestLead = 40 * kMillisecond;
+constexpr const char* kEmergencyStop = "emergency_stop";
+/// How often a stream of jogs comes, and how many of them.
+constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
+constexpr int kJogs = 12;
 constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
 constexpr pulse::Nanoseconds kQuietIsWatched = 250 * kMillisecond;
 constexpr std::size_t kMostSteps = 200'000;
@@ -45,6 +49,7 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   configs[2].jerk = 50.0;
   configs[2].idle_timeout = 0.03;
   if (variant == 0) configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
+  if (variant == 1) configs[2].idle_action = config::IdleAction::kSleep;
   return configs;
 }
 
@@ -65,20 +70,21 @@ std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs)
   return names;
 }
 
-/// From the fastest motion of any axis, the most that a deceleration takes, and 10 %.
-pulse::Nanoseconds slowingOf(const std::vector<config::AxisConfig>& configs,
-                             const Schedule& schedule) {
+/// Of each axis, the most that a deceleration takes, and 10 %.
+std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
+                                                const Schedule& schedule) {
   const bool late =
       std::any_of(schedule.deviations.begin(), schedule.deviations.end(),
                   [](const Deviation& deviation) { return deviation.who == Who::kEngine; });
-  double longest = 0.0;
-  for (const config::AxisConfig& config : configs) {
+  std::array<pulse::Nanoseconds, kAxes> slowing{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const config::AxisConfig& config = configs[axis];
     const double deceleration = config.stop_deceleration.value_or(config.deceleration);
     double time = config.max_speed / deceleration;
     if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
-    longest = std::max(longest, time);
+    slowing[axis] = std::llround(1.1 * time * 1e9) + (late ? kLongestLead : kLead);
   }
-  return std::llround(1.1 * longest * 1e9) + (late ? kLongestLead : kLead);
+  return slowing;
 }
 
 }  // namespace
@@ -98,14 +104,15 @@ Participants::Participants(const Schedule& schedule)
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
       rig_(rigOf(configs_), trace_),
       backend_(rig_, [this] { return clock_.now(); }),
-      wiring_(configs_),
-      lines_(backend_.request(wiring_.outputs, wiring_.inputs)) {
+      wiring_(configs_, config::InputSwitch{kEmergencyStop, true}),
+      lines_(std::make_shared<FailingReads>(backend_.request(wiring_.outputs, wiring_.inputs))) {
   axis::LineNames names;
   for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
   for (const gpio::InputRequest& input : wiring_.inputs) names.inputs.push_back(input.line);
-  engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness);
+  engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
+                                                 wiring_.emergency_stop);
   controller_ = std::make_unique<machine::Controller>(configs_, wiring_.motor_lines,
-                                                      std::move(names), std::nullopt);
+                                                      std::move(names), wiring_.emergency_stop);
   engine_->listen(news_);
   levels_.assign(wiring_.inputs.size(), 0);
   watched_ = readInputs();
@@ -131,7 +138,14 @@ void Participants::carryOut(activity::Outputs& out) {
   if (out.clear_stops != 0) {
     engine_->clearEmergencyStop(out.clear_stops);
     engine_->inputsChanged();
-    engine_called_ = true;
+    engine_called_ = engine_reads_inputs_ = true;
+  }
+  for (const pulse::Command& command : out.commands) {
+    for (std::size_t i = 0; i < command.follow_count; ++i) {
+      const pulse::Follow& follow = command.follows[i];
+      ordered_.at(static_cast<std::size_t>(follow.channel))
+          .push_back({follow.serial, follow.group != 0});
+    }
   }
   outbox_.insert(outbox_.end(), out.commands.begin(), out.commands.end());
   postCommands();
@@ -165,7 +179,11 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   note("answer of " + asked.name +
        (reply.failure ? ": " + reply.failure->text : std::string(": done")));
   oracle_.answered(call, !reply.failure, clock_.now());
+  if (!reply.failure && asked.meaning.quiet == Meaning::Quiet::kSlowsDown) checkSlowing(asked);
   const auto* moves = std::get_if<std::vector<axis::Move>>(&reply.value);
+  if (!reply.failure && !asked.goals.empty()) {
+    checkMoves(asked, moves != nullptr ? *moves : std::vector<axis::Move>());
+  }
   if (moves != nullptr && !reply.failure) {
     for (const axis::Move& move : *moves) {
       moves_.emplace_back(asked.name, move);
@@ -203,7 +221,7 @@ void Participants::takeRead(const machine::InputRead& read) {
 
 bool Participants::canGo(Who who) {
   const auto has_next = [this](std::size_t client) {
-    if (clients_[client].next) return true;
+    if (clients_[client].next) return clock_.now() >= clients_[client].from;
     return script_ && itemReady() && schedule_.items[next_item_].client == static_cast<int>(client);
   };
   switch (who) {
@@ -291,7 +309,6 @@ void Participants::go(Who who) {
         if (controller_->snapshot()->stops_handled < *client.waits_for_stops) continue;
         client.waits_for_stops.reset();
         note("answer of emergency stop");
-        oracle_.emergencyStopped(clock_.now());
       }
       return;
     }
@@ -318,14 +335,13 @@ void Participants::go(Who who) {
       requests_.pop_front();
       for (const machine::InputRead& read : asked.reads) takeRead(read);
       oracle_.served(asked.id, asked.name, asked.meaning);
+      noteServed(asked);
       return handle(machine::Requested{asked.id, std::move(asked.request)});
     }
     case Who::kTimer:
       return handle(machine::TimerDue{});
     case Who::kEngine:
-      engine_called_ = false;
-      engine_waits_since_ = pulse::kNever;
-      engine_due_ = engine_->serve();
+      serveEngine();
       return postCommands();
     case Who::kWriter:
       return write();
@@ -339,6 +355,20 @@ void Participants::go(Who who) {
     }
     case Who::kClock:
       return advanceTo(nextDue());
+  }
+}
+
+void Participants::serveEngine() {
+  const bool reads = std::exchange(engine_reads_inputs_, false);
+  engine_called_ = false;
+  engine_waits_since_ = pulse::kNever;
+  engine_due_ = engine_->serve();
+  if (std::exchange(input_stops_, engine_->inputStops()) != input_stops_) {
+    note("the emergency stop input is active");
+    oracle_.emergencyStopped(clock_.now());
+  }
+  if (reads && lines_->read(wiring_.emergency_stop->line) != 0 && !engine_->emergencyStopped()) {
+    oracle_.complain("the emergency stop input is active, and the engine is not stopped");
   }
 }
 
@@ -373,7 +403,7 @@ void Participants::watch() {
   }
   watch_due_ = pulse::kNever;
   engine_->inputsChanged();
-  engine_called_ = true;
+  engine_called_ = engine_reads_inputs_ = true;
   watched_ = readInputs();
   for (int i = 0; i < count; ++i) edges_.push_back(events.at(static_cast<std::size_t>(i)));
   reads_.insert(reads_.end(), watched_.begin(), watched_.end());
@@ -391,6 +421,9 @@ pulse::Nanoseconds Participants::nextDue() {
   look(engine_due_);
   look(controller_->due());
   look(watch_due_);
+  for (const Client& client : clients_) {
+    if (client.next) look(client.from);
+  }
   if (!jobs_.empty()) look(jobs_.front().returns);
   for (const Job& job : jobs_) {
     if (!job.told) look(job.deadline);
@@ -435,6 +468,7 @@ void Participants::post(int client, const std::string& name, machine::Request re
   asked.name = name;
   asked.request = std::move(request);
   asked.meaning = meaning;
+  noteGoals(asked);
   asked.reads = readInputs();
   asked.posted = clock_.now();
   asked.posted_step = steps_;
@@ -446,6 +480,122 @@ void Participants::post(int client, const std::string& name, machine::Request re
       std::holds_alternative<machine::Home>(requests_.back().request)) {
     position_changed_ = true;
   }
+}
+
+// What it gives a goal, and by how far.
+void Participants::noteGoals(Ask& asked) {
+  if (const auto* move = std::get_if<machine::MoveTo>(&asked.request)) {
+    asked.goals = {move->axis};
+    asked.relative = move->relative;
+    asked.ways = {move->position};
+  } else if (const auto* rounds = std::get_if<machine::MoveRounds>(&asked.request)) {
+    const config::AxisConfig& config = configs_.at(rounds->axis);
+    asked.goals = {rounds->axis};
+    asked.relative = true;
+    asked.ways = {rounds->rounds * config.steps_per_round / config.steps_per_unit};
+  } else if (const auto* line = std::get_if<machine::MoveLine>(&asked.request)) {
+    asked.goals = line->axes;
+    asked.relative = line->relative;
+    asked.ways = line->positions;
+  } else if (const auto* trajectory = std::get_if<machine::FollowTrajectory>(&asked.request)) {
+    asked.goals = trajectory->axes;
+  }
+}
+
+// It is handed to the controller now.
+void Participants::noteServed(Ask& asked) {
+  const auto found = open_.find(asked.id);
+  if (found == open_.end()) return;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    found->second.orders[axis] = ordered_[axis].size();
+  }
+  if (!asked.relative) return;
+  for (std::size_t i = 0; i < asked.goals.size(); ++i) {
+    const std::optional<double> origin = relativeOrigin(asked.goals[i]);
+    found->second.targets.push_back(origin ? std::optional(*origin + asked.ways[i]) : origin);
+  }
+}
+
+// Where the joint comes to rest as things are; none while that isn't known.
+std::optional<double> Participants::relativeOrigin(std::size_t axis) {
+  const auto snapshot = controller_->snapshot();
+  const machine::AxisSnapshot& now = snapshot->axes.at(axis);
+  if (now.memory) return now.memory->position;
+  const machine::AxisSnapshot::Motion& last = now.motions.back();
+  if (!last.target && !last.slows_down) return std::nullopt;
+  const double end = last.profile->endPosition().value();
+  const double slack =
+      static_cast<double>(now.channel.slack) + end - static_cast<double>(now.channel.count);
+  const double taken_up = std::clamp(slack, 0.0, static_cast<double>(now.backlash));
+  return now.origin + (end - taken_up) / now.steps_per_unit;
+}
+
+// A motion that was begun, from what its call said it would.
+void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& moves) {
+  if (moves.size() != asked.goals.size()) {
+    return oracle_.complain(asked.name + " succeeds with " + std::to_string(moves.size()) +
+                            " moves");
+  }
+  for (std::size_t i = 0; i < moves.size(); ++i) {
+    const std::size_t axis = asked.goals[i];
+    const std::string who = asked.name + ", " + configs_[axis].name;
+    const auto& ordered = ordered_[axis];
+    const auto begun = static_cast<std::ptrdiff_t>(asked.orders[axis]);
+    const std::uint64_t accepted = engine_->channel(static_cast<int>(axis)).accepted;
+    const bool together = moves.size() > 1;
+    if (std::none_of(ordered.begin() + begun, ordered.end(), [&](const Ordered& order) {
+          return order.serial <= accepted && order.together == together;
+        })) {
+      oracle_.complain(who + " succeeds, but the engine has not begun it");
+    }
+    if (!asked.relative || !asked.targets[i]) continue;
+    // It may count from a motion that takes the backlash up.
+    const double scale = controller_->snapshot()->axes[axis].steps_per_unit;
+    const double near = configs_[axis].backlash + 1.01 / scale;
+    if (std::abs(moves[i].target - *asked.targets[i]) > near) {
+      oracle_.complain(who + " goes to " + std::to_string(moves[i].target) + " m, not to " +
+                       std::to_string(*asked.targets[i]) + " m");
+    }
+  }
+}
+
+// Whatever still moves after a stop has an owner that slows it down.
+void Participants::checkSlowing(const Ask& asked) {
+  const auto snapshot = controller_->snapshot();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const std::uint64_t following = engine_->channel(static_cast<int>(axis)).following;
+    if (!asked.meaning.axes[axis] || following == 0 || !oracle_.isLatest(asked.id, axis)) continue;
+    const auto& motions = snapshot->axes[axis].motions;
+    if (std::none_of(motions.begin(), motions.end(), [&](const auto& motion) {
+          return motion.serial >= following && motion.slows_down;
+        })) {
+      oracle_.complain(configs_[axis].name + " doesn't slow down after " + asked.name);
+    }
+  }
+}
+
+void Participants::streamJog(int client, std::size_t axis) {
+  const auto snapshot = controller_->snapshot();
+  const machine::Jog jog{axis, 0.05, snapshot->axes.at(axis).state.stops};
+  postStreamedJog(client, axis, jog, oracle_.moment(), kJogs);
+}
+
+void Participants::postStreamedJog(int client, std::size_t axis, const machine::Jog& jog,
+                                   std::uint64_t as_of, int left) {
+  Meaning meaning;
+  meaning.moves = true;
+  meaning.axes[axis] = true;
+  meaning.as_of = as_of;
+  machine::Jog next = jog;
+  next.velocity = 0.08 - jog.velocity;
+  post(client, "jog stream", jog, meaning);
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.on_answer = [=](const activity::Reply&) {
+    if (left == 1) return;
+    Client& streams = clients_[static_cast<std::size_t>(client)];
+    streams.from = clock_.now() + kJogPeriod;
+    streams.next = [=] { postStreamedJog(client, axis, next, as_of, left - 1); };
+  };
 }
 
 void Participants::postTrajectory(int client, std::vector<std::size_t> axes, double size) {
@@ -502,6 +652,7 @@ void Participants::emergencyStop(int client) {
   who.waits_for_stops = engine_->emergencyStop();
   who.since = clock_.now();
   engine_called_ = true;
+  oracle_.emergencyStopped(clock_.now());
 }
 
 void Participants::shutDown(int client) {
@@ -509,6 +660,7 @@ void Participants::shutDown(int client) {
   Meaning all;
   all.axes.fill(true);
   all.quiet = Meaning::Quiet::kSlowsDown;
+  all.ends_hold = true;
   post(client, "close", machine::Close{"the machine was shut down"}, all);
   Client& who = clients_[static_cast<std::size_t>(client)];
   who.on_answer = [this, client, all](const activity::Reply&) {
@@ -544,6 +696,33 @@ void Participants::breakChip(std::size_t axis) {
   sim::RigFaults faults;
   faults.chip_fault_after = 5;
   rig_.setFaults(configs_[axis].name, faults);
+}
+
+void Participants::pressEmergencyStop(bool pressed) {
+  rig_.setInput(kEmergencyStop, pressed, clock_.now());
+}
+
+void Participants::failSteps(std::size_t axis) {
+  steps_failed_[axis] = true;
+  rig_.failWrites(configs_[axis].pins.step.line, 30, EIO);
+}
+
+void Participants::failTurns(std::size_t axis) {
+  rig_.failWrites(configs_[axis].pins.dir.line, 0, EIO);
+}
+
+void Participants::failSwitch(std::size_t axis) {
+  lines_->fail(wiring_.channels[axis].endstop_max->line, EIO);
+}
+
+void Participants::failEmergencyStop() { lines_->fail(wiring_.emergency_stop->line, EIO); }
+
+void Participants::mendLines() {
+  lines_->fail(-1, 0);
+  for (const config::AxisConfig& config : configs_) {
+    rig_.clearWriteFault(config.pins.step.line);
+    rig_.clearWriteFault(config.pins.dir.line);
+  }
 }
 
 // ---- the whole ----
@@ -599,12 +778,13 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
   const pulse::ChannelState state = engine_->channel(static_cast<int>(axis));
   const sim::RigAxisReport report = rig_.report(configs_[axis].name);
   const std::int64_t pulses = report.pulses_forward + report.pulses_backward;
-  if (static_cast<std::int64_t>(state.pulses) != pulses) {
+  // An edge down that could not be written leaves out the next one up.
+  if (!steps_failed_[axis] && static_cast<std::int64_t>(state.pulses) != pulses) {
     oracle_.complain(who + ": the engine counts " + std::to_string(state.pulses) +
                      " pulses, the rig " + std::to_string(pulses));
   }
   const std::int64_t count = report.pulses_forward - report.pulses_backward;
-  if (state.epoch == 0 && state.count != count) {
+  if (!steps_failed_[axis] && state.epoch == 0 && state.count != count) {
     oracle_.complain(who + ": the engine stands at " + std::to_string(state.count) +
                      ", the rig at " + std::to_string(count));
   }
@@ -731,11 +911,14 @@ std::vector<std::string> Participants::run() {
   script_ = false;
   if (oracle_.complaints.empty()) {
     for (std::size_t i = 0; i < kAxes; ++i) rig_.setFaults(configs_[i].name, {});
+    pressEmergencyStop(false);
+    mendLines();
     next_pin_error_ = 0;
     next_pin_hang_ = 0;
     Meaning stops;
     stops.axes.fill(true);
     stops.quiet = Meaning::Quiet::kSlowsDown;
+    stops.ends_hold = true;
     note("stop all in the end");
     ask("stop", machine::StopAll{}, stops);
     if (!playUntil([this] { return atRest(); }, kLongestCall)) {

@@ -16,6 +16,7 @@
 #include "machine/controller.h"
 #include "machine/wiring.h"
 #include "pulse/pulse_engine.h"
+#include "search/failing_reads.h"
 #include "search/oracle.h"
 #include "search/rise_watch.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
@@ -92,13 +93,21 @@ class Participants {
   /// @name What acts do
   /// @{
   void post(int client, const std::string& name, machine::Request request, const Meaning& meaning);
+  /// Jogs as a joystick does, and doesn't look at what becomes of it.
+  void streamJog(int client, std::size_t axis);
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
   void emergencyStop(int client);
   void shutDown(int client);
   void stopLastMove(int client, std::size_t axis);
   void cancelHomings(int client);
   void pressSwitch(std::size_t axis, bool pressed);
+  void pressEmergencyStop(bool pressed);
   void breakChip(std::size_t axis);
+  void failSteps(std::size_t axis);
+  void failTurns(std::size_t axis);
+  void failSwitch(std::size_t axis);
+  void failEmergencyStop();
+  void mendLines();
   void failNextPin(int error) { next_pin_error_ = error; }
   void hangNextPin(pulse::Nanoseconds time) { next_pin_hang_ = time; }
   void loseEdges() { loses_edges_ = true; }
@@ -111,6 +120,11 @@ class Participants {
     std::string name;
     machine::Request request;
     Meaning meaning;
+    std::vector<std::size_t> goals;  ///< axes that it gives a goal
+    bool relative = false;
+    std::vector<double> ways;  ///< of a relative one, by goal
+    std::vector<std::optional<double>> targets;
+    std::array<std::size_t, kAxes> orders{};  ///< of each axis when it was served
     std::vector<machine::InputRead> reads;
     pulse::Nanoseconds posted = 0;
     std::size_t posted_step = 0;
@@ -125,10 +139,16 @@ class Participants {
   struct Client {
     std::uint64_t waits_for = 0;  // a call; 0: none
     std::optional<std::uint64_t> waits_for_stops;
-    std::function<void()> next;  // its next step
+    std::function<void()> next;   // its next step
+    pulse::Nanoseconds from = 0;  // clock time before which it doesn't take that
     std::function<void(const activity::Reply&)> on_answer;
     pulse::Nanoseconds since = 0;
     bool idle() const { return waits_for == 0 && !waits_for_stops && !next; }
+  };
+  /// A motion that was ordered from the engine.
+  struct Ordered {
+    std::uint64_t serial = 0;
+    bool together = false;
   };
   class News : public pulse::NewsListener {
    public:
@@ -155,6 +175,14 @@ class Participants {
   void takeRead(const machine::InputRead& read);
   void prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
                       const std::vector<std::uint64_t>& stops, int tries);
+  void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
+                       int left);
+  void noteGoals(Ask& asked);
+  void noteServed(Ask& asked);
+  std::optional<double> relativeOrigin(std::size_t axis);
+  void checkMoves(const Ask& asked, const std::vector<axis::Move>& moves);
+  void checkSlowing(const Ask& asked);
+  void serveEngine();
   activity::Reply ask(const std::string& name, machine::Request request, const Meaning& meaning);
   /// Plays on until this is so. @return false if it takes too long.
   bool playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest);
@@ -175,7 +203,7 @@ class Participants {
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;
   machine::Wiring wiring_;
-  std::shared_ptr<gpio::Lines> lines_;
+  std::shared_ptr<FailingReads> lines_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<machine::Controller> controller_;
   News news_;
@@ -209,6 +237,10 @@ class Participants {
   bool closed_ = false;
   std::vector<std::pair<std::string, axis::Move>> moves_;
   std::array<std::uint64_t, kAxes> last_move_{};
+  std::array<std::vector<Ordered>, kAxes> ordered_;
+  std::array<bool, kAxes> steps_failed_{};
+  std::uint64_t input_stops_ = 0;
+  bool engine_reads_inputs_ = false;
   std::vector<activity::AcceptedHoming> homings_;
   bool position_changed_ = false;
 
