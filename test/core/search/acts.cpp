@@ -102,6 +102,11 @@ std::vector<Act> makeActs() {
       request("position of x", machine::SetPosition{kX, 0.001}, {}),
       {"emergency stop", [](Participants& all, int client) { all.emergencyStop(client); }},
       request("recover", machine::Recover{}, recovers),
+      {"emergency stop, and recover at once",
+       [=](Participants& all, int client) {
+         all.emergencyStop(client);
+         all.post(client, "recover", machine::Recover{}, recovers);
+       }},
       {"press the emergency stop", [](Participants& all, int) { all.pressEmergencyStop(true); }},
       {"release the emergency stop", [](Participants& all, int) { all.pressEmergencyStop(false); }},
       {"press x", [](Participants& all, int) { all.pressSwitch(kX, true); }},

@@ -109,7 +109,7 @@ Schedule tripleOf(std::mt19937_64& random) {
   return schedule;
 }
 
-/// About 138,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is how many are
+/// About 141,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is how many are
 /// played of each kind that is sampled, STEPDRIVER_FAILURES after how many failures a test ends.
 /// Seeds mean the same schedules whatever these are.
 class Interleavings : public testing::TestWithParam<std::size_t> {
