@@ -1,8 +1,12 @@
 #include "pulse/pulse_engine.h"
 
+#include <algorithm>
+
 #include "engine_channel.h"
 
 namespace stepdriver::pulse {
+
+using Action = EngineChannel::Action;
 
 PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
                          const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
@@ -122,6 +126,341 @@ bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
   return !late && !channel.reserved && order.continues == channel.latest() &&
          channel.successors.hasRoom(start) && order.stops == stopsAsked() && !emergencyStopped();
+}
+
+// ---- inputs and emergency stops ----
+
+std::uint64_t PulseEngine::emergencyStop() {
+  const std::uint64_t asked = stops_.ask();
+  clock_.wake();
+  return asked;
+}
+
+// Every motion of a stop that was asked for before this pass has ended by now; the pulses that were
+// out then may still be high.
+void PulseEngine::serveStops() {
+  const std::uint64_t asked = stopsAsked();
+  if (asked == stopsServed()) return;
+  for (const Channel& channel : channels_) {
+    if (channel.high || channel.profile != nullptr) return;
+  }
+  stops_.serve(asked);
+  news_ = true;
+}
+
+void PulseEngine::inputsChanged() {
+  inputs_changed_.store(true, std::memory_order_release);
+  clock_.wake();
+}
+
+void PulseEngine::readEmergencyStop() {
+  if (!emergency_input_) return;
+  const int level = lines_.read(emergency_input_->line);
+  const bool active = level < 0 || (level != 0) == emergency_input_->active;
+  // Active still after a clear: that is a stop of its own.
+  if (active && !(emergency_input_active_ && emergencyStopped())) {
+    input_stops_.fetch_add(1, std::memory_order_release);
+    stops_.ask();
+  }
+  emergency_input_active_ = active;
+}
+
+void PulseEngine::stopAll(Nanoseconds now) {
+  for (Channel& channel : channels_) {
+    if (channel.profile != nullptr) end(channel, EndReason::kEmergencyStop, now);
+  }
+}
+
+void PulseEngine::readInputs(Nanoseconds now) {
+  readEmergencyStop();
+  if (emergencyStopped()) stopAll(now);
+  for (Channel& channel : channels_) {
+    if (channel.config.fault) readFault(channel, now);
+    if (channel.next) mayStep(channel, now);
+  }
+}
+
+void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
+  // While its pins change, and while it wakes, a chip's fault line means nothing.
+  if (channel.reserved || now < channel.state.ready) return;
+  const int level = lines_.read(channel.config.fault->line);
+  const bool faulty = level < 0 || (level != 0) == channel.config.fault->active;
+  if (faulty && !channel.faulty) {
+    if (level < 0) {
+      fail(channel, {-level, channel.config.fault->line, true}, now);
+    } else {
+      ++channel.state.chip_faults;
+      end(channel, EndReason::kChipFault, now);
+    }
+  }
+  channel.faulty = faulty;
+}
+
+bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
+  // A chip may wake with a fault that it had before: its line doesn't change then.
+  if (channel.unchecked && now >= channel.state.ready) {
+    channel.unchecked = false;
+    readFault(channel, now);
+    if (!channel.next) return false;
+  }
+  const bool forward = channel.next->direction > 0;
+  const auto& endstop = forward ? channel.config.endstop_max : channel.config.endstop_min;
+  if (!endstop) return true;
+  const int level = lines_.read(endstop->line);
+  if (level < 0) {
+    fail(channel, {-level, endstop->line, true}, now);
+    return false;
+  }
+  if ((level != 0) != endstop->active) return true;
+  end(channel, forward ? EndReason::kEndstopMax : EndReason::kEndstopMin, now);
+  return false;
+}
+
+// ---- edges ----
+
+void PulseEngine::collectDue(Nanoseconds now) {
+  due_.clear();
+  dues_.collect(now, due_);
+}
+
+// Returns whether the timeline was slid, and others are due now.
+bool PulseEngine::meetLateness(Nanoseconds now) {
+  Nanoseconds excess = 0;
+  for (const std::size_t index : due_) {
+    Channel& channel = channels_[index];
+    const Nanoseconds late = now - dues_[index];
+    if (late == 0 || channel.action() != Action::kRise) continue;
+    channel.late = std::max(channel.late, late);
+    if (late > max_lateness_ && channel.isFast()) {
+      channel.state.end_lateness = late;
+      end(channel, EndReason::kTooLate, now);
+      continue;
+    }
+    const auto absorbed =
+        static_cast<Nanoseconds>((1.0 - kClosest) * static_cast<double>(channel.interval()));
+    excess = std::max(excess, late - absorbed);
+  }
+  if (excess == 0) return false;
+  slide(excess);
+  scheduleAll();
+  return true;
+}
+
+void PulseEngine::writeSteps(Nanoseconds now) {
+  writes_.clear();
+  writers_.clear();
+  for (const std::size_t index : due_) {
+    Channel& channel = channels_[index];
+    const Action action = channel.action();
+    const bool fall = action == Action::kFall;
+    if (!fall && !(action == Action::kRise && mayStep(channel, now))) continue;
+    const Signal& step = channel.config.step;
+    // Member by member: a pair that is made first and then copied whole has the processor wait.
+    gpio::LineWrite& write = writes_.emplace_back();
+    write.output = step.line;
+    write.level = step.active != fall;
+    writers_.push_back(&channel);
+  }
+  // The reads of the switches took time, and a stop may have come in it; and what ended one channel
+  // may have ended others.
+  if (emergencyStopped()) stopAll(now);
+  dropEnded();
+  if (writes_.empty()) return;
+  const std::uint64_t pulses = state_.pulses;
+  const int error = lines_.write(writes_.data(), writes_.size());
+  if (error != 0) {
+    writeOneByOne(error, now);
+  } else {
+    const Nanoseconds done = clock_.now();
+    for (Channel* channel : writers_) written(*channel, done);
+  }
+  if (state_.pulses != pulses) figures_.store(state_);
+}
+
+void PulseEngine::dropEnded() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    if (!writers_[i]->high && !writers_[i]->next) continue;
+    writes_[kept] = writes_[i];
+    writers_[kept++] = writers_[i];
+  }
+  writes_.resize(kept);
+  writers_.resize(kept);
+}
+
+// One by one it shows whose line it is. What the write that failed has set already keeps its level.
+void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    Channel& channel = *writers_[i];
+    errors_[i] = writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
+    const Nanoseconds done = clock_.now();
+    if (errors_[i] == 0) {
+      written(channel, done);
+    } else {
+      (channel.high ? channel.fell : channel.rose) = done;
+      channel.high = false;
+    }
+  }
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    if (errors_[i] != 0) {
+      fail(*writers_[i], {errors_[i], writes_[i].output}, now);
+    }
+  }
+}
+
+void PulseEngine::written(Channel& channel, Nanoseconds now) {
+  changed(channel);
+  channel.high = !channel.high;
+  if (!channel.high) {
+    channel.fell = now;
+    return;
+  }
+  channel.rose = now;
+  ++state_.pulses;
+  state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
+  lateness_.add(now, channel.late);
+  channel.countStep();
+}
+
+void PulseEngine::writeOthers(Nanoseconds now) {
+  for (const std::size_t index : due_) {
+    Channel& channel = channels_[index];
+    switch (channel.action()) {
+      case Action::kTurn:
+        turn(channel, now);
+        break;
+      case Action::kFinish:
+        end(channel, EndReason::kDone, now);
+        break;
+      default:
+        break;
+    }
+  }
+}
+
+void PulseEngine::turn(Channel& channel, Nanoseconds now) {
+  const bool forward = channel.next->direction > 0;
+  const Signal& dir = channel.config.dir;
+  const gpio::LineWrite write{dir.line, forward ? dir.active : !dir.active};
+  if (const int error = lines_.write(&write, 1)) {
+    fail(channel, {error, write.output}, now);
+    return;
+  }
+  channel.turned = clock_.now();
+  channel.direction = channel.next->direction;
+  changed(channel);
+}
+
+void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds now) {
+  channel.state.failure = failure;
+  ++channel.state.line_errors;
+  end(channel, EndReason::kLineError, now);
+}
+
+void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
+  const bool together =
+      channel.group != 0 && channel.profile != nullptr && reason != EndReason::kDone;
+  endOne(channel, reason, now);
+  if (!together) return;
+  for (Channel& other : channels_) {
+    if (other.profile != nullptr && other.group == channel.group) {
+      endOne(other, EndReason::kCompanion, now);
+    }
+  }
+}
+
+void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
+  channel.endMotion(reason, now - state_.slipped);
+  news_ = true;
+  changed(channel);
+}
+
+// ---- times ----
+
+void PulseEngine::changed(Channel& channel) {
+  if (channel.changed) return;
+  channel.changed = true;
+  changed_.push_back(&channel);
+}
+
+void PulseEngine::scheduleChanged() {
+  bool slid = false;
+  for (Channel* channel : changed_) {
+    channel->changed = false;
+    slid = schedule(*channel) || slid;
+  }
+  changed_.clear();
+  if (slid) scheduleAll();
+}
+
+void PulseEngine::scheduleAll() {
+  // A slide moves what was scheduled before it; it can't be followed by another for the same
+  // reason.
+  bool slid = true;
+  while (slid) {
+    slid = false;
+    for (Channel& channel : channels_) slid = schedule(channel) || slid;
+  }
+}
+
+bool PulseEngine::schedule(Channel& channel) {
+  while (!channel.high && channel.isSucceeded()) {
+    const Successors::Entry first = channel.successors.takeFirst();
+    channel.adopt(*first.profile, first.serial);
+    channel.publish();
+  }
+  Nanoseconds due = kNever;
+  bool slid = false;
+  switch (channel.action()) {
+    case Action::kRise:
+      return scheduleRise(channel);
+    case Action::kNothing:
+      break;
+    case Action::kFall:
+      due = channel.rose + channel.config.step_high;
+      // What a slow write takes from the next interval belongs to the same slip as its lateness.
+      slid = channel.next && !channel.isSucceeded() &&
+             slideUpTo(closestRise(channel), channel.next->time_ns + state_.slipped);
+      break;
+    case Action::kTurn:
+      due = channel.state.pulses != 0 ? channel.rose + channel.config.dir_hold : 0;
+      break;
+    case Action::kFinish:
+      due = channel.profile->endNs() + state_.slipped;
+      break;
+  }
+  dues_.set(channel.index, due);
+  return slid;
+}
+
+// As near as the next step may come to the last one.
+Nanoseconds PulseEngine::closestRise(const Channel& channel) {
+  return channel.rose +
+         static_cast<Nanoseconds>(kClosest * static_cast<double>(channel.interval()));
+}
+
+bool PulseEngine::scheduleRise(Channel& channel) {
+  const ChannelConfig& config = channel.config;
+  Nanoseconds earliest = std::max(channel.state.ready, channel.turned + config.dir_setup);
+  if (channel.state.pulses != 0) {
+    earliest = std::max({earliest, channel.fell + config.step_low, closestRise(channel)});
+  }
+  const Nanoseconds planned = channel.next->time_ns + state_.slipped;
+  dues_.set(channel.index, std::max(planned, earliest));
+  return slideUpTo(earliest, planned);
+}
+
+bool PulseEngine::slideUpTo(Nanoseconds earliest, Nanoseconds planned) {
+  if (earliest <= planned) return false;
+  slide(earliest - planned);
+  return true;
+}
+
+void PulseEngine::slide(Nanoseconds by) {
+  state_.slipped += by;
+  if (!slid_) ++state_.slips;
+  slid_ = true;
+  figures_.store(state_);
 }
 
 }  // namespace stepdriver::pulse

@@ -12,6 +12,7 @@
 #include "pulse/lateness_record.h"
 #include "pulse/mailbox.h"
 #include "pulse/snapshot.h"
+#include "pulse/stop_counts.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -79,23 +80,18 @@ class PulseEngine {
   void inputsChanged();
 
   /// @name Emergency stops
-  /// Three counts: of the stops that were asked for, by anyone; of those that were served, when
-  /// the pulse that was out has fallen and every motion has ended; and of those that were cleared.
-  /// No motion is followed while more were asked for than cleared: a stop that comes while an
-  /// earlier one is cleared is never lost.
+  /// No motion is followed while more were asked for than cleared, see StopCounts.
   /// @{
 
   /// Lets the pulse that is out finish and sends no other, on any channel, until it is cleared.
   ///
   /// @return the count of stops asked for, with this one.
   std::uint64_t emergencyStop();
-  std::uint64_t stopsAsked() const { return asked_.load(std::memory_order_acquire); }
-  std::uint64_t stopsServed() const { return served_.load(std::memory_order_acquire); }
+  std::uint64_t stopsAsked() const { return stops_.asked(); }
+  std::uint64_t stopsServed() const { return stops_.served(); }
   /// @param served a count that stopsServed() has given: all up to that are over.
-  void clearEmergencyStop(std::uint64_t served);
-  bool emergencyStopped() const {
-    return asked_.load(std::memory_order_acquire) != cleared_.load(std::memory_order_acquire);
-  }
+  void clearEmergencyStop(std::uint64_t served) { stops_.clear(served); }
+  bool emergencyStopped() const { return stops_.stopped(); }
 
   /// Times that the emergency-stop input asked for a stop.
   std::uint64_t inputStops() const { return input_stops_.load(std::memory_order_acquire); }
@@ -119,10 +115,15 @@ class PulseEngine {
 
   // Orders.
   void takeMail(Nanoseconds now);
+  void takeCommand(const Command& command, Nanoseconds now);
   void followAll(const Command& command, Nanoseconds now);
   bool mayFollow(const Follow& order, Nanoseconds now) const;
 
-  // Inputs.
+  // News.
+  void tell();
+
+  // Inputs and emergency stops.
+  void serveStops();
   void stopAll(Nanoseconds now);
   void readInputs(Nanoseconds now);
   void readEmergencyStop();
@@ -167,13 +168,8 @@ class PulseEngine {
   std::vector<int> errors_;
   bool slid_ = false;
   Mailbox<Command, 64> mail_;
-  void takeCommand(const Command& command, Nanoseconds now);
-  void serveStops();
-  void tell();
 
-  std::atomic<std::uint64_t> asked_{0};
-  std::atomic<std::uint64_t> served_{0};
-  std::atomic<std::uint64_t> cleared_{0};
+  StopCounts stops_;
   std::atomic<std::uint64_t> input_stops_{0};
   NewsListener* listener_ = nullptr;
   bool news_ = false;  // of this pass

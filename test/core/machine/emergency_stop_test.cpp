@@ -15,6 +15,7 @@
 #include "pulse/pulse_engine.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
+#include "support/passing_lines.h"
 #include "support/recording_lines.h"
 #include "support/refusal.h"
 
@@ -176,9 +177,9 @@ TEST_F(EmergencyStopInput, IsNeverLostToARecoverThatComesAtTheSameTime) {
 }
 
 /// Lines at which the pulse thread can be kept in a write.
-class GatedLines : public gpio::Lines {
+class GatedLines : public test::PassingLines {
  public:
-  explicit GatedLines(std::unique_ptr<gpio::Lines> lines) : lines_(std::move(lines)) {}
+  using PassingLines::PassingLines;
 
   int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
     std::unique_lock<std::mutex> lock(mutex_);
@@ -187,16 +188,8 @@ class GatedLines : public gpio::Lines {
     changed_.wait(lock, [this] { return !closed_; });
     blocked_ = false;
     lock.unlock();
-    return lines_->write(writes, count);
+    return PassingLines::write(writes, count);
   }
-  int read(int input) noexcept override { return lines_->read(input); }
-  int waitForEdges(std::int64_t timeout_ns, gpio::EdgeEvent* events,
-                   std::size_t capacity) noexcept override {
-    return lines_->waitForEdges(timeout_ns, events, capacity);
-  }
-  void interrupt() noexcept override { lines_->interrupt(); }
-  const std::string& outputName(int output) const override { return lines_->outputName(output); }
-  const std::string& inputName(int input) const override { return lines_->inputName(input); }
 
   /// @return whether a thread came to it within a minute.
   bool close() {
@@ -211,7 +204,6 @@ class GatedLines : public gpio::Lines {
   }
 
  private:
-  std::unique_ptr<gpio::Lines> lines_;
   std::mutex mutex_;
   std::condition_variable changed_;
   bool closed_ = false;

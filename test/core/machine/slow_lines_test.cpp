@@ -14,6 +14,7 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
+#include "support/passing_lines.h"
 
 // A GPIO chip whose writes hang. Each axis has a chip of its own.
 
@@ -54,29 +55,20 @@ class Gate {
   std::condition_variable opened_;
 };
 
-class GatedLines : public gpio::Lines {
+class GatedLines : public test::PassingLines {
  public:
   GatedLines(std::unique_ptr<gpio::Lines> lines, Gate& gate)
-      : lines_(std::move(lines)), gate_(gate) {}
+      : PassingLines(std::move(lines)), gate_(gate) {}
 
   int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
     for (std::size_t i = 0; i < count; ++i) gate_.pass(outputName(writes[i].output));
-    return lines_->write(writes, count);
+    return PassingLines::write(writes, count);
   }
-  int read(int input) noexcept override { return lines_->read(input); }
-  int waitForEdges(std::int64_t timeout_ns, gpio::EdgeEvent* events,
-                   std::size_t capacity) noexcept override {
-    return lines_->waitForEdges(timeout_ns, events, capacity);
-  }
-  void interrupt() noexcept override { lines_->interrupt(); }
-  const std::string& outputName(int output) const override { return lines_->outputName(output); }
-  const std::string& inputName(int input) const override { return lines_->inputName(input); }
   std::size_t outputChip(int output) const override {
     return static_cast<std::size_t>(outputName(output).front());
   }
 
  private:
-  std::unique_ptr<gpio::Lines> lines_;
   Gate& gate_;
 };
 

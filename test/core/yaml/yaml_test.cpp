@@ -12,19 +12,19 @@
 
 #include "stepdriver_core/error.h"
 
-namespace stepdriver::check {
+namespace stepdriver::yaml {
 namespace {
 
 using config::ConfigValue;
 
 ConfigValue valueOf(const std::string& scalar) {
-  const ConfigValue tree = yaml::parse("a: " + scalar + "\n", "text");
+  const ConfigValue tree = parse("a: " + scalar + "\n", "text");
   return tree.as<ConfigValue::Map>()->at("a");
 }
 
 std::string errorOf(const std::string& text) {
   try {
-    yaml::parse(text, "axis.yaml");
+    parse(text, "axis.yaml");
   } catch (const Error& error) {
     return error.what();
   }
@@ -101,7 +101,7 @@ TEST(Yaml, LeavesEverythingElseAString) {
 }
 
 TEST(Yaml, ResolvesAliasesAndMergeKeys) {
-  const ConfigValue tree = yaml::parse(
+  const ConfigValue tree = parse(
       "pins: &pins {step: A, dir: B}\n"
       "x: {<<: *pins, dir: C}\n"
       "y: *pins\n"
@@ -139,7 +139,7 @@ TEST(Yaml, SaysWhereItIsWrong) {
 TEST(Yaml, SaysWhichFileCannotBeRead) {
   for (const std::string path : {"/nowhere/at/all.yaml", "/"}) {
     try {
-      yaml::load(path);
+      load(path);
       FAIL();
     } catch (const Error& error) {
       EXPECT_EQ(std::string(error.what()).rfind(path + ": ", 0), 0U) << error.what();
@@ -149,7 +149,7 @@ TEST(Yaml, SaysWhichFileCannotBeRead) {
 
 TEST(Yaml, OfAnEmptyFileIsAnEmptyMap) {
   for (const char* text : {"", "# nothing\n", "---\n"}) {
-    const ConfigValue tree = yaml::parse(text, "text");
+    const ConfigValue tree = parse(text, "text");
     ASSERT_NE(tree.as<ConfigValue::Map>(), nullptr) << text;
     EXPECT_TRUE(tree.as<ConfigValue::Map>()->empty());
   }
@@ -174,7 +174,7 @@ class ConfigurationFile : public testing::Test {
 };
 
 TEST_F(ConfigurationFile, GivesAMachineWhateverOfTheNodeIsInIt) {
-  const setup::MachineConfig config = yaml::readFile(
+  const setup::MachineConfig config = readFile(
       file(std::string(kAxis) + "gpio: {backend: simulated}\n"
                                 "realtime: {policy: enforce, max_lateness_ms: 2.0}\n"
                                 "joint_state_rate: 10.0\njog_timeout: 1.0\nhardware_id: h\n"
@@ -189,7 +189,7 @@ TEST_F(ConfigurationFile, GivesAMachineWhateverOfTheNodeIsInIt) {
 
 TEST_F(ConfigurationFile, ListsEveryMistakeOfAMachine) {
   try {
-    yaml::readFile(file(
+    readFile(file(
         "gpio: {backend: gpio}\nstate_file: relative\nspeed: 1\naxes: {x: {driver: a4989}}\n"));
     FAIL();
   } catch (const ConfigError& error) {
@@ -204,9 +204,8 @@ TEST_F(ConfigurationFile, ListsEveryMistakeOfAMachine) {
 
 TEST_F(ConfigurationFile, IsRefusedIfItsRigCannotBeBuilt) {
   const std::string crossed = "simulation: {axes: {x: {min_switch_mm: 9.0, max_switch_mm: 1.0}}}\n";
-  EXPECT_THROW(yaml::readFile(file(kAxis + crossed), setup::BackendChoice::kSimulated),
-               ConfigError);
+  EXPECT_THROW(readFile(file(kAxis + crossed), setup::BackendChoice::kSimulated), ConfigError);
 }
 
 }  // namespace
-}  // namespace stepdriver::check
+}  // namespace stepdriver::yaml
