@@ -1,12 +1,12 @@
 #include "message_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <locale>
 #include <numeric>
-#include <sstream>
 
 namespace stepdriver {
 namespace {
@@ -56,13 +56,7 @@ std::size_t distance(const std::string& from, const std::string& to) {
 
 }  // namespace
 
-std::string numberText(double number) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text.precision(digitsOf(number));
-  text << number;
-  return text.str();
-}
+std::string numberText(double number) { return fmt::format("{:.{}g}", number, digitsOf(number)); }
 
 std::string roughText(double number) {
   return numberText(roughly(number, [](double scaled) { return std::round(scaled); }));

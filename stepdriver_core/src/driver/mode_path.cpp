@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <array>
 #include <cstddef>
 #include <queue>
@@ -31,8 +33,8 @@ ModeCode codeAt(std::size_t index) {
 std::size_t indexOfMode(const DriverChip& chip, int microsteps) {
   const std::optional<ModeCode> code = codeOf(chip, microsteps);
   if (!code) {
-    throw std::invalid_argument("The " + chip.title + " has no microstep pin code for " +
-                                std::to_string(microsteps) + " microsteps.");
+    throw std::invalid_argument(
+        fmt::format("The {} has no microstep pin code for {} microsteps.", chip.title, microsteps));
   }
   return indexOf(*code);
 }
@@ -62,8 +64,8 @@ std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int 
 
   if (next[from] == kUnseen) {
     throw std::invalid_argument(
-        "The " + chip.title + " has no way from " + std::to_string(from_microsteps) + " to " +
-        std::to_string(to_microsteps) + " microsteps over defined pin codes.");
+        fmt::format("The {} has no way from {} to {} microsteps over defined pin codes.",
+                    chip.title, from_microsteps, to_microsteps));
   }
   std::vector<ModeCode> path;
   for (std::size_t code = from; code != to; code = next[code]) path.push_back(codeAt(next[code]));

@@ -1,5 +1,7 @@
 #include "stepdriver_core/gpio/chip_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
@@ -66,11 +68,10 @@ std::string whatThereIs(const std::vector<ChipInfo>& chips) {
   std::string hidden;
   for (const ChipInfo& chip : chips) {
     if (chip.error == 0) {
-      append(found, chip.name + " (" + labelOf(chip) + ", " + std::to_string(chip.lines.size()) +
-                        " lines)");
+      append(found, fmt::format("{} ({}, {} lines)", chip.name, labelOf(chip), chip.lines.size()));
     } else {
-      hidden += " " + chip.name + " couldn't be opened: " + errorText(chip.error) + "." +
-                remedyFor(chip.error);
+      hidden += fmt::format(" {} couldn't be opened: {}.{}", chip.name, errorText(chip.error),
+                            remedyFor(chip.error));
     }
   }
   return (found.empty() ? "" : " There are: " + found + ".") + hidden;
@@ -81,13 +82,13 @@ LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const 
   const ChipInfo& chip = chips[index];
   const unsigned long offset = std::strtoul(digits.c_str(), nullptr, 10);
   if (chip.error != 0) {
-    throw GpioError("Line " + line + ": " + chip.name +
-                    " can't be opened: " + errorText(chip.error) + "." + remedyFor(chip.error));
+    throw GpioError(fmt::format("Line {}: {} can't be opened: {}.{}", line, chip.name,
+                                errorText(chip.error), remedyFor(chip.error)));
   }
   if (offset >= chip.lines.size()) {
-    throw GpioError("Line " + line + ": " + chip.name + " (" + labelOf(chip) + ") has " +
-                    std::to_string(chip.lines.size()) +
-                    " lines, counted from 0: there is no line " + digits + ".");
+    throw GpioError(
+        fmt::format("Line {}: {} ({}) has {} lines, counted from 0: there is no line {}.", line,
+                    chip.name, labelOf(chip), chip.lines.size(), digits));
   }
   return {index, static_cast<unsigned>(offset)};
 }
@@ -125,8 +126,9 @@ LineAddress findLine(const std::vector<ChipInfo>& chips, const std::string& line
     if (found.size() > 1) {
       std::string names;
       for (const std::size_t i : found) append(names, chips[i].name);
-      throw GpioError("Line " + line + ": several chips have the label " + place->chip + ": " +
-                      names + ". Name the chip instead.");
+      throw GpioError(
+          fmt::format("Line {}: several chips have the label {}: {}. Name the chip instead.", line,
+                      place->chip, names));
     }
   }
   const auto found = linesNamed(chips, line);
@@ -134,17 +136,20 @@ LineAddress findLine(const std::vector<ChipInfo>& chips, const std::string& line
   if (found.size() > 1) {
     std::string places;
     for (const LineAddress& address : found) {
-      append(places, chips[address.chip].name + ":" + std::to_string(address.offset));
+      append(places, fmt::format("{}:{}", chips[address.chip].name, address.offset));
     }
-    throw GpioError("Line " + line + ": several lines have that name: " + places +
-                    ". Name the one that is meant as chip:offset.");
+    throw GpioError(fmt::format(
+        "Line {}: several lines have that name: {}. Name the one that is meant as chip:offset.",
+        line, places));
   }
   if (place) {
-    throw GpioError("Line " + line + ": there is no chip with the name or label " + place->chip +
-                    "." + whatThereIs(chips));
+    throw GpioError(fmt::format("Line {}: there is no chip with the name or label {}.{}", line,
+                                place->chip, whatThereIs(chips)));
   }
-  throw GpioError("Line " + line + ": no chip has a line of that name." + whatThereIs(chips) +
-                  " The command gpioinfo lists the names of lines; chip:offset always works.");
+  throw GpioError(
+      fmt::format("Line {}: no chip has a line of that name.{} The command gpioinfo lists the "
+                  "names of lines; chip:offset always works.",
+                  line, whatThereIs(chips)));
 }
 
 std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
@@ -156,9 +161,10 @@ std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
     const LineAddress address = findLine(chips, line);
     const auto twin = taken.emplace(std::make_pair(address.chip, address.offset), line);
     if (!twin.second) {
-      throw GpioError("Line " + describe(chips, line, address) +
-                      " is named twice in one request, here and as " + twin.first->second +
-                      ". Each pin needs a line of its own.");
+      throw GpioError(
+          fmt::format("Line {} is named twice in one request, here and as {}. Each pin needs a "
+                      "line of its own.",
+                      describe(chips, line, address), twin.first->second));
     }
     addresses.push_back(address);
   };
@@ -179,30 +185,32 @@ std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
 std::string describe(const std::vector<ChipInfo>& chips, const std::string& line,
                      LineAddress address) {
   const ChipInfo& chip = chips[address.chip];
-  const std::string place = chip.name + ":" + std::to_string(address.offset);
+  const std::string place = fmt::format("{}:{}", chip.name, address.offset);
   const std::string& name = chip.lines[address.offset].name;
   std::string more;
   if (line != place) append(more, place);
   if (!chip.label.empty()) append(more, "chip " + labelOf(chip));
   if (!name.empty() && name != line) append(more, "line \"" + name + '"');
-  return more.empty() ? line : line + " (" + more + ")";
+  return more.empty() ? line : fmt::format("{} ({})", line, more);
 }
 
 std::string busyText(const LineInfo& line) {
-  const std::string busy = " is busy (" + errorText(EBUSY) + "): it is held by ";
   if (line.consumer.empty()) {
-    return busy +
-           "the kernel, perhaps as a pin with another function. Name another line, or free "
-           "it in the device tree (config.txt on a Raspberry Pi).";
+    return fmt::format(
+        " is busy ({}): it is held by the kernel, perhaps as a pin with another function. Name "
+        "another line, or free it in the device tree (config.txt on a Raspberry Pi).",
+        errorText(EBUSY));
   }
-  return busy + '"' + line.consumer + "\". Stop that program or driver, or name another line.";
+  return fmt::format(
+      " is busy ({}): it is held by \"{}\". Stop that program or driver, or name another line.",
+      errorText(EBUSY), line.consumer);
 }
 
 std::string errorText(int error) {
   const auto named = std::find_if(std::begin(kErrors), std::end(kErrors),
                                   [error](const ErrorWords& each) { return each.error == error; });
   if (named != std::end(kErrors)) return named->words;
-  return "errno " + std::to_string(error) + ", " + std::generic_category().message(error);
+  return fmt::format("errno {}, {}", error, std::generic_category().message(error));
 }
 
 std::string remedyFor(int error) {

@@ -1,5 +1,7 @@
 #include "stepdriver_core/gpio/simulated_lines.h"
 
+#include <fmt/format.h>
+
 #include <cerrno>
 #include <unordered_map>
 #include <utility>
@@ -148,14 +150,17 @@ std::unique_ptr<Lines> SimulatedBackend::request(const std::vector<OutputRequest
   const auto want = [&](const std::string& line, const char* use) {
     const auto earlier = shared_->held.find(line);
     if (earlier != shared_->held.end()) {
-      throw GpioError("Line " + line +
-                      " is busy (EBUSY): an earlier request still holds it as an " +
-                      earlier->second + ". Release that request first, or name another line.");
+      throw GpioError(
+          fmt::format("Line {} is busy (EBUSY): an earlier request still holds it as an {}. "
+                      "Release that request first, or name another line.",
+                      line, earlier->second));
     }
     const auto twin = wanted.emplace(line, use);
     if (!twin.second) {
-      throw GpioError("Line " + line + " is named twice in one request (EBUSY), as an " +
-                      twin.first->second + " and as an " + use + ". Name each line once.");
+      throw GpioError(
+          fmt::format("Line {} is named twice in one request (EBUSY), as an {} and as an {}. Name "
+                      "each line once.",
+                      line, twin.first->second, use));
     }
   };
   for (const OutputRequest& output : outputs) want(output.line, "output");

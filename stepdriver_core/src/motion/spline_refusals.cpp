@@ -1,56 +1,49 @@
 #include "spline_refusals.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdint>
-#include <locale>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
 namespace stepdriver::motion {
 namespace {
 
-template <typename... Words>
-std::string sentence(const Words&... words) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text.precision(17);
-  (text << ... << words);
-  return text.str();
-}
-
-template <typename... Words>
-[[noreturn]] void refuse(const Words&... words) {
-  throw std::invalid_argument(sentence(words...));
-}
+[[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument(why); }
 
 // "waypoint 3", or "the motion's start".
 void requireFinite(const std::string& owner, const char* quantity, double value) {
   if (!std::isfinite(value)) {
-    refuse("The ", quantity, " of ", owner, " is ", value, "; only finite numbers are allowed.");
+    refuse(fmt::format("The {} of {} is {}; only finite numbers are allowed.", quantity, owner,
+                       value));
   }
 }
 
 void requireNear(const std::string& owner, double position) {
   if (!(std::abs(position) <= kFarthest)) {
-    refuse("The position of ", owner, " is ", position, " microsteps; allowed is from -", kFarthest,
-           " to ", kFarthest, ".");
+    refuse(fmt::format(
+        "The position of {0} is {1:.17g} microsteps; allowed is from -{2:.17g} to {2:.17g}.", owner,
+        position, kFarthest));
   }
 }
 
 void requireTime(const std::vector<Waypoint>& waypoints, std::size_t index) {
   const std::int64_t time = waypoints[index].time_ns;
   if (index == 0 && time < 0) {
-    refuse("The time of waypoint 0 is ", time, " ns; it can't be before the start, 0.");
+    refuse(fmt::format("The time of waypoint 0 is {} ns; it can't be before the start, 0.", time));
   }
   if (index > 0 && time <= waypoints[index - 1].time_ns) {
-    refuse("The time of waypoint ", index, " is ", time, " ns; it must be at least 1 ns after the ",
-           waypoints[index - 1].time_ns, " ns of the one before.");
+    refuse(
+        fmt::format("The time of waypoint {} is {} ns; it must be at least 1 ns after the {} ns of "
+                    "the one before.",
+                    index, time, waypoints[index - 1].time_ns));
   }
   constexpr auto kEnd = static_cast<std::int64_t>(Profile::kLongest * 1e9);
   if (time >= kEnd) {
-    throw std::range_error(sentence("The time of waypoint ", index, " is ", time,
-                                    " ns; it must be less than ", kEnd, " ns, some 126 years."));
+    throw std::range_error(
+        fmt::format("The time of waypoint {} is {} ns; it must be less than {} ns, some 126 years.",
+                    index, time, kEnd));
   }
 }
 
@@ -73,7 +66,7 @@ void requireWaypoints(const std::vector<Waypoint>& waypoints) {
   if (waypoints.empty()) refuse("The trajectory has 0 waypoints; it needs at least 1.");
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
     const Waypoint& waypoint = waypoints[index];
-    const std::string owner = "waypoint " + std::to_string(index);
+    const std::string owner = fmt::format("waypoint {}", index);
     requireTime(waypoints, index);
     requireFinite(owner, "position", waypoint.position);
     requireNear(owner, waypoint.position);
@@ -88,8 +81,10 @@ void requireWaypoints(const std::vector<Waypoint>& waypoints) {
 void requireReach(double reach, std::size_t index) {
   constexpr double kReach = 9007199254740992.0;  // 2^53
   if (!(reach <= kReach)) {
-    refuse("The velocities and accelerations on the way to waypoint ", index, " lead up to ", reach,
-           " microsteps away; allowed is ", kReach, ".");
+    refuse(
+        fmt::format("The velocities and accelerations on the way to waypoint {} lead up to {:.17g} "
+                    "microsteps away; allowed is {:.17g}.",
+                    index, reach, kReach));
   }
 }
 

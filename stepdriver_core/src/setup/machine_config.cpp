@@ -1,5 +1,7 @@
 #include "stepdriver_core/setup/machine_config.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "config/read_axes.h"
@@ -66,8 +68,8 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   readGpio(reader.map("gpio"), config);
   config.state_file = reader.text("state_file", config.state_file);
   if (!config.state_file.empty() && config.state_file[0] != '/') {
-    reader.issue("state_file", "is " + reader.shown("state_file") +
-                                   ", but must be an absolute path, or empty for none");
+    reader.issue("state_file", fmt::format("is {}, but must be an absolute path, or empty for none",
+                                           reader.shown("state_file")));
   }
   if (reader.value("realtime").as<std::string>() != nullptr) {
     config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
@@ -84,14 +86,16 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   config.emergency_stop = config::readInputSwitch(reader, "emergency_stop", used);
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !reader.has("emergency_stop")) {
-    simulation.issue("emergency_stop", "is " + simulation.shown("emergency_stop") + ", but " +
-                                           reader.fullName("emergency_stop") + " is missing");
+    simulation.issue("emergency_stop",
+                     fmt::format("is {}, but {} is missing", simulation.shown("emergency_stop"),
+                                 reader.fullName("emergency_stop")));
   }
   config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right);
   if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {
-    reader.issue("simulation/trace", "is \"" + config.simulation.trace +
-                                         "\", but only the simulated rig has a trace, and "
-                                         "gpio/backend is libgpiod; leave it out or empty");
+    reader.issue("simulation/trace",
+                 fmt::format("is \"{}\", but only the simulated rig has a trace, and gpio/backend "
+                             "is libgpiod; leave it out or empty",
+                             config.simulation.trace));
   }
   return config;
 }

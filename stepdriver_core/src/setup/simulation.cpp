@@ -1,5 +1,7 @@
 #include "stepdriver_core/setup/simulation.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
@@ -118,9 +120,10 @@ void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig
     const SwitchPlaces places = switchPlaces(axis, config.axes.at(axis.name));
     if (places.min < places.max) continue;
     issues.push_back(
-        {name + "/axes/" + axis.name, "has the min switch at " + roughText(places.min) +
-                                          ", but it must be below the max switch, which is at " +
-                                          roughText(places.max)});
+        {name + "/axes/" + axis.name,
+         fmt::format(
+             "has the min switch at {}, but it must be below the max switch, which is at {}",
+             roughText(places.min), roughText(places.max))});
   }
 }
 

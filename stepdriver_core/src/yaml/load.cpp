@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
@@ -43,8 +44,7 @@ class Converter {
   }
 
   [[noreturn]] void fail(const YAML::Mark& mark, const std::string& what) const {
-    throw Error(name_ + ":" + std::to_string(mark.line + 1) + ":" +
-                std::to_string(mark.column + 1) + ": " + what);
+    throw Error(fmt::format("{}:{}:{}: {}", name_, mark.line + 1, mark.column + 1, what));
   }
 
  private:
@@ -69,8 +69,8 @@ class Converter {
   std::string keyOf(const YAML::Node& node) const {
     const ConfigValue key = scalar(node);
     if (const auto* word = key.as<std::string>()) return *word;
-    fail(node.Mark(), "the key " + node.Scalar() + " is read as " + key.shown() +
-                          ", but must be a word: put it in quotes");
+    fail(node.Mark(), fmt::format("the key {} is read as {}, but must be a word: put it in quotes",
+                                  node.Scalar(), key.shown()));
   }
 
   ConfigValue::Map map(const YAML::Node& node, int depth) {

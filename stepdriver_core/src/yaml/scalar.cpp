@@ -1,5 +1,7 @@
 #include "scalar.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -121,9 +123,9 @@ ConfigValue angleOf(const std::string& text) {
   const std::string inside = text.substr(4, text.size() - 5);
   const auto number = degrees ? anyNumber(without(inside, ' ')) : productOf(inside);
   if (!number) {
-    throw Error(text + " isn't an angle: " +
-                (degrees ? "it must be as deg(90.0)"
-                         : "it must be as rad(1.5), or as rad(2*pi/3) with * and / only"));
+    throw Error(
+        fmt::format("{} isn't an angle: it must be as {}", text,
+                    degrees ? "deg(90.0)" : "rad(1.5), or as rad(2*pi/3) with * and / only"));
   }
   return {degrees ? *number * kPi / 180.0 : *number};
 }
@@ -159,7 +161,7 @@ ConfigValue resolveTagged(const std::string& text, const std::string& type) {
   } else {
     throw Error("the tag !!" + type + " can't be a ROS parameter");
   }
-  throw Error(text + " isn't what its tag !!" + type + " says");
+  throw Error(fmt::format("{} isn't what its tag !!{} says", text, type));
 }
 
 }  // namespace stepdriver::yaml

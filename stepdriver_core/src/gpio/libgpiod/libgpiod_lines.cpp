@@ -1,5 +1,7 @@
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 
+#include <fmt/format.h>
+
 #include <cerrno>
 #include <map>
 #include <system_error>
@@ -40,9 +42,9 @@ class Requester {
     for (std::size_t i = 0; i < count; ++i) found[addresses_[first + i].chip].push_back(i);
     for (const auto& [chip, members] : found) {
       if (members.size() <= gpiod::kMostLines) continue;
-      throw GpioError(open_.table[chip].name + ": " + std::to_string(members.size()) + " " + kind +
-                      " are asked for, and the kernel gives at most " +
-                      std::to_string(gpiod::kMostLines) + " of a chip to one request.");
+      throw GpioError(fmt::format(
+          "{}: {} {} are asked for, and the kernel gives at most {} of a chip to one request.",
+          open_.table[chip].name, members.size(), kind, gpiod::kMostLines));
     }
     return found;
   }
@@ -50,9 +52,10 @@ class Requester {
   void checkBias() const {
     for (const InputRequest& input : inputs_) {
       if (input.bias == Bias::kAsIs || gpiod::canBias()) continue;
-      throw GpioError("Line " + input.line + ": libgpiod " + gpiod::version() +
-                      " can't set a bias; 1.5 and later can. Fit a pull resistor and ask for no "
-                      "bias.");
+      throw GpioError(
+          fmt::format("Line {}: libgpiod {} can't set a bias; 1.5 and later can. Fit a pull "
+                      "resistor and ask for no bias.",
+                      input.line, gpiod::version()));
     }
   }
 
@@ -124,8 +127,9 @@ class Requester {
           throw GpioError(refusal(k, culprit.code().value()));
         }
       }
-      throw GpioError(open_.table[chip].name + ": its " + kind + " can't be had together: " +
-                      error.what() + ": " + errorText(error.code().value()) + ".");
+      throw GpioError(fmt::format("{}: its {} can't be had together: {}: {}.",
+                                  open_.table[chip].name, kind, error.what(),
+                                  errorText(error.code().value())));
     }
   }
 
@@ -163,8 +167,8 @@ class Requester {
       }
       return described + busyText(holder);
     }
-    return described + " can't be had as an " + kind + ": " + errorText(error) + "." + reason +
-           remedyFor(error);
+    return fmt::format("{} can't be had as an {}: {}.{}{}", described, kind, errorText(error),
+                       reason, remedyFor(error));
   }
 
   const std::vector<OutputRequest>& outputs_;
