@@ -1,5 +1,7 @@
 #include "line_failure.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -43,9 +45,9 @@ std::string lineFailureText(const pulse::LineFailure& failure, const motor::Moto
       failure.input ? roleOf(failure.line, input_roles) : roleOf(failure.line, output_roles);
   const std::string& line_name =
       failure.input ? names.input(failure.line) : names.output(failure.line);
-  return "the " + std::string(role) + " line " + line_name +
-         (failure.input ? " can't be read: " : " can't be written: ") +
-         gpio::errorText(failure.error) + "; " + remedyFor(failure.error);
+  return fmt::format("the {} line {} can't be {}: {}; {}", role, line_name,
+                     failure.input ? "read" : "written", gpio::errorText(failure.error),
+                     remedyFor(failure.error));
 }
 
 }  // namespace stepdriver::axis

@@ -1,5 +1,7 @@
 #include "line_path.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -81,8 +83,8 @@ double LinePath::speedFor(double duration) const {
   const double highest = limits_.max_speed;
   const double fastest = durationAt(highest);
   if (duration < fastest * (1.0 - 1e-9)) {
-    axes_.front().refuse("the line can't be done in " + numberText(duration) +
-                         " s; the axes' limits allow " + lowerBoundText(fastest) + " s");
+    axes_.front().refuse(fmt::format("the line can't be done in {} s; the axes' limits allow {} s",
+                                     numberText(duration), lowerBoundText(fastest)));
   }
   if (duration <= fastest) return highest;
   // The duration falls as the speed rises.

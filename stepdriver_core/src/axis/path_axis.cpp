@@ -1,8 +1,9 @@
 #include "path_axis.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <tuple>
 
 #include "stepdriver_core/error.h"
@@ -35,10 +36,7 @@ double PathAxis::mostAcceleration() const {
 }
 
 std::string PathAxis::show(double value, const char* per) const {
-  char text[64];
-  std::snprintf(text, sizeof(text), "%.9g %s%s", value, kind == config::Kind::kLinear ? "m" : "rad",
-                per);
-  return text;
+  return fmt::format("{:.9g} {}{}", value, kind == config::Kind::kLinear ? "m" : "rad", per);
 }
 
 void PathAxis::refuse(const std::string& why) const { throw Refused(name + ": " + why); }
@@ -47,15 +45,15 @@ void PathAxis::refuseBeyondLimits(double position, const std::string& what) cons
   // Half a step of tolerance: what rounds to the limit is at the limit.
   const double tolerance = 0.5 / steps_per_unit;
   if (min_position && position < *min_position - tolerance) {
-    refuse(what + " " + show(position) + " is below the soft limit min_position " +
-           show(*min_position));
+    refuse(fmt::format("{} {} is below the soft limit min_position {}", what, show(position),
+                       show(*min_position)));
   }
   if (max_position && position > *max_position + tolerance) {
-    refuse(what + " " + show(position) + " is above the soft limit max_position " +
-           show(*max_position));
+    refuse(fmt::format("{} {} is above the soft limit max_position {}", what, show(position),
+                       show(*max_position)));
   }
   if (std::abs(countOf(position)) > kFarthest) {
-    refuse(what + " " + show(position) + " is more than 2^40 steps away");
+    refuse(fmt::format("{} {} is more than 2^40 steps away", what, show(position)));
   }
 }
 

@@ -1,5 +1,7 @@
 #include "prepared_trajectory.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -34,15 +36,15 @@ void requireWithin(const PathAxis& axis, const Peak& peak, double most, const ch
                    const char* per) {
   if (std::abs(peak.value) <= most * kMore) return;
   const double scale = axis.steps_per_unit;
-  axis.refuse("the trajectory's " + std::string(what) + " is " +
-              axis.show(peak.value / scale, per) + " " + at(peak.time_s) + ", but the axis has " +
-              axis.show(most / scale, per));
+  axis.refuse(fmt::format("the trajectory's {} is {} {}, but the axis has {}", what,
+                          axis.show(peak.value / scale, per), at(peak.time_s),
+                          axis.show(most / scale, per)));
 }
 
 void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double begin) {
   for (const Peak& peak : {joint.lowest, joint.highest}) {
     axis.refuseBeyondLimits(axis.positionOf(peak.value),
-                            "the trajectory's position " + at(begin + peak.time_s) + ",");
+                            fmt::format("the trajectory's position {},", at(begin + peak.time_s)));
   }
 }
 
@@ -50,11 +52,10 @@ void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double 
   if (axis.limits.jerk == 0.0) return;
   const Peak& jump = jerk.acceleration_jump;
   if (std::abs(jump.value) > kTrajectoryTolerance * axis.mostAcceleration()) {
-    axis.refuse("the trajectory's acceleration jumps by " +
-                axis.show(jump.value / axis.steps_per_unit, "/s^2") + " " +
-                at(begin + jump.time_s) +
-                ", but the axis has a jerk limit: all points must have velocities and "
-                "accelerations, 0 at the last");
+    axis.refuse(
+        fmt::format("the trajectory's acceleration jumps by {} {}, but the axis has a jerk limit: "
+                    "all points must have velocities and accelerations, 0 at the last",
+                    axis.show(jump.value / axis.steps_per_unit, "/s^2"), at(begin + jump.time_s)));
   }
   requireWithin(axis, later(jerk.jerk, begin), axis.limits.jerk, "jerk", "/s^3");
 }
@@ -70,18 +71,19 @@ void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin
 }
 
 [[noreturn]] void refuseTurn(const PathAxis& axis, double time_s) {
-  axis.refuse("the trajectory turns " + at(time_s) +
-              ", and goes on so close to the axis's limits that its backlash of " +
-              axis.show(axis.configured_backlash) + " can't be taken up meanwhile");
+  axis.refuse(
+      fmt::format("the trajectory turns {}, and goes on so close to the axis's limits that its "
+                  "backlash of {} can't be taken up meanwhile",
+                  at(time_s), axis.show(axis.configured_backlash)));
 }
 
 // At rest a first point at time 0 says where the trajectory believes the axis to be.
 void requireStart(const PathAxis& axis, const motion::Waypoint& first, const PathStart& start) {
   const double count = std::round(start.motor.position.value()) - start.slack;
   if (std::abs(first.position - count) <= axis.microsteps) return;
-  axis.refuse("the trajectory begins at " + axis.show(axis.positionOf(first.position)) +
-              ", but the axis stands at " + axis.show(axis.positionOf(count)) +
-              "; they may differ by one full step");
+  axis.refuse(fmt::format(
+      "the trajectory begins at {}, but the axis stands at {}; they may differ by one full step",
+      axis.show(axis.positionOf(first.position)), axis.show(axis.positionOf(count))));
 }
 
 double jerkOf(const Profile& profile) {
@@ -119,16 +121,16 @@ motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t 
                                                 const std::vector<motion::Waypoint>& before) const {
   const PathAxis& axis = axes_[member];
   // Made for a refusal only: there are many points.
-  const auto name = [&] { return "point " + std::to_string(index) + " of the trajectory "; };
+  const auto name = [&] { return fmt::format("point {} of the trajectory", index); };
   const auto check = [&](const std::vector<double>& numbers, const char* what, bool optional) {
     if (optional && numbers.empty()) return;
     if (numbers.size() != axes_.size()) {
-      axis.refuse(name() + "has " + std::to_string(numbers.size()) + " " + what +
-                  ", but must have " + std::to_string(axes_.size()) + (optional ? " or none" : ""));
+      axis.refuse(fmt::format("{} has {} {}, but must have {}{}", name(), numbers.size(), what,
+                              axes_.size(), optional ? " or none" : ""));
     }
     if (!std::isfinite(numbers[member])) {
-      axis.refuse(name() + "has " + numberText(numbers[member]) + " among its " + what +
-                  ", but they must be finite");
+      axis.refuse(fmt::format("{} has {} among its {}, but they must be finite", name(),
+                              numberText(numbers[member]), what));
     }
   };
   check(point.positions, "positions", false);
@@ -136,17 +138,17 @@ motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t 
   check(point.accelerations, "accelerations", true);
   constexpr double kLongest = Profile::kLongest;
   if (!(point.time >= 0.0 && point.time < kLongest)) {
-    axis.refuse(name() + "is at " + numberText(point.time) + " s, but must be from 0 s to " +
-                numberText(kLongest) + " s");
+    axis.refuse(fmt::format("{} is at {} s, but must be from 0 s to {} s", name(),
+                            numberText(point.time), numberText(kLongest)));
   }
   motion::Waypoint waypoint;
   waypoint.time_ns = nanoseconds(point.time);
   if (!before.empty() && waypoint.time_ns <= before.back().time_ns) {
-    axis.refuse(name() + "is at " + numberText(point.time) +
-                " s, but must be later than the one before it, at " +
-                roughText(static_cast<double>(before.back().time_ns) * 1e-9) + " s");
+    axis.refuse(fmt::format("{} is at {} s, but must be later than the one before it, at {} s",
+                            name(), numberText(point.time),
+                            roughText(static_cast<double>(before.back().time_ns) * 1e-9)));
   }
-  axis.refuseBeyondLimits(point.positions[member], name() + "at");
+  axis.refuseBeyondLimits(point.positions[member], name() + " at");
   waypoint.position = axis.countOf(point.positions[member]);
   if (!point.velocities.empty()) {
     waypoint.velocity = point.velocities[member] * axis.steps_per_unit;

@@ -1,8 +1,9 @@
 #include "stepdriver_core/machine/step_rates.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "pulse/hybrid_wait.h"
@@ -96,50 +97,47 @@ Interval shortest(const Load& load, const Others& others, const pulse::Capabilit
   return slept.ns < spun.ns ? slept : spun;
 }
 
-std::string inMicroseconds(double ns) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f us", ns * 1e-3);
-  return text;
-}
+std::string inMicroseconds(double ns) { return fmt::format("{:.1f} us", ns * 1e-3); }
 
-std::string percentText(double share) { return std::to_string(std::lround(share * 100.0)) + " %"; }
+std::string percentText(double share) { return fmt::format("{} %", std::lround(share * 100.0)); }
 
 std::string reasonOf(const Interval& interval, const Load& load, const Others& others,
                      pulse::Nanoseconds guard) {
   switch (interval.limit) {
     case RateLimit::kLateness:
-      return "wake-ups late by " + inMicroseconds(interval.lateness) + " and calls of " +
-             inMicroseconds(load.rise + others.rise) +
-             " before the pulse is out must fit in a quarter of a step's interval";
+      return fmt::format(
+          "wake-ups late by {} and calls of {} before the pulse is out must fit in a quarter of a "
+          "step's interval",
+          inMicroseconds(interval.lateness), inMicroseconds(load.rise + others.rise));
     case RateLimit::kPulse:
-      return "the chip's high and low time of " + inMicroseconds(load.chip) + ", calls of " +
-             inMicroseconds(load.calls + others.calls) + " and two wake-ups late by " +
-             inMicroseconds(interval.lateness) + " must fit in a step's interval";
+      return fmt::format(
+          "the chip's high and low time of {}, calls of {} and two wake-ups late by {} must fit in "
+          "a step's interval",
+          inMicroseconds(load.chip), inMicroseconds(load.calls + others.calls),
+          inMicroseconds(interval.lateness));
     case RateLimit::kSpinning:
       break;
   }
-  std::string text = "before an edge the pulse thread spins for " +
-                     inMicroseconds(static_cast<double>(guard)) + ", which it may for " +
-                     percentText(pulse::HybridWait::kMostSpinning) + " of the time";
-  if (others.not_spinning < 1.0) {
-    text += "; the other axes take " + percentText(1.0 - others.not_spinning);
-  }
-  return text + ", and without spinning wake-ups are later";
+  const std::string of_others =
+      others.not_spinning < 1.0 ? "; the other axes take " + percentText(1.0 - others.not_spinning)
+                                : "";
+  return fmt::format(
+      "before an edge the pulse thread spins for {}, which it may for {} of the time{}, and "
+      "without spinning wake-ups are later",
+      inMicroseconds(static_cast<double>(guard)), percentText(pulse::HybridWait::kMostSpinning),
+      of_others);
 }
 
-std::string rateText(double rate) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f steps/s", rate);
-  return text;
-}
+std::string rateText(double rate) { return fmt::format("{:.0f} steps/s", rate); }
 
 }  // namespace
 
 std::string StepRate::text() const {
-  std::string text =
-      axis + ": asks for " + rateText(asked) + ", and this machine holds " + rateText(held);
-  if (alone > held) text += " while all axes move, " + rateText(alone) + " with this one alone";
-  return text + ": " + limited;
+  const std::string of_alone =
+      alone > held ? fmt::format(" while all axes move, {} with this one alone", rateText(alone))
+                   : "";
+  return fmt::format("{}: asks for {}, and this machine holds {}{}: {}", axis, rateText(asked),
+                     rateText(held), of_alone, limited);
 }
 
 bool StepRates::holds() const {
@@ -196,9 +194,10 @@ std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
     why += (why.empty() ? "" : "; ") + complaint;
   }
   if (why.empty()) return "";
-  return "this machine can't do what is asked of it in real time: " + why +
-         ". Lower the top speed or the microsteps, allow real-time rights, run a PREEMPT_RT "
-         "kernel, or take load off this machine";
+  return fmt::format(
+      "this machine can't do what is asked of it in real time: {}. Lower the top speed or the "
+      "microsteps, allow real-time rights, run a PREEMPT_RT kernel, or take load off this machine",
+      why);
 }
 
 }  // namespace stepdriver::machine

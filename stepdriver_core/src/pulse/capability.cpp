@@ -1,5 +1,7 @@
 #include "stepdriver_core/pulse/capability.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -74,9 +76,8 @@ class CallMeter {
       const Nanoseconds begin = clock_.now();
       const int error = failure_.empty() ? call() : 0;
       if (error != 0) {
-        failure_ = "Line " + line +
-                   " failed while the cost of its calls was measured: " + gpio::errorText(error) +
-                   ".";
+        failure_ = fmt::format("Line {} failed while the cost of its calls was measured: {}.", line,
+                               gpio::errorText(error));
       }
       return clock_.now() - begin;
     };

@@ -1,5 +1,6 @@
 #include "pulse/realtime.h"
 
+#include <fmt/format.h>
 #include <link.h>
 #include <pthread.h>
 #include <sched.h>
@@ -29,7 +30,7 @@ std::string latencyText(int error) {
            "group realtime";
   }
   if (error == ENOENT) return text + " isn't there: this kernel or container hasn't got it";
-  return text + " can't be held (" + std::strerror(error) + ")";
+  return fmt::format("{} can't be held ({})", text, std::strerror(error));
 }
 
 // The pulse thread's code has smaller ones. This keeps out the tables of libraries that it doesn't
@@ -83,10 +84,11 @@ int lockMemory() {
 std::string RealtimeRights::text() const {
   if (scheduler_error < 0) return "real-time rights are not needed: the clock is virtual";
   std::string text = scheduler_error == 0
-                         ? "SCHED_FIFO " + std::to_string(kRealtimePriority)
-                         : "SCHED_FIFO refused (" + std::string(std::strerror(scheduler_error)) +
-                               "): `@realtime - rtprio 98` in /etc/security/limits.d "
-                               "allows it to the group realtime";
+                         ? fmt::format("SCHED_FIFO {}", kRealtimePriority)
+                         : fmt::format(
+                               "SCHED_FIFO refused ({}): `@realtime - rtprio 98` in "
+                               "/etc/security/limits.d allows it to the group realtime",
+                               std::strerror(scheduler_error));
   text += memory_error == 0
               ? "; memory locked"
               : "; memory not locked: `@realtime - memlock unlimited` there allows it";

@@ -1,5 +1,7 @@
 #include "stepdriver_core/sim/pin_trace.h"
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <stdexcept>
 
@@ -19,7 +21,7 @@ int MemoryTrace::pin(const std::string& scope, const std::string& variable) cons
   for (std::size_t i = 0; i < pins_.size(); ++i) {
     if (pins_[i].scope == scope && pins_[i].variable == variable) return static_cast<int>(i);
   }
-  throw std::out_of_range("The trace has no pin " + scope + "." + variable + ".");
+  throw std::out_of_range(fmt::format("The trace has no pin {}.{}.", scope, variable));
 }
 
 std::vector<std::int64_t> MemoryTrace::times(const std::string& scope, const std::string& variable,

@@ -1,5 +1,7 @@
 #include "rig_axis.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,12 +16,13 @@ const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const driver::DriverChip& chip = driver::driverChipOf(spec.model);
   const std::vector<int>& known = chip.microsteps;
   if (std::find(known.begin(), known.end(), spec.microsteps) == known.end()) {
-    throw std::invalid_argument("Axis " + spec.name + " of the rig: a " + chip.title +
-                                " doesn't do " + std::to_string(spec.microsteps) + " microsteps.");
+    throw std::invalid_argument(fmt::format("Axis {} of the rig: a {} doesn't do {} microsteps.",
+                                            spec.name, chip.title, spec.microsteps));
   }
   if (!(spec.full_step_travel > 0.0)) {
-    throw std::invalid_argument("Axis " + spec.name + " of the rig: full_step_travel is " +
-                                std::to_string(spec.full_step_travel) + ", it has to be above 0.");
+    throw std::invalid_argument(
+        fmt::format("Axis {} of the rig: full_step_travel is {:f}, it has to be above 0.",
+                    spec.name, spec.full_step_travel));
   }
   return spec;
 }
