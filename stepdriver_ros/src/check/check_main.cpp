@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -37,7 +39,7 @@ void print(const std::string& text) {
 }
 
 void section(const std::string& title, const std::string& text) {
-  print(title + "\n" + text + "\n");
+  print(fmt::format("{}\n{}\n", title, text));
 }
 
 /// The program, section by section. It remembers the worst that it found.
@@ -58,7 +60,7 @@ class Check {
     section("Measured here and now", measurementsText(config_.axes, capability_));
     reportRates();
     if (options_.move) move();
-    print((exit_code_ == kExitGood ? "Good: " : "NOT GOOD: ") + verdict_ + "\n");
+    print(fmt::format("{}: {}\n", exit_code_ == kExitGood ? "Good" : "NOT GOOD", verdict_));
     return exit_code_;
   }
 
@@ -85,8 +87,9 @@ class Check {
     const LinesReport report = linesReport(chips, linesOf(config_.axes, config_.emergency_stop));
     section(title, chipsText(chips) + "\n" + report.text);
     if (report.missing == 0) return;
-    note(kExitLines, std::to_string(report.missing) + (report.missing == 1 ? " line" : " lines") +
-                         " can't be had, see above; the calls and step rates weren't measured.");
+    note(kExitLines,
+         fmt::format("{} {} can't be had, see above; the calls and step rates weren't measured.",
+                     report.missing, report.missing == 1 ? "line" : "lines"));
   }
 
   void measure() {
@@ -108,9 +111,11 @@ class Check {
     const machine::StepRates rates = machine::stepRates(config_.axes, capability_);
     section("Step rates, with about one step in a hundred late, or fewer", ratesText(rates));
     if (!rates.holds()) {
-      note(kExitRates, "this machine doesn't hold the top speed of " + tooFast(rates) +
-                           ". Lower it or the microsteps, allow real-time rights, run a "
-                           "PREEMPT_RT kernel, or take load off this machine.");
+      note(kExitRates,
+           fmt::format(
+               "this machine doesn't hold the top speed of {}. Lower it or the microsteps, allow "
+               "real-time rights, run a PREEMPT_RT kernel, or take load off this machine.",
+               tooFast(rates)));
     } else if (config_.enforce_realtime) {
       const std::string why = machine::whyNotInRealtime(config_.axes, capability_);
       if (!why.empty()) note(kExitRates, "the node won't start (realtime: enforce): " + why + ".");
@@ -122,8 +127,10 @@ class Check {
       note(kExitMove, "nothing was moved: there are no lines to move it by.");
       return;
     }
-    print("Moving, in " + std::to_string(kWarning.count()) +
-          " s: keep clear. Nothing here knows where the axes stand. Ctrl-C stops them.\n");
+    print(
+        fmt::format("Moving, in {} s: keep clear. Nothing here knows where the axes stand. Ctrl-C "
+                    "stops them.\n",
+                    kWarning.count()));
     InterruptWatch::block();
     bool back = false;
     try {

@@ -1,5 +1,7 @@
 #include "lines_report.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -45,7 +47,7 @@ class Reasons {
 };
 
 std::string placeOf(const std::vector<gpio::ChipInfo>& chips, gpio::LineAddress address) {
-  return chips[address.chip].name + ":" + std::to_string(address.offset);
+  return fmt::format("{}:{}", chips[address.chip].name, address.offset);
 }
 
 std::string holderOf(const gpio::LineInfo& info) {

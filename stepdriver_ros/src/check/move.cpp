@@ -1,5 +1,7 @@
 #include "move.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "common/text.h"
@@ -34,21 +36,22 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   if (config.pins.enable.wired()) axis.enable(true);
   const double start = axis.state().position;
   const axis::MoveResult forth = axis.wait(axis.moveTo(stroke, true));
-  say("  " + config.name + ": forth: " + forth.message);
+  say(fmt::format("  {}: forth: {}", config.name, forth.message));
   bool reached = forth.end == axis::MoveEnd::kReached;
   // Away from an endstop that it met is where it came from; anything else isn't to be trusted.
   if (reached || forth.end == axis::MoveEnd::kEndstopMin ||
       forth.end == axis::MoveEnd::kEndstopMax) {
     const axis::MoveResult back = axis.wait(axis.moveTo(start));
-    say("  " + config.name + ": back: " + back.message);
+    say(fmt::format("  {}: back: {}", config.name, back.message));
     reached = reached && back.end == axis::MoveEnd::kReached;
   }
   const double off = axis.state().position - start;
   const machine::EngineFigures after = machine.figures();
-  say("  " + config.name + ": " + std::to_string(after.pulses - before.pulses) + " pulses, " +
-      std::to_string(after.slips - before.slips) + " slips, worst lateness so far " +
-      roundedText(after.worst_lateness * 1e6) + " us; " +
-      (off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
+  say(fmt::format(
+      "  {}: {} pulses, {} slips, worst lateness so far {} us; {}", config.name,
+      after.pulses - before.pulses, after.slips - before.slips,
+      roundedText(after.worst_lateness * 1e6),
+      off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
   if (config.pins.enable.wired()) axis.enable(false);
   return reached && off == 0.0;
 }

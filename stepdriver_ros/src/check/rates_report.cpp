@@ -1,5 +1,7 @@
 #include "rates_report.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdio>
 
@@ -12,9 +14,7 @@ namespace {
 using ros_node::roundedText;
 
 std::string inMicroseconds(pulse::Nanoseconds time) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f", static_cast<double>(time) * 1e-3);
-  return text;
+  return fmt::format("{:.2f}", static_cast<double>(time) * 1e-3);
 }
 
 std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spread) {
@@ -51,7 +51,7 @@ std::string ratesText(const machine::StepRates& rates) {
   for (const machine::StepRate& rate : rates.axes) {
     rows.push_back({rate.axis, roundedText(rate.asked), rateText(rate.alone), rateText(rate.held),
                     rate.holds() ? "ok" : "TOO FAST"});
-    reasons += "  " + rate.axis + ": " + rate.limited + "\n";
+    reasons += fmt::format("  {}: {}\n", rate.axis, rate.limited);
   }
   return table(rows) + "  What limits the rate with all axes moving:\n" + reasons;
 }

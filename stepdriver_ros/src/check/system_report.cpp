@@ -1,7 +1,8 @@
 #include "system_report.h"
 
+#include <fmt/format.h>
+
 #include <cerrno>
-#include <cstdio>
 
 #include "stepdriver_core/gpio/chip_table.h"
 #include "table.h"
@@ -15,11 +16,7 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-std::string modeText(unsigned mode) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%04o", mode);
-  return text;
-}
+std::string modeText(unsigned mode) { return fmt::format("{:04o}", mode); }
 
 bool isNumber(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
@@ -31,8 +28,8 @@ std::string orUnknown(const std::string& text) { return text.empty() ? "unknown"
 std::string throttleText(const SystemFacts& facts) {
   if (facts.rt_runtime_us.empty()) return "unknown";
   if (facts.rt_runtime_us == "-1") return "none (sched_rt_runtime_us -1)";
-  return "real-time threads run for " + facts.rt_runtime_us + " of each " + facts.rt_period_us +
-         " us (sched_rt_runtime_us)";
+  return fmt::format("real-time threads run for {} of each {} us (sched_rt_runtime_us)",
+                     facts.rt_runtime_us, facts.rt_period_us);
 }
 
 }  // namespace
@@ -47,9 +44,10 @@ std::string permissionsText(const SystemFacts& facts) {
     all_usable = all_usable && node.usable;
   }
   text += rows.empty() ? "  no /dev/gpiochip*\n" : table(rows);
-  text += std::string("  config/udev/60-stepdriver-gpio.rules is ") +
-          (facts.udev_rule ? "" : "not ") + "installed in /etc/udev/rules.d" +
-          (all_usable && !rows.empty() && !facts.udev_rule ? ", and not needed\n" : "\n");
+  text +=
+      fmt::format("  config/udev/60-stepdriver-gpio.rules is {}installed in /etc/udev/rules.d{}\n",
+                  facts.udev_rule ? "" : "not ",
+                  all_usable && !rows.empty() && !facts.udev_rule ? ", and not needed" : "");
   if (!all_usable) text += " " + gpio::remedyFor(EACCES) + "\n";
   return text;
 }

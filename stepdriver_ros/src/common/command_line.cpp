@@ -1,5 +1,7 @@
 #include "command_line.h"
 
+#include <fmt/format.h>
+
 #include <boost/lexical_cast/try_lexical_convert.hpp>
 #include <boost/program_options/errors.hpp>
 #include <boost/program_options/option.hpp>
@@ -38,7 +40,7 @@ std::optional<double> findNumber(const po::variables_map& options, const std::st
   const auto& text = options[name].as<std::string>();
   double number = 0.0;
   if (!boost::conversion::try_lexical_convert(text, number) || !allowed(number)) {
-    throw Error("--" + name + " " + text + ": it must be " + wanted);
+    throw Error(fmt::format("--{} {}: it must be {}", name, text, wanted));
   }
   return number;
 }

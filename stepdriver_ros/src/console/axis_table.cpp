@@ -1,7 +1,8 @@
 #include "axis_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 
 namespace stepdriver::console {
 namespace {
@@ -15,12 +16,6 @@ struct Column {
   bool right_aligned = false;
   std::vector<std::string> cells;
 };
-
-std::string roundedText(const char* format, double number, const std::string& unit) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, number);
-  return text + (" " + unit);
-}
 
 std::string switchText(bool there, bool known, bool active) {
   if (!there) return "-";
@@ -58,8 +53,8 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
     const bool chosen = axis.name == session.chosen();
     const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
     const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,
-                                            old(roundedText("%.4f", axis.position, unit)),
-                                            old(roundedText("%.2f", axis.velocity, unit + "/s")),
+                                            old(fmt::format("{:.4f} {}", axis.position, unit)),
+                                            old(fmt::format("{:.2f} {}/s", axis.velocity, unit)),
                                             old(switchText(config != nullptr && config->endstop_min,
                                                            axis.switches_known, axis.min_active)),
                                             old(switchText(config != nullptr && config->endstop_max,

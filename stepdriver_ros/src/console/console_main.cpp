@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/names.h>
@@ -32,10 +33,10 @@ void findDriver(const std::string& driver) {
   if (std::find(running.begin(), running.end(), driver) != running.end()) return;
   std::string others;
   for (const std::string& name : running) others += (others.empty() ? "" : ", ") + name;
-  throw Error("no stepdriver_node is running as " + driver + ". " +
-              (others.empty()
-                   ? "None is running at all: roslaunch stepdriver axis.launch starts one"
-                   : "There is " + others + ": give its name by --driver"));
+  throw Error(fmt::format(
+      "no stepdriver_node is running as {}. {}", driver,
+      others.empty() ? "None is running at all: roslaunch stepdriver axis.launch starts one"
+                     : "There is " + others + ": give its name by --driver"));
 }
 
 int run(const Options& options, EndRequests& end_requests) {
@@ -44,8 +45,8 @@ int run(const Options& options, EndRequests& end_requests) {
   try {
     std::string why;
     if (!ros::names::validate(options.driver, why) || options.driver.empty()) {
-      throw Error("--driver " + options.driver + ": it must be the name of a node" +
-                  (why.empty() ? "" : ": " + why));
+      throw Error(fmt::format("--driver {}: it must be the name of a node{}", options.driver,
+                              why.empty() ? "" : ": " + why));
     }
     const std::string driver = node.resolveName(options.driver);
     findDriver(driver);
@@ -82,8 +83,10 @@ int start(int argc, char** argv, EndRequests& end_requests) {
   ros::init(argc, argv, "console",
             ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
   if (!ros::master::check()) {
-    complain("there is no ROS master at " + ros::master::getURI() +
-             ": start the driver first, by roslaunch stepdriver axis.launch, say");
+    complain(
+        fmt::format("there is no ROS master at {}: start the driver first, by roslaunch stepdriver "
+                    "axis.launch, say",
+                    ros::master::getURI()));
     return ros_node::kExitConfig;
   }
   return run(options, end_requests);

@@ -1,7 +1,8 @@
 #include "screen.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 
 #include "axis_table.h"
 #include "wrapped.h"
@@ -11,11 +12,7 @@ namespace {
 
 constexpr int kFewestMessages = 3;  // rows; before the help takes any
 
-std::string secondsText(double seconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f s", seconds);
-  return text;
-}
+std::string secondsText(double seconds) { return fmt::format("{:.1f} s", seconds); }
 
 std::vector<Row> rowsOf(const std::string& text, int columns, bool loud = false) {
   std::vector<Row> rows;
@@ -46,12 +43,14 @@ std::vector<Row> emergencyRows(const Session& session, int columns, double now) 
     case Session::Emergency::kNone:
       return {};
     case Session::Emergency::kSent:
-      return rowsOf("*** EMERGENCY STOP sent " + secondsText(now - session.emergencySince()) +
-                        " ago, NO ANSWER YET: be ready to cut the power ***",
-                    columns, true);
+      return rowsOf(
+          fmt::format(
+              "*** EMERGENCY STOP sent {} ago, NO ANSWER YET: be ready to cut the power ***",
+              secondsText(now - session.emergencySince())),
+          columns, true);
     case Session::Emergency::kFailed:
-      return rowsOf("*** EMERGENCY STOP FAILED: " + session.emergencyMessage() +
-                        ". CUT THE POWER BY HAND ***",
+      return rowsOf(fmt::format("*** EMERGENCY STOP FAILED: {}. CUT THE POWER BY HAND ***",
+                                session.emergencyMessage()),
                     columns, true);
     case Session::Emergency::kStopped:
       break;
@@ -92,9 +91,9 @@ std::vector<Row> axisRows(const AxisTable& table, Body& body) {
   const int fit = std::max(body.left() - 1, 1);
   const int first = std::clamp(table.chosen - fit / 2, 0, count - fit);
   std::vector<Row> rows(table.rows.begin() + first, table.rows.begin() + first + fit);
-  rows.push_back({"axes " + std::to_string(first + 1) + " to " + std::to_string(first + fit) +
-                      " of " + std::to_string(count) + "; up, down: the others",
-                  false});
+  rows.push_back(
+      {fmt::format("axes {} to {} of {}; up, down: the others", first + 1, first + fit, count),
+       false});
   return body.take(rows);
 }
 
@@ -102,7 +101,7 @@ std::vector<Row> faultRows(const Session& session, int columns) {
   std::vector<Row> rows;
   for (const AxisView& axis : session.driver().axes()) {
     if (!axis.fault.empty()) {
-      append(rows, rowsOf("FAULT " + axis.name + ": " + axis.fault, columns, true));
+      append(rows, rowsOf(fmt::format("FAULT {}: {}", axis.name, axis.fault), columns, true));
     }
   }
   const bool told = session.emergency() == Session::Emergency::kStopped;
@@ -125,7 +124,8 @@ std::vector<Row> pendingRows(const Session& session, int columns, double now) {
     const double since = now - pending.since;
     if (since < 0.5) continue;
     append(rows,
-           rowsOf("... " + pending.call.name() + ": under way for " + secondsText(since), columns));
+           rowsOf(fmt::format("... {}: under way for {}", pending.call.name(), secondsText(since)),
+                  columns));
   }
   return rows;
 }
@@ -133,9 +133,9 @@ std::vector<Row> pendingRows(const Session& session, int columns, double now) {
 std::vector<Row> helpRows(const Session& session, int columns) {
   const std::string axis = session.chosen().empty() ? "the axis" : session.chosen();
   std::vector<std::string> lines = {
-      "up down 1-9 choose an axis    e enable " + axis + "    d disable " + axis,
+      fmt::format("up down 1-9 choose an axis    e enable {0}    d disable {0}", axis),
       "left right  jog slowly while held    shift+left shift+right, < >  fast",
-      "- +  one step    h home " + axis + "    a home all    r recover from faults"};
+      fmt::format("- +  one step    h home {}    a home all    r recover from faults", axis)};
   if (session.showsHelp()) {
     lines.insert(lines.end(),
                  {", .  jog slowly too    k j tab  choose an axis too    = one step too",
@@ -151,8 +151,7 @@ std::vector<Row> messageRows(const Session& session, int columns, int room) {
   std::vector<Row> rows;
   const auto& all = session.messages().all();
   for (auto message = all.rbegin(); message != all.rend(); ++message) {
-    const std::string times =
-        message->times > 1 ? " (" + std::to_string(message->times) + " times)" : "";
+    const std::string times = message->times > 1 ? fmt::format(" ({} times)", message->times) : "";
     const std::vector<Row> lines = rowsOf(message->text + times, columns);
     if (static_cast<int>(rows.size() + lines.size()) > room) {
       // The newest is worth its beginning at least.

@@ -1,5 +1,7 @@
 #include "session.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -189,7 +191,7 @@ void Session::answered(const Call& call, bool success, const std::string& messag
   pending_.erase(std::remove_if(pending_.begin(), pending_.end(),
                                 [&](const PendingCall& one) { return one.call.name() == name; }),
                  pending_.end());
-  messages_.say(success ? message : name + " REFUSED: " + message);
+  messages_.say(success ? message : fmt::format("{} REFUSED: {}", name, message));
   if (success && call.what == Call::What::kRecover && emergency_ != Emergency::kSent) {
     emergency_ = Emergency::kNone;
   }

@@ -1,5 +1,7 @@
 #include "terminal.h"
 
+#include <fmt/format.h>
+
 // As macros, what curses calls its functions would change what others are called.
 #define NCURSES_NOMACROS
 #include <curses.h>
@@ -48,8 +50,8 @@ Terminal::Terminal() {
     }
     if (tty_ != nullptr) std::fclose(tty_);
     const char* const type = std::getenv("TERM");
-    throw Error(std::string("this terminal can't show a screen: TERM is ") +
-                (type == nullptr ? "not set" : type) + "; --wizard does without");
+    throw Error(fmt::format("this terminal can't show a screen: TERM is {}; --wizard does without",
+                            type == nullptr ? "not set" : type));
   }
   output_ = std::move(output);
   screen_ = curses;

@@ -1,5 +1,7 @@
 #include "driver_axes.h"
 
+#include <fmt/format.h>
+
 #include <optional>
 
 namespace stepdriver::joystick {
@@ -32,7 +34,8 @@ void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
     const std::string key = name + "/axes/" + axis.name;
     const auto found = axes->find(axis.name);
     if (found == axes->end()) {
-      issues.push_back({key, "is no axis of " + driver + ", which has " + namesOf(*axes)});
+      issues.push_back(
+          {key, fmt::format("is no axis of {}, which has {}", driver, namesOf(*axes))});
       continue;
     }
     const auto* own = found->second.as<ConfigValue::Map>();
@@ -40,15 +43,16 @@ void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
     const char* const wanted = speedKey(axis.kind);
     const char* const other = speedKey(axis.kind == config::Kind::kLinear ? config::Kind::kRotary
                                                                           : config::Kind::kLinear);
-    const std::string theirs = driver + "/axes/" + axis.name + "/";
+    const std::string theirs = fmt::format("{}/axes/{}/", driver, axis.name);
     const auto most = numberAt(*own, wanted);
     if (!most && numberAt(*own, other)) {
-      issues.push_back({key + "/" + wanted,
-                        std::string("must be ") + other + ", as there is a " + theirs + other});
+      issues.push_back(
+          {key + "/" + wanted, fmt::format("must be {0}, as there is a {1}{0}", other, theirs)});
     } else if (most && axis.max_speed > *most) {
-      issues.push_back({key + "/" + wanted, "is " + ConfigValue(axis.max_speed).shown() +
-                                                ", but must be at most " + theirs + wanted +
-                                                ", which is " + ConfigValue(*most).shown()});
+      issues.push_back(
+          {key + "/" + wanted, fmt::format("is {}, but must be at most {}{}, which is {}",
+                                           ConfigValue(axis.max_speed).shown(), theirs, wanted,
+                                           ConfigValue(*most).shown())});
     }
   }
 }

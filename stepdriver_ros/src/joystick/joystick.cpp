@@ -1,5 +1,6 @@
 #include "joystick.h"
 
+#include <fmt/format.h>
 #include <ros/console.h>
 #include <ros/transport_hints.h>
 #include <std_srvs/SetBool.h>
@@ -24,7 +25,7 @@ Joystick::Joystick(ros::NodeHandle node, const std::string& driver, JoystickConf
   for (const JogAxis& axis : config_.axes) {
     Jogged jogged;
     jogged.config = axis;
-    jogged.service = driver + "/" + axis.name + "/enable";
+    jogged.service = fmt::format("{}/{}/enable", driver, axis.name);
     if (axis.disable_in_dead_band) {
       jogged.sequence = JogSequence::disabling(axis.disable_after);
       jogged.enable = std::make_unique<client::BackgroundCall>();
@@ -68,19 +69,21 @@ std::string Joystick::mistakeIn(const sensor_msgs::Joy& message) const {
   for (const Jogged& axis : axes_) {
     const auto index = static_cast<std::size_t>(axis.config.joystick_axis);
     if (index >= message.axes.size()) {
-      return "the message has " + std::to_string(message.axes.size()) + " axes, but " +
-             axis.config.name + " is jogged by joystick_axis " + std::to_string(index) +
-             ", counted from 0: nothing jogs";
+      return fmt::format(
+          "the message has {} axes, but {} is jogged by joystick_axis {}, counted from 0: nothing "
+          "jogs",
+          message.axes.size(), axis.config.name, index);
     }
     if (!std::isfinite(message.axes[index])) {
-      return "axis " + std::to_string(index) + " of the message, which jogs " + axis.config.name +
-             ", isn't a finite number: nothing jogs";
+      return fmt::format(
+          "axis {} of the message, which jogs {}, isn't a finite number: nothing jogs", index,
+          axis.config.name);
     }
   }
   if (config_.deadman_button >= static_cast<int>(message.buttons.size())) {
-    return "the message has " + std::to_string(message.buttons.size()) +
-           " buttons, but deadman_button is " + std::to_string(config_.deadman_button) +
-           ", counted from 0: nothing jogs";
+    return fmt::format(
+        "the message has {} buttons, but deadman_button is {}, counted from 0: nothing jogs",
+        message.buttons.size(), config_.deadman_button);
   }
   return {};
 }

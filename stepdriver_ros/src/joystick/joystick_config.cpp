@@ -1,5 +1,7 @@
 #include "joystick_config.h"
 
+#include <fmt/format.h>
+
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::joystick {
@@ -24,11 +26,13 @@ void readMaxSpeed(ConfigReader& reader, JogAxis& axis) {
   const auto linear = reader.findNumber(linear_key, Range::positive(), Presence::kOptional);
   const auto rotary = reader.findNumber(rotary_key, Range::positive(), Presence::kOptional);
   if (reader.has(linear_key) && reader.has(rotary_key)) {
-    reader.issue(rotary_key, "is " + reader.shown(rotary_key) + ", but " + linear_key +
-                                 " must not be given with it: an axis is linear or rotary");
+    reader.issue(rotary_key,
+                 fmt::format("is {}, but {} must not be given with it: an axis is linear or rotary",
+                             reader.shown(rotary_key), linear_key));
   } else if (reader.isMap() && !reader.has(linear_key) && !reader.has(rotary_key)) {
-    reader.issue(linear_key, "is missing; it, or " + rotary_key +
-                                 " of a rotary axis, must be a number above 0");
+    reader.issue(linear_key,
+                 fmt::format("is missing; it, or {} of a rotary axis, must be a number above 0",
+                             rotary_key));
   }
   axis.kind = rotary ? Kind::kRotary : Kind::kLinear;
   axis.max_speed = linear.value_or(rotary.value_or(0.0));

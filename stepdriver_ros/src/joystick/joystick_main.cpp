@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <ros/callback_queue.h>
 #include <ros/console.h>
 #include <ros/init.h>
@@ -51,9 +52,8 @@ JoystickConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle
       readJoystickConfig(ros_node::privateParameters(private_node), name, issues);
   std::string why;
   if (config.driver.empty() || !ros::names::validate(config.driver, why)) {
-    issues.push_back({name + "/driver", "is \"" + config.driver +
-                                            "\", but must be the name of a node" +
-                                            (why.empty() ? "" : ": " + why)});
+    issues.push_back({name + "/driver", fmt::format("is \"{}\", but must be the name of a node{}",
+                                                    config.driver, why.empty() ? "" : ": " + why)});
   }
   if (!issues.empty()) throw ConfigError(issues);
   driver = node.resolveName(config.driver);

@@ -1,5 +1,7 @@
 #include "axis_bring_up.h"
 
+#include <fmt/format.h>
+
 #include "bring_up_checks.h"
 #include "common/text.h"
 
@@ -52,8 +54,8 @@ Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const config::AxisC
   Findings findings;
   findings.axis = config.name;
   const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
-  dialogue.say("\n==== Axis " + config.name + ": " + ros_node::roundedText(steps) + " steps per " +
-               unitOf(config.kind) + " at " + std::to_string(config.microsteps) + " microsteps");
+  dialogue.say(fmt::format("\n==== Axis {}: {} steps per {} at {} microsteps", config.name,
+                           ros_node::roundedText(steps), unitOf(config.kind), config.microsteps));
   dialogue.say("\n-- 1. Do the switches read right?");
   checkSwitches(dialogue, machine, config, findings);
   Current current(machine, config.name);

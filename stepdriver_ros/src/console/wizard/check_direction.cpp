@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "bring_up_checks.h"
 #include "hand_move.h"
 
@@ -14,9 +16,9 @@ void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const config::Ax
       move.distance = -move.distance;
       continue;
     }
-    const std::string way = moved < 0.0 ? "minus" : "plus";
-    const std::string answer =
-        dialogue.ask("Did it go towards " + way + ", as plus is to be? (y, n, a: again) [y/n/a] ");
+    const char* const way = moved < 0.0 ? "minus" : "plus";
+    const std::string answer = dialogue.ask(
+        fmt::format("Did it go towards {}, as plus is to be? (y, n, a: again) [y/n/a] ", way));
     if (answer == "y" || answer == "n") {
       findings.wrong_way = answer == "n";
       return;

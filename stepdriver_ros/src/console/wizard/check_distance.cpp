@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <cmath>
 #include <optional>
 #include <string>
@@ -21,8 +23,10 @@ std::string usualCause(double factor) {
   const double power = std::log2(factor);
   const double whole = std::round(power);
   if (whole == 0.0 || std::abs(power - whole) > kNearPower) return {};
-  return "That is near a factor of " + roundedText(std::exp2(std::abs(whole))) +
-         ": look at the microsteps first, at straps and DIP switches against `microsteps`.";
+  return fmt::format(
+      "That is near a factor of {}: look at the microsteps first, at straps and DIP switches "
+      "against `microsteps`.",
+      roundedText(std::exp2(std::abs(whole))));
 }
 
 struct Measured {
@@ -69,9 +73,9 @@ void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::Axi
   const std::string unit = unitOf(config.kind);
   const std::string commanded = roundedText(measured->commanded);
   const std::string really = roundedText(measured->really);
-  dialogue.say("Commanded " + commanded + " " + unit + ", measured " + really + " " + unit + ": " +
-               roundedText(steps) + " x " + commanded + " / " + really + " = " +
-               roundedText(steps * factor) + " steps per " + unit + ".");
+  dialogue.say(
+      fmt::format("Commanded {0} {2}, measured {1} {2}: {3} x {0} / {1} = {4} steps per {2}.",
+                  commanded, really, unit, roundedText(steps), roundedText(steps * factor)));
   if (std::abs(factor - 1.0) < kAsGoodAsRight) {
     dialogue.say("That is as good as right; it stays.");
     return;

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <optional>
 #include <string>
 
@@ -36,23 +38,26 @@ std::optional<Press> awaitPress(Dialogue& dialogue, MachineAtHand& machine,
 
 std::optional<Press> checkEnd(Dialogue& dialogue, MachineAtHand& machine,
                               const config::AxisConfig& config, const std::string& end) {
-  dialogue.say("Press the switch at the " + end + " end by hand, and let it go." +
-               " (Enter: there is none, or nothing happens)");
+  dialogue.say(
+      fmt::format("Press the switch at the {} end by hand, and let it go. (Enter: there is none, "
+                  "or nothing happens)",
+                  end));
   const auto press = awaitPress(dialogue, machine, config.name);
   if (!press) {
     dialogue.say("  Nothing was seen at the " + end + " end.");
     return {};
   }
-  dialogue.say("  The switch at the " + end + " end is the one that is configured as " +
-               nameOf(press->max) +
-               (press->inverted ? ", and it reads the wrong way round." : "."));
+  dialogue.say(fmt::format("  The switch at the {} end is the one that is configured as {}{}", end,
+                           nameOf(press->max),
+                           press->inverted ? ", and it reads the wrong way round." : "."));
   return press;
 }
 
 void sayDead(Dialogue& dialogue, const std::string& name) {
-  dialogue.say("  ATTENTION: " + name +
-               " is configured, but was never seen to change. Check its wire, its line and its "
-               "supply before you rely on it; the wizard can't mend that.");
+  dialogue.say(
+      fmt::format("  ATTENTION: {} is configured, but was never seen to change. Check its wire, "
+                  "its line and its supply before you rely on it; the wizard can't mend that.",
+                  name));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "configuration_file.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -16,7 +17,7 @@ namespace stepdriver::console {
 namespace {
 
 Error failure(const std::string& path, const std::string& what) {
-  return Error(path + " can't be " + what + ": " + std::strerror(errno));
+  return Error(fmt::format("{} can't be {}: {}", path, what, std::strerror(errno)));
 }
 
 }  // namespace

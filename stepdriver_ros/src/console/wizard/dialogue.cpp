@@ -1,5 +1,7 @@
 #include "dialogue.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -18,7 +20,7 @@ std::string trimmed(const std::string& text) {
 }
 
 void sayNotUnderstood(Dialogue& dialogue, const std::string& answer, const std::string& wanted) {
-  dialogue.say("\"" + answer + "\" isn't understood: " + wanted + ".");
+  dialogue.say(fmt::format("\"{}\" isn't understood: {}.", answer, wanted));
 }
 
 }  // namespace
@@ -36,7 +38,7 @@ bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_defau
 
 std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
                                 const std::string& unit) {
-  const std::string shown = question + " [" + unit + "] ";
+  const std::string shown = fmt::format("{} [{}] ", question, unit);
   for (;;) {
     const std::string answer = trimmed(dialogue.ask(shown));
     if (answer.empty()) return {};
@@ -52,7 +54,8 @@ std::optional<double> askNumber(Dialogue& dialogue, const std::string& question,
 std::optional<double> askLength(Dialogue& dialogue, const std::string& question,
                                 const std::string& unit, std::optional<double> fallback) {
   const std::string shown =
-      question + (fallback ? " (Enter: " + ros_node::roundedText(*fallback) + ")" : "");
+      fallback ? fmt::format("{} (Enter: {})", question, ros_node::roundedText(*fallback))
+               : question;
   for (;;) {
     const auto length = askNumber(dialogue, shown, unit);
     if (!length) return fallback;

@@ -1,5 +1,6 @@
 #include "driver_at_hand.h"
 
+#include <fmt/format.h>
 #include <ros/callback_queue.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
@@ -53,7 +54,9 @@ void DriverAtHand::awaitState() {
 AxisView DriverAtHand::state(const std::string& axis) {
   poll();
   const AxisView* const view = session_.driver().axis(axis);
-  if (view == nullptr) throw Error(session_.driverName() + " has no axis " + axis + " any more");
+  if (view == nullptr) {
+    throw Error(fmt::format("{} has no axis {} any more", session_.driverName(), axis));
+  }
   return *view;
 }
 
@@ -88,7 +91,7 @@ double DriverAtHand::unitsOf(const std::string& axis) const {
 }
 
 std::string DriverAtHand::service(const std::string& axis, const std::string& name) const {
-  return session_.driverName() + "/" + axis + "/" + name;
+  return fmt::format("{}/{}/{}", session_.driverName(), axis, name);
 }
 
 }  // namespace stepdriver::console

@@ -1,5 +1,7 @@
 #include "findings.h"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -104,8 +106,9 @@ std::vector<std::string> changesText(const Findings& findings, const config::Axi
   }
   if (findings.scale) {
     const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
-    changes.push_back(axis + ": " + roundedText(steps * *findings.scale) + " steps per " +
-                      unitOf(config.kind) + " instead of " + roundedText(steps));
+    changes.push_back(fmt::format("{}: {} steps per {} instead of {}", axis,
+                                  roundedText(steps * *findings.scale), unitOf(config.kind),
+                                  roundedText(steps)));
   }
   return changes;
 }

@@ -1,5 +1,7 @@
 #include "hand_move.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -31,10 +33,10 @@ SmallMove measurableMove(const config::AxisConfig& config) {
 
 double HandMove::ask(const SmallMove& move) {
   const std::string unit = unitOf(config_.kind);
-  const std::string what = config_.name + " will move " + roundedText(std::abs(move.distance)) +
-                           " " + unit + " towards " + (move.distance < 0.0 ? "minus" : "plus") +
-                           ", as it is configured, at " + roundedText(move.speed) + " " + unit +
-                           "/s. Enter stops it. Move?";
+  const std::string what = fmt::format(
+      "{0} will move {1} {2} towards {3}, as it is configured, at {4} {2}/s. Enter stops it. Move?",
+      config_.name, roundedText(std::abs(move.distance)), unit,
+      move.distance < 0.0 ? "minus" : "plus", roundedText(move.speed));
   if (!askYesNo(dialogue_, what, false)) return 0.0;
   const double start = machine_.state(config_.name).position;
   const client::Answer answer = machine_.move(config_.name, move.distance, move.speed);

@@ -1,5 +1,6 @@
 #include "wizard.h"
 
+#include <fmt/format.h>
 #include <ros/init.h>
 
 #include <vector>
@@ -23,7 +24,9 @@ std::vector<config::AxisConfig> chosenAxes(const DriverParameters& parameters,
     names += (names.empty() ? "" : ", ") + axis.name;
     if (only.empty() || axis.name == only) axes.push_back(axis);
   }
-  if (axes.empty()) throw Error("--axis " + only + ": there is no such axis, but " + names);
+  if (axes.empty()) {
+    throw Error(fmt::format("--axis {}: there is no such axis, but {}", only, names));
+  }
   return axes;
 }
 
@@ -38,8 +41,8 @@ void check(const config::ConfigValue& parameters, const std::string& driver) {
 
 std::vector<std::string> commentOf(const std::string& driver,
                                    const std::vector<std::string>& changes) {
-  std::vector<std::string> comment = {"The parameters of " + driver +
-                                      ", by `rosrun stepdriver console --wizard`."};
+  std::vector<std::string> comment = {
+      fmt::format("The parameters of {}, by `rosrun stepdriver console --wizard`.", driver)};
   if (changes.empty()) comment.emplace_back("Nothing had to be changed.");
   for (const std::string& change : changes) comment.push_back(change + ".");
   return comment;

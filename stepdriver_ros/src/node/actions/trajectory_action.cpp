@@ -1,5 +1,6 @@
 #include "trajectory_action.h"
 
+#include <fmt/format.h>
 #include <ros/console.h>
 
 #include <algorithm>
@@ -98,7 +99,7 @@ bool TrajectoryAction::conclude(Following& following) {
   const bool reached = result->end == axis::MoveEnd::kReached;
   GoalHandle& handle = following.handle;
   if (!reached && !following.preempted_by.empty()) {
-    const std::string why = following.preempted_by + "; " + result->message;
+    const std::string why = fmt::format("{}; {}", following.preempted_by, result->message);
     handle.setCanceled(resultOf(Result::SUCCESSFUL, why), why);
   } else if (!reached && !following.violated.empty()) {
     handle.setAborted(resultOf(Result::PATH_TOLERANCE_VIOLATED, following.violated),
@@ -120,8 +121,8 @@ std::string TrajectoryAction::shortOfGoal(const Following& following,
   const double late = result.duration + machine_.figures().slipped - following.slipped_before -
                       following.move.duration;
   if (late > following.tolerances.goal_time) {
-    return "it ended " + roundedText(late) + " s later than planned; goal_time_tolerance is " +
-           roundedText(following.tolerances.goal_time) + " s";
+    return fmt::format("it ended {} s later than planned; goal_time_tolerance is {} s",
+                       roundedText(late), roundedText(following.tolerances.goal_time));
   }
   return violation(following.joints, following.tolerances.goal, following.goal, result.positions);
 }

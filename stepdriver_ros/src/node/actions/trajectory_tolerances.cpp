@@ -1,5 +1,7 @@
 #include "trajectory_tolerances.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -26,10 +28,11 @@ std::vector<double> limitsOf(const std::vector<std::string>& joints, const Toler
   for (const auto& tolerance : tolerances) {
     const auto joint = std::find(joints.begin(), joints.end(), tolerance.name);
     if (joint == joints.end()) {
-      refuse(name + " names the joint " + tolerance.name + ", which isn't in the trajectory");
+      refuse(fmt::format("{} names the joint {}, which isn't in the trajectory", name,
+                         tolerance.name));
     }
     if (std::isnan(tolerance.position)) {
-      refuse(name + " of the joint " + tolerance.name + " isn't a number");
+      refuse(fmt::format("{} of the joint {} isn't a number", name, tolerance.name));
     }
     limits[static_cast<std::size_t>(joint - joints.begin())] = limitOf(tolerance.position);
   }
@@ -50,8 +53,9 @@ std::string violation(const std::vector<std::string>& joints, const std::vector<
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const double off = std::abs(wanted[i] - actual[i]);
     if (off <= limits[i]) continue;
-    return joints[i] + " is at " + roundedText(actual[i]) + ", " + roundedText(off) + " from " +
-           roundedText(wanted[i]) + "; the tolerance is " + roundedText(limits[i]);
+    return fmt::format("{} is at {}, {} from {}; the tolerance is {}", joints[i],
+                       roundedText(actual[i]), roundedText(off), roundedText(wanted[i]),
+                       roundedText(limits[i]));
   }
   return {};
 }

@@ -1,5 +1,7 @@
 #include "axis_diagnostics.h"
 
+#include <fmt/format.h>
+
 #include <string>
 
 #include "common/text.h"
@@ -27,8 +29,9 @@ void warnNearLimit(const config::AxisConfig& config, double position,
   const double near = both ? (*config.max_position - *config.min_position) * kNearLimit
                            : 0.5 / config.steps_per_unit;
   const auto warn = [&](const char* which, double limit) {
-    status.mergeSummary(DiagnosticStatus::WARN, std::string("near the soft limit ") + which + ", " +
-                                                    roundedText(limit) + " " + unitOf(config.kind));
+    status.mergeSummary(DiagnosticStatus::WARN,
+                        fmt::format("near the soft limit {}, {} {}", which, roundedText(limit),
+                                    unitOf(config.kind)));
   };
   if (config.min_position && position <= *config.min_position + near) {
     warn("min_position", *config.min_position);

@@ -1,5 +1,6 @@
 #include "diagnostics.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <array>
@@ -73,7 +74,7 @@ std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::s
   gethostname(host.data(), host.size() - 1);
   std::string text = std::string(host.data()) + ": ";
   for (const config::AxisConfig& axis : axes) {
-    text += axis.name + " " + driver::driverChipOf(axis.driver).title + ", ";
+    text += fmt::format("{} {}, ", axis.name, driver::driverChipOf(axis.driver).title);
   }
   return text + "on " + on;
 }

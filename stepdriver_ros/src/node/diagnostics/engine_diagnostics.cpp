@@ -1,5 +1,7 @@
 #include "engine_diagnostics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -20,18 +22,20 @@ void judgeLateness(const EngineReading& reading, DiagnosticStatusWrapper& status
   const double late = static_cast<double>(reading.figures.lateness_last_second.max) * 1e-9;
   if (late < reading.max_lateness * kLatenessPart) return;
   const bool too_late = late > reading.max_lateness;
-  status.mergeSummary(too_late ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN,
-                      "in the last second a pulse was " + roundedText(late * 1e3) +
-                          " ms late; beyond realtime/max_lateness_ms, " +
-                          roundedText(reading.max_lateness * 1e3) + " ms, it is a fault at speed");
+  status.mergeSummary(
+      too_late ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN,
+      fmt::format("in the last second a pulse was {} ms late; beyond realtime/max_lateness_ms, {} "
+                  "ms, it is a fault at speed",
+                  roundedText(late * 1e3), roundedText(reading.max_lateness * 1e3)));
 }
 
 void judgeSlips(const EngineReading& reading, DiagnosticStatusWrapper& status) {
   const std::uint64_t slips = reading.figures.slips - reading.slips_before;
   if (slips == 0) return;
-  status.mergeSummary(DiagnosticStatus::WARN,
-                      "late pulses made all motions take longer, " + std::to_string(slips) +
-                          (slips == 1 ? " time" : " times") + " in the last second");
+  status.mergeSummary(
+      DiagnosticStatus::WARN,
+      fmt::format("late pulses made all motions take longer, {} {} in the last second", slips,
+                  slips == 1 ? "time" : "times"));
 }
 
 void judgeMargins(const EngineReading& reading, DiagnosticStatusWrapper& status) {

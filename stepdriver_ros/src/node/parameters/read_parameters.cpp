@@ -1,5 +1,6 @@
 #include "read_parameters.h"
 
+#include <fmt/format.h>
 #include <ros/console.h>
 #include <ros/param.h>
 
@@ -27,7 +28,8 @@ std::vector<LimitSources> applyDescriptionParameter(const ros::NodeHandle& node,
   const config::ConfigValue description = configValue(value);
   const auto* urdf = description.as<std::string>();
   if (urdf == nullptr) {
-    issues.push_back({name, "is " + description.shown() + ", but must be the XML of a URDF"});
+    issues.push_back(
+        {name, fmt::format("is {}, but must be the XML of a URDF", description.shown())});
     return {};
   }
   return applyRobotDescription(*urdf, name, axes, issues);

@@ -1,5 +1,6 @@
 #include "robot_description.h"
 
+#include <fmt/format.h>
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
@@ -43,7 +44,8 @@ class JointFitter {
 
   LimitSources fit(const urdf::Joint* joint) {
     if (joint == nullptr) {
-      issue("has no joint \"" + axis_.joint + "\", which is the joint of axis " + axis_.name);
+      issue(fmt::format("has no joint \"{}\", which is the joint of axis {}", axis_.joint,
+                        axis_.name));
     } else if (checkType(*joint) && checkLimits(*joint)) {
       tighten(*joint);
     }
@@ -53,19 +55,24 @@ class JointFitter {
  private:
   void issue(const std::string& message) { issues_.push_back({name_, message}); }
 
-  std::string joint() const { return "joint \"" + axis_.joint + "\" of axis " + axis_.name; }
+  /// @param message what is wrong with the joint, after its name.
+  void issueOfJoint(const std::string& message) {
+    issue(fmt::format("is wrong: joint \"{}\" of axis {} {}", axis_.joint, axis_.name, message));
+  }
 
   bool checkType(const urdf::Joint& joint) {
     const bool linear = joint.type == urdf::Joint::PRISMATIC;
     const bool rotary =
         joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS;
-    const std::string is = this->joint() + " is " + typeName(joint) + ", but must be ";
     if (axis_.kind == Kind::kLinear && !linear) {
-      issue("is wrong: " + is + "prismatic: the axis is configured in mm");
+      issueOfJoint(fmt::format("is {}, but must be prismatic: the axis is configured in mm",
+                               typeName(joint)));
       return false;
     }
     if (axis_.kind == Kind::kRotary && !rotary) {
-      issue("is wrong: " + is + "revolute or continuous: the axis is configured in degrees");
+      issueOfJoint(fmt::format(
+          "is {}, but must be revolute or continuous: the axis is configured in degrees",
+          typeName(joint)));
       return false;
     }
     return true;
@@ -74,26 +81,26 @@ class JointFitter {
   bool checkLimits(const urdf::Joint& joint) {
     const bool limited = joint.type != urdf::Joint::CONTINUOUS;
     if (!joint.limits) {
-      if (limited) issue("is wrong: " + this->joint() + " has no <limit>");
+      if (limited) issueOfJoint("has no <limit>");
       return !limited;
     }
     const urdf::JointLimits& limits = *joint.limits;
     bool right = true;
     if (!(limits.velocity > 0.0)) {
-      issue("is wrong: " + this->joint() + " has the velocity limit " +
-            roundedText(limits.velocity) + ", but it must be above 0");
+      issueOfJoint(fmt::format("has the velocity limit {}, but it must be above 0",
+                               roundedText(limits.velocity)));
       right = false;
     } else if (const double lowest = lowestSpeed(); limits.velocity < lowest) {
-      issue("is wrong: " + this->joint() + " has the velocity limit " +
-            roundedText(limits.velocity) + ", but it must be at least " + roundedText(lowest) +
-            " " + unitOf(axis_.kind) + "/s, which is " + roundedText(config::kLowestRate) +
-            " steps/s");
+      issueOfJoint(fmt::format(
+          "has the velocity limit {}, but it must be at least {} {}/s, which is {} steps/s",
+          roundedText(limits.velocity), roundedText(lowest), unitOf(axis_.kind),
+          roundedText(config::kLowestRate)));
       right = false;
     }
     if (limited && !(limits.lower < limits.upper)) {
-      issue("is wrong: " + this->joint() + " has lower=" + roundedText(limits.lower) +
-            " and upper=" + roundedText(limits.upper) +
-            ", but lower must be below upper (where one is missing it is 0)");
+      issueOfJoint(fmt::format(
+          "has lower={} and upper={}, but lower must be below upper (where one is missing it is 0)",
+          roundedText(limits.lower), roundedText(limits.upper)));
       right = false;
     }
     return right;
@@ -127,9 +134,9 @@ class JointFitter {
       sources_.max_position = "joint";
     }
     if (*axis_.min_position < *axis_.max_position) return;
-    issue("is wrong: " + this->joint() + " goes from " + roundedText(limits.lower) + " to " +
-          roundedText(limits.upper) + " " + unitOf(axis_.kind) +
-          ", which leaves nothing of the axis's own range");
+    issueOfJoint(fmt::format("goes from {} to {} {}, which leaves nothing of the axis's own range",
+                             roundedText(limits.lower), roundedText(limits.upper),
+                             unitOf(axis_.kind)));
   }
 
   AxisConfig& axis_;
@@ -140,7 +147,7 @@ class JointFitter {
 
 std::string positionText(const std::optional<double>& position, Kind kind, const char* source) {
   if (!position) return "without limit";
-  return roundedText(*position) + " " + unitOf(kind) + " (" + source + ")";
+  return fmt::format("{} {} ({})", roundedText(*position), unitOf(kind), source);
 }
 
 }  // namespace
@@ -166,18 +173,19 @@ std::vector<LimitSources> applyRobotDescription(const std::string& urdf, const s
 }
 
 std::string continuousJointText(const AxisConfig& axis) {
-  return "axis " + axis.name + " has soft limits, but its joint " + axis.joint +
-         " is continuous in the robot description: the limits hold, and whoever plans by the "
-         "description will ask for positions that are refused. Make the joint revolute, or take "
-         "the "
-         "limits away";
+  return fmt::format(
+      "axis {} has soft limits, but its joint {} is continuous in the robot description: the "
+      "limits hold, and whoever plans by the description will ask for positions that are refused. "
+      "Make the joint revolute, or take the limits away",
+      axis.name, axis.joint);
 }
 
 std::string limitsText(const AxisConfig& axis, const LimitSources& sources) {
-  return "axis " + axis.name + " (joint " + axis.joint + ") is limited: min position " +
-         positionText(axis.min_position, axis.kind, sources.min_position) + ", max position " +
-         positionText(axis.max_position, axis.kind, sources.max_position) + ", speed " +
-         roundedText(axis.max_speed) + " " + unitOf(axis.kind) + "/s (" + sources.max_speed + ")";
+  return fmt::format(
+      "axis {} (joint {}) is limited: min position {}, max position {}, speed {} {}/s ({})",
+      axis.name, axis.joint, positionText(axis.min_position, axis.kind, sources.min_position),
+      positionText(axis.max_position, axis.kind, sources.max_position), roundedText(axis.max_speed),
+      unitOf(axis.kind), sources.max_speed);
 }
 
 }  // namespace stepdriver::ros_node

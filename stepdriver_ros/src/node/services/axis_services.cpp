@@ -1,5 +1,7 @@
 #include "axis_services.h"
 
+#include <fmt/format.h>
+
 #include "common/text.h"
 #include "respond.h"
 
@@ -13,10 +15,10 @@ std::string changesText(const axis::AxisLimits& before, const axis::AxisLimits& 
   const auto compare = [&](const char* what, double was, double is, const char* per) {
     if (was == is) return;
     const auto shown = [&](double value) {
-      return value > 0.0 ? roundedText(value) + " " + unit + per : std::string("none");
+      return value > 0.0 ? fmt::format("{} {}{}", roundedText(value), unit, per) : "none";
     };
-    text += (text.empty() ? "" : ", ") + std::string(what) + " " + shown(is) + " instead of " +
-            shown(was);
+    text +=
+        fmt::format("{}{} {} instead of {}", text.empty() ? "" : ", ", what, shown(is), shown(was));
   };
   compare("max_speed", before.max_speed, now.max_speed, "/s");
   compare("acceleration", before.acceleration, now.acceleration, "/s^2");
@@ -75,7 +77,7 @@ bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
     response.duration = planned.move.duration;
     response.overshoot = planned.move.overshoot;
     response.steps_per_unit = planned.steps_per_unit;
-    response.message = axis_.config().name + ": would move " + wayText(planned.move);
+    response.message = fmt::format("{}: would move {}", axis_.config().name, wayText(planned.move));
     for (const axis::MovePiece& piece : planned.pieces) {
       response.pieces.emplace_back();
       Piece& shown = response.pieces.back();
@@ -89,12 +91,12 @@ bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
 }
 
 std::string AxisServices::wayText(const axis::Move& move) const {
-  const std::string unit = std::string(" ") + unitOf(axis_.config().kind);
+  const char* const unit = unitOf(axis_.config().kind);
   std::string text =
-      "to " + roundedText(move.target) + unit + " in " + roundedText(move.duration) + " s";
+      fmt::format("to {} {} in {} s", roundedText(move.target), unit, roundedText(move.duration));
   if (move.overshoot > 0.0) {
-    text += "; it can't stop before that, goes " + roundedText(move.overshoot) + unit +
-            " beyond, and comes back";
+    text += fmt::format("; it can't stop before that, goes {} {} beyond, and comes back",
+                        roundedText(move.overshoot), unit);
   }
   return text;
 }
@@ -104,7 +106,7 @@ void AxisServices::respondToMove(const axis::Move& move, bool wait, Response& re
   if (!wait) {
     response.position = move.target;
     response.duration = move.duration;
-    response.message = axis_.config().name + ": moves " + wayText(move);
+    response.message = fmt::format("{}: moves {}", axis_.config().name, wayText(move));
     return;
   }
   const axis::MoveResult result = axis_.wait(move);
@@ -117,8 +119,9 @@ void AxisServices::respondToMove(const axis::Move& move, bool wait, Response& re
 bool AxisServices::microstep(Microstep::Request& request, Microstep::Response& response) {
   respond(response, [&] {
     axis_.setMicrosteps(request.microsteps);
-    response.message = axis_.config().name + ": makes " + std::to_string(request.microsteps) +
-                       (request.microsteps == 1 ? " microstep" : " microsteps") + " per full step";
+    response.message =
+        fmt::format("{}: makes {} {} per full step", axis_.config().name, request.microsteps,
+                    request.microsteps == 1 ? "microstep" : "microsteps");
   });
   response.microsteps = axis_.state().microsteps;
   return true;
@@ -128,8 +131,9 @@ bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& r
   respond(response, [&] {
     const axis::AxisLimits before = axis_.limits();
     axis_.setLimits({request.max_speed, request.acceleration, request.deceleration, request.jerk});
-    response.message = axis_.config().name + ": " +
-                       changesText(before, axis_.limits(), unitOf(axis_.config().kind));
+    response.message =
+        fmt::format("{}: {}", axis_.config().name,
+                    changesText(before, axis_.limits(), unitOf(axis_.config().kind)));
   });
   const axis::AxisLimits holding = axis_.limits();
   response.max_speed = holding.max_speed;
@@ -142,8 +146,8 @@ bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& r
 bool AxisServices::setPosition(SetPosition::Request& request, SetPosition::Response& response) {
   respond(response, [&] {
     axis_.setPosition(request.position);
-    response.message = axis_.config().name + ": stands at " + roundedText(request.position) + " " +
-                       unitOf(axis_.config().kind);
+    response.message = fmt::format("{}: stands at {} {}", axis_.config().name,
+                                   roundedText(request.position), unitOf(axis_.config().kind));
   });
   response.position = axis_.state().position;
   return true;

@@ -1,5 +1,6 @@
 #include "machine_services.h"
 
+#include <fmt/format.h>
 #include <ros/console.h>
 #include <std_srvs/SetBool.h>
 #include <stepdriver/MoveLine.h>
@@ -39,11 +40,12 @@ void moveLine(machine::Machine& machine, const MoveLine::Request& request,
   }
   for (const auto& [name, own] : move.members) {
     const config::Kind kind = machine.axis(name).config().kind;
-    response.message += (response.message.empty() ? "" : ", ") + name + " to " +
-                        roundedText(own.target) + " " + unitOf(kind);
+    response.message += fmt::format("{}{} to {} {}", response.message.empty() ? "" : ", ", name,
+                                    roundedText(own.target), unitOf(kind));
     response.position.push_back(own.target);
   }
-  response.message = "a line: " + response.message + " in " + roundedText(move.duration) + " s";
+  response.message =
+      fmt::format("a line: {} in {} s", response.message, roundedText(move.duration));
   response.duration = move.duration;
 }
 
@@ -52,7 +54,7 @@ std::string kindsText(const sim::RigAxisReport& report) {
   std::string text;
   for (const auto& [violation, count] : report.violations) {
     if (!text.empty()) text += ", ";
-    text += std::to_string(count) + " " + sim::nameOf(violation);
+    text += fmt::format("{} {}", count, sim::nameOf(violation));
   }
   return text.empty() ? "none" : text;
 }
@@ -106,8 +108,9 @@ void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
       [&machine](SpeedOverride::Request& request, SpeedOverride::Response& response) {
         return respond(response, [&] {
           machine.setSpeedOverride(request.factor);
-          response.message = "all axes move at " + roundedText(request.factor) +
-                             " times the velocity that is commanded, within their maximum";
+          response.message = fmt::format(
+              "all axes move at {} times the velocity that is commanded, within their maximum",
+              roundedText(request.factor));
         });
       };
   node_.setCallbackQueue(&queues_.control());
@@ -165,11 +168,11 @@ void MachineServices::advertiseEndstop(setup::Simulation& simulation, const std:
       [&simulation, axis, end, name](Press::Request& request, Press::Response& response) {
         return respond(response, [&] {
           simulation.pressEndstop(axis, end, request.data != 0);
-          response.message = axis + ": the switch at the " + name + " end is " +
-                             (request.data != 0 ? "pressed" : "let go");
+          response.message = fmt::format("{}: the switch at the {} end is {}", axis, name,
+                                         request.data != 0 ? "pressed" : "let go");
         });
       };
-  servers_.push_back(node_.advertiseService("rig/" + axis + "/press_" + name, press));
+  servers_.push_back(node_.advertiseService(fmt::format("rig/{}/press_{}", axis, name), press));
 }
 
 }  // namespace stepdriver::ros_node

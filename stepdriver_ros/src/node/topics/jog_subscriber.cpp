@@ -1,5 +1,6 @@
 #include "jog_subscriber.h"
 
+#include <fmt/format.h>
 #include <ros/console.h>
 #include <ros/transport_hints.h>
 
@@ -43,9 +44,9 @@ void JogSubscriber::take(const Jog::ConstPtr& message) {
 
 std::vector<std::size_t> JogSubscriber::axesOf(const Jog& message) const {
   if (message.name.size() != message.velocity.size()) {
-    throw Refused("there are " + std::to_string(message.name.size()) + " names and " +
-                  std::to_string(message.velocity.size()) +
-                  " velocities; each name must have one velocity");
+    throw Refused(
+        fmt::format("there are {} names and {} velocities; each name must have one velocity",
+                    message.name.size(), message.velocity.size()));
   }
   std::vector<std::size_t> axes;
   for (std::size_t i = 0; i < message.name.size(); ++i) {

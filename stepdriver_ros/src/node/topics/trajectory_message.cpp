@@ -1,5 +1,7 @@
 #include "trajectory_message.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "common/text.h"
@@ -25,10 +27,9 @@ double timeOf(const trajectory_msgs::JointTrajectory& message, std::size_t index
   const bool tells_where_it_begins = index == 0 && planned == 0.0 && message.points.size() > 1;
   if (tells_where_it_begins) return 0.0;
   if (planned <= late) {
-    throw BadTrajectory(Kind::kOldStamp, "point " + std::to_string(index) + ", " +
-                                             roundedText(planned) +
-                                             " s after header.stamp, is in the past by " +
-                                             roundedText(late - planned) + " s");
+    throw BadTrajectory(Kind::kOldStamp,
+                        fmt::format("point {}, {} s after header.stamp, is in the past by {} s",
+                                    index, roundedText(planned), roundedText(late - planned)));
   }
   return planned - late;
 }
@@ -48,8 +49,10 @@ std::vector<double> restingPositions(const machine::Machine& machine,
   for (const std::string& axis : axes) {
     const axis::AxisState state = machine.axis(axis).state();
     if (state.moving) {
-      throw Refused(axis + ": it moves; a trajectory that starts later, " + roundedText(delay) +
-                    " s from now by its header.stamp, needs its axes at rest");
+      throw Refused(
+          fmt::format("{}: it moves; a trajectory that starts later, {} s from now by its "
+                      "header.stamp, needs its axes at rest",
+                      axis, roundedText(delay)));
     }
     positions.push_back(state.position);
   }
@@ -73,7 +76,7 @@ std::vector<std::string> axesOf(const std::vector<std::string>& joints, const Ax
     const auto axis = axes.find(joint);
     if (axis == axes.end()) {
       throw BadTrajectory(Kind::kJoints,
-                          "there is no joint " + joint + "; there are " + namesOf(axes));
+                          fmt::format("there is no joint {}; there are {}", joint, namesOf(axes)));
     }
     if (std::find(found.begin(), found.end(), axis->second) != found.end()) {
       throw BadTrajectory(Kind::kJoints, "the joint " + joint + " is named twice");
