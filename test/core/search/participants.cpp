@@ -495,10 +495,12 @@ void Participants::noteGoals(Ask& asked) {
     asked.ways = {rounds->rounds * config.steps_per_round / config.steps_per_unit};
   } else if (const auto* line = std::get_if<machine::MoveLine>(&asked.request)) {
     asked.goals = line->axes;
+    asked.together = true;
     asked.relative = line->relative;
     asked.ways = line->positions;
   } else if (const auto* trajectory = std::get_if<machine::FollowTrajectory>(&asked.request)) {
     asked.goals = trajectory->axes;
+    asked.together = true;
   }
 }
 
@@ -542,9 +544,8 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
     const auto& ordered = ordered_[axis];
     const auto begun = static_cast<std::ptrdiff_t>(asked.orders[axis]);
     const std::uint64_t accepted = engine_->channel(static_cast<int>(axis)).accepted;
-    const bool together = moves.size() > 1;
     if (std::none_of(ordered.begin() + begun, ordered.end(), [&](const Ordered& order) {
-          return order.serial <= accepted && order.together == together;
+          return order.serial <= accepted && order.together == asked.together;
         })) {
       oracle_.complain(who + " succeeds, but the engine has not begun it");
     }
@@ -619,11 +620,15 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
   }
-  std::vector<axis::TrajectoryPoint> points(3);
+  // There and a little back; smooth, as an axis without a start speed can't jump.
+  static constexpr std::array<double, 3> places = {0.4, 1.0, 0.7};
+  static constexpr std::array<double, 3> speeds = {3.0, 0.0, 0.0};
+  std::vector<axis::TrajectoryPoint> points(places.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].time = 0.25 * static_cast<double>(i + 1);
-    points[i].positions.assign(axes.size(),
-                               i == 1 ? 0.4 * size : size / (3.0 - static_cast<double>(i)));
+    points[i].positions.assign(axes.size(), places.at(i) * size);
+    points[i].velocities.assign(axes.size(), speeds.at(i) * size);
+    points[i].accelerations.assign(axes.size(), 0.0);
   }
   std::shared_ptr<const axis::PreparedTrajectory> prepared;
   try {

@@ -121,6 +121,7 @@ class Participants {
     machine::Request request;
     Meaning meaning;
     std::vector<std::size_t> goals;  ///< axes that it gives a goal
+    bool together = false;           ///< along one path
     bool relative = false;
     std::vector<double> ways;  ///< of a relative one, by goal
     std::vector<std::optional<double>> targets;
