@@ -46,7 +46,9 @@ constexpr int kClients = 4;
 constexpr int kResets = 20;
 constexpr double kLongestStorm = 2.5;       // [s] between two calms
 constexpr double kLongestBackground = 0.8;  // [s] from the last motion that is asked for to its end
-constexpr double kMostGrowth = 8.0;  // [MB] of the node, from the first quarter of the storm on
+// [MB] of the node, from the first quarter of the storm on. A node with a sanitizer needs another
+// `~most_growth`.
+constexpr double kMostGrowth = 8.0;
 constexpr std::size_t kMostReported = 10;
 
 void sleepFor(double seconds) {
@@ -227,13 +229,16 @@ void Storm::noteRest() {
     fail("the axes don't come to rest after a stop");
     return;
   }
-  // States that are read from here on are those of rest.
+  // States that are read from here on are those of rest. The rest is noted with the time of its
+  // first state: the offset of the rig's clock is only known to within the latency of a call, and
+  // the next motion may begin right after the last state.
   const int before = states_->count();
+  const std::int64_t at_rest = steadyNow();
   if (!waitUntil([&] { return !isAlive() || states_->count() > before + 1; })) {
     fail("axis_states doesn't come any more");
     return;
   }
-  seen_.rests.push_back({steadyNow(), states_->latest().position});
+  seen_.rests.push_back({at_rest, states_->latest().position});
   memory_.push_back(static_cast<double>(node_.process().kilobytes("VmRSS")) / 1024.0);
 }
 
@@ -317,7 +322,8 @@ TEST_F(Storm, KeepsThePromises) {
   end();
   judge();
   const std::size_t quarter = memory_.size() / 4;
-  EXPECT_LT(memory_.back() - memory_.at(quarter), kMostGrowth) << "[MB]";
+  EXPECT_LT(memory_.back() - memory_.at(quarter), ros::param::param("~most_growth", kMostGrowth))
+      << "[MB]";
 }
 
 }  // namespace
