@@ -65,6 +65,10 @@ std::vector<Act> makeActs() {
        [](Participants& all, int client) {
          all.postTrajectory(client, {kX, kY}, 0.008);
        }},
+      {"trajectory of x and z",
+       [](Participants& all, int client) {
+         all.postTrajectory(client, {kX, kZ}, 0.006);
+       }},
       {"trajectory of z",
        [](Participants& all, int client) { all.postTrajectory(client, {kZ}, 0.006); }},
       request("jog x", machine::Jog{kX, 0.05, {}}, moving({kX})),

@@ -36,5 +36,23 @@ TEST(FoundSchedules, RecoverComesRightAfterAChipFault) {
               {}});
 }
 
+TEST(FoundSchedules, AnAxisThatMovesIsStoppedWhileATrajectoryWakesAnotherOne) {
+  for (const char* stop : {"stop x", "stop", "hold", "disable x", "shut down"}) {
+    expectGood({0,
+                {does(0, 0, "jog x"), does(1, 200, "a pin is slow"),
+                 does(0, 1, "trajectory of x and z"), does(1, 8, stop)},
+                {}});
+  }
+}
+
+TEST(FoundSchedules, AMoveGoesOnIfATrajectoryCannotTakeItOverAfterItHasWokenAnotherAxis) {
+  expectGood({0, {does(0, 0, "move x to 8 mm"), does(1, 200, "trajectory of x and z")}, {}});
+}
+
+TEST(FoundSchedules, RelativePositionsCountFromTheJointWhileItsBacklashIsTakenUp) {
+  expectGood({0, {does(0, 0, "line of x and y"), does(1, 0, "move y by 7 mm")}, {}});
+  expectGood({0, {does(0, 0, "line of x and y"), does(1, 4, "line of y and z by")}, {}});
+}
+
 }  // namespace
 }  // namespace stepdriver::search

@@ -550,10 +550,8 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
       oracle_.complain(who + " succeeds, but the engine has not begun it");
     }
     if (!asked.relative || !asked.targets[i]) continue;
-    // It may count from a motion that takes the backlash up.
     const double scale = controller_->snapshot()->axes[axis].steps_per_unit;
-    const double near = configs_[axis].backlash + 1.01 / scale;
-    if (std::abs(moves[i].target - *asked.targets[i]) > near) {
+    if (std::abs(moves[i].target - *asked.targets[i]) > 1.01 / scale) {
       oracle_.complain(who + " goes to " + std::to_string(moves[i].target) + " m, not to " +
                        std::to_string(*asked.targets[i]) + " m");
     }
