@@ -1,5 +1,6 @@
 #include "follow_goal.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "axis/line_path.h"
@@ -23,8 +24,20 @@ std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes,
 
 // ---- from whatever the axes do ----
 
+namespace {
+
+// While pins are written nobody would slow down what the others do: they come to rest before that.
+Activity::Handover handoverOf(const std::vector<Order>& orders) {
+  const bool wakes = std::any_of(orders.begin(), orders.end(), [](const Order& order) {
+    return order.axis->motor.power().isIdle();
+  });
+  return wakes ? Activity::Handover::kAfterRest : Activity::Handover::kAtSpeed;
+}
+
+}  // namespace
+
 FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call)
-    : Script(context, axesOf(orders), Handover::kAtSpeed, std::move(call)),
+    : Script(context, axesOf(orders), handoverOf(orders), std::move(call)),
       orders_(std::move(orders)),
       join_(std::move(join)) {}
 
@@ -35,9 +48,6 @@ std::unique_ptr<FollowStep> FollowGoal::follow() {
 }
 
 void FollowGoal::prepare() {
-  for (const Order& order : orders_) {
-    if (order.axis->motor.power().isIdle()) return;  // it is planned when the motor has current
-  }
   prepared_ = follow();
   prepared_->prepare();
 }

@@ -11,7 +11,8 @@
 
 namespace stepdriver::activity {
 
-/// A move or a jog of one axis, or a path of several, from whatever they do.
+/// A move or a jog of one axis, or a path of several, from whatever they do. If one of them is
+/// idle, all come to rest first, and it is woken.
 class FollowGoal : public Script {
  public:
   /// @param join empty for one axis alone.

@@ -200,8 +200,11 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
   const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
   const motor::Motion* latest = axis.motor.motions().latest();
   if (motion == nullptr || latest == nullptr) return static_cast<double>(axis.jointCount());
-  if (latest->slows_down) return axis.jointAt(latest->profile->endPosition().value());
   const Goal* goal = motion->goalOf(axis);
+  // What slows down, and what takes up backlash, ends where its motor does.
+  if (latest->slows_down || (goal != nullptr && goal->of_motor)) {
+    return axis.jointAt(latest->profile->endPosition().value());
+  }
   if (goal == nullptr || !goal->target) {
     axis.refuse("busy: it jogs without an end; give an absolute position");
   }

@@ -45,7 +45,7 @@ TEST(FoundSchedules, AnAxisThatMovesIsStoppedWhileATrajectoryWakesAnotherOne) {
   }
 }
 
-TEST(FoundSchedules, AMoveGoesOnIfATrajectoryCannotTakeItOverAfterItHasWokenAnotherAxis) {
+TEST(FoundSchedules, AMoveEndsWhereItIsSaidToIfATrajectoryWakesAnotherAxis) {
   expectGood({0, {does(0, 0, "move x to 8 mm"), does(1, 200, "trajectory of x and z")}, {}});
 }
 
