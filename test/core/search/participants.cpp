@@ -525,11 +525,19 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   if (now.memory) return now.memory->position;
   const machine::AxisSnapshot::Motion& last = now.motions.back();
   if (!last.target && !last.slows_down) return std::nullopt;
-  const double end = last.profile->endPosition().value();
-  const double slack =
-      static_cast<double>(now.channel.slack) + end - static_cast<double>(now.channel.count);
-  const double taken_up = std::clamp(slack, 0.0, static_cast<double>(now.backlash));
-  return now.origin + (end - taken_up) / now.steps_per_unit;
+  // Each turn on the way takes the backlash up anew.
+  double motor = static_cast<double>(now.channel.count);
+  double slack = static_cast<double>(now.channel.slack);
+  const auto move_to = [&](double position) {
+    slack = std::clamp(slack + position - motor, 0.0, static_cast<double>(now.backlash));
+    motor = position;
+  };
+  constexpr pulse::Nanoseconds kStep = 1'000'000;
+  for (auto time = clock_.now(); time < last.profile->endNs(); time += kStep) {
+    move_to(last.profile->stateAt(time).position.value());
+  }
+  move_to(last.profile->endPosition().value());
+  return now.origin + (motor - slack) / now.steps_per_unit;
 }
 
 // A motion that was begun, from what its call said it would.
