@@ -15,14 +15,14 @@ struct MotionKeys {
   long double units_per_round;    ///< 360 degrees; 0: given by per_round or wheel_diameter
   std::string steps_per_unit;
   std::string per_round, wheel_diameter;  ///< empty: there is none
-  std::string max_speed, min_speed;
+  std::string max_speed, start_speed;
   std::string acceleration, deceleration, stop_deceleration, jerk;
   std::string backlash;
   std::string min_position, max_position;
 
   std::vector<std::string> all() const {
-    std::vector<std::string> keys{steps_per_unit, max_speed,         min_speed, acceleration,
-                                  deceleration,   stop_deceleration, jerk,      backlash,
+    std::vector<std::string> keys{steps_per_unit, max_speed,         start_speed, acceleration,
+                                  deceleration,   stop_deceleration, jerk,        backlash,
                                   min_position,   max_position};
     for (const std::string& key : {per_round, wheel_diameter}) {
       if (!key.empty()) keys.push_back(key);
@@ -42,7 +42,7 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "mm_per_round",
                                  "wheel_diameter_mm",
                                  "max_speed_mm_s",
-                                 "min_speed_mm_s",
+                                 "start_speed_mm_s",
                                  "acceleration_mm_s2",
                                  "deceleration_mm_s2",
                                  "stop_deceleration_mm_s2",
@@ -58,7 +58,7 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "",
                                  "",
                                  "max_speed_deg_s",
-                                 "min_speed_deg_s",
+                                 "start_speed_deg_s",
                                  "acceleration_deg_s2",
                                  "deceleration_deg_s2",
                                  "stop_deceleration_deg_s2",

@@ -75,7 +75,7 @@ class HomingReader {
     const auto latch = readSpeed(latch_key, restart,
                                  fmt::format("{}, the speed that the motor stops from without a "
                                              "ramp ({}, or that after one full step)",
-                                             upperBoundText(restart), keys_.min_speed));
+                                             upperBoundText(restart), keys_.start_speed));
     if (seek && latch && *latch > *seek) {
       mustBe(latch_key, fmt::format("at most {}, which is {}", seek_key, homing_.shown(seek_key)));
     }

@@ -81,9 +81,9 @@ class MotionReader {
 
   void readSpeeds(AxisConfig& config) {
     const auto max = axis_.findNumber(keys_.max_speed, Range::positive(), presence_);
-    const auto min = axis_.findNumber(keys_.min_speed, Range::notNegative(), Presence::kOptional);
+    const auto min = axis_.findNumber(keys_.start_speed, Range::notNegative(), Presence::kOptional);
     if (min && max && *min > *max) {
-      mustBe(keys_.min_speed,
+      mustBe(keys_.start_speed,
              fmt::format("at most {}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
     }
     if (max) checkRate(*max);

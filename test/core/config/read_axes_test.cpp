@@ -21,7 +21,7 @@ TEST(ReadAxes, ReadsAWholeLinearA4988) {
              {"reset", "gpiochip0:26"}}));
   put(axis, "invert", mapOf({{"dir", true}, {"enable", true}, {"ms2", true}, {"step", false}}));
   put(axis, "steps_per_round", 3200);
-  put(axis, "min_speed_mm_s", 5);
+  put(axis, "start_speed_mm_s", 5);
   put(axis, "deceleration_mm_s2", 250.0);
   put(axis, "min_position_mm", -10.0);
   put(axis, "max_position_mm", 200.0);
@@ -74,7 +74,7 @@ TEST(ReadAxes, ReadsAWholeRotaryDrv8825) {
   put(axis, "pins/m1", "M1");
   put(axis, "pins/m2", "M2");
   put(axis, "invert/m2", true);
-  put(axis, "min_speed_deg_s", 18.0);
+  put(axis, "start_speed_deg_s", 18.0);
   put(axis, "deceleration_deg_s2", 90.0);
   put(axis, "min_position_deg", -180.0);
   put(axis, "max_position_deg", 360);

@@ -113,7 +113,7 @@ TEST(ReadHoming, ChecksItAgainstTheAxis) {
        {"homing/latch_speed_mm_s", 14.1421, ""},
        {"homing/latch_speed_mm_s", 14.15,
         "is 14.15, but must be at most 14.1421, the speed that the motor stops from without a ramp "
-        "(min_speed_mm_s, or that after one full step)"},
+        "(start_speed_mm_s, or that after one full step)"},
        {"homing/max_travel_mm", 1e11,
         "is 100000000000.0, but must be at most 13743800000, which is 2^40 steps"},
        {"homing/pull_off_mm", 251.0, "is 251.0, but must be at most max_travel_mm, which is 250.0"},

@@ -22,9 +22,9 @@ TEST(ReadMotion, ChecksEachNumberOfTheMotion) {
   }
   expectIssues(
       linearAxis(),
-      {{"min_speed_mm_s", -0.1, "is -0.1, but must be 0 or more"},
-       {"min_speed_mm_s", 100.0, ""},
-       {"min_speed_mm_s", 101, "is 101, but must be at most max_speed_mm_s, which is 100.0"},
+      {{"start_speed_mm_s", -0.1, "is -0.1, but must be 0 or more"},
+       {"start_speed_mm_s", 100.0, ""},
+       {"start_speed_mm_s", 101, "is 101, but must be at most max_speed_mm_s, which is 100.0"},
        {"min_position_mm", kNan, "is nan, but must be a finite number"},
        {"max_position_mm", "far", "is \"far\" (a string), but must be a number"}});
 }
@@ -79,15 +79,16 @@ TEST(ReadMotion, WantsTheLowerLimitBelowTheUpper) {
 
 TEST(ReadMotion, RefusesTwoUnitsInOneAxis) {
   ConfigValue axis = linearAxis();
-  put(axis, "min_speed_deg_s", 5.0);
+  put(axis, "start_speed_deg_s", 5.0);
   const std::string mixed =
-      "/axes/x: has steps_per_mm and min_speed_deg_s, but must be either linear, with all of it in "
+      "/axes/x: has steps_per_mm and start_speed_deg_s, but must be either linear, with all of it "
+      "in "
       "mm, or rotary, with all of it in degrees";
   EXPECT_EQ(issuesOfX(axis), Lines{mixed});
-  put(axis, "min_speed_deg_s", -5.0);
+  put(axis, "start_speed_deg_s", -5.0);
   put(axis, "max_speed_mm_s", 0);
   EXPECT_EQ(issuesOfX(axis), (Lines{mixed, "/axes/x/max_speed_mm_s: is 0, but must be above 0",
-                                    "/axes/x/min_speed_deg_s: is -5.0, but must be 0 or more"}));
+                                    "/axes/x/start_speed_deg_s: is -5.0, but must be 0 or more"}));
 }
 
 TEST(ReadMotion, SaysWhereAnAxisHasNoUnit) {

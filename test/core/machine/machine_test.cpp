@@ -193,6 +193,8 @@ class RandomCommands {
     EXPECT_GT(endstops_, 0);
     EXPECT_GT(stops_, 0);
     EXPECT_GT(taken_over_, 0);
+    EXPECT_GT(refused_, 0) << "some targets are out of reach";
+    EXPECT_LT(refused_, commands / 2) << "most commands must do something";
     checkSpeeds();
   }
 

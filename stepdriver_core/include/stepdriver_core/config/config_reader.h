@@ -139,7 +139,7 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     # end of the ways
 ///     steps_per_round: 3200     # [microsteps] per motor round; default: from full_steps_per_round
 ///     max_speed_mm_s: 100.0     # max_speed_deg_s, and so on
-///     min_speed_mm_s: 0.0       # reached without a ramp; default: 0
+///     start_speed_mm_s: 0.0     # reached without a ramp; default: 0
 ///     acceleration_mm_s2: 500.0
 ///     deceleration_mm_s2: 500.0 # default: the acceleration
 ///     backlash_mm: 0.0          # that a reversal loses, and that is made up for; default: 0
