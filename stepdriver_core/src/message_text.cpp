@@ -63,9 +63,7 @@ std::string roughText(double number) {
 }
 
 std::string millisecondsText(std::int64_t nanoseconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g ms", static_cast<double>(nanoseconds) * 1e-6);
-  return text;
+  return fmt::format("{:.3g} ms", static_cast<double>(nanoseconds) * 1e-6);
 }
 
 // The slack keeps a bound that is a round number but for its last bit.

@@ -1,5 +1,7 @@
 #include "follow_goal.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -115,7 +117,8 @@ Steps FollowLine::takeUp(const Order& order) {
         check();
         const auto result = goal.outcome->get();
         if (result && result->end != axis::MoveEnd::kReached) {
-          throw Refused(axis.name() + ": the line did not begin: " + result->message);
+          throw Refused(
+              fmt::format("{}: the line did not begin: {}", axis.name(), result->message));
         }
       }));
   return steps;

@@ -1,5 +1,7 @@
 #include "homing.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -78,7 +80,7 @@ void Homing::onBegin(std::vector<Predecessor> /*predecessors*/) {
 }
 
 void Homing::onAbandon(const Why& why) {
-  failure_ = axis_.name() + " isn't homed: " + why.text;
+  failure_ = fmt::format("{} isn't homed: {}", axis_.name(), why.text);
   conclude(failure_ + "; it stands at ", true);
 }
 
@@ -96,7 +98,7 @@ void Homing::cancelHomings(const std::vector<std::uint64_t>& ids) {
 std::vector<Predecessor> Homing::handOver(const std::string& by) {
   std::vector<Predecessor> left = stroke_->handOver();
   result_.end = HomingEnd::kFailed;
-  failure_ = axis_.name() + " isn't homed: " + by;
+  failure_ = fmt::format("{} isn't homed: {}", axis_.name(), by);
   conclude(failure_, false);
   return left;
 }
@@ -178,8 +180,8 @@ void Homing::strokeEnded() {
       config_.at_max ? axis::MoveEnd::kEndstopMax : axis::MoveEnd::kEndstopMin;
   if (end == axis::MoveEnd::kReached || end == axis::MoveEnd::kStopped) return rested();
   if (end != own) {
-    fail(std::string("the ") + (config_.at_max ? "min" : "max") + " endstop was met while " +
-         nameOf(phase_));
+    fail(fmt::format("the {} endstop was met while {}", config_.at_max ? "min" : "max",
+                     nameOf(phase_)));
     return onLook();
   }
   if (phase_ == HomingPhase::kLatching) keepLatch();
@@ -251,9 +253,9 @@ void Homing::sample() {
   }
   if (context().now - steady_since_ >= debounce_) return settled();
   if (context().now - settle_began_ > kMostDebounces * debounce_) {
-    fail(switch_ + " bounces without end: after " +
-         millisecondsText(context().now - settle_began_) +
-         " it still hasn't been at rest for debounce_ms, " + millisecondsText(debounce_));
+    fail(fmt::format(
+        "{} bounces without end: after {} it still hasn't been at rest for debounce_ms, {}",
+        switch_, millisecondsText(context().now - settle_began_), millisecondsText(debounce_)));
     onLook();
   }
 }
@@ -319,16 +321,16 @@ void Homing::pullOff() {
 // ---- the end ----
 
 std::string Homing::timeOver() const {
-  const std::string within = " within timeout_s, " + numberText(config_.timeout) + " s";
-  if (phase_ == HomingPhase::kPullingOff) return "it didn't come to its end" + within;
+  const std::string within = fmt::format("within timeout_s, {} s", numberText(config_.timeout));
+  if (phase_ == HomingPhase::kPullingOff) return "it didn't come to its end " + within;
   const bool leaving = phase_ == HomingPhase::kLeaving || phase_ == HomingPhase::kBackingOff;
-  return switch_ + (leaving ? " didn't open" : " didn't close") + within;
+  return fmt::format("{} didn't {} {}", switch_, leaving ? "open" : "close", within);
 }
 
 void Homing::fail(const std::string& why, HomingEnd end, const Ack& call) {
   if (phase_ != HomingPhase::kStopping) {
     phase_ = HomingPhase::kStopping;
-    failure_ = axis_.name() + " isn't homed: " + why;
+    failure_ = fmt::format("{} isn't homed: {}", axis_.name(), why);
     result_.end = end;
   }
   settling_ = false;

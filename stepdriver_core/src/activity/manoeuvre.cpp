@@ -1,5 +1,7 @@
 #include "manoeuvre.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -47,7 +49,7 @@ axis::MoveResult resultWith(const axis::AxisModel& axis, const Goal& goal, axis:
   result.position = axis.positionNow();
   result.duration = secondsSince(goal.began_ns, state.end_time);
   if (end == axis::MoveEnd::kReached) {
-    result.message = axis.name() + " reached " + axis.show(result.position);
+    result.message = fmt::format("{} reached {}", axis.name(), axis.show(result.position));
     return result;
   }
   result.message = standsAt(axis, goal, why);
@@ -74,11 +76,11 @@ Failure failureOf(const std::exception& error) {
 }
 
 std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why) {
-  std::string text = axis.name() + " stands at " + axis.show(axis.positionNow());
-  if (goal.target) {
-    text += ", not at " + axis.show(axis.positionOf(static_cast<double>(*goal.target)));
-  }
-  return text + ": " + why;
+  const std::string not_at =
+      goal.target ? ", not at " + axis.show(axis.positionOf(static_cast<double>(*goal.target)))
+                  : "";
+  return fmt::format("{} stands at {}{}: {}", axis.name(), axis.show(axis.positionNow()), not_at,
+                     why);
 }
 
 Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join)
@@ -325,10 +327,11 @@ void Manoeuvre::refused() {
 
 void Manoeuvre::tryAgain() {
   if (lead_ > kLongestLead) {
-    return fail({Failure::Kind::kRefused,
-                 orders_.front().axis->name() +
-                     ": the pulse thread doesn't keep up: it took a plan later than " +
-                     millisecondsText(lead_) + " after it was made"});
+    return fail(
+        {Failure::Kind::kRefused,
+         fmt::format(
+             "{}: the pulse thread doesn't keep up: it took a plan later than {} after it was made",
+             orders_.front().axis->name(), millisecondsText(lead_))});
   }
   lead_ *= 2;
   try {
@@ -457,7 +460,7 @@ std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
     const pulse::EndReason end = other.axis->motor.state().end;
     if (other.axis != &axis && end != pulse::EndReason::kDone &&
         end != pulse::EndReason::kCompanion) {
-      return "it moved together with " + other.axis->name() + ", which was stopped";
+      return fmt::format("it moved together with {}, which was stopped", other.axis->name());
     }
   }
   return "an axis that it moved together with was stopped";
@@ -468,8 +471,9 @@ axis::MoveResult Manoeuvre::droppedResult(const Order& order, bool by_it) const 
   if (by_it || orders_.size() == 1) {
     return resultWith(*order.axis, order.goal, why_.end, why_.text);
   }
-  return resultWith(*order.axis, order.goal, axis::MoveEnd::kCompanion,
-                    "it was held together with " + orders_.front().axis->name() + ": " + why_.text);
+  return resultWith(
+      *order.axis, order.goal, axis::MoveEnd::kCompanion,
+      fmt::format("it was held together with {}: {}", orders_.front().axis->name(), why_.text));
 }
 
 axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Order& by,
@@ -479,16 +483,16 @@ axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Orde
   result.end = axis::MoveEnd::kReplaced;
   result.position = axis.positionNow();
   result.duration = secondsSince(before.goal.began_ns, profile.startNs());
-  result.message = axis.name() + " was at " + axis.show(result.position) + " when ";
+  std::string what;
   if (by.goal.kind == Goal::Kind::kJog) {
-    result.message += "a jog took over";
+    what = "a jog";
   } else if (by.goal.kind == Goal::Kind::kTogether) {
-    result.message += "a motion together with other axes took over";
+    what = "a motion together with other axes";
   } else {
-    result.message += "a move to " +
-                      axis.show(axis.positionOf(static_cast<double>(*by.goal.target))) +
-                      " took over";
+    what = "a move to " + axis.show(axis.positionOf(static_cast<double>(*by.goal.target)));
   }
+  result.message =
+      fmt::format("{} was at {} when {} took over", axis.name(), axis.show(result.position), what);
   return result;
 }
 

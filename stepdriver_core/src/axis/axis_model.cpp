@@ -1,5 +1,8 @@
 #include "axis_model.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -95,20 +98,21 @@ pulse::Nanoseconds AxisModel::restartInterval() const {
 double AxisModel::checkedLimit(const char* what, double wanted, double configured, double lowest,
                                const char* per) const {
   if (!std::isfinite(wanted) || wanted < 0.0) {
-    refuse(std::string("the ") + what +
-           " must be a finite number, above 0 or 0 for what is configured");
+    refuse(
+        fmt::format("the {} must be a finite number, above 0 or 0 for what is configured", what));
   }
   // The bound as the configuration rounds it is not below itself.
   const double bound = lowest / config.steps_per_unit;
   if (wanted > 0.0 && wanted * (1.0 + 1e-9) < bound) {
-    refuse(std::string("the ") + what + " " + show(wanted, per) + " is below the lowest, " +
-           lowerBoundText(bound) + (config.kind == config::Kind::kLinear ? " m" : " rad") + per +
-           ", which is " + numberText(lowest) + " steps" + per);
+    refuse(fmt::format("the {0} {1} is below the lowest, {2} {3}{4}, which is {5} steps{4}", what,
+                       show(wanted, per), lowerBoundText(bound),
+                       config.kind == config::Kind::kLinear ? "m" : "rad", per,
+                       numberText(lowest)));
   }
   // Without a jerk limit in the configuration any is within it.
   if (configured > 0.0 && wanted > configured * (1.0 + 1e-12)) {
-    refuse(std::string("the ") + what + " " + show(wanted, per) + " is above the configured " +
-           show(configured, per));
+    refuse(fmt::format("the {} {} is above the configured {}", what, show(wanted, per),
+                       show(configured, per)));
   }
   return wanted > 0.0 ? wanted : configured;
 }
@@ -157,7 +161,8 @@ void AxisModel::refuseUnlessReady() const {
 
 void AxisModel::refuseTooFast(double speed) const {
   if (speed <= maxSpeed() * (1.0 + 1e-12)) return;
-  refuse("the velocity " + show(speed, "/s") + " is above the maximum " + show(maxSpeed(), "/s"));
+  refuse(fmt::format("the velocity {} is above the maximum {}", show(speed, "/s"),
+                     show(maxSpeed(), "/s")));
 }
 
 double AxisModel::checkedVelocity(double velocity) const {
@@ -182,21 +187,18 @@ void AxisModel::refuseMicrosteps(int wanted) const {
   const driver::DriverChip& chip = driver::driverChipOf(config.driver);
   const auto& known = chip.microsteps;
   if (chip.modes.empty()) {
-    refuse("the microsteps of a " + chip.title +
-           " are set by its DIP switches while its power is off, not by software; they are "
-           "configured as `microsteps`, here " +
-           std::to_string(motor.microsteps()));
+    refuse(
+        fmt::format("the microsteps of a {} are set by its DIP switches while its power is off, "
+                    "not by software; they are configured as `microsteps`, here {}",
+                    chip.title, motor.microsteps()));
   }
   if (std::find(known.begin(), known.end(), wanted) == known.end()) {
-    std::string list;
-    for (const int mode_known : known) {
-      list += (list.empty() ? "" : ", ") + std::to_string(mode_known);
-    }
-    refuse("a " + chip.title + " has no 1/" + std::to_string(wanted) + " mode; it has " + list);
+    refuse(fmt::format("a {} has no 1/{} mode; it has {}", chip.title, wanted,
+                       fmt::join(known, ", ")));
   }
   if (!motor.pins().hasMode()) {
-    refuse("the microstep pins aren't configured: the board decides, here 1/" +
-           std::to_string(motor.microsteps()));
+    refuse(fmt::format("the microstep pins aren't configured: the board decides, here 1/{}",
+                       motor.microsteps()));
   }
 }
 

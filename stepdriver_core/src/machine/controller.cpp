@@ -1,5 +1,7 @@
 #include "controller.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -35,7 +37,8 @@ constexpr const char* kLateRemedy =
 
 void refuseBadNumber(const axis::AxisModel& axis, const std::string& what, double value) {
   if (std::isfinite(value) && value >= 0.0) return;
-  axis.refuse("the " + what + " is " + numberText(value) + ", but must be 0 or above, and finite");
+  axis.refuse(
+      fmt::format("the {} is {}, but must be 0 or above, and finite", what, numberText(value)));
 }
 
 }  // namespace
@@ -109,9 +112,10 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     axis.rest_since = std::min(context_.now, state.end_time + context_.slipped);
     if (state.end == pulse::EndReason::kEmergencyStop) axis.fault.latchEmergencyStop(false);
     if (state.end == pulse::EndReason::kTooLate) {
-      axis.fault.latch("a pulse was " + millisecondsText(state.end_lateness) +
-                           " late, more than the motor can go on from at this speed",
-                       kLateRemedy);
+      axis.fault.latch(
+          fmt::format("a pulse was {} late, more than the motor can go on from at this speed",
+                      millisecondsText(state.end_lateness)),
+          kLateRemedy);
       axis.position.distrust();
     }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.position.distrust();
@@ -292,8 +296,8 @@ void Controller::serve(const Jog& wanted, const Ack& call) {
   if (!moved.moving()) {
     const std::int64_t sign = wanted.velocity > 0.0 ? 1 : -1;
     if (goal.target && (*goal.target - moved.jointCount()) * sign <= 0) {
-      moved.refuse("it stands at the soft limit " + moved.show(*limit) +
-                   "; it jogs only away from it");
+      moved.refuse(fmt::format("it stands at the soft limit {}; it jogs only away from it",
+                               moved.show(*limit)));
     }
     moved.refuseIntoEndstop(sign);
   } else if (jogs && !motion->slowsDown() && current->velocity == wanted.velocity) {
@@ -529,10 +533,10 @@ void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
   if (common != count) {
     const double place = changed.positionOf(changed.jointAt(static_cast<double>(common)));
     if (!changed.config.align_on_microstep_change) {
-      changed.refuse("1/" + std::to_string(wanted.microsteps) + " has no position at " +
-                     changed.show(changed.positionNow()) +
-                     "; the nearest that both modes have is " + changed.show(place) +
-                     ": move there first, or configure align_on_microstep_change");
+      changed.refuse(
+          fmt::format("1/{} has no position at {}; the nearest that both modes have is {}: move "
+                      "there first, or configure align_on_microstep_change",
+                      wanted.microsteps, changed.show(changed.positionNow()), changed.show(place)));
     }
     refuseUnlessReadyToMove(changed);
     changed.refuseBeyondLimits(place, "the common position");
@@ -564,9 +568,9 @@ void Controller::serve(const RestorePosition& wanted, const Ack& call) {
   axis::AxisModel& restored = axis(wanted.axis);
   const axis::AxisMemory& kept = wanted.memory;
   if (kept.kind != restored.config.kind || kept.steps_per_unit != restored.config.steps_per_unit) {
-    restored.position.setNote("the position was kept for another axis, of " +
-                              numberText(kept.steps_per_unit) + " steps per " +
-                              (kept.kind == config::Kind::kLinear ? "m" : "rad"));
+    restored.position.setNote(fmt::format(
+        "the position was kept for another axis, of {} steps per {}",
+        numberText(kept.steps_per_unit), kept.kind == config::Kind::kLinear ? "m" : "rad"));
     return;
   }
   activities_.begin(

@@ -1,9 +1,10 @@
 #include "stepdriver_core/machine/machine.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <optional>
 #include <utility>
@@ -81,14 +82,14 @@ class Machine::Impl {
       if (axis->config().name == name) return *axis;
       names += (names.empty() ? "" : ", ") + axis->config().name;
     }
-    throw Refused("there is no axis " + name + "; there are " + names);
+    throw Refused(fmt::format("there is no axis {}; there are {}", name, names));
   }
 
   CoordinatedMove moveLine(const LineRequest& request) {
     const std::vector<AxisId> axes = idsOf(axesOf(request.names));
     if (request.positions.size() != axes.size()) {
-      throw Refused("there are " + std::to_string(axes.size()) + " names, but " +
-                    std::to_string(request.positions.size()) + " positions");
+      throw Refused(fmt::format("there are {} names, but {} positions", axes.size(),
+                                request.positions.size()));
     }
     return moveOf(request.names, ask(*shell_, MoveLine{axes, request.positions, request.relative,
                                                        request.velocity, request.duration}));
@@ -259,10 +260,8 @@ void Machine::checkHoming(const std::vector<std::string>& names) const {
 
 void Machine::setSpeedOverride(double factor) {
   if (!(factor >= kLeastOverride && factor <= kMostOverride)) {
-    char text[96];
-    std::snprintf(text, sizeof text, "the speed override is %.9g, but must be from %g to %g",
-                  factor, kLeastOverride, kMostOverride);
-    throw Refused(text);
+    throw Refused(fmt::format("the speed override is {:.9g}, but must be from {:g} to {:g}", factor,
+                              kLeastOverride, kMostOverride));
   }
   ask(*impl_->shell_, SetSpeedOverride{factor});
 }

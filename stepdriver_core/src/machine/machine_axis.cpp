@@ -1,5 +1,7 @@
 #include "machine_axis.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <string>
@@ -127,7 +129,7 @@ std::vector<axis::HomingResult> homeInOrder(Shell& shell, const std::vector<Mach
       axis::HomingResult result;
       result.axis = axis->config().name;
       result.end = end;
-      result.message = result.axis + " isn't homed: " + why;
+      result.message = fmt::format("{} isn't homed: {}", result.axis, why);
       result.position = axis->state().position;
       results.push_back(std::move(result));
     }

@@ -1,6 +1,7 @@
 #include "machine/state_file.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -24,20 +25,18 @@ constexpr const char* kColumns =
     "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home";
 
 [[noreturn]] void failed(const std::string& what, const std::string& path) {
-  throw Error("the state file " + path + " can't be " + what + ": " + std::strerror(errno));
+  throw Error(fmt::format("the state file {} can't be {}: {}", path, what, std::strerror(errno)));
 }
 
 std::string textOf(const KeptState& state) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text.precision(17);
-  text << kTitle << '\n' << (state.clean ? kClean : kRunning) << '\n' << kColumns << '\n';
+  std::string text = fmt::format("{}\n{}\n{}\n", kTitle, state.clean ? kClean : kRunning, kColumns);
   for (const auto& [name, axis] : state.axes) {
-    text << name << ' ' << (axis.kind == config::Kind::kLinear ? "linear" : "rotary") << ' '
-         << axis.steps_per_unit << ' ' << axis.position << ' ' << axis.slack << ' ' << axis.valid
-         << ' ' << axis.homed << ' ' << axis.at_home << '\n';
+    text +=
+        fmt::format("{} {} {:.17g} {:.17g} {:.17g} {:d} {:d} {:d}\n", name,
+                    axis.kind == config::Kind::kLinear ? "linear" : "rotary", axis.steps_per_unit,
+                    axis.position, axis.slack, axis.valid, axis.homed, axis.at_home);
   }
-  return text.str();
+  return text;
 }
 
 // A file that has what is to be on the disk, before it takes the place of the one that is there.
@@ -100,7 +99,8 @@ StateFile::StateFile(std::string path) : path_(std::move(path)) {
   close(lock_);
   errno = error;
   if (error == EWOULDBLOCK) {
-    throw Error("the state file " + path_ + " is used by another program: each node needs its own");
+    throw Error(fmt::format("the state file {} is used by another program: each node needs its own",
+                            path_));
   }
   failed("locked", path_);
 }
@@ -114,8 +114,8 @@ std::optional<KeptState> StateFile::load() const {
     failed("read", path_);
   }
   const auto broken = [this](int line) {
-    return Error("the state file " + path_ + " is broken in line " + std::to_string(line) +
-                 "; delete it, or put it right");
+    return Error(fmt::format("the state file {} is broken in line {}; delete it, or put it right",
+                             path_, line));
   };
   KeptState state;
   std::string line;
