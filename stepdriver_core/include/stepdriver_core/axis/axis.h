@@ -11,9 +11,9 @@ namespace stepdriver::axis {
 
 /// One axis of a machine::Machine, which makes it: units in, pulses out.
 ///
-/// All calls are safe from any thread. They are carried out in the order in which they come, with
-/// those of all other axes. Every command is either accepted whole or throws Refused and changes
-/// nothing. A unit is m on a linear axis, rad on a rotary one.
+/// All calls are safe from any thread. The machine carries out the calls of all its axes one after
+/// another, in the order in which they arrive. Every command is either accepted as a whole, or
+/// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
   Axis() = default;
@@ -21,21 +21,20 @@ class Axis {
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
 
-  /// As configured; what setLimits() and setMicrosteps() change is in limits() and state().
+  /// As configured. limits() and state() have what setLimits() and setMicrosteps() change.
   virtual const config::AxisConfig& config() const = 0;
 
-  /// Moves to a position and rests there. A motion under way is replaced: the axis goes on from the
-  /// speed and the acceleration that it has, and whoever waits for the earlier move is told. It
-  /// doesn't pass its target, but where it can't stop before it; then it comes back, and
-  /// Move::overshoot says how far it goes.
+  /// Moves to a position and rests there. It can interrupt another motion without a jump in speed
+  /// or acceleration; the caller of the interrupted move is told. If the axis can't stop before its
+  /// target, it overshoots and comes back; Move::overshoot says how far.
   ///
-  /// @param position [unit] absolute, or, where `relative`, from where the axis stands; while it
-  ///   moves, from where that motion would have ended.
+  /// @param position [unit] absolute. If `relative`, it counts from where the axis stands, or, if
+  ///   the axis moves, from where that motion would have ended.
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
-  /// @throw Refused where a number isn't finite, the target is beyond a soft limit, the velocity
+  /// @throw Refused if a number isn't finite, the target is beyond a soft limit, the velocity is
   ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or
-  ///   at fault, or the machine shuts down; an absolute position also where the axis isn't homed,
-  ///   but has to be.
+  ///   at fault, the machine is on hold or shuts down, or the position is absolute and the axis
+  ///   must be homed first.
   virtual Move moveTo(double position, bool relative = false, double velocity = 0.0) = 0;
 
   /// What moveTo() would do now; nothing moves.
@@ -43,96 +42,101 @@ class Axis {
   /// @throw Refused as moveTo().
   virtual MovePlan plan(double position, bool relative = false, double velocity = 0.0) = 0;
 
-  /// Turns the motor by a number of rounds, which need not be whole.
+  /// Turns the motor by a number of revolutions, which need not be whole.
   ///
-  /// @throw Refused as moveTo(), and where the steps of a round are not known.
+  /// @throw Refused as moveTo(), and if the steps of a revolution are not known.
   virtual Move moveRounds(double rounds, double velocity = 0.0) = 0;
 
-  /// How a move ended, however long ago; none if it hasn't.
+  /// How a move ended, however long ago; empty if it hasn't ended.
   virtual std::optional<MoveResult> result(const Move& move) const = 0;
 
   /// Returns when the move has ended. @throw Refused for a move of plan().
   virtual MoveResult wait(const Move& move) = 0;
 
-  /// Moves on at a velocity until it is told otherwise, or up to the soft limit, where it rests; 0
-  /// ends a jog. A motion under way is replaced. To call it again with the same velocity changes
-  /// nothing.
+  /// Moves at a velocity until another command comes, or up to the soft limit, and rests there. 0
+  /// ends a jog. A motion under way is replaced. A call with the velocity that the jog has already
+  /// changes nothing.
   ///
   /// @param velocity [unit/s] negative: towards min.
   /// @param unless_stopped_since AxisState::stops as it was when the stream of jogs began that this
-  ///   one belongs to: a stream does not run on through a stop, a hold, a disable or a recover.
+  ///   one belongs to: a stream does not continue after a stop, a hold, a disable or a recover.
   /// @throw Refused as moveTo(), and if the axis rests at the soft limit ahead, or has been stopped
   ///   since.
   virtual void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since = {}) = 0;
 
-  /// Changes what motions keep to, within what is configured. A lower max_speed slows down a move
-  /// or a jog under way at once; axes that move together keep what they began with. Another
-  /// acceleration, deceleration or jerk holds for motions that begin at rest: one under way is
-  /// planned to come to rest by the old ones, and might not do so in time by the new ones.
+  /// Changes the limits of motions, within what is configured. A lower max_speed slows down a move
+  /// or a jog under way at once; axes that move together keep the limits that they began with. A
+  /// new acceleration, deceleration or jerk applies to motions that begin at rest: a motion under
+  /// way was planned to stop with the old ones, and might not stop in time with the new ones. Stops
+  /// always use the configured deceleration and jerk.
   ///
   /// @param wanted 0: as configured.
-  /// @throw Refused where one isn't a number from 0 to what is configured, or to any where no jerk
-  ///   limit is; then nothing changes.
+  /// @throw Refused if a number isn't 0 or between the lowest limit and the configured one. A jerk
+  ///   has no upper bound if no jerk limit is configured.
   virtual void setLimits(const AxisLimits& wanted) = 0;
 
-  /// For motions that begin at rest.
+  /// The limits of motions that begin at rest.
   virtual AxisLimits limits() const = 0;
 
-  /// Decelerates to rest, and returns when the deceleration has been handed to the pulse thread.
-  /// The axes that move together with this one stop with it, along their path. What is held is
-  /// given up. Without effect else at rest.
+  /// Decelerates to rest, and returns when the pulse thread has the deceleration. The axes that
+  /// move together with this one stop with it, along their path. A held goal is given up. Does
+  /// nothing if the axis is at rest.
   virtual void stop() = 0;
 
-  /// The same where the axis still makes this move, or holds it: what has replaced it goes on.
+  /// Stops the axis if it still makes this move or holds it. A motion that has replaced the move
+  /// continues.
   virtual void stop(const Move& move) = 0;
 
-  /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when that is
-  /// over. Soft limits don't count meanwhile. Where it fails, the axis stands, enabled as before,
-  /// and isn't homed: the result says why. Stops end it; other motions take over from it.
+  /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when the homing
+  /// is over. Soft limits don't apply meanwhile. If it fails, the axis rests, enabled as before,
+  /// and isn't homed: the result says why. A stop ends it; another motion takes over from it.
   ///
-  /// @param cancelled asked often, from the calling thread: true decelerates and ends it.
-  /// @throw Refused where homing isn't configured, while moving, and as moveTo().
+  /// @param cancelled is asked often, in the calling thread: true decelerates and ends the homing.
+  /// @throw Refused as moveTo(), if homing isn't configured, and while the axis moves.
   virtual HomingResult home(const std::function<bool()>& cancelled = {}) = 0;
 
-  /// @throw Refused where home() would be, now.
+  /// @throw Refused if home() would be refused now.
   virtual void checkHoming() const = 0;
 
-  /// Energizes the motor, or takes its current away; a motion under way is stopped first. Disabling
-  /// ends the trust in the position, but with AxisConfig::holds_position_unpowered: nothing holds
-  /// the motor.
+  /// Energizes the motor, or takes its current away; a motion under way is stopped first. Nothing
+  /// holds a motor without current: disabling invalidates the position, unless
+  /// AxisConfig::holds_position_unpowered is set.
   ///
-  /// @throw Refused where the axis is at fault (enabling only), or enable isn't wired.
+  /// @throw Refused if enable isn't wired, or if a faulty axis is to be enabled.
   virtual void enable(bool on) = 0;
 
-  /// Puts the chip to sleep, or wakes it: at Home, so that the position is trusted only where that
-  /// was its phase and AxisConfig::holds_position_unpowered is set. @throw Refused while moving,
-  /// and where SLEEP isn't wired.
+  /// Puts the chip to sleep, or wakes it. A chip wakes at its Home position, so the axis's position
+  /// stays valid only if the translator was there and AxisConfig::holds_position_unpowered is set.
+  ///
+  /// @throw Refused while the axis moves, and if SLEEP isn't wired.
   virtual void sleep(bool asleep) = 0;
 
-  /// Pulses RESET: the translator goes to Home. @throw Refused while moving, and where RESET isn't
-  /// wired.
+  /// Pulses RESET: the translator returns to its Home position.
+  ///
+  /// @throw Refused while the axis moves, and if RESET isn't wired.
   virtual void reset() = 0;
 
-  /// Changes the microstep mode and keeps the position; steps per unit follow. Where the new mode
-  /// has no place at this position it is refused, or, with AxisConfig::align_on_microstep_change,
-  /// the axis moves to the nearest common one first (the call then waits for that).
+  /// Changes the microstep mode and keeps the position; the steps per unit follow. If the new mode
+  /// has no microstep at this position, the change is refused. With
+  /// AxisConfig::align_on_microstep_change the axis moves to the nearest common position first, and
+  /// the call waits for that.
   ///
-  /// @throw Refused while moving, for a mode that the chip doesn't have or whose pins aren't wired,
-  ///   and for chips whose mode is set by switches.
+  /// @throw Refused while the axis moves, if the chip doesn't have the mode or its pins aren't
+  ///   wired, and for a chip whose mode is set by switches.
   virtual void setMicrosteps(int microsteps) = 0;
 
-  /// Declares where the axis stands; the position is trusted from then on. Nothing moves.
+  /// Declares where the axis stands; the position is valid from then on. Nothing moves.
   ///
-  /// @throw Refused while moving, where the number isn't finite or is beyond a soft limit.
+  /// @throw Refused while the axis moves, and if the number isn't finite or is beyond a soft limit.
   virtual void setPosition(double position) = 0;
 
-  /// What the axis is and does now, whole and from one instant.
+  /// What the axis is and does now: consistent, of one instant.
   virtual AxisState state() const = 0;
 
-  /// [microsteps/s] The highest rate of the motion under way, as planned; 0 at rest.
+  /// [microsteps/s] The highest planned rate of the motion under way; 0 at rest.
   virtual double peakRate() const = 0;
 
-  /// @throw GpioError where a line can't be read.
+  /// @throw GpioError if a line can't be read.
   virtual EndstopState endstops() const = 0;
 };
 

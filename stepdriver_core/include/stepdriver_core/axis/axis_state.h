@@ -12,8 +12,8 @@
 
 namespace stepdriver::axis {
 
-/// How something ended that takes time: empty while it is under way, set once when it is over. Any
-/// thread may read it, for as long as it keeps it.
+/// The result of something that takes time: empty while it is under way, set once when it is over.
+/// Any thread may read it.
 template <typename Result>
 class Outcome {
  public:
@@ -22,7 +22,7 @@ class Outcome {
     return result_;
   }
 
-  /// The first result counts.
+  /// Only the first result counts.
   void set(Result result) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!result_) result_ = std::move(result);
@@ -33,23 +33,23 @@ class Outcome {
   std::optional<Result> result_;
 };
 
-/// What the motions of an axis keep to. A unit is m on a linear axis, rad on a rotary one.
+/// The limits of the motions of an axis. A unit is m on a linear axis, rad on a rotary one.
 struct AxisLimits {
   double max_speed = 0.0;     ///< [unit/s]
   double acceleration = 0.0;  ///< [unit/s^2]
-  double deceleration = 0.0;  ///< [unit/s^2] of a stop it is AxisConfig's
-  double jerk = 0.0;          ///< [unit/s^3] 0: none, the acceleration may jump
+  double deceleration = 0.0;  ///< [unit/s^2] not of stops, which use the configured one
+  double jerk = 0.0;          ///< [unit/s^3] 0: no limit, the acceleration may jump
 };
 
-/// What a homing does at one time.
+/// The phases of a homing.
 enum class HomingPhase {
   kNone,
-  kLeaving,     ///< off the switch that it stood on at the beginning
+  kLeaving,     ///< off the switch, if it was closed at the beginning
   kSeeking,     ///< towards the switch
   kBackingOff,  ///< off the switch, until it is open
-  kLatching,    ///< slowly towards the switch: where it closes now is the trigger point
-  kPullingOff,  ///< to where the axis stands at the end
-  kStopping,    ///< it has failed, and comes to rest
+  kLatching,    ///< slowly towards the switch: the place where it closes is the trigger point
+  kPullingOff,  ///< from the trigger point to the final position
+  kStopping,    ///< it has failed, and the axis comes to rest
 };
 
 /// In words, as in messages: `seeking`.
@@ -68,28 +68,28 @@ struct HomingResult {
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
 struct AxisState {
-  bool enabled = false;  ///< wants its current; on a shared ENABLE line it may have it all the same
+  bool enabled = false;  ///< by its own commands; a shared ENABLE line may energize it all the same
   bool asleep = false;
-  bool idle = false;  ///< disabled or asleep since it stood for long; the next motion ends that
+  bool idle = false;  ///< disabled or asleep by its idle timeout; the next motion ends that
   bool moving = false;
   bool held = false;  ///< the machine is on hold: this axis too, moving or not
   bool homed = false;
-  HomingPhase homing = HomingPhase::kNone;  ///< what a homing under way does
+  HomingPhase homing = HomingPhase::kNone;  ///< the phase of a homing under way
   bool position_valid = false;              ///< the position can be trusted
   int microsteps = 1;
   double position = 0.0;  ///< [unit] from the count of the edges that went out
-  /// [unit] Where the plan of the motion under way has it; the position at rest. As the count and
-  /// the clock can't be read at one instant, it is the nearest to the position of what the plan
-  /// went through meanwhile.
+  /// [unit] The planned position of the motion under way; the position at rest. The count and the
+  /// clock can't be read at one instant: of the places that the plan passed meanwhile, this is the
+  /// one that is nearest to the position.
   double planned = 0.0;
   double velocity = 0.0;  ///< [unit/s] of the plan
-  double slack = 0.0;     ///< [unit] of the backlash, what is taken up towards max
+  double slack = 0.0;     ///< [unit] the part of the backlash that is taken up towards max
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
   double target = 0.0;
   /// [s] Until the motion under way ends, as planned; 0 at rest and in a jog without an end.
   double time_left = 0.0;
-  std::string fault;   ///< in words; empty: none
-  std::string remedy;  ///< what ends the fault, in words; empty where there is none
+  std::string fault;   ///< in words; empty: no fault
+  std::string remedy;  ///< what ends the fault, in words; empty if there is none
   /// How many times something has stopped the axis, moving or not (a stop, a hold, a disable, a
   /// sleep, a fault, an emergency stop), or ended that (a resume, an enable, a wake, a recover).
   std::uint64_t stops = 0;
@@ -98,7 +98,7 @@ struct AxisState {
   std::string position_note;
 };
 
-/// Levels of the switches as their lines read now, true where active. None where there is none.
+/// Levels of the switches as their lines read now: true if active, empty if there is no switch.
 struct EndstopState {
   std::optional<bool> min;
   std::optional<bool> max;
@@ -116,7 +116,7 @@ enum class MoveEnd {
   kCompanion,  ///< an axis that it moved together with was stopped by one of these
 };
 
-/// How and where a move ended, as one that waits for it is told.
+/// How and where a move ended, as its waiting caller is told.
 struct MoveResult {
   MoveEnd end = MoveEnd::kReached;
   std::string message;    ///< a sentence that says how and where
@@ -126,12 +126,11 @@ struct MoveResult {
 
 /// A motion that was accepted.
 struct Move {
-  std::uint64_t id = 0;   ///< never the same twice on one axis
-  double target = 0.0;    ///< [unit]
-  double duration = 0.0;  ///< [s] as planned
-  double overshoot =
-      0.0;  ///< [unit] how far it overshoots its target first, as it can't stop before it
-  /// Where its result appears, for as long as this is kept.
+  std::uint64_t id = 0;    ///< never the same twice on one axis
+  double target = 0.0;     ///< [unit]
+  double duration = 0.0;   ///< [s] as planned
+  double overshoot = 0.0;  ///< [unit] beyond the target, if the axis can't stop before it
+  /// Its result appears here.
   std::shared_ptr<const Outcome<MoveResult>> outcome;
 };
 
@@ -145,19 +144,19 @@ struct MovePiece {
 };
 
 /// What a move would be, piece after piece. Positions are those of the motor: with a backlash they
-/// are off the joint's by what of it is taken up.
+/// differ from the joint's by the part that is taken up.
 struct MovePlan {
   Move move;                      ///< its id is 0
-  double steps_per_unit = 0.0;    ///< [microsteps/unit] in the microstep mode of now
-  std::vector<MovePiece> pieces;  ///< none where nothing would move
+  double steps_per_unit = 0.0;    ///< [microsteps/unit] in the present microstep mode
+  std::vector<MovePiece> pieces;  ///< empty if nothing would move
 };
 
 /// What a trajectory wants of its axes at one time; one number for each axis, in their units.
 struct TrajectoryPoint {
   double time = 0.0;  ///< [s] after the start
   std::vector<double> positions;
-  std::vector<double> velocities;     ///< or none
-  std::vector<double> accelerations;  ///< or none
+  std::vector<double> velocities;     ///< or empty
+  std::vector<double> accelerations;  ///< or empty
 };
 
 /// Relative. A curve between points that keep to a limit may go beyond it by so much.

@@ -11,12 +11,13 @@ namespace stepdriver::machine {
 struct LineRequest {
   std::vector<std::string> names;  ///< of the axes, each once
   std::vector<double> positions;   ///< [unit] one for each name
-  bool relative = false;           ///< positions are from where the axes stand
-  /// Highest speed along the path; 0: as the axes' limits allow. Where a linear axis moves it is
-  /// that of the linear axes, the root of the sum of their squared speeds [m/s], and rotary axes go
-  /// along; where only rotary axes move, the same of theirs [rad/s].
+  bool relative = false;  ///< positions count from where the axes stand, see Machine::moveLine()
+  /// Highest speed along the path; 0: as fast as the limits of all axes allow. If a linear axis
+  /// moves, it is the root of the sum of the squared speeds of the linear axes [m/s], and rotary
+  /// axes follow. If only rotary axes move, it is the same of their speeds [rad/s].
   double velocity = 0.0;
-  /// [s] That the line takes; 0: as fast as the limits allow. Not together with a velocity.
+  /// [s] Time that the line takes; 0: as fast as the limits of all axes allow. Not together with a
+  /// velocity.
   double duration = 0.0;
 };
 
@@ -26,7 +27,7 @@ struct TrajectoryRequest {
   std::vector<axis::TrajectoryPoint> points;
 };
 
-/// A motion of several axes that was accepted.
+/// An accepted motion of several axes.
 struct CoordinatedMove {
   /// The part of one axis in it.
   struct Member {

@@ -16,28 +16,26 @@
 
 namespace stepdriver::machine {
 
-/// What a Machine is made with, beside its axes.
+/// What a Machine is made with, in addition to its axes.
 struct MachineOptions {
-  /// Serve the pulses in a thread of the machine's own. Without, waiting calls serve them, and
-  /// advance() does: for tests on a virtual clock.
+  /// Threads of the machine serve its pulses and calls. If false, waiting calls and advance() serve
+  /// the pulses: for tests on a virtual clock.
   bool threaded = true;
   /// A pulse that comes later than this at a speed that the motor can't restart from is a fault.
   double max_lateness = 0.005;  ///< [s]
-  /// On a clock that is real, measure what the machine and its lines can do, before anything else.
+  /// On a real clock, first measure what step rates this computer and its lines can sustain.
   bool measure = false;
-  /// And where that is less than the axes ask for, or real-time rights are refused, don't start.
+  /// Don't start if that is less than the axes ask for, or if real-time rights are refused.
   bool enforce = false;
-  /// A line other than STEP and DIR that can't be written in this time is a fault of its axis,
-  /// which names it.
+  /// If a line other than STEP and DIR can't be written in this time, its axis has a fault that
+  /// names the line.
   double write_timeout = 0.5;  ///< [s]
-  /// An input that does what Machine::emergencyStop() does, where it becomes active or can't be
-  /// read.
+  /// An input that does what Machine::emergencyStop() does, if it becomes active or can't be read.
   std::optional<config::InputSwitch> emergency_stop{};
-  /// Absolute path of the file that keeps positions over a restart; empty: none. See
-  /// machine::StateFile.
+  /// Absolute path of the file that keeps positions over a restart; empty: no file.
   std::string state_file{};
-  /// On a clock that is real, held open to keep the processors awake; empty: they may sleep. See
-  /// pulse::kCpuLatencyDevice.
+  /// Held open on a real clock to keep the processors awake, see pulse::kCpuLatencyDevice; empty:
+  /// they may sleep.
   std::string latency_device = pulse::kCpuLatencyDevice;
 };
 
@@ -54,19 +52,22 @@ struct EngineFigures {
   std::string realtime;  ///< how the pulse thread runs, in words
 };
 
-/// All axes, one pulse engine, one set of lines. All calls are safe from any thread.
+/// All axes of a machine, with one pulse engine and one set of lines. All calls are safe from any
+/// thread.
 class Machine {
  public:
-  /// Takes the lines, all with their safe levels, and brings each chip to a known state; enables
-  /// the axes that want it. Nothing moves.
+  /// Requests the lines, all with their safe levels, brings each driver chip to a known state, and
+  /// enables the axes that are configured so. Nothing moves.
   ///
   /// @param backend, clock outlive the machine.
-  /// @throw GpioError where a line can't be had; then none is held.
-  /// @throw Refused with MachineOptions::enforce, naming what can't be done; no line is held then.
+  /// @throw GpioError if a line can't be requested; then no line is held.
+  /// @throw Refused with MachineOptions::enforce, naming what this computer can't do; no line is
+  /// held
+  ///   then.
   Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 
-  /// shutdown(), where that wasn't called; then drives every line to its safe level and releases
+  /// Calls shutdown() if it wasn't called; then drives every line to its safe level and releases
   /// it.
   ~Machine();
   Machine(const Machine&) = delete;
@@ -75,20 +76,21 @@ class Machine {
   /// The axes in the order of the configuration.
   const std::vector<std::unique_ptr<axis::Axis>>& axes() const;
 
-  /// @throw Refused naming the axes that there are.
+  /// @throw Refused if there is no such axis; it names those that there are.
   axis::Axis& axis(const std::string& name) const;
 
   /// Decelerates every axis to rest, and ends a hold.
   void stop();
 
   /// A straight line of several axes: all begin and end together, each within its own limits. Axes
-  /// that move come to rest first; relative positions count from where their motions were to end.
-  /// What ends one of them ends all, a stop of one slows all of them down along the line.
+  /// that move come to rest first; relative positions count from where their motions would have
+  /// ended. Whatever ends the motion of one axis ends that of all; a stop of one slows all of them
+  /// down along the line.
   ///
-  /// @throw Refused as Axis::moveTo(), and where the request isn't one; then nothing moves.
+  /// @throw Refused as Axis::moveTo(), and if the request is malformed; then nothing moves.
   CoordinatedMove moveLine(const LineRequest& request);
 
-  /// Several axes through the points of a trajectory, from whatever they do, which it replaces. The
+  /// Moves several axes through the points of a trajectory; it can interrupt their motions. The
   /// points' time is the trajectory's: a hold or a speed override below 1 runs through it more
   /// slowly, one above 1 does nothing. A backlash is taken up in addition to the joint's own
   /// motion, which may last longer than the points. A long one is planned in the calling thread and
@@ -101,7 +103,7 @@ class Machine {
   ///   backlash, or if one of the axes was stopped while this was planned.
   CoordinatedMove followTrajectory(const TrajectoryRequest& request);
 
-  /// How a motion of several axes ended; none where it hasn't.
+  /// How a motion of several axes ended; empty if it hasn't ended.
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
   /// Returns when it has ended.
   CoordinatedResult wait(const CoordinatedMove& move) const;
@@ -115,52 +117,52 @@ class Machine {
   void resume();
 
   /// Homes several axes, by HomingConfig::order: the lowest first, those with the same at once.
-  /// Where one fails, those that come later aren't homed. Returns when all is over.
+  /// If one fails, those that come later aren't homed. Returns when all is over.
   ///
   /// @param names empty: all that have a homing.
   /// @param cancelled as for Axis::home().
   /// @return how each ended, in the order in which they came.
-  /// @throw Refused where a name isn't known or comes twice, or one of the axes can't be homed now;
+  /// @throw Refused if a name isn't known or comes twice, or one of the axes can't be homed now;
   ///   then none moves.
   std::vector<axis::HomingResult> home(const std::vector<std::string>& names = {},
                                        const std::function<bool()>& cancelled = {});
 
-  /// @throw Refused where home() would be, now.
+  /// @throw Refused if home() would be refused now.
   void checkHoming(const std::vector<std::string>& names = {}) const;
 
-  /// Scales the velocities of all motions, of those under way too, within the axes' accelerations.
-  /// No axis goes beyond its maximum.
+  /// Scales the velocities of all motions, also of those under way, within the limits of their
+  /// axes.
   ///
-  /// @param factor 0.01 to 2.0. @throw Refused where it isn't; then nothing changes.
+  /// @param factor 0.01 to 2.0. @throw Refused if it is outside of that; then nothing changes.
   void setSpeedOverride(double factor);
 
-  /// Lets the pulse that is out finish and sends no other. Every axis is at fault until recover();
-  /// motors stay energized. MachineOptions::emergency_stop does the same; where it is active at the
-  /// start no motor is energized.
+  /// Completes the pulse that is out, sends no other, and returns then. Every axis is at fault
+  /// until recover(); motors stay energized. MachineOptions::emergency_stop does the same; if it is
+  /// active at the start, no motor is energized.
   void emergencyStop();
-  /// From an emergency stop on until recover().
+  /// True from an emergency stop until recover().
   bool emergencyStopped() const;
 
-  /// Ends the emergency stop and all faults. Nothing moves.
+  /// Clears the emergency stop and all faults. Nothing moves.
   ///
-  /// @throw Refused while the emergency-stop input is active or can't be read; nothing is ended
-  ///   then.
+  /// @throw Refused while the emergency-stop input is active or can't be read; then nothing is
+  ///   cleared.
   void recover();
 
   /// Refuses every command from now on, decelerates, and disables the axes that are configured so.
-  /// Returns when that is done. @throw Error where a line can't be written; all others are, then.
+  /// Returns when that is done. @throw Error if a line can't be written; all others are written.
   void shutdown();
 
-  /// What the engine has done, read while it goes on.
+  /// What the pulse engine has done so far.
   EngineFigures figures() const;
 
-  /// Why the state file couldn't be written the last time; empty: it could, or there is none.
+  /// Why the last write of the state file failed; empty if it succeeded, or if there is no file.
   std::string stateFileError() const;
 
-  /// As measured at the start; none where that wasn't asked for, or the clock is virtual.
+  /// As measured at the start; empty if that wasn't asked for, or if the clock is virtual.
   const std::optional<pulse::Capability>& capability() const;
 
-  /// Serves the pulses for a time of the clock. Only where the machine has no thread.
+  /// Serves the pulses for a time of the clock. Only for a machine without threads.
   void advance(double seconds);
 
  private:

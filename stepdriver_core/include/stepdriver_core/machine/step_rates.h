@@ -13,9 +13,9 @@ namespace stepdriver::machine {
 /// configured microsteps.
 struct StepRate {
   std::string axis;
-  double asked = 0.0;   ///< [steps/s] at the axis's top speed
-  double alone = 0.0;   ///< [steps/s] that can be held with this axis alone
-  double held = 0.0;    ///< [steps/s] that can be held while all others move at their top speeds
+  double asked = 0.0;  ///< [steps/s] at the axis's top speed
+  double alone = 0.0;  ///< [steps/s] that can be sustained if no other axis moves
+  double held = 0.0;  ///< [steps/s] that can be sustained while all others move at their top speeds
   std::string limited;  ///< `held` is, by what, in words
 
   /// Whether the axis can have the rate that it asks for.
@@ -24,32 +24,32 @@ struct StepRate {
   std::string text() const;
 };
 
-/// What a machine can do of what its axes ask for.
+/// The step rates of all axes.
 struct StepRates {
   std::vector<StepRate> axes;
 
-  /// Whether all of them can.
+  /// Whether every axis can have the rate that it asks for.
   bool holds() const;
-  /// What doesn't hold, a sentence each; empty: all does.
+  /// A sentence for each axis that can't; empty if all can.
   std::vector<std::string> complaints() const;
 };
 
 /// The highest step rates, from the lateness l of wake-ups and the costs w of a write and r of an
 /// endstop's read, each at its 99th percentile. With the chip's high and low times h and d, and the
-/// sums over all other axes, an interval T can be held where
+/// sums over all other axes, an interval T can be sustained if
 ///
 ///   T >= 4 (l + r + w + sum(r + w))           a pulse must be out within a quarter of an interval
 ///                                             after its planned time: that is what the engine
 ///                                             absorbs (PulseEngine::kClosest)
 ///   T >= 2 l + r + 2 w + h + d + sum(r + 2 w)  the pulse itself, both of its wake-ups late
-///   T >= g + h + r + 2 w                      where the clock spins for a guard g before an edge,
+///   T >= g + h + r + 2 w                      if the clock spins for a guard g before an edge,
 ///   T >= (g + min(g, h) - s) / 0.8            less what a sleep is late by (s, a median): it may
 ///                                             for so much of the time
 ///   1 - product(1 - (g + min(g, h)) / T) <= 0.8, over all axes: the same for several
 ///
-/// or where the first two hold with the lateness of waits that don't spin. Faster, more than about
-/// one step in a hundred slides the timeline: nothing is lost and no pulse is too short, but the
-/// motion takes longer than planned.
+/// or if the first two are true with the lateness of waits that don't spin. At higher rates more
+/// than about one step in a hundred slides the timeline: no step is lost and no pulse is too short,
+/// but the motion takes longer than planned.
 ///
 /// Steps of several axes that fall due at once are one call for each chip; that counts as one for
 /// each axis here. Changes of DIR, and what the engine calculates, about a microsecond a step, are
@@ -57,22 +57,22 @@ struct StepRates {
 StepRates stepRates(const std::vector<config::AxisConfig>& axes,
                     const pulse::Capability& capability);
 
-/// The same of what moves: beside the others that move, and at the rates at which all of them do.
+/// The same for the axes that move, at the rates at which they move.
 ///
-/// @param rates [steps/s] of each axis; 0: it is at rest, and takes nothing of the time.
+/// @param rates [steps/s] of each axis; 0: it is at rest, and takes no time.
 /// @return the axes that move.
 StepRates stepRatesInMotion(const std::vector<config::AxisConfig>& axes,
                             const pulse::Capability& capability, const std::vector<double>& rates);
 
-/// Why a machine under MachineOptions::enforce doesn't start; empty: it does.
+/// Why a machine with MachineOptions::enforce doesn't start; empty if it does.
 std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability);
 
-/// Takes the lines of the axes as a Machine does, measures, and releases them. Nothing moves, and
+/// Requests the lines of the axes like a Machine, measures, and releases them. Nothing moves, and
 /// ENABLE isn't asserted.
 ///
 /// @param latency_device see MachineOptions.
-/// @throw GpioError where a line can't be had, written or read; none is held then.
+/// @throw GpioError if a line can't be requested, written or read; no line is held then.
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                           pulse::Clock& clock,
                           const std::string& latency_device = pulse::kCpuLatencyDevice);
