@@ -40,7 +40,7 @@ struct StepRates {
 ///
 ///   T >= 4 (l + r + w + sum(r + w))           a pulse must be out within a quarter of an interval
 ///                                             after its planned time: that is what the engine
-///                                             absorbs (PulseEngine::kClosest)
+///                                             absorbs
 ///   T >= 2 l + r + 2 w + h + d + sum(r + 2 w)  the pulse itself, both of its wake-ups late
 ///   T >= g + h + r + 2 w                      if the clock spins for a guard g before an edge,
 ///   T >= (g + min(g, h) - s) / 0.8            less what a sleep is late by (s, a median): it may
