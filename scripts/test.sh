@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros]
+usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize]
 
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
@@ -20,6 +20,8 @@ Installs what is missing, builds, and runs the parts that are named; all of them
   --ros   the catkin package, its rostests, its install space with all its commands and its service,
           and a package that depends on it, and the trace of a move from there, read by sigrok-cli; the commands of the pages; with
           --kernel also the whole node on that kernel's GPIO chips
+  --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
+          ThreadSanitizer; a node with each in a storm of requests
 
 A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
 END
@@ -28,12 +30,12 @@ END
 parts=()
 for argument; do
   case $argument in
-    --lint | --core | --kernel | --ros) parts+=("${argument#--}") ;;
+    --lint | --core | --kernel | --ros | --sanitize) parts+=("${argument#--}") ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
 done
-((${#parts[@]} > 0)) || parts=(lint core kernel ros)
+((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize)
 wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 ! wants kernel || wants core || parts+=(core)
 
@@ -274,10 +276,78 @@ check_docs() {
 
 check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
+# ---- sanitizers: builds by the presets asan and tsan
+
+# Builds TARGETS of the sources in SOURCE in $build/NAME-PRESET, without the tests that nothing here runs.
+# build_sanitized SOURCE NAME PRESET TARGET...
+build_sanitized() {
+  cmake -S "$1" --preset "$3" -B "$build/$2-$3" &&
+    cmake --build "$build/$2-$3" -j "$jobs" --target "${@:4}"
+}
+
+# Exports what the test preset of that name sets.
+use_test_preset() {
+  local exports
+  # shellcheck disable=SC2016  # sourceDir is CMake's.
+  exports=$(/usr/bin/python3 -B -c '
+import json, shlex, sys
+source, name = sys.argv[1:]
+with open(source + "/CMakePresets.json", encoding="utf-8") as file:
+    presets = json.load(file)["testPresets"]
+for key, value in next(p for p in presets if p["name"] == name)["environment"].items():
+    print("export", shlex.quote(key + "=" + value.replace("${sourceDir}", source)))' "$src" "$1")
+  eval "$exports"
+}
+
+# sanitize_core PRESET EXCLUDED PROGRAM...: runs the programs' tests, except those whose names match.
+sanitize_core() {
+  local preset=$1 excluded=$2
+  quietly "$preset-core-build" build_sanitized "$src/stepdriver_core" core "$preset" "${@:3}"
+  use_test_preset "$preset"
+  # How many schedules the search samples of each kind.
+  STEPDRIVER_SCHEDULES=2000 ctest --test-dir "$build/core-$preset" -j "$jobs" --timeout 300 \
+    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|$excluded"
+}
+# Except for those that take minutes there. The search has one thread: ThreadSanitizer has nothing to find in it.
+slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess'
+sanitize_core_asan() { sanitize_core asan "$slow_tests" machine_tests pulse_tests search_tests; }
+sanitize_core_tsan() { sanitize_core tsan "$slow_tests" gpio_tests machine_tests pulse_tests; }
+
+# sanitize_node PRESET TEST...: a storm and tests of --ros. Only the node that they start has the sanitizer. It
+# writes its findings to files, as not every test reads all that its node prints.
+sanitize_node() {
+  local preset=$1 findings=$build/log/$1-findings name status=0
+  shift
+  quietly "$preset-node-build" build_sanitized "$src" catkin "$preset" stepdriver_node
+  quietly "$preset-tests-build" build_node_tests storm_test "$@"
+  rm -f "$findings".*
+  use_test_preset "$preset"
+  for name in ASAN_OPTIONS TSAN_OPTIONS UBSAN_OPTIONS; do
+    export "$name=${!name:-}:log_path=$findings"
+  done
+  use_ros "$build/catkin/devel"
+  export STEPDRIVER_NODE=$build/catkin-$preset/devel/lib/stepdriver/stepdriver_node
+  # The sanitizers' own memory grows.
+  rostest "$src/test/node/storm/storm.test" most_growth:=300 || status=1
+  for name; do rostest "$src/test/node/node.test" "test:=$name" || status=1; done
+  for name in "$findings".*; do
+    [[ -f $name ]] || continue
+    say "$name:"
+    head -n 50 "$name"
+    status=1
+  done
+  return "$status"
+}
+build_node_tests() {
+  configure_catkin && cmake --build "$build/catkin" -j "$jobs" --target "$@"
+}
+sanitize_node_asan() { sanitize_node asan bring_up_test ending_test; }
+sanitize_node_tsan() { sanitize_node tsan ending_test; }
+
 choose_build_folder
 rm -rf "$build/ros"
 install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
-  "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)"
+  "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)" "$(wants sanitize && echo ros)"
 
 if wants lint; then
   stage shell check_shell
@@ -316,6 +386,12 @@ if wants ros; then
   stage operations check_operations install
   stage trace check_trace install
   stage docs check_docs install
+fi
+if wants sanitize; then
+  stage asan-core sanitize_core_asan
+  stage asan-node sanitize_node_asan
+  stage tsan-core sanitize_core_tsan
+  stage tsan-node sanitize_node_tsan
 fi
 
 say "" "$summary"

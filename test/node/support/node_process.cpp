@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 
@@ -18,9 +19,14 @@ namespace {
 
 constexpr int kCannotExecute = 127;
 
+const char* fromEnvironment(const char* name, const char* otherwise) {
+  const char* value = std::getenv(name);
+  return value != nullptr ? value : otherwise;
+}
+
 }  // namespace
 
-const char* const kStepdriverNode = STEPDRIVER_NODE;
+const char* const kStepdriverNode = fromEnvironment("STEPDRIVER_NODE", STEPDRIVER_NODE);
 const char* const kStepdriverJoystick = STEPDRIVER_JOYSTICK;
 
 NodeProcess::NodeProcess(const std::vector<std::string>& arguments, const std::string& program) {

@@ -12,7 +12,8 @@
 
 namespace stepdriver::node_test {
 
-// The package's nodes, by the full names of their files.
+// The package's nodes, by the full names of their files. The environment variable STEPDRIVER_NODE
+// names another build of the node, as one with a sanitizer.
 extern const char* const kStepdriverNode;
 extern const char* const kStepdriverJoystick;
 
