@@ -34,7 +34,7 @@ class Homing : public Activity {
   void speedChanged(const Ack& call) override;
   void cancelHomings(const std::vector<std::uint64_t>& ids) override;
   pulse::Nanoseconds due() const override;
-  bool watchesInputs() const override { return true; }
+  bool watchesInputs() const override { return !isHeld(); }
   axis::HomingPhase homingPhase() const override { return phase_; }
   const Manoeuvre* motion() const override { return stroke_.get(); }
   bool isHeld() const { return held_since_.has_value(); }

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::int64_t kInputPeriodNs = 100'000'000;
 constexpr pulse::Nanoseconds kOften = 1'000'000;
+constexpr pulse::Nanoseconds kVirtualInputPeriod = 1'000'000;
 constexpr std::size_t kMostRequests = 256;
 
 /// Requests that may be refused because of the level of a switch. Their callers read the inputs
@@ -249,7 +250,7 @@ void Shell::run() {
     if (news_hold_.exchange(false)) clock_.release();
     while (turn()) {
     }
-    if (!clock_.realtime()) pulse_thread_->setAlarm(controller_.due());
+    if (!clock_.realtime()) pulse_thread_->setAlarm(alarm());
     // Until the engine has taken what was ordered, and the lines are written.
     if (!ordersAreOpen() && writers_.idle()) {
       clock_.release();
@@ -258,6 +259,13 @@ void Shell::run() {
   }
   if (holding) clock_.release();
   if (news_hold_.exchange(false)) clock_.release();
+}
+
+// When virtual time has to stand still until the controller has looked at it. The thread that
+// watches the inputs takes real time, in which virtual time could pass by far what a switch says.
+pulse::Nanoseconds Shell::alarm() const {
+  const pulse::Nanoseconds due = controller_.due();
+  return controller_.watchesInputs() ? std::min(due, clock_.now() + kVirtualInputPeriod) : due;
 }
 
 // Without threads.
@@ -307,6 +315,7 @@ bool Shell::turn() {
     any = true;
   }
   feedWhatIsWatched();
+  if (threaded_ && !clock_.realtime() && controller_.watchesInputs()) feedInputs();
   std::optional<Item> item;
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -88,10 +88,10 @@ class Shell : public pulse::NewsListener {
   void carryOut(activity::Outputs& out);
   void postCommands();
   bool ordersAreOpen() const;
+  pulse::Nanoseconds alarm() const;
   void settle();
   void wakeUp();
   void answer(activity::CallId call, activity::Reply reply);
-  pulse::Nanoseconds alarm() const;
 
   Controller& controller_;
   pulse::PulseEngine& engine_;

@@ -1,0 +1,43 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "support/homing_bench.h"
+
+// A machine with threads on a clock that waits for nobody: a wait ends at once.
+
+namespace stepdriver {
+namespace {
+
+using axis::HomingEnd;
+using test::Bench;
+using test::homingAxis;
+
+// Off the switch there are 5 mm to go: the pulse thread is through with them in less than a
+// millisecond.
+config::AxisConfig shortHoming(const std::string& name) {
+  config::AxisConfig config = homingAxis(name);
+  config.homing->max_travel = 0.005;
+  config.homing->latch_speed = 0.0005;
+  return config;
+}
+
+TEST(VirtualTime, DoesNotPassWhatASwitchSaysHoweverLateTheThreads) {
+  Bench bench({shortHoming("x"), shortHoming("y")}, true, 0.0);
+  for (const auto& axis : bench.machine->axes()) axis->setPosition(0.0);
+  for (int i = 0; i < 40; ++i) {
+    for (const auto& axis : bench.machine->axes()) {
+      const axis::MoveResult moved = axis->wait(axis->moveTo(-0.097));
+      ASSERT_EQ(moved.end, axis::MoveEnd::kReached) << moved.message;
+    }
+    for (const axis::HomingResult& result : bench.machine->home()) {
+      ASSERT_EQ(result.end, HomingEnd::kHomed) << i << ": " << result.message;
+      // The edge of the switch may come late; its place is known to within a step then.
+      const double carriage = bench.report(result.axis).carriage / 1000.0;
+      EXPECT_NEAR(result.position, carriage, 2.0 * test::kStep) << i << ", " << result.axis;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stepdriver
