@@ -181,10 +181,10 @@ configure() {
 configure_core() { configure "$src/stepdriver_core" "$build/core" "$@"; }
 configure_catkin() {
   configure "$src" "$build/catkin" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-    -DCMAKE_INSTALL_PREFIX="$build/install"
+    -DCMAKE_INSTALL_PREFIX="$build/install" "$@"
 }
 build_catkin() {
-  configure_catkin &&
+  configure_catkin "$@" &&
     cmake --build "$build/catkin" -j "$jobs"
 }
 # What is there to be used. The devel space is for the tests: below the sources as it is, roslaunch

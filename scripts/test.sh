@@ -121,7 +121,7 @@ compiled_by() {
   done
 }
 configure_tidy() {
-  configure_core -DSTEPDRIVER_BENCH=ON && configure_catkin &&
+  configure_core "$strict" -DSTEPDRIVER_BENCH=ON && configure_catkin "$strict" &&
     cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
 }
 # clang can't read the headers that gcc has precompiled.
@@ -136,8 +136,10 @@ tidy() {
 build_core() {
   quietly core-build build_core_quietly
 }
+# All builds have this option, as ccache takes compilations with the same options only.
+strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=ON
 build_core_quietly() {
-  configure_core -DCMAKE_COMPILE_WARNING_AS_ERROR=ON -DSTEPDRIVER_BENCH=ON &&
+  configure_core "$strict" -DSTEPDRIVER_BENCH=ON &&
     cmake --build "$build/core" -j "$jobs"
 }
 test_core() {
@@ -195,14 +197,14 @@ test_kernel_gpiod2() {
   test_waveform_in_kernel "$build/gpiod2"
 }
 build_gpiod2() {
-  cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DSTEPDRIVER_GPIOD=2 \
-    -DSTEPDRIVER_GPIOD_ROOT="$1" &&
+  cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DCMAKE_BUILD_TYPE=RelWithDebInfo "$strict" \
+    -DSTEPDRIVER_GPIOD=2 -DSTEPDRIVER_GPIOD_ROOT="$1" &&
     cmake --build "$build/gpiod2" -j "$jobs" --target gpio_tests machine_waveform_test \
       step_times_test write_cost
 }
 
 build_node() {
-  quietly node-build build_catkin &&
+  quietly node-build build_catkin "$strict" &&
     quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
 }
 test_node() {
@@ -339,14 +341,14 @@ sanitize_node() {
   return "$status"
 }
 build_node_tests() {
-  configure_catkin && cmake --build "$build/catkin" -j "$jobs" --target "$@"
+  configure_catkin "$strict" && cmake --build "$build/catkin" -j "$jobs" --target "$@"
 }
 sanitize_node_asan() { sanitize_node asan bring_up_test ending_test; }
 sanitize_node_tsan() { sanitize_node tsan ending_test; }
 
 choose_build_folder
 rm -rf "$build/ros"
-install_packages core "${parts[@]}" "$(wants ros && echo trace)" \
+install_packages core ccache "${parts[@]}" "$(wants ros && echo trace)" \
   "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)" "$(wants sanitize && echo ros)"
 
 if wants lint; then
