@@ -11,7 +11,7 @@ import sys
 
 import pages
 
-ROOMS = ("axis", "chip", "gpio", "machine", "motion", "pulse", "sim")
+ROOMS = ("activity", "axis", "config", "driver", "gpio", "machine", "motion", "motor", "pulse", "setup", "sim")
 ENDINGS = "cpp|h|launch|md|msg|py|rst|rules|sh|srv|svg|test|txt|urdf|yaml"
 
 
@@ -40,7 +40,8 @@ def is_there(name, files):
         if not re.search(r"/$|\.(h|cpp)$", name):
             return True  # a parameter: `gpio/backend`
         place = rf"stepdriver_core/(include/stepdriver_core|src)/{re.escape(name)}"
-        return any(re.search(place, file) for file in files)
+        # There is a folder config/ too.
+        return any(re.search(place, file) for file in files) or (pages.ROOT / name).exists()
     if "/" not in name:
         return any(file.endswith(f"/{name}") for file in files)
     # A program goes by its source.
