@@ -105,33 +105,63 @@ check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
 # is the one to the version that is installed.
-check_tidy() {
+tidy_all() {
   local status=0
-  quietly tidy-configure configure_tidy
-  own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | compiled_by "$build/core" |
-    tidy core || status=1
+  own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | tidy core || status=1
   own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/' |
     tidy catkin || status=1
   return "$status"
 }
+# clang can't read the headers that gcc has precompiled.
+configure_tidy() {
+  local name
+  configure_core "$strict" -DSTEPDRIVER_BENCH=ON && configure_catkin "$strict" &&
+    cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
+  for name in core catkin; do
+    mkdir -p "$build/tidy/$name"
+    sed -E 's| -Winvalid-pch||; s| -include [^ ]*/cmake_pch[.]hxx||' "$build/$name/compile_commands.json" \
+      >"$build/tidy/$name/compile_commands.json"
+  done
+}
+check_tidy_setup() { quietly tidy-configure configure_tidy; }
 compiled_by() {
   local name
   while IFS= read -r name; do
     ! grep -qF "\"file\": \"$src/$name\"" "$1/compile_commands.json" || say "$name"
   done
 }
-configure_tidy() {
-  configure_core "$strict" -DSTEPDRIVER_BENCH=ON && configure_catkin "$strict" &&
-    cmake --build "$build/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
-}
-# clang can't read the headers that gcc has precompiled.
 tidy() {
-  mkdir -p "$build/tidy/$1"
-  sed -E 's| -Winvalid-pch||; s| -include [^ ]*/cmake_pch[.]hxx||' "$build/$1/compile_commands.json" \
-    >"$build/tidy/$1/compile_commands.json"
-  sed "s|^|$src/|" | xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$build/tidy/$1" \
-    --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
+  compiled_by "$build/tidy/$1" | sed "s|^|$src/|" |
+    xargs -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$build/tidy/$1" \
+      --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
+
+# clang-tidy takes the longest of all. It begins before the kernel's stages, which use one processor, and
+# has what these and others leave; the stage `tidy` waits for its end.
+tidy_group=
+begin_tidy() {
+  rm -f "$build/log/tidy-status"
+  set -m
+  (
+    renice -n 19 -p "$BASHPID" >/dev/null
+    status=0
+    tidy_all || status=1
+    say "$status" >"$build/log/tidy-status"
+  ) </dev/null >"$build/log/tidy-found.log" 2>&1 &
+  set +m
+  tidy_group=$!
+}
+check_tidy() {
+  local i
+  for ((i = 0; i < 3600; i++)); do
+    [[ ! -s $build/log/tidy-status ]] || break
+    sleep 1
+  done
+  cat "$build/log/tidy-found.log"
+  [[ $(cat "$build/log/tidy-status") == 0 ]]
+}
+end_tidy() { [[ -z $tidy_group ]] || end_group "$tidy_group" 5; }
+at_exit end_tidy
 
 build_core() {
   quietly core-build build_core_quietly
@@ -371,6 +401,10 @@ if wants core; then
   stage core-tests test_core core-build
   stage pictures check_pictures core-build
 fi
+if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
+  stage tidy-setup check_tidy_setup
+  [[ ${outcome[tidy-setup]} != passed ]] || begin_tidy
+fi
 if wants kernel; then
   stage kernel test_kernel core-build
   stage kernel-gpiod2 test_kernel_gpiod2 kernel
@@ -379,7 +413,7 @@ if wants ros; then
   stage node-build build_node
 fi
 if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
-  stage tidy check_tidy
+  stage tidy check_tidy tidy-setup
 fi
 if wants ros; then
   stage node-tests test_node node-build
