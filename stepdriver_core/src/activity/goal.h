@@ -43,7 +43,8 @@ struct Predecessor {
   Goal goal;
   bool slowed_down = false;  ///< it had been stopped
   std::string stopped_by;
-  Ack call;  ///< of its beginning, if the engine had not yet taken that
+  Ack call;                  ///< of its beginning, if the engine had not yet taken that
+  std::uint64_t serial = 0;  ///< of the order that would have begun it
 };
 
 }  // namespace stepdriver::activity

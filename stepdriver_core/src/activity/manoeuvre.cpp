@@ -63,6 +63,11 @@ void conclude(const Goal& goal, axis::MoveResult result) {
   if (goal.outcome) goal.outcome->set(std::move(result));
 }
 
+Failure neverBegun(const Predecessor& left) {
+  return {Failure::Kind::kRefused,
+          left.axis->name() + ": another command took over before it began"};
+}
+
 }  // namespace
 
 Failure failureOf(const std::exception& error) {
@@ -109,11 +114,14 @@ std::shared_ptr<const motion::Profile> Manoeuvre::planPath(std::int64_t at) {
 
 Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
   Plans plans;
+  // What was never joined to a path comes to rest axis by axis.
+  const bool alone = !join_ || (slowsDown() && path_ == nullptr);
   for (const Order& order : orders_) {
+    if (alone && slowsDown() && !order.axis->moving()) continue;
     plans.at = std::max(plans.at, earliestStart(context_, *order.axis, lead));
   }
   try {
-    if (join_) {
+    if (!alone) {
       plans.path = planPath(plans.at);
       for (std::size_t i = 0; i < orders_.size(); ++i) {
         plans.planned.push_back(
@@ -122,14 +130,17 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
       }
       return plans;
     }
-    const Order& order = orders_.front();
-    if (slowsDown()) {
-      plans.planned.push_back(
-          {std::make_shared<const motion::Profile>(planStop(*order.axis, plans.at)), 0.0});
-    } else {
+    if (!slowsDown()) {
+      const Order& order = orders_.front();
       motion::Plan own = planGoal(*order.axis, order.goal, plans.at);
       plans.planned.push_back(
           {std::make_shared<const motion::Profile>(std::move(own.profile)), own.overshoot});
+      return plans;
+    }
+    for (const Order& order : orders_) {
+      Planned& planned = plans.planned.emplace_back();
+      if (!order.axis->moving()) continue;
+      planned.profile = std::make_shared<const motion::Profile>(planStop(*order.axis, plans.at));
     }
   } catch (const std::range_error& error) {
     orders_.front().axis->refuse(error.what());
@@ -156,15 +167,20 @@ void Manoeuvre::order(Plans plans) {
   OpenOrder open;
   open.mode = mode_;
   for (std::size_t i = 0; i < orders_.size(); ++i) {
+    if (plans.planned[i].profile == nullptr) {
+      open.serials.push_back(0);
+      continue;
+    }
     axis::AxisModel& axis = *orders_[i].axis;
     const motor::Motion* before = axis.motor.motions().latest();
     open.serials.push_back(axis.motor.nextSerial());
     follows->push_back({axis.motor.channel(), open.serials[i], plans.planned[i].profile.get(),
-                        before != nullptr ? before->serial : 0, axis.restartInterval(), group_,
-                        context_.stops_handled});
+                        before != nullptr ? before->serial : 0, axis.restartInterval(),
+                        plans.path != nullptr ? group_ : 0, context_.stops_handled});
   }
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     Order& order = orders_[i];
+    if (plans.planned[i].profile == nullptr) continue;
     if (!started_ && !slowsDown()) order.goal.began_ns = plans.at;
     motor::Motion motion;
     motion.serial = open.serials[i];
@@ -275,12 +291,11 @@ bool Manoeuvre::look() {
   if (isOpen()) return false;
   if (!open_.empty()) {
     // What was ordered after a refused order is refused too.
-    const std::uint64_t accepted = orders_.front().axis->motor.state().accepted;
     const std::vector<OpenOrder> orders = std::exchange(open_, {});
     for (const OpenOrder& order : orders) {
-      if (order.serials.front() <= accepted) accept(order);
+      if (wasAccepted(order)) accept(order);
     }
-    if (orders.back().serials.front() <= accepted) {
+    if (wasAccepted(orders.back())) {
       calls_.clear();
     } else {
       refused();
@@ -288,6 +303,15 @@ bool Manoeuvre::look() {
   }
   if (!over_ && open_.empty() && !anyMoves() && !held_) rested();
   return over_;
+}
+
+// The engine takes an order for all of its axes or for none.
+bool Manoeuvre::wasAccepted(const OpenOrder& order) const {
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    const std::uint64_t serial = order.serials[i];
+    if (serial != 0) return serial <= orders_[i].axis->motor.state().accepted;
+  }
+  return false;
 }
 
 void Manoeuvre::accept(const OpenOrder& order) {
@@ -298,7 +322,7 @@ void Manoeuvre::accept(const OpenOrder& order) {
   accepted_path_ = order.plans.path;
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     for (std::size_t i = 0; i < orders_.size(); ++i) {
-      if (orders_[i].axis != before.axis) continue;
+      if (orders_[i].axis != before.axis || order.plans.planned[i].profile == nullptr) continue;
       activity::conclude(before.goal,
                          replacedResult(before, orders_[i], *order.plans.planned[i].profile));
     }
@@ -309,6 +333,11 @@ void Manoeuvre::accept(const OpenOrder& order) {
 void Manoeuvre::refused() {
   path_ = accepted_path_;
   for (auto before = predecessors_.begin(); before != predecessors_.end();) {
+    // This was planned from what the other had ordered: if that was refused, it was never begun.
+    if (before->call && before->axis->motor.state().accepted < before->serial) {
+      before->call->fail(neverBegun(*before));
+      before->call.reset();
+    }
     const bool ended = !before->axis->moving();
     if (ended) conclude(*before);
     before = ended ? predecessors_.erase(before) : before + 1;
@@ -412,8 +441,10 @@ void Manoeuvre::finish() {
 
 std::vector<Predecessor> Manoeuvre::handOver() {
   std::vector<Predecessor> left = std::exchange(predecessors_, {});
-  for (const Order& order : orders_) {
-    left.push_back({order.axis, order.goal, accepted_mode_ == Mode::kStop, why_.text, call_});
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    const Order& order = orders_[i];
+    left.push_back({order.axis, order.goal, accepted_mode_ == Mode::kStop, why_.text, call_,
+                    open_.empty() ? 0 : open_.front().serials[i]});
   }
   over_ = true;
   call_.reset();
@@ -431,11 +462,8 @@ const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
 // ---- how it ended, in words ----
 
 void Manoeuvre::conclude(const Predecessor& ended) {
-  if (ended.call) {
-    // Neither it nor what took over from it was begun.
-    ended.call->fail({Failure::Kind::kRefused,
-                      ended.axis->name() + ": another command took over before it began"});
-  }
+  // Neither it nor what took over from it was begun.
+  if (ended.call) ended.call->fail(neverBegun(ended));
   auto [end, why] = endOf(*ended.axis);
   if (end == axis::MoveEnd::kReached && ended.slowed_down) {
     end = axis::MoveEnd::kStopped;

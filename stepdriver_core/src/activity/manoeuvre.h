@@ -65,7 +65,7 @@ class Manoeuvre {
   enum class Mode { kRun, kStop, kHold };
 
   struct Planned {
-    std::shared_ptr<const motion::Profile> profile;
+    std::shared_ptr<const motion::Profile> profile;  // none if the axis stands while others stop
     double overshoot = 0.0;
   };
   struct Plans {
@@ -76,7 +76,7 @@ class Manoeuvre {
 
   /// What the engine has not yet dealt with.
   struct OpenOrder {
-    std::vector<std::uint64_t> serials;  // by axis
+    std::vector<std::uint64_t> serials;  // by axis; 0: it has no part in it
     Mode mode = Mode::kRun;
     Plans plans;
   };
@@ -87,6 +87,7 @@ class Manoeuvre {
   void change(Mode mode, const Ack& call);
   bool anyMoves() const;
   bool isOpen() const;
+  bool wasAccepted(const OpenOrder& order) const;
   void accept(const OpenOrder& order);
   void refused();
   void tryAgain();

@@ -54,5 +54,25 @@ TEST(FoundSchedules, RelativePositionsCountFromTheJointWhileItsBacklashIsTakenUp
   expectGood({0, {does(0, 0, "line of x and y"), does(1, 4, "line of y and z by")}, {}});
 }
 
+TEST(FoundSchedules, AnAxisThatCouldNotJoinATrajectoryInTimeComesToRest) {
+  expectGood({0,
+              {does(0, 0, "jog z back"), does(1, 2, "trajectory of x and z")},
+              {{6, Who::kEngine, 200}}});
+  expectGood({0,
+              {does(0, 0, "line of y and z by"), does(1, 4, "trajectory of x and z")},
+              {{8, Who::kEngine, 10}}});
+  expectGood(
+      {0, {does(0, 0, "move z to 6 mm"), does(1, 4, "trajectory of z")}, {{5, Who::kEngine, 10}}});
+}
+
+TEST(FoundSchedules, ATrajectoryThatTheEngineNeverTookDoesNotSucceedIfAJogTakesOver) {
+  expectGood({0,
+              {does(0, 0, "stream a jog of x"), does(1, 4, "trajectory of x and z")},
+              {{9, Who::kEngine, 4}}});
+  expectGood({1,
+              {does(0, 0, "stream a jog of x"), does(1, 8, "trajectory of x and y")},
+              {{8, Who::kEngine, 10}}});
+}
+
 }  // namespace
 }  // namespace stepdriver::search

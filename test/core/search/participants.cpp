@@ -533,7 +533,8 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
     motor = position;
   };
   constexpr pulse::Nanoseconds kStep = 1'000'000;
-  for (auto time = clock_.now(); time < last.profile->endNs(); time += kStep) {
+  for (auto time = clock_.now() - engine_->state().slipped; time < last.profile->endNs();
+       time += kStep) {
     move_to(last.profile->stateAt(time).position.value());
   }
   move_to(last.profile->endPosition().value());
