@@ -153,9 +153,13 @@ std::vector<axis::Move> Manoeuvre::prepare() {
   std::vector<axis::Move> moves;
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Planned& planned = prepared_->planned[i];
-    moves.push_back(moveOf(*orders_[i].axis, *planned.profile, planned.overshoot));
-    moves.back().id = orders_[i].goal.move;
-    moves.back().outcome = orders_[i].goal.outcome;
+    const Goal& goal = orders_[i].goal;
+    axis::Move move = moveOf(*orders_[i].axis, *planned.profile, planned.overshoot);
+    // A path may turn, which takes the backlash up anew: the motor's end doesn't tell the joint's.
+    if (join_) move.target = orders_[i].axis->positionOf(static_cast<double>(*goal.target));
+    move.id = goal.move;
+    move.outcome = goal.outcome;
+    moves.push_back(std::move(move));
   }
   return moves;
 }

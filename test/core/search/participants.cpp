@@ -828,7 +828,7 @@ void Participants::checkOutcomes() {
     if (!result) {
       oracle_.complain("the outcome of " + name + " is not set");
     } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
-               std::abs(result->position - move.target) > 0.51 / 20'000.0 * 16.0) {
+               std::abs(result->position - move.target) > 1e-9) {
       oracle_.complain(name + " has reached " + std::to_string(result->position) +
                        " m, but its target is " + std::to_string(move.target) + " m");
     }
