@@ -14,22 +14,11 @@ bool has(const std::vector<axis::AxisModel*>& axes, const axis::AxisModel* axis)
 
 }  // namespace
 
-Activity* Activities::owner(const axis::AxisModel& axis) const {
-  for (const auto& activity : all_) {
-    if (activity->hasBegun() && !activity->isFinished() && has(activity->axes(), &axis)) {
-      return activity.get();
-    }
-  }
-  return nullptr;
-}
-
-Activity* Activities::heir(const axis::AxisModel& axis) const {
-  for (const auto& activity : all_) {
-    if (!activity->hasBegun() && !activity->isFinished() && has(activity->axes(), &axis)) {
-      return activity.get();
-    }
-  }
-  return nullptr;
+Activity* Activities::find(const axis::AxisModel& axis, bool begun) const {
+  const auto found = std::find_if(all_.begin(), all_.end(), [&](const auto& activity) {
+    return activity->hasBegun() == begun && !activity->isFinished() && has(activity->axes(), &axis);
+  });
+  return found != all_.end() ? found->get() : nullptr;
 }
 
 void Activities::begin(std::unique_ptr<Activity> activity, const Why& why) {

@@ -19,8 +19,8 @@ class Activities {
  public:
   explicit Activities(Context& context) : context_(context) {}
 
-  Activity* owner(const axis::AxisModel& axis) const;
-  Activity* heir(const axis::AxisModel& axis) const;
+  Activity* owner(const axis::AxisModel& axis) const { return find(axis, true); }
+  Activity* heir(const axis::AxisModel& axis) const { return find(axis, false); }
   /// Nobody owns it, or is to.
   bool isFree(const axis::AxisModel& axis) const {
     return owner(axis) == nullptr && heir(axis) == nullptr;
@@ -45,6 +45,7 @@ class Activities {
   bool watchInputs() const;
 
  private:
+  Activity* find(const axis::AxisModel& axis, bool begun) const;
   void takeOver(std::unique_ptr<Activity> activity);
   bool sweep();
   bool mayBegin(const Activity& activity) const;

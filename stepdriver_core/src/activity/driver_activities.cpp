@@ -13,8 +13,11 @@ namespace {
 // A level that has changed is told in this time, even if its edge was lost.
 constexpr pulse::Nanoseconds kLevelIsTold = 250'000'000;
 
-void append(Steps& steps, Steps more) {
-  for (auto& step : more) steps.push_back(std::move(step));
+std::unique_ptr<Step> resetStep(Context& context, axis::AxisModel& axis) {
+  return pinsStep(context, axis, axis.motor.pins().reset(), [&axis] {
+    axis.noteUnpowered();
+    axis.noteHome();
+  });
 }
 
 }  // namespace
@@ -87,10 +90,7 @@ Steps Sleep::plan() {
 Steps Reset::plan() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
-  add(steps, pinsStep(context(), axis, axis.motor.pins().reset(), [&axis] {
-        axis.noteUnpowered();
-        axis.noteHome();
-      }));
+  add(steps, resetStep(context(), axis));
   return steps;
 }
 
@@ -143,10 +143,7 @@ Steps Recover::resetIfFaulty() {
   // Asleep a chip says nothing of the fault that it may have kept.
   const bool unknown = axis.config.fault && axis.motor.power().isAsleep();
   if (!(isFaulty() || unknown) || !axis.motor.pins().hasReset()) return steps;
-  add(steps, pinsStep(context(), axis, axis.motor.pins().reset(), [&axis] {
-        axis.noteUnpowered();
-        axis.noteHome();
-      }));
+  add(steps, resetStep(context(), axis));
   add(steps, std::make_unique<WaitStep>(context(), [&axis] { return axis.motor.state().ready; }));
   // The line has another level by then, which may be told a little later.
   add(steps, std::make_unique<WaitStep>(

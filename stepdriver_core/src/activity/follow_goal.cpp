@@ -58,7 +58,7 @@ Steps FollowGoal::plan() {
   Steps steps;
   for (const Order& order : orders_) {
     order.axis->refuseUnlessReady();  // as an heir it begins later than it was accepted
-    for (auto& step : wakeSteps(context(), *order.axis)) steps.push_back(std::move(step));
+    append(steps, wakeSteps(context(), *order.axis));
   }
   steps.push_back(prepared_ ? std::move(prepared_) : follow());
   return steps;
@@ -89,7 +89,7 @@ Steps FollowLine::plan() {
   check();
   Steps steps;
   for (const Order& order : orders_) {
-    for (auto& step : wakeSteps(context(), *order.axis)) steps.push_back(std::move(step));
+    append(steps, wakeSteps(context(), *order.axis));
   }
   for (const Order& order : orders_) {
     add(steps, std::make_unique<RunStep>([this, &order] { insert(takeUp(order)); }));

@@ -120,4 +120,8 @@ std::unique_ptr<Step> pinsStep(Context& context, axis::AxisModel& axis,
 Steps wakeSteps(Context& context, axis::AxisModel& axis);
 /// @}
 
+inline void append(Steps& steps, Steps more) {
+  for (auto& step : more) steps.push_back(std::move(step));
+}
+
 }  // namespace stepdriver::activity
