@@ -58,8 +58,8 @@ motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
   return changeRate(at_ns, from, 0.0, &Member::stop_bounds);
 }
 
-// As fast as no axis gets more acceleration and jerk than it may have: now, or where one of them
-// has all of it already, as soon as it leaves some. Where that is never, the trajectory goes on
+// As fast as the limits of all axes allow: now, or, if one of them is at its limit already, as soon
+// as it leaves some room. If it never does, the trajectory continues
 // nearly as it is: it ends at rest too.
 motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::MotionState& from,
                                            double rate, Bounds bounds) const {

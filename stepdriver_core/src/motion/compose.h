@@ -16,8 +16,8 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale);
 
 /// What one axis does on a curve q(s) while s runs as `path` says: q(s(t)).
 ///
-/// Where s runs at a constant rate this is exact, and an excerpt of the course: that takes the same
-/// time and memory however long it is. Where the rate changes, s(t) is a parabola or a cubic, and
+/// If s runs at a constant rate this is exact, and an excerpt of the course: that takes the same
+/// time and memory however long it is. If the rate changes, s(t) is a parabola or a cubic, and
 /// q(s(t)) has a degree of up to 9; it is cut into cubics of h that have its position and velocity
 /// at both ends, which leave it by at most h^4/384 max|d^4 q/dt^4| <= kComposeError, with
 /// d^4 q/dt^4 = 6 q''' s'^2 s'' + q'' (3 s''^2 + 4 s' s''').

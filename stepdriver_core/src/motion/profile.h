@@ -27,7 +27,7 @@ struct Piece {
   DoubleDouble accelerationAt(DoubleDouble t) const;
 
   /// The first time after `after` [s] and clearly before the end at which the velocity changes its
-  /// sign; the end where there is none. A turning point this close to an end moves nothing.
+  /// sign; the end if there is none. A turning point this close to an end moves nothing.
   double firstTurn(double after) const;
 };
 
@@ -107,11 +107,11 @@ class Profile {
   std::size_t pieceAt(DoubleDouble time) const;
 
   class Pieces;
-  /// In the order of time; none where nothing moves. Not to be used when the profile is gone.
+  /// In the order of time; empty if nothing moves. Not to be used when the profile is gone.
   Pieces pieces() const;
 
  private:
-  // What makes the pieces from `first` on: `of`, or where that is none, pieces_ from `own` on.
+  // What makes the pieces from `first` on: `of`, or if that is null, pieces_ from `own` on.
   struct Section {
     std::size_t first = 0;
     DoubleDouble start;  // s

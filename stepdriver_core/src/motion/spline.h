@@ -80,7 +80,7 @@ class SplineTail {
   /// @throw as planSpline().
   explicit SplineTail(const std::vector<Waypoint>& waypoints);
 
-  /// Where the tail begins [s], after the trajectory's start. Where there is only one segment, that
+  /// Where the tail begins [s], after the trajectory's start. If there is only one segment, that
   /// ends here.
   double beginS() const { return static_cast<double>(first_.time_ns) * 1e-9; }
   /// What the tail does, from its own beginning on; none if there is only one segment.

@@ -19,7 +19,7 @@ std::int64_t nearest(double number) {
   return static_cast<std::int64_t>((number + kShift) - kShift);
 }
 
-// The first turning point or highest speed after the time `after`; the end where there is none.
+// The first turning point or highest speed after the time `after`; the end if there is none.
 double firstCut(const Piece& piece, double after) {
   const double turn = piece.firstTurn(after);
   if (piece.j == 0.0) return turn;

@@ -17,7 +17,7 @@ class DriverPins {
   bool hasReset() const { return lines_.reset >= 0; }
   bool hasMode() const { return lines_.mode[0] >= 0; }
 
-  /// From the safe levels to awake and out of reset. Empty where neither pin is wired.
+  /// From the safe levels to awake and out of reset. Empty if neither pin is wired.
   PinSequence bringUp() const;
   PinSequence enable(bool on) const;
   PinSequence sleep(bool asleep) const;
