@@ -17,6 +17,10 @@ constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kArrival = 250 * kMillisecond;
 /// How far the rig's clock falls behind at most while the computer doesn't stall.
 constexpr std::int64_t kLag = 200 * kMillisecond;
+/// Stalls so far from a request count for when its motion may begin.
+constexpr std::int64_t kStallReach = 10 * kLag;
+/// How long before its request at most a motion seems to begin on the rig's clock.
+constexpr std::int64_t kEarliest = kLag + 2 * kStallReach;
 /// For the offset of the clocks, which is measured by calls.
 constexpr std::int64_t kOffsetError = 2 * kMillisecond;
 constexpr double kStopMargin = 1.1;
@@ -41,9 +45,58 @@ struct Span {
   std::int64_t end;
 };
 
+/// The stalls of the computer, and how long they took in all up to any time.
+class Stalls {
+ public:
+  explicit Stalls(const std::vector<Stall>& stalls) : stalls_(stalls) {
+    before_.reserve(stalls.size());
+    std::int64_t sum = 0;
+    for (const Stall& stall : stalls) {
+      before_.push_back(sum);
+      sum += stall.end - stall.begin;
+    }
+  }
+
+  std::int64_t between(std::int64_t begin, std::int64_t end) const {
+    return upTo(end) - upTo(begin);
+  }
+
+ private:
+  std::int64_t upTo(std::int64_t time) const {
+    const auto next =
+        std::upper_bound(stalls_.begin(), stalls_.end(), time,
+                         [](std::int64_t t, const Stall& stall) { return t < stall.begin; });
+    if (next == stalls_.begin()) return 0;
+    const auto last = static_cast<std::size_t>(next - stalls_.begin()) - 1;
+    return before_[last] + std::min(time, stalls_[last].end) - stalls_[last].begin;
+  }
+
+  const std::vector<Stall>& stalls_;
+  std::vector<std::int64_t> before_;  // the sum of those before each
+};
+
+/// What an axis was asked, as far as a lookup by time needs it.
+struct AxisRequests {
+  std::vector<std::int64_t> trajectories;  // when each was sent
+  std::vector<const Request*> renamings;   // what may change what its position is counted from
+};
+
+/// Requests are in the order in which they were sent, and each lookup takes only those near the
+/// time that it is about: so judging takes time in proportion to the length of the storm.
 class Judge {
  public:
-  explicit Judge(const Observation& observation) : seen_(observation) {}
+  explicit Judge(const Observation& observation)
+      : seen_(observation), stalls_(observation.stalls), of_axis_(observation.axes.size()) {
+    for (const Request& request : seen_.requests) {
+      for (std::size_t axis = 0; axis < of_axis_.size(); ++axis) {
+        if (!isOf(request, axis)) continue;
+        if (request.is_trajectory) of_axis_[axis].trajectories.push_back(request.sent);
+        if (request.kind == Kind::kSetPosition || request.kind == Kind::kHoming) {
+          of_axis_[axis].renamings.push_back(&request);
+        }
+      }
+    }
+  }
 
   std::vector<std::string> verdict() {
     for (const Request& request : seen_.requests) {
@@ -51,7 +104,7 @@ class Judge {
       judgeArrivals(request);
       if (!ends(request.kind)) continue;
       for (std::size_t axis = 0; axis < seen_.axes.size(); ++axis) {
-        if ((request.axes >> axis & 1U) != 0) judgeEnd(request, axis);
+        if (isOf(request, axis)) judgeEnd(request, axis);
       }
     }
     judgePositions();
@@ -74,20 +127,23 @@ class Judge {
     return (request.axes >> axis & 1U) != 0;
   }
 
-  std::int64_t stalled(std::int64_t begin, std::int64_t end) const {
-    std::int64_t sum = 0;
-    for (const Stall& stall : seen_.stalls) {
-      sum += std::max<std::int64_t>(0, std::min(end, stall.end) - std::max(begin, stall.begin));
-    }
-    return sum;
-  }
-
   /// Whether the node may have handled it after the other one.
   bool mayFollow(const Request& request, const Request& other) const {
     if (&request == &other) return false;
     if (request.answered && *request.answered < other.sent) return false;
-    const std::int64_t apart = other.sent - request.sent;
-    return apart - (apart > 0 ? stalled(request.sent, other.sent) : 0) < kArrival;
+    return mayArriveAfter(request, other);
+  }
+
+  bool mayArriveAfter(const Request& request, const Request& other) const {
+    if (request.sent >= other.sent) return true;
+    return other.sent - request.sent - stalls_.between(request.sent, other.sent) < kArrival;
+  }
+
+  /// The first request that may arrive after this one; all that were sent later may, too.
+  std::vector<Request>::const_iterator firstAfter(const Request& other) const {
+    return std::partition_point(
+        seen_.requests.begin(), seen_.requests.end(),
+        [&](const Request& request) { return !mayArriveAfter(request, other); });
   }
 
   /// Whether this allows motions again that the ending forbids.
@@ -109,49 +165,76 @@ class Judge {
     }
   }
 
-  /// When this motion may put out pulses; it can't have begun before `earliest`.
+  /// When this motion may put out pulses, on the rig's clock; it can't have begun before
+  /// `earliest`.
   Span spanOf(const Request& motion, std::int64_t earliest, std::size_t axis) const {
-    std::int64_t end = kForever;
+    const std::int64_t begin = std::max(motion.sent, earliest);
     // A line that didn't begin may have moved its axes to take up backlash.
     if (motion.answered && (motion.waits || !motion.success)) {
-      end = *motion.answered + longestStop(motion, axis);
+      const std::int64_t end = *motion.answered + longestStop(motion, axis);
+      return {mayBegin(begin), end - seen_.clock_offset + kOffsetError};
     }
-    return {std::max(motion.sent, earliest), end};
+    return {mayBegin(begin), kForever};
   }
 
-  /// The motions that explain pulses after the ending.
-  std::vector<Span> newerMotions(const Request& ending, std::size_t axis) const {
-    std::vector<Span> spans;
-    const auto add = [&](const Request& after, std::int64_t earliest) {
-      for (const Request& motion : seen_.requests) {
-        if (moves(motion.kind) && isOf(motion, axis) && mayFollow(motion, after)) {
-          spans.push_back(spanOf(motion, earliest, axis));
-        }
+  /// The rig's clock may be behind when a motion begins.
+  std::int64_t mayBegin(std::int64_t asked) const {
+    return asked - seen_.clock_offset - kLag -
+           stalls_.between(asked - kStallReach, asked + kStallReach);
+  }
+
+  /// What explains pulses after an ending: all that come after `end`, and those in `passing`.
+  struct Explained {
+    std::int64_t end = kForever;
+    std::vector<Span> passing;
+
+    void add(const Span& span) {
+      if (span.end == kForever) {
+        end = std::min(end, span.begin);
+      } else {
+        passing.push_back(span);
       }
-    };
+    }
+  };
+
+  /// Whether nothing that is asked from this request on explains a pulse before the end.
+  bool isBeyond(const Request& request, const Explained& explained) const {
+    return explained.end != kForever &&
+           request.sent - seen_.clock_offset - kEarliest > explained.end;
+  }
+
+  void explainByMotions(const Request& after, std::size_t axis, Explained& explained) const {
+    for (auto motion = firstAfter(after); motion != seen_.requests.end(); ++motion) {
+      if (isBeyond(*motion, explained)) return;
+      if (moves(motion->kind) && isOf(*motion, axis) && mayFollow(*motion, after)) {
+        explained.add(spanOf(*motion, after.sent, axis));
+      }
+    }
+  }
+
+  Explained explainedAfter(const Request& ending, std::size_t axis) const {
+    Explained explained;
     if (ending.kind == Kind::kStop) {
-      add(ending, ending.sent);
-      return spans;
+      explainByMotions(ending, axis, explained);
+      return explained;
     }
-    for (const Request& request : seen_.requests) {
-      if (!allowsAgain(request, ending, axis)) continue;
-      if (request.kind == Kind::kResume) spans.push_back({request.sent, kForever});
-      add(request, request.sent);
+    for (auto request = firstAfter(ending); request != seen_.requests.end(); ++request) {
+      if (isBeyond(*request, explained)) break;
+      if (!allowsAgain(*request, ending, axis)) continue;
+      if (request->kind == Kind::kResume) explained.add({mayBegin(request->sent), kForever});
+      explainByMotions(*request, axis, explained);
     }
-    return spans;
+    return explained;
   }
 
   std::int64_t longestStop(const Request& ending, std::size_t axis) const {
     double seconds = 0.0;
     // Axes that move as one stop as the slowest of them does.
     for (const AxisFacts& facts : seen_.axes) seconds = std::max(seconds, facts.longest_stop);
-    for (const Request& request : seen_.requests) {
-      if (!request.is_trajectory || !isOf(request, axis) || request.sent > *ending.answered ||
-          request.sent < ending.sent - kLongestTrajectory) {
-        continue;
-      }
-      return std::llround(seconds * kTrajectoryStops * kStopMargin * 1e9);
-    }
+    const auto& trajectories = of_axis_[axis].trajectories;
+    const auto recent = std::lower_bound(trajectories.begin(), trajectories.end(),
+                                         ending.sent - kLongestTrajectory);
+    if (recent != trajectories.end() && *recent <= *ending.answered) seconds *= kTrajectoryStops;
     return std::llround(seconds * kStopMargin * 1e9);
   }
 
@@ -159,18 +242,7 @@ class Judge {
     const bool decelerates = ending.kind == Kind::kStop || ending.kind == Kind::kHold;
     const std::int64_t allowed = decelerates ? longestStop(ending, axis) : 0;
     const std::int64_t begin = *ending.answered - seen_.clock_offset + kOffsetError + allowed;
-    std::int64_t end = kForever;
-    std::vector<Span> passing;
-    for (const Span& span : newerMotions(ending, axis)) {
-      // The rig's clock may be behind when the motion begins.
-      const std::int64_t from = span.begin - seen_.clock_offset - kLag -
-                                stalled(span.begin - 10 * kLag, span.begin + 10 * kLag);
-      if (span.end == kForever) {
-        end = std::min(end, from);
-      } else {
-        passing.push_back({from, span.end - seen_.clock_offset + kOffsetError});
-      }
-    }
+    const auto [end, passing] = explainedAfter(ending, axis);
     std::size_t count = 0;
     std::int64_t first = 0;
     std::int64_t last = 0;
@@ -213,10 +285,9 @@ class Judge {
 
   /// Whether what the position is counted from may have changed between two times.
   bool mayBeRenamed(std::size_t axis, std::int64_t begin, std::int64_t end) const {
-    return std::any_of(seen_.requests.begin(), seen_.requests.end(), [&](const Request& request) {
-      return (request.kind == Kind::kSetPosition || request.kind == Kind::kHoming) &&
-             isOf(request, axis) && request.sent < end &&
-             (!request.answered || *request.answered > begin);
+    const auto& renamings = of_axis_[axis].renamings;
+    return std::any_of(renamings.begin(), renamings.end(), [&](const Request* request) {
+      return request->sent < end && (!request->answered || *request->answered > begin);
     });
   }
 
@@ -254,6 +325,8 @@ class Judge {
   }
 
   const Observation& seen_;
+  const Stalls stalls_;
+  std::vector<AxisRequests> of_axis_;
   std::vector<std::string> broken_;
 };
 
