@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "give_way.h"
 #include "message_text.h"
 #include "motion/profile_parts.h"
 #include "nanoseconds.h"
@@ -171,6 +172,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(
   std::vector<motion::Waypoint> waypoints;
   waypoints.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
+    giveWay(i);
     waypoints.push_back(waypointOf(member, i, points[i], waypoints));
   }
   Part part;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "give_way.h"
 #include "motion/planner.h"
 #include "motion/profile_parts.h"
 #include "nanoseconds.h"
@@ -195,6 +196,7 @@ struct MotorTail::Plan {
   explicit Plan(const Profile& joint) : peaks(joint) {
     Turns all(startOf(joint));
     for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
+      giveWay(i);
       all.take(joint.piece(i), joint.pieceStart(i).value());
       if (all.found().empty()) moves_after = i + 1;
     }
@@ -215,6 +217,7 @@ MotorTail::MotorTail(const Profile& joint, std::int64_t backlash, const MotionLi
   std::vector<Piece> pieces;
   DoubleDouble time;
   for (std::size_t i = 1; i < turns.size() && !take_ups.noRoom(); ++i) {
+    giveWay(i);
     plan->from_rest[i] = take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i]);
     const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
     if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);

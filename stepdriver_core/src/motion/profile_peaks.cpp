@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "give_way.h"
+
 namespace stepdriver::motion {
 namespace {
 
@@ -60,6 +62,7 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double
   peaks.highest.value = first;
   double velocity = velocity_before;
   for (std::size_t index = 0; index < profile.pieces().size(); ++index) {
+    giveWay(index);
     const Piece piece = profile.piece(index);
     const double start = profile.pieceStart(index).value();
     takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);

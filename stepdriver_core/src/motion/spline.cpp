@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "give_way.h"
 #include "hermite.h"
 #include "spline_refusals.h"
 #include "spline_segment.h"
@@ -154,6 +155,7 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints) {
   begin_acceleration_ = accelerationAtBegin(segments.at(1));
   JerkMeter meter(begin_acceleration_);
   for (std::size_t i = 1; i < segments.size(); ++i) {
+    giveWay(i);
     append(pieces, segments.at(i));
     meter.take(segments.at(i));
   }

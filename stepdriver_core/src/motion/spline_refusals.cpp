@@ -7,24 +7,28 @@
 #include <stdexcept>
 #include <string>
 
+#include "give_way.h"
+
 namespace stepdriver::motion {
 namespace {
 
 [[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument(why); }
 
-// "waypoint 3", or "the motion's start".
-void requireFinite(const std::string& owner, const char* quantity, double value) {
+// An owner is a function that makes its name, "waypoint 3" or "the motion's start", for a refusal.
+template <typename Owner>
+void requireFinite(const Owner& owner, const char* quantity, double value) {
   if (!std::isfinite(value)) {
-    refuse(fmt::format("The {} of {} is {}; only finite numbers are allowed.", quantity, owner,
+    refuse(fmt::format("The {} of {} is {}; only finite numbers are allowed.", quantity, owner(),
                        value));
   }
 }
 
-void requireNear(const std::string& owner, double position) {
+template <typename Owner>
+void requireNear(const Owner& owner, double position) {
   if (!(std::abs(position) <= kFarthest)) {
     refuse(fmt::format(
-        "The position of {0} is {1:.17g} microsteps; allowed is from -{2:.17g} to {2:.17g}.", owner,
-        position, kFarthest));
+        "The position of {0} is {1:.17g} microsteps; allowed is from -{2:.17g} to {2:.17g}.",
+        owner(), position, kFarthest));
   }
 }
 
@@ -55,7 +59,7 @@ void requirePlannable(const MotionState& from, const std::vector<Waypoint>& wayp
 }
 
 void requireStart(const MotionState& from) {
-  const std::string start = "the motion's start";
+  const auto start = [] { return std::string("the motion's start"); };
   requireFinite(start, "position", from.position.value());
   requireNear(start, from.position.value());
   requireFinite(start, "velocity", from.velocity);
@@ -66,7 +70,8 @@ void requireWaypoints(const std::vector<Waypoint>& waypoints) {
   if (waypoints.empty()) refuse("The trajectory has 0 waypoints; it needs at least 1.");
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
     const Waypoint& waypoint = waypoints[index];
-    const std::string owner = fmt::format("waypoint {}", index);
+    giveWay(index);
+    const auto owner = [index] { return fmt::format("waypoint {}", index); };
     requireTime(waypoints, index);
     requireFinite(owner, "position", waypoint.position);
     requireNear(owner, waypoint.position);
