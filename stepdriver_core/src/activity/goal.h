@@ -22,10 +22,12 @@ struct Goal {
   std::uint64_t move = 0;  ///< its number; 0: nobody asked for it
   /// [microsteps] Of a move; of a jog where it has to stand at the latest, none without a limit.
   std::optional<std::int64_t> target;
-  double velocity = 0.0;  ///< [unit/s] as asked for, before any override; of a jog with its sign
-  bool of_motor = false;  ///< the target is the motor's; else the joint's, backlash or not
+  double remainder = 0.0;  ///< [microsteps] of a move: what was asked for less the target
+  double velocity = 0.0;   ///< [unit/s] as asked for, before any override; of a jog with its sign
+  bool of_motor = false;   ///< the target is the motor's; else the joint's, backlash or not
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
+  pulse::Nanoseconds slipped_ns = 0;  ///< by which the timeline had slid until then
 };
 
 /// Makes the path that axes share which are taken over at a motion time. @throw Refused

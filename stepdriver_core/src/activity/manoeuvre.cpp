@@ -16,8 +16,10 @@ namespace {
 
 constexpr pulse::Nanoseconds kLongestLead = 2'000'000'000;
 
-double secondsSince(std::int64_t began_ns, std::int64_t end_ns) {
-  return std::max(0.0, static_cast<double>(end_ns - began_ns) * 1e-9);
+/// [s] From the beginning of a goal to a motion time, as a clock on the wall measures it.
+double durationOf(const Context& context, const Goal& goal, std::int64_t end_ns) {
+  const std::int64_t slid = context.slipped - goal.slipped_ns;
+  return std::max(0.0, static_cast<double>(end_ns - goal.began_ns + slid) * 1e-9);
 }
 
 /// How the engine ended an axis's motion, and in words.
@@ -41,13 +43,13 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis) {
   return {axis::MoveEnd::kCompanion, "an axis that it moved together with was stopped"};
 }
 
-axis::MoveResult resultWith(const axis::AxisModel& axis, const Goal& goal, axis::MoveEnd end,
-                            const std::string& why) {
+axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis, const Goal& goal,
+                            axis::MoveEnd end, const std::string& why) {
   const pulse::ChannelState& state = axis.motor.state();
   axis::MoveResult result;
   result.end = end;
   result.position = axis.positionNow();
-  result.duration = secondsSince(goal.began_ns, state.end_time);
+  result.duration = durationOf(context, goal, state.end_time);
   if (end == axis::MoveEnd::kReached) {
     result.message = fmt::format("{} reached {}", axis.name(), axis.show(result.position));
     return result;
@@ -59,8 +61,15 @@ axis::MoveResult resultWith(const axis::AxisModel& axis, const Goal& goal, axis:
   return result;
 }
 
-void conclude(const Goal& goal, axis::MoveResult result) {
+void tell(const Goal& goal, axis::MoveResult result) {
   if (goal.outcome) goal.outcome->set(std::move(result));
+}
+
+/// Of a goal that nothing has taken over from: the axis stands.
+void conclude(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
+  const bool reached = result.end == axis::MoveEnd::kReached;
+  axis.position.reached(reached ? goal.remainder / axis.stepsPerUnit() : 0.0);
+  tell(goal, std::move(result));
 }
 
 Failure neverBegun(const Predecessor& left) {
@@ -154,9 +163,7 @@ std::vector<axis::Move> Manoeuvre::prepare() {
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Planned& planned = prepared_->planned[i];
     const Goal& goal = orders_[i].goal;
-    axis::Move move = moveOf(*orders_[i].axis, *planned.profile, planned.overshoot);
-    // A path may turn, which takes the backlash up anew: the motor's end doesn't tell the joint's.
-    if (join_) move.target = orders_[i].axis->positionOf(static_cast<double>(*goal.target));
+    axis::Move move = moveOf(*orders_[i].axis, goal, *planned.profile, planned.overshoot);
     move.id = goal.move;
     move.outcome = goal.outcome;
     moves.push_back(std::move(move));
@@ -247,7 +254,7 @@ void Manoeuvre::stop(const Why& why, const Ack& call) {
 // What it kept at rest is given up.
 void Manoeuvre::drop() {
   for (const Order& order : orders_) {
-    activity::conclude(order.goal, droppedResult(order, &order == &orders_.front()));
+    activity::conclude(*order.axis, order.goal, droppedResult(order, &order == &orders_.front()));
   }
   result_ = droppedResult(orders_.front(), true);
   finish();
@@ -320,6 +327,9 @@ bool Manoeuvre::wasAccepted(const OpenOrder& order) const {
 
 void Manoeuvre::accept(const OpenOrder& order) {
   lead_ = kLead;
+  if (!started_) {
+    for (Order& own : orders_) own.goal.slipped_ns = context_.slipped;
+  }
   started_ = true;
   from_rest_ = false;
   accepted_mode_ = order.mode;
@@ -327,8 +337,7 @@ void Manoeuvre::accept(const OpenOrder& order) {
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     for (std::size_t i = 0; i < orders_.size(); ++i) {
       if (orders_[i].axis != before.axis || order.plans.planned[i].profile == nullptr) continue;
-      activity::conclude(before.goal,
-                         replacedResult(before, orders_[i], *order.plans.planned[i].profile));
+      tell(before.goal, replacedResult(before, orders_[i], *order.plans.planned[i].profile));
     }
   }
   call_.reset();
@@ -343,7 +352,7 @@ void Manoeuvre::refused() {
       before->call.reset();
     }
     const bool ended = !before->axis->moving();
-    if (ended) conclude(*before);
+    if (ended) conclude(context_, *before);
     before = ended ? predecessors_.erase(before) : before + 1;
   }
   // What was to change has ended by itself.
@@ -427,12 +436,14 @@ void Manoeuvre::concludeGoals() {
   for (const Order& order : orders_) {
     const axis::MoveResult result = resultOf(order);
     if (&order == &orders_.front()) result_ = result;
-    activity::conclude(order.goal, result);
+    activity::conclude(*order.axis, order.goal, result);
   }
 }
 
 void Manoeuvre::concludePredecessors() {
-  for (const Predecessor& before : std::exchange(predecessors_, {})) conclude(before);
+  for (const Predecessor& before : std::exchange(predecessors_, {})) {
+    conclude(context_, before);
+  }
 }
 
 void Manoeuvre::finish() {
@@ -465,7 +476,7 @@ const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
 
 // ---- how it ended, in words ----
 
-void Manoeuvre::conclude(const Predecessor& ended) {
+void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
   // Neither it nor what took over from it was begun.
   if (ended.call) ended.call->fail(neverBegun(ended));
   auto [end, why] = endOf(*ended.axis);
@@ -473,7 +484,8 @@ void Manoeuvre::conclude(const Predecessor& ended) {
     end = axis::MoveEnd::kStopped;
     why = ended.stopped_by;
   }
-  activity::conclude(ended.goal, resultWith(*ended.axis, ended.goal, end, why));
+  activity::conclude(*ended.axis, ended.goal,
+                     resultWith(context, *ended.axis, ended.goal, end, why));
 }
 
 axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
@@ -484,7 +496,7 @@ axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
   } else if (end == axis::MoveEnd::kCompanion) {
     why = endedWith(*order.axis);
   }
-  return resultWith(*order.axis, order.goal, end, why);
+  return resultWith(context_, *order.axis, order.goal, end, why);
 }
 
 std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
@@ -501,20 +513,20 @@ std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
 // Of what was held at rest.
 axis::MoveResult Manoeuvre::droppedResult(const Order& order, bool by_it) const {
   if (by_it || orders_.size() == 1) {
-    return resultWith(*order.axis, order.goal, why_.end, why_.text);
+    return resultWith(context_, *order.axis, order.goal, why_.end, why_.text);
   }
   return resultWith(
-      *order.axis, order.goal, axis::MoveEnd::kCompanion,
+      context_, *order.axis, order.goal, axis::MoveEnd::kCompanion,
       fmt::format("it was held together with {}: {}", orders_.front().axis->name(), why_.text));
 }
 
 axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Order& by,
-                                           const motion::Profile& profile) {
+                                           const motion::Profile& profile) const {
   const axis::AxisModel& axis = *before.axis;
   axis::MoveResult result;
   result.end = axis::MoveEnd::kReplaced;
   result.position = axis.positionNow();
-  result.duration = secondsSince(before.goal.began_ns, profile.startNs());
+  result.duration = durationOf(context_, before.goal, profile.startNs());
   std::string what;
   if (by.goal.kind == Goal::Kind::kJog) {
     what = "a jog";

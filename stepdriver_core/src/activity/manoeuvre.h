@@ -58,7 +58,7 @@ class Manoeuvre {
   /// What an axis was asked to do; nullptr if it has no part in it.
   const Goal* goalOf(const axis::AxisModel& axis) const;
   /// Tells how a goal ended that nobody has taken over from.
-  static void conclude(const Predecessor& ended);
+  static void conclude(const Context& context, const Predecessor& ended);
   bool slowsDown() const { return mode_ != Mode::kRun; }
 
  private:
@@ -99,8 +99,8 @@ class Manoeuvre {
   void concludePredecessors();
   axis::MoveResult resultOf(const Order& order) const;
   axis::MoveResult droppedResult(const Order& order, bool by_it) const;
-  static axis::MoveResult replacedResult(const Predecessor& before, const Order& by,
-                                         const motion::Profile& profile);
+  axis::MoveResult replacedResult(const Predecessor& before, const Order& by,
+                                  const motion::Profile& profile) const;
   std::string endedWith(const axis::AxisModel& axis) const;
 
   Context& context_;

@@ -67,9 +67,15 @@ std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
   return *goal.target - axis.jointCount();
 }
 
-axis::Move moveOf(const axis::AxisModel& axis, const motion::Profile& profile, double overshoot) {
+axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::Profile& profile,
+                  double overshoot) {
   axis::Move move;
-  move.target = axis.positionOf(axis.jointAt(profile.endPosition().value()));
+  // A path may turn, which takes the backlash up anew: the motor's end doesn't tell the joint's.
+  const double rest = goal.kind == Goal::Kind::kTogether
+                          ? static_cast<double>(*goal.target)
+                          : axis.jointAt(profile.endPosition().value());
+  move.rest = axis.positionOf(rest);
+  move.target = axis.positionOf(rest + goal.remainder);
   move.duration = static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9;
   move.overshoot = overshoot / axis.stepsPerUnit();
   return move;

@@ -26,7 +26,8 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
 /// The steps that a goal asks for; of a jog just their sign.
 std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal);
 
-/// What a caller is told of a plan; without an outcome. @param overshoot [microsteps]
-axis::Move moveOf(const axis::AxisModel& axis, const motion::Profile& profile, double overshoot);
+/// What a caller is told of a plan for a goal; without an outcome. @param overshoot [microsteps]
+axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::Profile& profile,
+                  double overshoot);
 
 }  // namespace stepdriver::activity

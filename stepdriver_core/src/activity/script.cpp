@@ -45,7 +45,7 @@ void Script::run() {
 void Script::fail(const Failure& failure) {
   if (call_) call_->fail(failure);
   call_.reset();
-  for (Predecessor& left : takePredecessors()) Manoeuvre::conclude(left);
+  for (Predecessor& left : takePredecessors()) Manoeuvre::conclude(context(), left);
   steps_.clear();
   current_.reset();
   finish();

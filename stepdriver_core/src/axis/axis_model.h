@@ -125,6 +125,12 @@ class AxisModel {
   std::string whyUnverified(const AxisMemory& kept, bool clean) const;
   /// @}
 
+  /// Something stopped it, moving or not: what it was commanded to do is over.
+  void noteStop() {
+    ++stops;
+    position.dropRemainder();
+  }
+
   /// Clock time of the last thing that it did.
   pulse::Nanoseconds rest_since = 0;
   /// Times that something stopped it, other than the end of its motion.

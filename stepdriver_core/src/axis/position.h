@@ -6,8 +6,8 @@
 
 namespace stepdriver::axis {
 
-/// Where an axis says that it stands: the position at count 0, and whether it can be trusted. It
-/// alone changes these.
+/// Where an axis says that it stands: the position at count 0, whether it can be trusted, and what
+/// its last move left to the microstep that it rests on. It alone changes these.
 class Position {
  public:
   /// [unit] The position at count 0.
@@ -19,13 +19,26 @@ class Position {
   /// is none.
   const std::string& note() const { return valid_ ? kNothing : note_; }
 
+  /// [unit] The commanded position less the one that the axis rests on: up to half a microstep
+  /// after a move that reached its target, else 0. A relative move counts from the commanded
+  /// position, so that roundings don't add up.
+  double remainder() const { return remainder_; }
+  /// A motion has reached its target but for this [unit].
+  void reached(double remainder) { remainder_ = remainder; }
+  /// From now on the commanded position is where the axis stands.
+  void dropRemainder() { remainder_ = 0.0; }
+
   /// Something has happened after which nobody knows where the axis stands.
-  void distrust() { valid_ = homed_ = false; }
+  void distrust() {
+    valid_ = homed_ = false;
+    dropRemainder();
+  }
 
   /// Somebody who knows says where the axis stands.
   void declare(double origin) {
     origin_ = origin;
     valid_ = true;
+    dropRemainder();
   }
   void home(double origin) {
     declare(origin);
@@ -43,6 +56,7 @@ class Position {
     note_ = std::move(doubt);
     valid_ = note_.empty();
     homed_ = valid_ && homed;
+    dropRemainder();
   }
   void setNote(std::string why) { note_ = std::move(why); }
 
@@ -50,6 +64,7 @@ class Position {
   inline static const std::string kNothing;
 
   double origin_ = 0.0;
+  double remainder_ = 0.0;
   bool valid_ = false;
   bool homed_ = false;
   std::string note_;

@@ -113,7 +113,6 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
   parts_.reserve(axes_.size());
   for (std::size_t member = 0; member < axes_.size(); ++member) {
     parts_.push_back(prepare(member, points));
-    targets_.push_back(std::llround(std::nearbyint(parts_.back().ends.back().position)));
   }
 }
 

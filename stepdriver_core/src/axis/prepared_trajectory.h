@@ -32,8 +32,8 @@ class PreparedTrajectory {
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
   const std::vector<PathAxis>& axes() const { return axes_; }
-  /// [microsteps] Where each axis comes to rest.
-  const std::vector<std::int64_t>& targets() const { return targets_; }
+  /// [microsteps] Where each axis is to come to rest.
+  double target(std::size_t member) const { return parts_[member].ends.back().position; }
 
   /// The path from where the axes are. With a backlash also what takes it up until that is what was
   /// prepared, which is mostly at the first turn.
@@ -65,7 +65,6 @@ class PreparedTrajectory {
   motion::MotionLimits motorLimits(std::size_t member) const;
 
   std::vector<PathAxis> axes_;
-  std::vector<std::int64_t> targets_;
   std::vector<Part> parts_;
 };
 

@@ -92,7 +92,10 @@ void Controller::takeStops(const EngineNews& news) {
   if (news.stops_served == context_.stops_handled) return;
   context_.stops_handled = news.stops_served;
   input_stops_seen_ = news.input_stops;
-  for (const auto& axis : context_.axes) axis->fault.latchEmergencyStop(by_input);
+  for (const auto& axis : context_.axes) {
+    if (!axis->fault) axis->noteStop();
+    axis->fault.latchEmergencyStop(by_input);
+  }
 }
 
 void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
@@ -121,7 +124,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.position.distrust();
   }
   if (!axis.moving()) axis.atRest();
-  if (!was_faulty && axis.fault) ++axis.stops;
+  if (!was_faulty && axis.fault) axis.noteStop();
 }
 
 // What falls due by the state of things alone.
@@ -203,7 +206,9 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
   const Activity* owner = activities_.owner(axis);
   const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
   const motor::Motion* latest = axis.motor.motions().latest();
-  if (motion == nullptr || latest == nullptr) return static_cast<double>(axis.jointCount());
+  if (motion == nullptr || latest == nullptr) {
+    return static_cast<double>(axis.jointCount()) + axis.position.remainder() * axis.stepsPerUnit();
+  }
   const Goal* goal = motion->goalOf(axis);
   // What slows down, and what takes up backlash, ends where its motor does.
   if (latest->slows_down || (goal != nullptr && goal->of_motor)) {
@@ -212,22 +217,24 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
   if (goal == nullptr || !goal->target) {
     axis.refuse("busy: it jogs without an end; give an absolute position");
   }
-  return static_cast<double>(*goal->target);
+  return static_cast<double>(*goal->target) + goal->remainder;
 }
 
-std::int64_t Controller::targetOf(axis::AxisModel& axis, double position, bool relative) {
+void Controller::setTarget(Goal& goal, axis::AxisModel& axis, double position, bool relative) {
   refuseUnlessReadyToMove(axis);
   if (!relative) axis.refuseUnlessHomed();
   if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
-  const double goal = relative ? axis.positionOf(relativeOrigin(axis)) + position : position;
-  axis.refuseBeyondLimits(goal, "the position");
-  return std::llround(axis.countOf(goal));
+  const double count =
+      relative ? relativeOrigin(axis) + position * axis.stepsPerUnit() : axis.countOf(position);
+  axis.refuseBeyondLimits(relative ? axis.positionOf(count) : position, "the position");
+  goal.target = std::llround(count);
+  goal.remainder = count - static_cast<double>(*goal.target);
 }
 
 Goal Controller::goalOf(const MoveTo& wanted) {
   axis::AxisModel& moved = axis(wanted.axis);
   Goal goal;
-  goal.target = targetOf(moved, wanted.position, wanted.relative);
+  setTarget(goal, moved, wanted.position, wanted.relative);
   goal.velocity = moved.checkedVelocity(wanted.velocity);
   if (!moved.moving()) moved.refuseIntoEndstop(*goal.target - moved.jointCount());
   return goal;
@@ -263,7 +270,7 @@ void Controller::serve(const PlanMove& wanted, const Ack& call) {
   }();
   axis::MovePlan shown;
   shown.steps_per_unit = moved.stepsPerUnit();
-  shown.move = activity::moveOf(moved, planned.profile, planned.overshoot);
+  shown.move = activity::moveOf(moved, goal, planned.profile, planned.overshoot);
   const double unit = 1.0 / moved.stepsPerUnit();
   for (const motion::Piece& piece : planned.profile.pieces()) {
     shown.pieces.push_back({piece.duration.value(), moved.positionOf(piece.p0.value()),
@@ -321,7 +328,7 @@ void Controller::serve(const MoveLine& wanted, const Ack& call) {
     axis::AxisModel& moved = axis(wanted.axes[i]);
     Goal goal;
     goal.kind = Goal::Kind::kTogether;
-    goal.target = targetOf(moved, wanted.positions[i], wanted.relative);
+    setTarget(goal, moved, wanted.positions[i], wanted.relative);
     orders.push_back({&moved, goalWithOutcome(goal)});
   }
   activities_.begin(std::make_unique<activity::FollowLine>(context_, std::move(orders),
@@ -340,7 +347,9 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
     axes.push_back(&moved);
     Goal goal;
     goal.kind = Goal::Kind::kTogether;
-    goal.target = wanted.prepared->targets()[i];
+    const double target = wanted.prepared->target(i);
+    goal.target = std::llround(std::nearbyint(target));
+    goal.remainder = target - static_cast<double>(*goal.target);
     orders.push_back({&moved, goalWithOutcome(goal)});
   }
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -358,7 +367,7 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
 // ---- stops ----
 
 void Controller::serve(const StopAxis& wanted, const Ack& call) {
-  ++axis(wanted.axis).stops;
+  axis(wanted.axis).noteStop();
   activities_.end(axis(wanted.axis), kStopped, call);
 }
 
@@ -368,13 +377,13 @@ void Controller::serve(const StopMove& wanted, const Ack& call) {
   const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
   const Goal* goal = motion != nullptr ? motion->goalOf(stopped) : nullptr;
   if (goal == nullptr || goal->move != wanted.move) return;
-  ++stopped.stops;
+  stopped.noteStop();
   activities_.end(stopped, kStopped, call);
 }
 
 void Controller::serve(const StopAll& /*wanted*/, const Ack& call) {
   context_.mode.held = false;
-  for (const auto& axis : context_.axes) ++axis->stops;
+  for (const auto& axis : context_.axes) axis->noteStop();
   activities_.endAll(kStopped, call);
 }
 

@@ -76,7 +76,8 @@ class Controller {
 
   axis::AxisModel& axis(AxisId id) { return *context_.axes.at(id); }
   activity::Goal goalOf(const MoveTo& wanted);
-  std::int64_t targetOf(axis::AxisModel& axis, double position, bool relative);
+  void setTarget(activity::Goal& goal, axis::AxisModel& axis, double position, bool relative);
+  /// [microsteps] Of the joint, where a relative move counts from.
   double relativeOrigin(const axis::AxisModel& axis) const;
   activity::Goal newGoal() { return goalWithOutcome({}); }
   activity::Goal goalWithOutcome(activity::Goal goal);

@@ -60,6 +60,7 @@ class SlowBackend : public gpio::Backend {
     std::string line;
     bool level;
     bool edge;  ///< it had the other level
+    pulse::Nanoseconds time;
   };
   std::vector<Write> written;
   bool held = false;
@@ -81,10 +82,11 @@ class SlowBackend::Held : public gpio::Lines {
 
   int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
     backend_.clock_.pass(backend_.write_cost());
+    const pulse::Nanoseconds now = backend_.clock_.now();
     for (std::size_t i = 0; i < count; ++i) {
       const auto output = static_cast<std::size_t>(writes[i].output);
       backend_.written.push_back(
-          {outputs_[output].line, writes[i].level, levels_[output] != writes[i].level});
+          {outputs_[output].line, writes[i].level, levels_[output] != writes[i].level, now});
       levels_[output] = writes[i].level;
     }
     return backend_.write_error;

@@ -127,7 +127,8 @@ struct MoveResult {
 /// A motion that was accepted.
 struct Move {
   std::uint64_t id = 0;    ///< never the same twice on one axis
-  double target = 0.0;     ///< [unit]
+  double target = 0.0;     ///< [unit] the commanded position
+  double rest = 0.0;       ///< [unit] the microstep nearest to it, where the axis comes to rest
   double duration = 0.0;   ///< [s] as planned
   double overshoot = 0.0;  ///< [unit] beyond the target, if the axis can't stop before it
   /// Its result appears here.

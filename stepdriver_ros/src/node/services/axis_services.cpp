@@ -53,7 +53,7 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
 }
 
 bool AxisServices::moveTo(MoveTo::Request& request, MoveTo::Response& response) {
-  response.position = axis_.state().position;
+  response.target = response.position = axis_.state().position;
   return respond(response, [&] {
     const axis::Move move = axis_.moveTo(request.position, request.relative != 0, request.velocity);
     respondToMove(move, request.wait != 0, response);
@@ -61,7 +61,7 @@ bool AxisServices::moveTo(MoveTo::Request& request, MoveTo::Response& response) 
 }
 
 bool AxisServices::moveRounds(MoveRounds::Request& request, MoveRounds::Response& response) {
-  response.position = axis_.state().position;
+  response.target = response.position = axis_.state().position;
   return respond(response, [&] {
     const axis::Move move = axis_.moveRounds(request.rounds, request.velocity);
     respondToMove(move, request.wait != 0, response);
@@ -94,6 +94,10 @@ std::string AxisServices::wayText(const axis::Move& move) const {
   const char* const unit = unitOf(axis_.config().kind);
   std::string text =
       fmt::format("to {} {} in {} s", roundedText(move.target), unit, roundedText(move.duration));
+  const std::string rest = roundedText(move.rest);
+  if (rest != roundedText(move.target)) {
+    text += fmt::format("; it comes to rest at {} {}, the nearest microstep", rest, unit);
+  }
   if (move.overshoot > 0.0) {
     text += fmt::format("; it can't stop before that, goes {} {} beyond, and comes back",
                         roundedText(move.overshoot), unit);
@@ -103,8 +107,9 @@ std::string AxisServices::wayText(const axis::Move& move) const {
 
 template <typename Response>
 void AxisServices::respondToMove(const axis::Move& move, bool wait, Response& response) {
+  response.target = move.target;
   if (!wait) {
-    response.position = move.target;
+    response.position = move.rest;
     response.duration = move.duration;
     response.message = fmt::format("{}: moves {}", axis_.config().name, wayText(move));
     return;

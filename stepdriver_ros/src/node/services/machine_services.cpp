@@ -30,6 +30,7 @@ machine::LineRequest lineRequest(const MoveLine::Request& request) {
 void moveLine(machine::Machine& machine, const MoveLine::Request& request,
               MoveLine::Response& response) {
   const machine::CoordinatedMove move = machine.moveLine(lineRequest(request));
+  for (const auto& [name, own] : move.members) response.target.push_back(own.target);
   if (request.wait != 0) {
     machine::CoordinatedResult result = machine.wait(move);
     response.success = result.end == axis::MoveEnd::kReached;
@@ -42,7 +43,7 @@ void moveLine(machine::Machine& machine, const MoveLine::Request& request,
     const config::Kind kind = machine.axis(name).config().kind;
     response.message += fmt::format("{}{} to {} {}", response.message.empty() ? "" : ", ", name,
                                     roundedText(own.target), unitOf(kind));
-    response.position.push_back(own.target);
+    response.position.push_back(own.rest);
   }
   response.message =
       fmt::format("a line: {} in {} s", response.message, roundedText(move.duration));
