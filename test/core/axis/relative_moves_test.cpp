@@ -30,7 +30,12 @@ config::AxisConfig axisNamed(const char* name, double backlash = 0.0) {
 class RelativeMoves : public testing::Test {
  protected:
   void build(double backlash = 0.0) {
-    bench.emplace(std::vector<config::AxisConfig>{axisNamed("x", backlash), axisNamed("y")});
+    std::vector<config::AxisConfig> axes{axisNamed("x", backlash), axisNamed("y")};
+    for (config::AxisConfig& axis : axes) {
+      axis.endstop_min.reset();
+      axis.endstop_max.reset();
+    }
+    bench.emplace(axes);
   }
   void SetUp() override { build(); }
 

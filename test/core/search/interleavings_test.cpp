@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <iostream>
 #include <random>
 #include <string>
@@ -110,8 +111,9 @@ Schedule tripleOf(std::mt19937_64& random) {
 }
 
 /// About 141,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is how many are
-/// played of each kind that is sampled, STEPDRIVER_FAILURES after how many failures a test ends.
-/// Seeds mean the same schedules whatever these are.
+/// played of each kind that is sampled, STEPDRIVER_FIRST_SEED the seed that they begin with, and
+/// STEPDRIVER_FAILURES after how many failures a test ends. A seed means the same schedule whatever
+/// these are.
 class Interleavings : public testing::TestWithParam<std::size_t> {
  protected:
   /// @return whether to go on.
@@ -129,15 +131,18 @@ class Interleavings : public testing::TestWithParam<std::size_t> {
     ADD_FAILURE() << seed << "\n" << text;
     return ++failed_ < mostFailures();
   }
-  static std::size_t mostFailures() {
-    const char* wanted = std::getenv("STEPDRIVER_FAILURES");
-    return wanted != nullptr ? std::strtoull(wanted, nullptr, 10) : 3;
+  static std::size_t wanted(const char* variable, std::size_t usual) {
+    const char* text = std::getenv(variable);
+    return text != nullptr ? std::strtoull(text, nullptr, 10) : usual;
   }
-  /// How many are played in all shards together of what is sampled.
-  static std::size_t sampled(std::size_t usual) {
-    const char* wanted = std::getenv("STEPDRIVER_SCHEDULES");
-    const std::size_t all = wanted != nullptr ? std::strtoull(wanted, nullptr, 10) : usual;
-    return (all + kShards - 1) / kShards;
+  static std::size_t mostFailures() { return wanted("STEPDRIVER_FAILURES", 3); }
+  /// Calls with each seed of this shard, until it says that this is enough.
+  void forEachSeed(const std::function<bool(std::uint64_t seed)>& play_seed) {
+    const std::size_t first = wanted("STEPDRIVER_FIRST_SEED", 0);
+    const std::size_t end = first + wanted("STEPDRIVER_SCHEDULES", 40'000);
+    for (std::uint64_t seed = first; seed < end; ++seed) {
+      if (seed % kShards == GetParam() && !play_seed(seed)) return;
+    }
   }
   void TearDown() override { std::cout << played_ << " schedules\n"; }
 
@@ -152,23 +157,21 @@ TEST_P(Interleavings, KeepThePromisesForEachPairOfRequests) {
 }
 
 TEST_P(Interleavings, KeepThePromisesForPairsOutOfTurn) {
-  for (std::size_t i = 0; i < sampled(40'000); ++i) {
-    const std::uint64_t seed = i * kShards + GetParam();
+  forEachSeed([this](std::uint64_t seed) {
     std::mt19937_64 random(seed);
     Schedule schedule = pairOf(any(random, pairs()));
     deviate(schedule, random);
-    if (!expectGood(schedule, "pair, seed " + std::to_string(seed))) return;
-  }
+    return expectGood(schedule, "pair, seed " + std::to_string(seed));
+  });
 }
 
 TEST_P(Interleavings, KeepThePromisesForSeveralRequests) {
-  for (std::size_t i = 0; i < sampled(40'000); ++i) {
-    const std::uint64_t seed = i * kShards + GetParam();
+  forEachSeed([this](std::uint64_t seed) {
     std::mt19937_64 random(seed);
     Schedule schedule = tripleOf(random);
     if (any(random, 2) == 0) deviate(schedule, random);
-    if (!expectGood(schedule, "several, seed " + std::to_string(seed))) return;
-  }
+    return expectGood(schedule, "several, seed " + std::to_string(seed));
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Shards, Interleavings, testing::Range<std::size_t>(0, kShards));

@@ -27,6 +27,7 @@ struct Meaning {
   bool ends_hold = false;   ///< whatever its answer, motions may begin after a hold before it
   std::uint64_t as_of = 0;  ///< nothing must have stopped it since this Oracle::moment(); 0: any
   std::array<bool, kAxes> axes{};  ///< that it is about
+  bool on_curve = false;           ///< it moves them along a trajectory
 };
 
 /// Judges pulses by the answers that clients got: after the answer of a stop no pulse goes out that
@@ -77,7 +78,7 @@ class Oracle {
       quiet.name = ended.name;
       quiet.slows =
           meaning.quiet == Meaning::Quiet::kSlowsDown || meaning.quiet == Meaning::Quiet::kHeld;
-      quiet.since = now + (quiet.slows ? slowing_[axis] - slipped_() : 0);
+      quiet.since = now + (quiet.slows ? slowingOf(axis) - slipped_() : 0);
       // A motion that was handed over after the stop, and accepted before its answer.
       if (last_motion_[axis] > ended.order) continue;
       quiets_[axis].push_back(quiet);
@@ -148,6 +149,11 @@ class Oracle {
     }
   }
 
+  // The acceleration that a trajectory itself has at a place is missing to a stop along it there.
+  pulse::Nanoseconds slowingOf(std::size_t axis) const {
+    return on_curve_[axis] ? slowing_[axis] * 5 / 4 : slowing_[axis];
+  }
+
   // Axes that share a path take as long as the slowest of them.
   void moveTogether(const Meaning& meaning) {
     pulse::Nanoseconds longest = 0;
@@ -155,7 +161,9 @@ class Oracle {
       if (meaning.axes[axis]) longest = std::max(longest, slowing_[axis]);
     }
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      if (meaning.axes[axis]) slowing_[axis] = longest;
+      if (!meaning.axes[axis]) continue;
+      slowing_[axis] = longest;
+      if (meaning.on_curve) on_curve_[axis] = true;
     }
   }
 
@@ -186,6 +194,7 @@ class Oracle {
   }
 
   std::array<pulse::Nanoseconds, kAxes> slowing_;
+  std::array<bool, kAxes> on_curve_{};
   const std::function<pulse::Nanoseconds()> slipped_;
   std::uint64_t order_ = 0;
   std::uint64_t hold_ended_ = 0;

@@ -558,9 +558,15 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
         })) {
       oracle_.complain(who + " succeeds, but the engine has not begun it");
     }
-    if (!asked.relative || !asked.targets[i]) continue;
     const double scale = controller_->snapshot()->axes[axis].steps_per_unit;
-    if (std::abs(moves[i].target - *asked.targets[i]) > 1.01 / scale) {
+    if (asked.meaning.moves && std::abs(moves[i].rest - moves[i].target) > 0.501 / scale) {
+      oracle_.complain(who + " comes to rest at " + std::to_string(moves[i].rest) +
+                       " m, not at the microstep nearest to " + std::to_string(moves[i].target));
+    }
+    if (!asked.relative || !asked.targets[i]) continue;
+    // What it counts from is the target of the last move, half a step from where it stands at most.
+    const double half_step = 0.51 * configs_[axis].microsteps / configs_[axis].steps_per_unit;
+    if (std::abs(moves[i].target - *asked.targets[i]) > half_step) {
       oracle_.complain(who + " goes to " + std::to_string(moves[i].target) + " m, not to " +
                        std::to_string(*asked.targets[i]) + " m");
     }
@@ -623,6 +629,7 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
   std::vector<axis::PathAxis> facts;
   Meaning meaning;
   meaning.moves = true;
+  meaning.on_curve = true;
   for (const std::size_t axis : axes) {
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
@@ -828,9 +835,9 @@ void Participants::checkOutcomes() {
     if (!result) {
       oracle_.complain("the outcome of " + name + " is not set");
     } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
-               std::abs(result->position - move.target) > 1e-9) {
+               std::abs(result->position - move.rest) > 1e-9) {
       oracle_.complain(name + " has reached " + std::to_string(result->position) +
-                       " m, but its target is " + std::to_string(move.target) + " m");
+                       " m, but was to come to rest at " + std::to_string(move.rest) + " m");
     }
   }
   for (const activity::AcceptedHoming& homing : homings_) {
