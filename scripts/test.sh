@@ -11,7 +11,7 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize]
 Installs what is missing, builds, and runs the parts that are named; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck over the project's own files; doxygen over the
-          public headers; links of the pages, and the files that they name
+          public headers; links of the pages, and the files that they name; the English of pages and comments
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that find
           it installed; what of its benchmarks is exact; the pictures of docs/motion.md from what that
           build does
@@ -101,6 +101,12 @@ check_shell() {
 }
 
 check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
+check_prose() {
+  local status=0
+  own_files | (cd "$root" && xargs -d '\n' codespell --ignore-words=test/docs/spelling.txt) || status=1
+  /usr/bin/python3 -B "$root/test/docs/prose_test.py" || status=1
+  return "$status"
+}
 check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 
 # Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
@@ -387,6 +393,7 @@ if wants lint; then
   stage shell check_shell
   stage doxygen check_doxygen
   stage links check_links
+  stage prose check_prose
   # Debian 12's clang says what the format is; another one formats some lines in its own way.
   if [[ $(clang-format --version) == *' 14.'* ]]; then
     stage format check_format

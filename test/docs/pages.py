@@ -2,6 +2,7 @@
 
 import pathlib
 import re
+import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -17,6 +18,19 @@ def names():
     return ["README.md", "CONTRIBUTING.md"] + sorted(
         f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")
     )
+
+
+def own_files():
+    """All files of the project, by their paths in the checkout."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT, check=False, capture_output=True, text=True,
+    )
+    if listed.returncode == 0:
+        return [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
+    made = re.compile(r"(build.*|\..*)/")
+    files = (str(file.relative_to(ROOT)) for file in ROOT.rglob("*") if file.is_file())
+    return [name for name in files if not made.match(name)]
 
 
 def text_of(page):
@@ -49,6 +63,38 @@ def prose(text):
     return "\n".join(
         line for language, lines in _blocks(text) if language is None for line in lines
     )
+
+
+def without_blocks(text):
+    """A page whose fenced blocks are empty lines: each line keeps its number."""
+    kept, in_block = [], False
+    for line in text.splitlines():
+        fence = re.match(r"\s*```", line)
+        kept.append("" if fence or in_block else line)
+        in_block = in_block != bool(fence)
+    return "\n".join(kept)
+
+
+# Strings come first: what they contain is no comment.
+_CPP = r'''R"\((?:.|\n)*?\)"|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])'|(//[^\n]*(?:\n\s*//[^\n]*)*)'''
+_HASH = r"""'[^'\n]*'|"[^"\n]*"|((?<!\S)#[^\n]*(?:\n\s*#[^\n]*)*)"""
+_XML = r"""((?<=doc=")[^"]*|<!--(?:.|\n)*?-->)"""
+_COMMENTS = {
+    "cpp": _CPP, "h": _CPP, "launch": _XML, "xacro": _XML, "urdf": _XML,
+    "action": _HASH, "msg": _HASH, "srv": _HASH, "yaml": _HASH,
+}
+
+
+def comments(name):
+    """The comments of a source file: for each the number of its first line, and its text as one line."""
+    pattern = _COMMENTS.get(name.rpartition(".")[2])
+    if not pattern:
+        return
+    text = text_of(name)
+    for match in re.finditer(pattern, text):
+        if match[1]:
+            lines = (re.sub(r"^\s*(//+<?|#+)", "", line).strip() for line in match[1].splitlines())
+            yield text.count("\n", 0, match.start(1)) + 1, " ".join(lines)
 
 
 def _of_sentences(text):
