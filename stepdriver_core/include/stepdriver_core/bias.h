@@ -2,7 +2,7 @@
 
 namespace stepdriver {
 
-/// What the GPIO chip pulls an input to while nothing drives it.
+/// The level to which the GPIO chip pulls an input while nothing drives it.
 enum class Bias { kAsIs, kPullUp, kPullDown, kDisabled };
 
 }  // namespace stepdriver

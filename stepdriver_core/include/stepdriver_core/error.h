@@ -6,31 +6,32 @@
 
 namespace stepdriver {
 
-/// What every stepdriver error is. what() is a whole sentence for the person who reads it.
+/// The base of all stepdriver errors. what() is a whole sentence for the person who reads it.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A command that can't be accepted as things stand. Nothing was changed by it.
+/// A command that can't be accepted at the moment. It has changed nothing.
 class Refused : public Error {
  public:
   using Error::Error;
 };
 
-/// A GPIO line that can't be had, written or read; names the line and the reason.
+/// A GPIO line can't be requested, written or read; names the line and the reason.
 class GpioError : public Error {
  public:
   using Error::Error;
 };
 
-/// One thing wrong in a configuration.
+/// One mistake in a configuration.
 struct ConfigIssue {
-  std::string key;      ///< full name of the parameter
-  std::string message;  ///< its value and what is allowed; reads on from the key
+  std::string key;  ///< full name of the parameter
+  /// Its value and what is allowed; continues the sentence that the key begins.
+  std::string message;
 };
 
-/// Everything that is wrong in a configuration, all at once.
+/// All mistakes in a configuration.
 class ConfigError : public Error {
  public:
   explicit ConfigError(std::vector<ConfigIssue> issues);

@@ -8,19 +8,19 @@
 
 namespace stepdriver::config {
 
-/// The lowest limits that an axis may have, whoever gives them. Far below any machine, and well
-/// inside what the motion can count and time in 64 bits.
+/// The lowest limits that an axis may have, from any source. They are far below any machine, and
+/// well within what the motion can count and time in 64 bits.
 constexpr double kLowestRate = 1e-3;          ///< [steps/s]
 constexpr double kLowestAcceleration = 1e-3;  ///< [steps/s^2]
 constexpr double kLowestJerk = 1e-3;          ///< [steps/s^3]
 
-/// What an axis moves along, and so its units.
+/// What an axis moves along, which determines its units.
 enum class Kind {
-  kLinear,  ///< mm in configurations, m outside
-  kRotary,  ///< degrees in configurations, rad outside
+  kLinear,  ///< mm in configurations, m elsewhere
+  kRotary,  ///< degrees in configurations, rad elsewhere
 };
 
-/// A unit of configurations, mm or degree, in one of the axis's, m or rad.
+/// Units of configurations (mm or degrees) per unit of the axis (m or rad).
 constexpr double configUnitsPerUnit(Kind kind) {
   return kind == Kind::kLinear ? 1000.0 : 180.0 / 3.14159265358979323846;
 }
@@ -54,25 +54,25 @@ struct FaultPin {
   Bias bias = Bias::kAsIs;
 };
 
-/// How the motor's current is taken away at rest.
+/// How the motor's current is switched off at rest.
 enum class IdleAction { kDisable, kSleep };
 
-/// How an axis finds its zero: by the place where one of its endstop switches closes. A unit is m
-/// on a linear axis, rad on a rotary one.
+/// How an axis finds its zero: at the position where one of its endstop switches closes. A unit is
+/// m on a linear axis, rad on a rotary one.
 struct HomingConfig {
-  bool at_max = false;       ///< the switch is the max endstop; else the min endstop
-  double seek_speed = 0.0;   ///< [unit/s] towards the switch at first
-  double latch_speed = 0.0;  ///< [unit/s] off the switch, and back to the place that counts
-  double pull_off = 0.0;     ///< [unit] from the trigger point to where it stands at the end
+  bool at_max = false;       ///< true: the switch is the max endstop; false: the min endstop
+  double seek_speed = 0.0;   ///< [unit/s] of the first approach to the switch
+  double latch_speed = 0.0;  ///< [unit/s] off the switch, and back to the trigger point
+  double pull_off = 0.0;     ///< [unit] from the trigger point to the final position
   double offset = 0.0;       ///< [unit] position of the trigger point
-  double max_travel = 0.0;   ///< [unit] that each stroke takes at most to reach or leave the switch
-  double timeout = 60.0;     ///< [s] for all of it
+  double max_travel = 0.0;   ///< [unit] longest stroke to reach or leave the switch
+  double timeout = 60.0;     ///< [s] for the whole homing
   double debounce = 0.005;   ///< [s] that a level of the switch must last to count
-  int order = 0;             ///< of several axes the lowest is first, the same are at once
+  int order = 0;  ///< axes with the lowest number go first; the same number: simultaneously
 };
 
-/// All that an axis needs to know, checked by readAxes(). A unit is m on a linear axis, rad on a
-/// rotary one; a step is a microstep of the configured mode.
+/// The complete configuration of an axis, checked by readAxes(). A unit is m on a linear axis, rad
+/// on a rotary one; a step is a microstep of the configured mode.
 struct AxisConfig {
   std::string name;
   std::string joint;  ///< its name in joint_states and in the URDF
@@ -81,18 +81,18 @@ struct AxisConfig {
   driver::Timing timing{};
   Pins pins;
 
-  int microsteps = 1;            ///< microsteps per full step that steps_per_unit counts
+  int microsteps = 1;            ///< microsteps per full step, as counted by steps_per_unit
   double steps_per_unit = 0.0;   ///< [steps/unit]
-  double steps_per_round = 0.0;  ///< [steps/round of the motor]; 0: not known
+  double steps_per_round = 0.0;  ///< [steps per motor revolution]; 0: not known
 
   double max_speed = 0.0;     ///< [unit/s]
   double start_speed = 0.0;   ///< [unit/s] reached without a ramp (pull-in); 0: ramps start at rest
   double acceleration = 0.0;  ///< [unit/s^2]
   double deceleration = 0.0;  ///< [unit/s^2]
-  /// [unit/s^2] Of a stop, at least the deceleration; none: that.
+  /// [unit/s^2] Of a stop; at least the deceleration, which is also the default.
   std::optional<double> stop_deceleration;
-  double jerk = 0.0;                   ///< [unit/s^3] 0: the acceleration may jump
-  double backlash = 0.0;               ///< [unit] that a reversal loses; made up for
+  double jerk = 0.0;      ///< [unit/s^3] 0: the acceleration may jump
+  double backlash = 0.0;  ///< [unit] travel that a reversal loses; the motor makes it up
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;
 
@@ -101,17 +101,17 @@ struct AxisConfig {
   std::optional<FaultPin> fault;
 
   std::optional<HomingConfig> homing;
-  bool require_homing = false;  ///< absolute moves are refused before it is homed
+  bool require_homing = false;  ///< absolute moves are refused until the axis is homed
 
   bool enable_on_start = false;
   bool disable_on_shutdown = true;
-  /// A microstep change where the new mode has no position moves to the nearest common one first;
-  /// else it is refused.
+  /// If the current position doesn't exist in the new mode, a microstep change first moves to the
+  /// nearest common one; if false, it is refused.
   bool align_on_microstep_change = false;
 
-  double idle_timeout = 0.0;  ///< [s] at rest, then the idle action is taken; 0: never
-  IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired, where there is a timeout
-  /// The carriage stays where it is without current, as a self-locking screw has it.
+  double idle_timeout = 0.0;                      ///< [s] at rest until the idle action; 0: never
+  IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired if there is a timeout
+  /// The carriage stays where it is without current, as with a self-locking screw.
   bool holds_position_unpowered = false;
 };
 

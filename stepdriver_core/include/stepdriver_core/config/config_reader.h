@@ -12,7 +12,7 @@
 
 namespace stepdriver::config {
 
-/// What a number may be; bounds included unless said otherwise.
+/// The allowed range of a number; bounds are included unless stated otherwise.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -25,26 +25,26 @@ struct Range {
   bool holds(double number) const;
 };
 
-/// Whether a key that isn't there is an issue.
+/// Whether a missing key is an issue.
 enum class Presence { kRequired, kOptional };
 
-/// Reads one map of a configuration strictly: the types are exact (an int is taken where a double
-/// is wanted, nothing else is converted), numbers are finite, unknown keys are errors. It collects
-/// every issue, under the full name of the parameter, and never throws on what it reads.
+/// Reads one map of a configuration strictly: types are exact (an int is accepted for a double,
+/// nothing else is converted), numbers are finite, unknown keys are errors. It collects every issue
+/// under the full name of the parameter, and never throws because of what it reads.
 ///
-/// A reader that found something wrong returns the default; whoever reads looks at the issues
-/// before using anything. Where something is to be computed from several values, the find...()
-/// functions tell what is right from what is wrong, so that one mistake gives one message. A reader
-/// of something that isn't a map has said so once, and finds nothing else to say.
+/// If a value is wrong, the reader returns the default; the caller checks the issues before it uses
+/// anything. To compute something from several values, use the find...() functions: they tell right
+/// values from wrong ones, so that one mistake gives one message. A reader of something that isn't
+/// a map reports this once, and nothing else.
 class ConfigReader {
  public:
-  /// @param value the map; where it isn't one, that is the first issue. Outlives the reader.
-  /// @param name full name of the map, as `/stepdriver/axes/x`.
-  /// @param issues where issues go; outlives the reader.
+  /// @param value the map; if it isn't one, that is the first issue. Outlives the reader.
+  /// @param name full name of the map, such as `/stepdriver/axes/x`.
+  /// @param issues collects the issues; outlives the reader.
   ConfigReader(const ConfigValue& value, std::string name, std::vector<ConfigIssue>& issues);
   ConfigReader(ConfigValue&&, std::string, std::vector<ConfigIssue>&) = delete;
 
-  /// False where the value isn't a map, which has been reported.
+  /// False if the value isn't a map, which has been reported.
   bool isMap() const { return map_ != nullptr; }
   bool has(const std::string& key) const;
   /// The value of a key as messages show it.
@@ -54,7 +54,8 @@ class ConfigReader {
   /// @param key empty: the map itself.
   std::string fullName(const std::string& key) const;
 
-  /// @name Values of keys. With a default the key may be missing; without, that is an issue.
+  /// @name Values of keys. The key may be missing if there is a default; otherwise that is an
+  ///   issue.
   /// @{
   double number(const std::string& key, const Range& range, std::optional<double> fallback = {});
   int integer(const std::string& key, int min, int max, std::optional<int> fallback = {});
@@ -64,40 +65,40 @@ class ConfigReader {
                     const std::optional<std::string>& fallback = {});
   /// @}
 
-  /// @name None where the key is missing, or where its value is wrong, which is an issue.
+  /// @name Empty if the key is missing, or if its value is wrong, which is an issue.
   /// @{
   std::optional<double> findNumber(const std::string& key, const Range& range, Presence presence);
   std::optional<int> findInteger(const std::string& key, int min, int max, Presence presence);
   std::optional<int> findOneOf(const std::string& key, const std::vector<int>& allowed,
                                Presence presence);
   std::optional<bool> findBoolean(const std::string& key, Presence presence);
-  /// @param wanted what the text must be, for the messages.
+  /// @param wanted describes the required text, for messages.
   std::optional<std::string> findText(const std::string& key, Presence presence,
                                       const std::string& wanted = "a string");
   std::optional<std::string> findOneOf(const std::string& key,
                                        const std::vector<std::string>& allowed, Presence presence);
   /// @}
 
-  /// A map below this one; an empty one where the key is missing.
+  /// A map below this one; an empty one if the key is missing.
   ConfigReader map(const std::string& key);
 
   /// @param key empty: the issue is with the map itself.
-  /// @param message reads on from the name of the parameter.
+  /// @param message continues the sentence that the name of the parameter begins.
   void issue(const std::string& key, const std::string& message);
 
-  /// Everything that was wrong so far, of other readers too.
+  /// All issues so far, also those of other readers.
   std::vector<ConfigIssue>& issues() const { return issues_; }
 
-  /// Takes a key as known although nothing asks for its value.
+  /// Accepts a key as known although nothing reads its value.
   void allow(const std::string& key);
 
-  /// Reports every key of the map that nothing has asked for, with the nearest known one.
+  /// Reports every key of the map that nothing has read, with the nearest known one.
   void rejectUnknown();
 
  private:
   ConfigReader(const ConfigValue::Map* map, std::string name, std::vector<ConfigIssue>& issues);
 
-  /// @return nullptr where there is no such key; that is an issue where it is required.
+  /// @return nullptr if there is no such key; that is an issue if the key is required.
   const ConfigValue* find(const std::string& key, Presence presence, const std::string& wanted);
   void wrong(const std::string& key, const std::string& is, const std::string& wanted);
 
@@ -107,7 +108,7 @@ class ConfigReader {
   std::set<std::string> known_;
 };
 
-/// Makes an issue of a map with a name that no axis can have: it is a part of ROS names.
+/// Reports a map whose name no axis can have, because the name becomes part of ROS names.
 void checkAxisName(const std::string& name, ConfigReader& axis);
 
 /// Reads the map of axes.
@@ -160,8 +161,8 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     holds_position_unpowered: false
 /// @endcode
 ///
-/// @param name full name of the map, as `/stepdriver/axes`.
-/// @param issues everything that is wrong is added here.
+/// @param name full name of the map, such as `/stepdriver/axes`.
+/// @param issues every mistake is added here.
 /// @return the axes in the order of their names; to be used only if no issue was added.
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues);

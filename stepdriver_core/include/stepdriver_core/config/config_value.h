@@ -8,11 +8,10 @@
 
 namespace stepdriver::config {
 
-/// A configuration as it was written, before anyone believes it: what the parameter server or a
-/// YAML file holds.
+/// An unchecked configuration, as the parameter server or a YAML file contains it.
 class ConfigValue {
  public:
-  /// Both may hold values of any type, also each other.
+  /// Both may contain values of any type, including each other.
   using List = std::vector<ConfigValue>;
   using Map = std::map<std::string, ConfigValue>;
 
@@ -25,7 +24,7 @@ class ConfigValue {
   ConfigValue(List value) : value_(std::move(value)) {}           // NOLINT
   ConfigValue(Map value) : value_(std::move(value)) {}            // NOLINT
 
-  /// @return nullptr where the value is of another type. An int is not a double here.
+  /// @return nullptr if the value is of another type. An int is not a double here.
   template <typename T>
   const T* as() const {
     return std::get_if<T>(&value_);
@@ -35,7 +34,7 @@ class ConfigValue {
     return std::get_if<T>(&value_);
   }
 
-  /// Whether there is a key with no value behind it, as `key:` in YAML.
+  /// Whether this is a key without a value, such as `key:` in YAML.
   bool isNothing() const { return std::holds_alternative<std::monostate>(value_); }
 
   /// The value as messages show it: `"abc"`, `1.5`, `true`, `a map of 3`, `nothing`.

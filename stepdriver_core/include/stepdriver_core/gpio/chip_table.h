@@ -13,18 +13,18 @@ namespace stepdriver::gpio {
 struct LineInfo {
   std::string name;      ///< the kernel's name of the line; most have none
   bool used = false;     ///< held by a program or by the kernel
-  std::string consumer;  ///< who holds it, as it calls itself; may be empty
+  std::string consumer;  ///< the name under which its holder requested it; may be empty
 };
 
 /// A chip, whether it could be opened or not.
 struct ChipInfo {
   std::string name;             ///< `gpiochip0`; may change from one boot to the next
-  std::string label;            ///< as `pinctrl-bcm2711`: stays
-  int error = 0;                ///< errno with which it couldn't be opened or read; then no lines
+  std::string label;            ///< such as `pinctrl-bcm2711`; doesn't change
+  int error = 0;                ///< errno if it couldn't be opened or read; it then has no lines
   std::vector<LineInfo> lines;  ///< by offset
 };
 
-/// A line by where it is.
+/// The address of a line.
 struct LineAddress {
   std::size_t chip;  ///< index in the table
   unsigned offset;
@@ -35,15 +35,16 @@ struct LineAddress {
 };
 
 /// Finds a line: `chip:offset`, `label:offset`, or the kernel's name of the line. A chip's name
-/// goes before a label, and both go before the name of a line that happens to look like that.
+/// takes precedence over a label, and both take precedence over the name of a line that looks like
+/// one of them.
 ///
-/// @throw GpioError where there is no such chip or line, where several have that label or name, or
-///   where the offset is beyond the chip's lines; it says which there are.
+/// @throw GpioError if there is no such chip or line, if several have that label or name, or if the
+///   offset is beyond the chip's lines; it lists the existing ones.
 LineAddress findLine(const std::vector<ChipInfo>& chips, const std::string& line);
 
 /// The lines of a request, outputs first.
 ///
-/// @throw GpioError as findLine(), where two names are one line, and where one is in use.
+/// @throw GpioError as findLine(), if two names refer to the same line, and if a line is in use.
 std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
                                    const std::vector<OutputRequest>& outputs,
                                    const std::vector<InputRequest>& inputs);
@@ -52,13 +53,14 @@ std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
 std::string describe(const std::vector<ChipInfo>& chips, const std::string& line,
                      LineAddress address);
 
-/// Who holds a line, and what to do about it; reads on from the line's description.
+/// Who holds a line, and what to do about it; continues a sentence that begins with the line's
+/// description.
 std::string busyText(const LineInfo& line);
 
 /// An errno in words: `EACCES, permission denied`.
 std::string errorText(int error);
 
-/// What to do about an errno that has to do with rights; empty for others.
+/// The remedy for an errno about missing permissions; empty for others.
 std::string remedyFor(int error);
 
 }  // namespace stepdriver::gpio

@@ -7,27 +7,28 @@
 #include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/gpio/lines.h"
 
-/// The lines of the machine's GPIO chips, through libgpiod. Lines are named as findLine() says.
+/// The lines of the computer's GPIO chips, through libgpiod. Lines have the names that findLine()
+/// accepts.
 ///
-/// A request takes the inputs first, and then the outputs chip by chip, each chip's in one call of
-/// the kernel. It looks for all lines, and for who holds them, before it takes the first: where one
-/// can't be had nothing was touched, but for outputs that the kernel refuses only when it is asked.
-/// The kernel knows the lines as held by `stepdriver`.
+/// A request takes the inputs first, and then the outputs chip by chip, each chip's in one kernel
+/// call. It finds all lines and their holders before it takes the first: if one isn't available,
+/// nothing was touched, except if the kernel itself refuses an output. The kernel lists
+/// `stepdriver` as the holder of the lines.
 ///
-/// A write is one call of the kernel for each chip that it names, and a read is one. Where a chip
-/// was removed they fail with ENODEV. Before it is released each output is driven to its safe
-/// level, in the order of the request.
+/// A write makes one kernel call for each chip that it names, and a read makes one. If a chip was
+/// removed they fail with ENODEV. Each output is driven to its safe level before it is released, in
+/// the order of the request.
 namespace stepdriver::gpio {
 
-/// `1.6.3`; empty where stepdriver was built without libgpiod.
+/// `1.6.3`; empty if stepdriver was built without libgpiod.
 std::string libgpiodVersion();
 
-/// @throw GpioError where stepdriver was built without libgpiod.
+/// @throw GpioError if stepdriver was built without libgpiod.
 std::unique_ptr<Backend> makeLibgpiodBackend();
 
-/// The machine's chips as they are now, by number; those too that may not be opened.
+/// The current chips of the computer, by number, including those that may not be opened.
 ///
-/// @throw GpioError where stepdriver was built without libgpiod.
+/// @throw GpioError if stepdriver was built without libgpiod.
 std::vector<ChipInfo> gpioChips();
 
 }  // namespace stepdriver::gpio

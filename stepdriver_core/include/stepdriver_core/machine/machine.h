@@ -25,14 +25,14 @@ struct MachineOptions {
   double max_lateness = 0.005;  ///< [s]
   /// On a real clock, first measure what step rates this computer and its lines can sustain.
   bool measure = false;
-  /// Don't start if that is less than the axes ask for, or if real-time rights are refused.
+  /// Don't start if that is less than the axes need, or if real-time permissions are refused.
   bool enforce = false;
   /// If a line other than STEP and DIR can't be written in this time, its axis has a fault that
   /// names the line.
   double write_timeout = 0.5;  ///< [s]
   /// An input that does what Machine::emergencyStop() does, if it becomes active or can't be read.
   std::optional<config::InputSwitch> emergency_stop{};
-  /// Absolute path of the file that keeps positions over a restart; empty: no file.
+  /// Absolute path of the file that keeps positions across a restart; empty: no file.
   std::string state_file{};
   /// Held open on a real clock to keep the processors awake, see pulse::kCpuLatencyDevice; empty:
   /// they may sleep.
@@ -130,14 +130,14 @@ class Machine {
   /// @throw Refused if home() would be refused now.
   void checkHoming(const std::vector<std::string>& names = {}) const;
 
-  /// Scales the velocities of all motions, also of those under way, within the limits of their
+  /// Scales the velocities of all motions, including those in progress, within the limits of their
   /// axes.
   ///
   /// @param factor 0.01 to 2.0. @throw Refused if it is outside of that; then nothing changes.
   void setSpeedOverride(double factor);
 
-  /// Completes the pulse that is out, sends no other, and returns then. Every axis is at fault
-  /// until recover(); motors stay energized. MachineOptions::emergency_stop does the same; if it is
+  /// Completes the current pulse, sends no more, and then returns. Every axis is at fault until
+  /// recover(); motors stay energized. MachineOptions::emergency_stop does the same; if it is
   /// active at the start, no motor is energized.
   void emergencyStop();
   /// True from an emergency stop until recover().
@@ -159,7 +159,7 @@ class Machine {
   /// Why the last write of the state file failed; empty if it succeeded, or if there is no file.
   std::string stateFileError() const;
 
-  /// As measured at the start; empty if that wasn't asked for, or if the clock is virtual.
+  /// As measured at the start; empty if that wasn't requested, or if the clock is virtual.
   const std::optional<pulse::Capability>& capability() const;
 
   /// Serves the pulses for a time of the clock. Only for a machine without threads.

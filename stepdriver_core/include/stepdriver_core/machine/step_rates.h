@@ -9,16 +9,16 @@
 
 namespace stepdriver::machine {
 
-/// The highest step rate of one axis, on a machine and lines as they were measured; at the
-/// configured microsteps.
+/// The highest step rate of one axis, on a computer and lines that were measured, at the configured
+/// microsteps.
 struct StepRate {
   std::string axis;
   double asked = 0.0;  ///< [steps/s] at the axis's top speed
   double alone = 0.0;  ///< [steps/s] that can be sustained if no other axis moves
   double held = 0.0;  ///< [steps/s] that can be sustained while all others move at their top speeds
-  std::string limited;  ///< `held` is, by what, in words
+  std::string limited;  ///< what limits `held`, in words
 
-  /// Whether the axis can have the rate that it asks for.
+  /// Whether the computer can sustain the rate that the axis needs.
   bool holds() const { return asked <= held; }
   /// "x: asks for 8000 steps/s, and this machine holds 12500 steps/s: ..."
   std::string text() const;
@@ -28,9 +28,9 @@ struct StepRate {
 struct StepRates {
   std::vector<StepRate> axes;
 
-  /// Whether every axis can have the rate that it asks for.
+  /// Whether the computer can sustain the rates of all axes.
   bool holds() const;
-  /// A sentence for each axis that can't; empty if all can.
+  /// A sentence for each axis whose rate can't be sustained.
   std::vector<std::string> complaints() const;
 };
 

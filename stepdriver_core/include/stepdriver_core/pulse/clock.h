@@ -12,42 +12,43 @@ namespace stepdriver::pulse {
 
 class HybridWait;
 
-/// Nanoseconds on a Clock. Its zero means nothing; the steady clock's is CLOCK_MONOTONIC's.
+/// Nanoseconds on a Clock. The zero is arbitrary; that of the steady clock is CLOCK_MONOTONIC's.
 using Nanoseconds = std::int64_t;
 
 constexpr Nanoseconds kNever = std::numeric_limits<Nanoseconds>::max();
 
-/// The time that pulses are put out by. now() and wake() may be called from any thread; waitUntil()
-/// only by the one that serves the pulses.
+/// The clock that times the pulses. now() and wake() may be called from any thread, waitUntil()
+/// only from the thread that serves the pulses.
 class Clock {
  public:
   virtual ~Clock() = default;
 
-  /// Never falls.
+  /// Never decreases.
   virtual Nanoseconds now() = 0;
 
-  /// Returns when the time has come, or earlier after a wake(). kNever waits for a wake() alone.
+  /// Returns at the given time, or earlier after a wake(). kNever waits only for a wake().
   virtual void waitUntil(Nanoseconds time) = 0;
 
-  /// The same as a wait is where the clock has spun for as long as it may: it returns when the
-  /// system lets it. For whoever measures.
+  /// The same without spinning, like a wait after the clock has spun for as long as it may: it
+  /// returns when the system wakes the thread. For measurements.
   virtual void sleepUntil(Nanoseconds time) { waitUntil(time); }
 
-  /// How long before the time waitUntil() begins to spin; 0: it doesn't.
+  /// How long before the deadline waitUntil() begins to spin; 0: it doesn't spin.
   virtual Nanoseconds guard() const { return 0; }
 
-  /// Ends the wait under way, or else the next one.
+  /// Ends the wait in progress; if there is none, ends the next one.
   virtual void wake() = 0;
 
-  /// Whether being late matters: the thread that serves the pulses then asks for real-time rights.
+  /// Whether lateness matters: the thread that serves the pulses then requests real-time
+  /// permissions.
   virtual bool realtime() const { return false; }
 
-  /// While anyone holds the clock, a virtual clock stands still; a real one goes on.
+  /// While anyone holds the clock, a virtual clock stands still; a real one continues.
   virtual void hold() {}
   virtual void release() {}
 };
 
-/// Holds a clock for as long as it lives: for planning against a moment that must not pass.
+/// Holds a clock during its lifetime: for planning against a moment that must not pass.
 class ClockHold {
  public:
   explicit ClockHold(Clock& clock) : clock_(clock) { clock_.hold(); }
@@ -59,11 +60,11 @@ class ClockHold {
   Clock& clock_;
 };
 
-/// CLOCK_MONOTONIC: sleeps up to a guard before the time, then spins, for at most four fifths of
-/// the time.
+/// CLOCK_MONOTONIC: sleeps until a guard time before the deadline, then spins, for at most four
+/// fifths of the time.
 class SteadyClock : public Clock {
  public:
-  /// @param guard how long before the time the sleep ends, at most 200 us. By default the clock
+  /// @param guard how long before the deadline the sleep ends, at most 200 us. By default the clock
   ///   learns it from its sleeps.
   explicit SteadyClock(std::optional<Nanoseconds> guard = {});
   ~SteadyClock() override;
@@ -71,7 +72,7 @@ class SteadyClock : public Clock {
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
   void sleepUntil(Nanoseconds time) override;
-  /// As it is now. Not while another thread waits.
+  /// The current guard time. Not to be called while another thread waits.
   Nanoseconds guard() const override;
   void wake() override;
   bool realtime() const override { return true; }
@@ -84,8 +85,8 @@ class SteadyClock : public Clock {
   std::uint32_t seen_ = 0;
 };
 
-/// Time that is only as real as it has to be: it goes from event to event, each at its exact
-/// nanosecond, however late the thread that serves them.
+/// Virtual time: it jumps from event to event, each at its exact nanosecond, however late the
+/// thread that serves them is.
 class VirtualClock : public Clock {
  public:
   /// @param speed virtual seconds per second of CLOCK_MONOTONIC; 0: a wait ends at once, and the

@@ -10,9 +10,9 @@
 
 namespace stepdriver::setup {
 
-/// What a configured machine drives, and the clock that times its pulses: the GPIO lines of this
-/// computer on CLOCK_MONOTONIC, or the simulated rig on a clock of its own. A machine::Machine
-/// requests the lines; until then none is touched.
+/// The lines of a configured machine, and the clock that times its pulses: the GPIO lines of this
+/// computer on CLOCK_MONOTONIC, or the simulated rig on a clock of its own. No line is touched
+/// until a machine::Machine requests the lines.
 class Hardware {
  public:
   /// @param name of the map that the configuration was read from, for messages; it may be empty.

@@ -11,8 +11,7 @@
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/setup/simulation_config.h"
 
-/// From a configuration to the parts of a machine: which lines it drives, by which clock, with what
-/// options.
+/// Makes the parts of a machine from a configuration: its lines, its clock and its options.
 namespace stepdriver::setup {
 
 /// The lines that a machine drives.
@@ -21,8 +20,8 @@ enum class GpioBackend {
   kLibgpiod,   ///< the GPIO lines of this computer
 };
 
-/// What a configuration says of a machine. The node reads it from its parameters, and
-/// yaml::readFile() from a file.
+/// The configuration of a machine. The node reads it from its parameters, and yaml::readFile() from
+/// a file.
 struct MachineConfig {
   GpioBackend backend{};
   SimulationConfig simulation;           ///< only for the simulated backend
@@ -38,7 +37,7 @@ struct MachineConfig {
   machine::MachineOptions options() const;
 };
 
-/// Reads the keys of a machine from a map that may hold other keys too.
+/// Reads the keys of a machine from a map that may contain other keys too.
 ///
 /// @code{.yaml}
 /// gpio:
@@ -60,23 +59,23 @@ struct MachineConfig {
 /// @return to be used only if there was no issue.
 MachineConfig readMachineConfig(config::ConfigReader& reader);
 
-/// How the file of a configuration is meant.
+/// Which backend to use for a configuration file.
 enum class BackendChoice {
-  kAsInTheFile,  ///< a file that names no backend means libgpiod
-  kSimulated,    ///< on the simulated rig, whatever the file says
-  kLibgpiod,     ///< on GPIO lines, whatever the file says; then the rig's trace is left out
+  kAsInTheFile,  ///< libgpiod if the file names no backend
+  kSimulated,    ///< the simulated rig, whatever the file says
+  kLibgpiod,     ///< GPIO lines, whatever the file says; the rig's trace is left out
 };
 
-/// Writes the chosen backend into a configuration. Anything else stays, right or wrong.
+/// Writes the chosen backend into a configuration. Everything else remains, right or wrong.
 void chooseBackend(config::ConfigValue& tree, BackendChoice choice);
 
-/// Reads a whole configuration, with or without the keys that only the ROS node heeds.
+/// Reads a whole configuration, with or without the keys that only the ROS node uses.
 ///
-/// @throw ConfigError with everything that is wrong.
+/// @throw ConfigError listing every mistake.
 MachineConfig machineConfigOf(config::ConfigValue tree,
                               BackendChoice choice = BackendChoice::kAsInTheFile);
 
-/// @throw ConfigError if there are issues, with names that begin below the map that was read.
+/// @throw ConfigError if there are issues. Their names are relative to the map that was read.
 void throwIssues(std::vector<ConfigIssue> issues);
 
 }  // namespace stepdriver::setup

@@ -15,12 +15,12 @@
 
 namespace stepdriver::setup {
 
-/// The simulated rig of a configuration, its lines, and the clock that it lives on.
-/// All calls are safe from any thread.
+/// The simulated rig of a configuration, its lines and its clock. All calls are safe from any
+/// thread.
 class Simulation {
  public:
-  /// @param emergency_stop the input of the machine, with a button at it.
-  /// @throw Error where the trace can't be written.
+  /// @param emergency_stop the machine's input, to which the rig connects a button.
+  /// @throw Error if the trace can't be written.
   Simulation(const std::vector<config::AxisConfig>& axes,
              std::optional<config::InputSwitch> emergency_stop, const SimulationConfig& config);
 
@@ -32,17 +32,17 @@ class Simulation {
 
   const std::vector<config::AxisConfig>& axes() const { return axes_; }
 
-  /// Presses the button of the emergency-stop input, or releases it. @throw Refused where none is
-  /// configured.
+  /// Presses the button of the emergency-stop input, or releases it. @throw Refused if no such
+  /// input is configured.
   void pressEmergencyStop(bool pressed);
 
   /// An end of an axis, with its switch.
   enum class End { kMin, kMax };
-  /// Presses an endstop by hand, or lets it go. What else is wrong with the axis by configuration
-  /// counts from here on anew.
+  /// Presses an endstop as if by hand, or releases it. Restarts the counters of the axis's other
+  /// configured faults.
   ///
   /// @param axis of the configuration.
-  /// @param end of the axis; which line that changes is a matter of the wiring.
+  /// @param end of the axis; the wiring determines which line changes.
   void pressEndstop(const std::string& axis, End end, bool pressed);
 
  private:
@@ -50,7 +50,7 @@ class Simulation {
   const std::optional<config::InputSwitch> emergency_stop_;
   std::map<std::string, sim::RigFaults> faults_;
   std::mutex mutex_;
-  std::map<std::string, sim::RigFaults> pressed_;  // faults, and the switches that are pressed
+  std::map<std::string, sim::RigFaults> pressed_;  // the faults, and the pressed switches
   pulse::VirtualClock clock_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;

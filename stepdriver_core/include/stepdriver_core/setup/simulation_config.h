@@ -17,7 +17,7 @@ namespace stepdriver::setup {
 struct SimulatedWiring {
   std::optional<bool> dir_inverted;      ///< DIR, on its way to the chip
   std::optional<double> steps_per_unit;  ///< [microsteps/mm|deg] at the configured microsteps
-  std::optional<std::string> min_pin;    ///< the line that the switch at the min end is at
+  std::optional<std::string> min_pin;    ///< the line of the switch at the min end
   std::optional<std::string> max_pin;
   std::optional<bool> min_active_level;  ///< of that line, while the switch is pressed
   std::optional<bool> max_active_level;
@@ -26,21 +26,23 @@ struct SimulatedWiring {
 /// How the rig of one axis is built, and what is wrong with it. Lengths are in mm on a linear axis,
 /// in degrees on a rotary one.
 struct SimulatedAxis {
-  double start = 0.0;                ///< [mm|deg] where the carriage stands at first
-  double switch_hysteresis = 0.0;    ///< [mm|deg]
-  int bounces = 0;                   ///< extra on-off pairs after each change of a switch
-  double bounce_ms = 0.2;            ///< [ms] from one bounce edge to the next
-  std::optional<double> min_switch;  ///< [mm|deg] place of the switch; none: outside the soft limit
+  double start = 0.0;              ///< [mm|deg] where the carriage stands at first
+  double switch_hysteresis = 0.0;  ///< [mm|deg]
+  int bounces = 0;                 ///< extra on-off pairs after each change of a switch
+  double bounce_ms = 0.2;          ///< [ms] from one bounce edge to the next
+  /// [mm|deg] Position of the switch; empty: outside the soft limit.
+  std::optional<double> min_switch;
   std::optional<double> max_switch;
   SimulatedWiring wiring;
   sim::RigFaults faults;
-  std::optional<int> fail_step_write_after;  ///< [writes] to STEP that work before all others fail
+  /// [writes] To STEP that succeed before all others fail.
+  std::optional<int> fail_step_write_after;
 };
 
-/// What a configuration says of the simulated rig.
+/// The configuration of the simulated rig.
 struct SimulationConfig {
-  double speed = 1.0;           ///< seconds of the rig per second; 0: as fast as it goes
-  std::string trace;            ///< path of the VCD file; empty: none
+  double speed = 1.0;           ///< seconds of the rig per second; 0: as fast as possible
+  std::string trace;            ///< path of the VCD file; empty: no trace
   bool emergency_stop = false;  ///< its button is pressed at the start
   std::map<std::string, SimulatedAxis> axes;
 };
@@ -76,14 +78,15 @@ struct SimulationConfig {
 ///
 /// @param reader of that map.
 /// @param axes the axes that are simulated.
-/// @param axes_are_right false: issues were found in them. Then what depends on them is not judged.
+/// @param axes_are_right false: the axes have issues. Values that depend on them are then not
+///   checked.
 SimulationConfig readSimulation(config::ConfigReader reader,
                                 const std::vector<config::AxisConfig>& axes, bool axes_are_right);
 
 /// Checks what depends on the limits of the axes: the min switch must be below the max switch.
 ///
 /// @param name full name of the map `simulation`.
-/// @param issues everything that is wrong is added here.
+/// @param issues every mistake is added here.
 void checkSimulation(const std::vector<config::AxisConfig>& axes, const SimulationConfig& config,
                      const std::string& name, std::vector<ConfigIssue>& issues);
 

@@ -6,13 +6,14 @@
 
 namespace stepdriver::sim {
 
-/// A pin of the rig as a trace shows it: one scope for each axis.
+/// A pin of the rig in a trace: one scope for each axis.
 struct TracePin {
   std::string scope;     ///< name of the axis
   std::string variable;  ///< step, dir, enable, ms1, ms2, ms3, sleep, reset, endstop_min or _max
 };
 
-/// Where the rig's edges go: levels as they are on the line, times in nanoseconds, never falling.
+/// Receives the rig's edges: the levels are those of the line, the times are in nanoseconds and
+/// never decrease.
 class PinTrace {
  public:
   virtual ~PinTrace() = default;
@@ -23,7 +24,7 @@ class PinTrace {
   /// A pin changed to this level. Called in the order of time.
   virtual void edge(int pin, bool level, std::int64_t time_ns) = 0;
 
-  /// Makes what came so far visible to whoever reads the trace while it grows.
+  /// Makes all edges so far visible to readers of the growing trace.
   virtual void flush() {}
 };
 
@@ -48,7 +49,7 @@ class MemoryTrace : public PinTrace {
   /// @return index of the pin. @throw std::out_of_range
   int pin(const std::string& scope, const std::string& variable) const;
 
-  /// Times at which the pin took this level; the one that it had at begin() isn't among them.
+  /// Times at which the pin changed to this level; its level at begin() isn't included.
   std::vector<std::int64_t> times(const std::string& scope, const std::string& variable,
                                   bool level) const;
 

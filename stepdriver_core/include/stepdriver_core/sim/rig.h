@@ -11,22 +11,22 @@
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/sim/pin_trace.h"
 
-/// The simulated rig: for each axis a driver chip that reads its pins as the datasheet says, a
+/// The simulated rig: each axis has a driver chip that reads its pins according to the datasheet, a
 /// motor, a carriage and two switches, behind the lines of a gpio::SimulatedBackend.
 namespace stepdriver::sim {
 
 /// How a line reaches the chip. An empty name: the pin isn't wired. An unwired ENABLE energizes the
-/// motor, an unwired SLEEP or RESET does nothing, an unwired DIR is low (high where inverted), and
+/// motor, an unwired SLEEP or RESET does nothing, an unwired DIR is low (high if inverted), and
 /// unwired microstep pins are strapped as RigAxisSpec::microsteps says.
 struct Wire {
   std::string line;
-  bool inverted = false;  ///< the chip sees the other level, as with common-anode wiring
+  bool inverted = false;  ///< the chip sees the opposite level, as with common-anode wiring
 };
 
 /// An endstop switch that the carriage presses.
 ///
-/// After each change its line has the new level at once, then bounces on-off pairs of edges, each
-/// bounce_ns after the one before, and so ends at the new level.
+/// After each change its line takes the new level at once, and then makes `bounces` on-off pairs of
+/// edges, bounce_ns apart, ending at the new level.
 struct SwitchSpec {
   std::string line;
   bool active_level = false;   ///< level of the line while the switch is pressed
@@ -43,14 +43,14 @@ struct RigAxisSpec {
   driver::Timing timing{};  ///< what counts as a violation
   Wire step, dir, enable, ms1, ms2, ms3, sleep, reset;
   int microsteps = 1;             ///< the DIP switches, or how unwired microstep pins are strapped
-  double full_step_travel = 0.0;  ///< [mm|deg] that the carriage moves for a full step; above 0
+  double full_step_travel = 0.0;  ///< [mm|deg] travel of the carriage per full step; above 0
   double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
   std::optional<SwitchSpec> min_switch, max_switch;
   std::string fault_line;  ///< the chip's nFAULT, with a pull-up; empty: not wired
 };
 
-/// Everything that the chip must never see. One edge may be several of them. A time that is exactly
-/// the limit is none.
+/// Everything that the chip must never see. One edge may violate several of these. A time of
+/// exactly the limit is no violation.
 enum class Violation {
   kShortStepHigh,
   kShortStepLow,
@@ -58,7 +58,7 @@ enum class Violation {
   kDirHold,
   kModeSetup,
   kModeHold,
-  kUndefinedMode,      ///< an undefined code on the microstep pins, even in passing, or at a step
+  kUndefinedMode,      ///< an undefined code on the microstep pins, even in passing or at a step
   kStepWhileDisabled,  ///< whether the chip counts it or not
   kStepAfterEnable,    ///< before the enable time is over
   kStepWhileAsleep,
@@ -72,14 +72,15 @@ const char* nameOf(Violation violation);
 
 /// What an axis of the rig has seen so far.
 struct RigAxisReport {
-  std::int64_t pulses_forward = 0;  ///< active STEP edges with DIR forward, taken or not
+  /// Active STEP edges with DIR forward, whether the chip counts them or not.
+  std::int64_t pulses_forward = 0;
   std::int64_t pulses_backward = 0;
-  std::int64_t translator = 0;  ///< microsteps of the finest mode, counted from Home at start;
-                                ///< RESET and SLEEP bring it to the nearest Home
+  std::int64_t translator = 0;  ///< microsteps of the finest mode, counted from Home at the start;
+                                ///< RESET and SLEEP take it to the nearest Home
   double carriage = 0.0;        ///< [mm|deg]
-  int microsteps = 1;           ///< the mode that the last STEP edge was taken in
+  int microsteps = 1;           ///< the mode at the last STEP edge
   bool energized = false;       ///< current flows: enabled, awake and not in RESET
-  bool min_pressed = false;     ///< as its line read at the last time that the rig was told
+  bool min_pressed = false;     ///< the reading of its line at the rig's latest time
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
 
@@ -87,69 +88,70 @@ struct RigAxisReport {
   std::int64_t totalViolations() const;
 };
 
-/// Knobs that break things.
+/// Faults to simulate.
 struct RigFaults {
-  std::optional<bool> min_stuck;  ///< the switch reads active (true) or inactive whatever happens
+  std::optional<bool> min_stuck;  ///< the switch always reads active (true) or inactive
   std::optional<bool> max_stuck;
-  std::int64_t lose_every = 0;  ///< every n-th step of the motor, counted from setFaults() on,
-                                ///< slips: the carriage stays behind for good; 0: none
+  std::int64_t lose_every = 0;  ///< every n-th motor step, counted from setFaults() on, slips: the
+                                ///< carriage stays behind permanently; 0: no step slips
   /// Over-current after this many steps of the motor, counted from setFaults() on: outputs off and
   /// nFAULT low until RESET.
   std::optional<std::int64_t> chip_fault_after;
 };
 
-/// The model of an axis. STEP's active edge moves the translator to the next place that the mode
-/// has, where the chip counts: not asleep, not in RESET, and enabled unless the chip counts anyway.
-/// While current flows the rotor follows the translator, and the carriage the rotor. When current
-/// starts to flow, the rotor snaps to the place nearest to it that has the translator's phase: a
-/// multiple of an electrical cycle away from the translator's own count. DIR high at the chip is
-/// forward, where the carriage's position grows.
+/// The model of an axis. STEP's active edge moves the translator to the next index of the mode if
+/// the chip counts: it must not be asleep or in RESET, and must be enabled unless it counts while
+/// disabled. While current flows, the rotor follows the translator, and the carriage follows the
+/// rotor. When current starts to flow, the rotor snaps to the nearest position with the
+/// translator's phase, a multiple of an electrical cycle away from the translator's own count. DIR
+/// high at the chip is forward: the carriage's position grows.
 ///
-/// Lines. Before its first request a line stands as pull resistors towards the safe side leave it:
-/// disabled, asleep, in RESET, all else inactive or low. The first request makes no edge: the line
-/// is taken to have had its level for ever, but a chip that it enables, wakes or lets out of RESET
-/// is so from that time on. A released line keeps its level; a later request is an edge where its
-/// level is another one. Lines that no axis knows are ignored, unknown inputs read low until
-/// setInput(). A line may go to several pins and axes; switches that share a line read active where
-/// any of them does. Who watches a switch is told when the carriage or a fault changes its line,
-/// not of the bounces after that.
+/// Lines. Before its first request a line has the level of a pull resistor towards the safe side:
+/// disabled, asleep, in RESET, everything else inactive or low. The first request makes no edge:
+/// the line is assumed to have had its level always, but a chip that it enables, wakes up or
+/// releases from RESET is in that state only from then on. A released line keeps its level; a later
+/// request with another level makes an edge. Lines that no axis knows are ignored, and unknown
+/// inputs read low until setInput(). A line may go to several pins and axes; switches that share a
+/// line read active if any of them does. The watcher of a switch is told when the carriage or a
+/// fault changes its line, but not of the bounces after that.
 ///
-/// All calls are safe from any thread. Times that fall back are taken as the latest one so far.
+/// All calls are safe from any thread. A time before the latest one so far counts as the latest
+/// one.
 class Rig : public gpio::Board {
  public:
-  /// @param trace where every edge goes, in the order of time, also those of bouncing switches;
+  /// @param trace receives every edge in the order of time, including those of bouncing switches;
   ///   levels are those of the lines. May be null.
-  /// @throw std::invalid_argument where an axis is named twice, doesn't travel, or has microsteps
-  ///   that its chip hasn't.
+  /// @throw std::invalid_argument if an axis is named twice, doesn't travel, or has microsteps that
+  ///   its chip doesn't have.
   explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr);
   ~Rig() override;
 
-  /// @throw std::out_of_range where there is no such axis; so do all that take an axis.
+  /// @throw std::out_of_range if there is no such axis; so do all functions that take an axis.
   RigAxisReport report(const std::string& axis) const;
   /// Their names, in the order in which they were given.
   std::vector<std::string> axes() const;
 
-  /// Takes effect at the latest time that the rig was told.
+  /// Takes effect at the rig's latest time.
   void setFaults(const std::string& axis, const RigFaults& faults);
 
-  /// The write that comes after `writes` more successful ones on this line fails with `error`
-  /// (an errno), and so do all after it until clearWriteFault(). A write that fails for the sake of
-  /// another line may count.
+  /// The write that comes after `writes` more successful ones on this line fails with `error` (an
+  /// errno), and so do all after it until clearWriteFault(). A write that fails because of another
+  /// line may count.
   void failWrites(const std::string& line, std::int64_t writes, int error);
   /// Writes of this line succeed again.
   void clearWriteFault(const std::string& line);
 
-  /// Gives an input that no axis has a level, as a switch beside the axes does: the emergency stop.
+  /// Sets the level of an input that belongs to no axis, such as the emergency stop.
   void setInput(const std::string& line, bool level, std::int64_t time_ns);
 
-  /// Puts the carriage somewhere else, as a hand would: no step is counted, and the rotor turns
-  /// with it. Against current it snaps to the nearest place with the translator's phase, up to two
-  /// full steps away.
+  /// Moves the carriage as if by hand: no step is counted, and the rotor turns with it. If current
+  /// flows, it snaps to the nearest position with the translator's phase, up to two full steps
+  /// away.
   void placeCarriage(const std::string& axis, double position, std::int64_t time_ns);
 
   /// Makes the trace readable up to its last edge while the rig lives.
   ///
-  /// @throw Error where the trace can't be written.
+  /// @throw Error if the trace can't be written.
   void flushTrace();
 
   int lineIndex(const std::string& line) override;
