@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "axis/line_path.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::activity {
@@ -85,8 +84,20 @@ void FollowLine::check() const {
   }
 }
 
+std::shared_ptr<const axis::LinePath> FollowLine::linePath() const {
+  std::vector<std::int64_t> targets;
+  std::vector<axis::PathAxis> facts;
+  for (const Order& order : orders_) {
+    targets.push_back(*order.goal.target);
+    facts.push_back(order.axis->pathAxis());
+  }
+  return std::make_shared<const axis::LinePath>(std::move(facts), startsOf(axes(), 0), targets,
+                                                velocity_, duration_);
+}
+
 Steps FollowLine::plan() {
   check();
+  linePath();  // what it refuses is refused before the backlash is taken up
   Steps steps;
   for (const Order& order : orders_) {
     append(steps, wakeSteps(context(), *order.axis));
@@ -126,12 +137,7 @@ Steps FollowLine::takeUp(const Order& order) {
 
 Steps FollowLine::followLine() {
   check();
-  std::vector<std::int64_t> targets;
-  for (const Order& order : orders_) targets.push_back(*order.goal.target);
-  std::vector<axis::PathAxis> facts;
-  for (const axis::AxisModel* axis : axes()) facts.push_back(axis->pathAxis());
-  const auto path = std::make_shared<const axis::LinePath>(std::move(facts), startsOf(axes(), 0),
-                                                           targets, velocity_, duration_);
+  const auto path = linePath();
   const auto join = [this, path](std::int64_t at) -> std::shared_ptr<const axis::SharedPath> {
     path->requireStart(startsOf(axes(), at));
     return {path};

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "axis/line_path.h"
 #include "axis/path_axis.h"
 #include "script.h"
 #include "steps.h"
@@ -46,6 +47,8 @@ class FollowLine : public Script {
  private:
   Failure notDone(const std::string& why) const override;
   void check() const;
+  /// @throw Refused if the limits don't allow its velocity or its duration.
+  std::shared_ptr<const axis::LinePath> linePath() const;
   Steps takeUp(const Order& order);
   Steps followLine();
 

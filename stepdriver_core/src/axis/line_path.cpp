@@ -28,7 +28,7 @@ LinePath::LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& sta
     length_ = std::max(length_, static_cast<std::int64_t>(std::ceil(std::abs(ways_[i].value()))));
   }
   takeLimits();
-  speed_ = velocity > 0.0 ? std::min(limits_.max_speed, pathSpeed(velocity)) : limits_.max_speed;
+  speed_ = velocity > 0.0 && length_ > 0 ? checkedSpeed(velocity) : limits_.max_speed;
   if (duration > 0.0 && length_ > 0) speed_ = speedFor(duration);
 }
 
@@ -73,6 +73,19 @@ double LinePath::pathSpeed(double velocity) const {
   return velocity * static_cast<double>(length_) / std::sqrt(linear > 0.0 ? linear : rotary);
 }
 
+double LinePath::checkedSpeed(double velocity) const {
+  const double speed = pathSpeed(velocity);
+  if (speed <= limits_.max_speed * (1.0 + 1e-12)) return std::min(speed, limits_.max_speed);
+  const bool linear = std::any_of(axes_.begin(), axes_.end(), [this](const PathAxis& axis) {
+    return axis.kind == config::Kind::kLinear && ways_[&axis - axes_.data()].value() != 0.0;
+  });
+  axes_.front().refuse(fmt::format(
+      "the velocity {0} {2} of the line is above the {1} {2} that the limits of its axes "
+      "allow in its direction",
+      numberText(velocity), numberText(velocity * limits_.max_speed / speed),
+      linear ? "m/s" : "rad/s"));
+}
+
 double LinePath::durationAt(double speed) const {
   motion::MotionLimits limits = limits_;
   limits.max_speed = speed;
@@ -83,8 +96,9 @@ double LinePath::speedFor(double duration) const {
   const double highest = limits_.max_speed;
   const double fastest = durationAt(highest);
   if (duration < fastest * (1.0 - 1e-9)) {
-    axes_.front().refuse(fmt::format("the line can't be done in {} s; the axes' limits allow {} s",
-                                     numberText(duration), lowerBoundText(fastest)));
+    axes_.front().refuse(
+        fmt::format("the target can't be reached in {} s; the limits of the axes allow {} s",
+                    numberText(duration), lowerBoundText(fastest)));
   }
   if (duration <= fastest) return highest;
   // The duration falls as the speed rises.

@@ -16,7 +16,7 @@ class LinePath : public SharedPath {
   /// @param starts at rest; the backlash is taken up. @param targets [microsteps] of each joint.
   /// @param velocity along the path, as machine::LineRequest has it; 0: as the limits allow.
   /// @param duration [s] that the line takes; 0: as short as the velocity makes it.
-  /// @throw Refused if it can't be that short.
+  /// @throw Refused if the limits of the axes don't allow that velocity, or that duration.
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
            const std::vector<std::int64_t>& targets, double velocity, double duration);
 
@@ -32,6 +32,7 @@ class LinePath : public SharedPath {
  private:
   void takeLimits();
   double pathSpeed(double velocity) const;
+  double checkedSpeed(double velocity) const;
   double durationAt(double speed) const;
   double speedFor(double duration) const;
   double scale(std::size_t member) const;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "give_way.h"
+#include "line_path.h"
 #include "message_text.h"
 #include "motion/profile_parts.h"
 #include "nanoseconds.h"
@@ -110,6 +111,8 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        const std::vector<TrajectoryPoint>& points)
     : axes_(std::move(axes)) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
+  lone_position_ = points.size() == 1 && points.front().velocities.empty() &&
+                   points.front().accelerations.empty();
   parts_.reserve(axes_.size());
   for (std::size_t member = 0; member < axes_.size(); ++member) {
     parts_.push_back(prepare(member, points));
@@ -173,6 +176,11 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(
   for (std::size_t i = 0; i < points.size(); ++i) {
     giveWay(i);
     waypoints.push_back(waypointOf(member, i, points[i], waypoints));
+  }
+  if (lone_position_) {
+    // From a motion it comes to rest there as smoothly as the axis's limits ask for.
+    waypoints.front().velocity = 0.0;
+    if (axis.limits.jerk > 0.0) waypoints.front().acceleration = 0.0;
   }
   Part part;
   part.ends = {waypoints.front(), waypoints.back()};
@@ -283,9 +291,28 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
   return made;
 }
 
-std::shared_ptr<const TrajectoryPath> PreparedTrajectory::join(
+std::shared_ptr<const SharedPath> PreparedTrajectory::lineTo(
+    const std::vector<PathStart>& starts) const {
+  std::vector<std::int64_t> targets;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const motion::Waypoint& point = parts_[i].ends.back();
+    const std::int64_t joint = std::llround(std::nearbyint(point.position));
+    const std::int64_t slack = std::llround(starts[i].slack);
+    const std::int64_t way =
+        joint + slack - std::llround(std::nearbyint(starts[i].motor.position.value()));
+    // The backlash is taken up on the way.
+    targets.push_back(joint + (way > 0 ? axes_[i].backlash : way < 0 ? 0 : slack) - slack);
+  }
+  const double duration = static_cast<double>(parts_.front().ends.back().time_ns) / 1e9;
+  return std::make_shared<const LinePath>(axes_, starts, targets, 0.0, duration);
+}
+
+std::shared_ptr<const SharedPath> PreparedTrajectory::join(
     const std::shared_ptr<const PreparedTrajectory>& prepared,
     const std::vector<PathStart>& starts) {
+  const bool at_rest = std::none_of(starts.begin(), starts.end(),
+                                    [](const PathStart& start) { return start.moves; });
+  if (prepared->lone_position_ && at_rest) return prepared->lineTo(starts);
   std::vector<TrajectoryPath::Member> members;
   members.reserve(starts.size());
   for (std::size_t i = 0; i < starts.size(); ++i) {

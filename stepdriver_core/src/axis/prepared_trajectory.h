@@ -40,9 +40,12 @@ class PreparedTrajectory {
   ///
   /// @param prepared is shared by the path, and by all profiles along it.
   /// @param starts one for each axis, at the time at which the path begins.
+  ///
+  /// One point alone without velocities is a straight line to rest, in its time.
+  ///
   /// @throw Refused if an axis can't do its part from there; or if the backlash is taken up anew at
   ///   turn after turn and never at rest in between, so that it would take unbounded time to say.
-  static std::shared_ptr<const TrajectoryPath> join(
+  static std::shared_ptr<const SharedPath> join(
       const std::shared_ptr<const PreparedTrajectory>& prepared,
       const std::vector<PathStart>& starts);
 
@@ -56,6 +59,7 @@ class PreparedTrajectory {
     motion::MotorBounds bounds;                      // that the tail comes to
   };
 
+  std::shared_ptr<const SharedPath> lineTo(const std::vector<PathStart>& starts) const;
   Part prepare(std::size_t member, const std::vector<TrajectoryPoint>& points) const;
   motion::Waypoint waypointOf(std::size_t member, std::size_t index, const TrajectoryPoint& point,
                               const std::vector<motion::Waypoint>& before) const;
@@ -66,6 +70,7 @@ class PreparedTrajectory {
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
+  bool lone_position_ = false;  // its only point has nothing but positions
 };
 
 }  // namespace stepdriver::axis

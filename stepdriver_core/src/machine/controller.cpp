@@ -35,6 +35,21 @@ constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check tells what it holds), call "
     "recover, and home it or set its position";
 
+/// Of a line that may still have to wait for its axes to rest, whatever its direction.
+void refuseTooFast(const std::vector<const axis::AxisModel*>& axes, double velocity) {
+  double linear = 0.0;
+  double rotary = 0.0;
+  for (const axis::AxisModel* axis : axes) {
+    double& sum = axis->config.kind == config::Kind::kLinear ? linear : rotary;
+    sum += axis->maxSpeed() * axis->maxSpeed();
+  }
+  const double most = std::sqrt(std::max(linear, rotary));
+  if (velocity <= most * (1.0 + 1e-12)) return;
+  axes.front()->refuse(
+      fmt::format("the velocity {} of the line is above {}, what its axes reach together",
+                  numberText(velocity), numberText(most)));
+}
+
 void refuseBadNumber(const axis::AxisModel& axis, const std::string& what, double value) {
   if (std::isfinite(value) && value >= 0.0) return;
   axis.refuse(
@@ -323,6 +338,9 @@ void Controller::serve(const MoveLine& wanted, const Ack& call) {
   if (wanted.velocity > 0.0 && wanted.duration > 0.0) {
     first.refuse("the line has a velocity and a duration; give one of them");
   }
+  std::vector<const axis::AxisModel*> moved_axes;
+  for (const AxisId id : wanted.axes) moved_axes.push_back(&axis(id));
+  refuseTooFast(moved_axes, wanted.velocity);
   std::vector<Order> orders;
   for (std::size_t i = 0; i < wanted.axes.size(); ++i) {
     axis::AxisModel& moved = axis(wanted.axes[i]);

@@ -143,7 +143,41 @@ TEST_F(Line, TakesTheTimeThatItIsGiven) {
   EXPECT_NEAR(move.duration, 7.5, 1e-9);
   EXPECT_NEAR(machine().wait(move).duration, 7.5, 1e-6);
   const std::string why = refusal([&] { start({{"x", "y"}, {0.0, 0.0}, false, 0.0, 1.4}); });
-  EXPECT_EQ(why, "x: the line can't be done in 1.4 s; the axes' limits allow 1.5 s");
+  EXPECT_EQ(why, "x: the target can't be reached in 1.4 s; the limits of the axes allow 1.5 s");
+}
+
+TEST_F(Line, RefusesAVelocityAboveItsLimitsInItsDirection) {
+  // x has 1 m/s, so 3 and 4 m: 5/3 m/s.
+  EXPECT_EQ(refusal([&] { start({{"x", "y"}, {3.0, 4.0}, false, 1.25}); }), "");
+  machine().stop();
+  awaitRest();
+  machine().axis("x").wait(machine().axis("x").moveTo(0.0));
+  machine().axis("y").wait(machine().axis("y").moveTo(0.0));
+  EXPECT_EQ(refusal([&] {
+              start({{"x", "y"}, {3.0, 4.0}, false, 1.3});
+            }),
+            "x: the velocity 1.3 m/s of the line is above the 1.25 m/s that the limits of its axes "
+            "allow in its direction");
+  EXPECT_EQ(position("x"), 0.0);
+  EXPECT_EQ(position("y"), 0.0);
+}
+
+TEST_F(Line, RefusesAVelocityThatItsAxesNeverReachWithoutStoppingThem) {
+  const axis::Move move = bench->axis("x").moveTo(0.5);
+  advance(0.2);
+  const std::string why = refusal([&] { start({{"x", "y"}, {3.0, 4.0}, false, 50.0}); });
+  EXPECT_NE(why.find("x: the velocity 50 of the line is above "), std::string::npos) << why;
+  EXPECT_EQ(bench->axis("x").wait(move).end, MoveEnd::kReached);
+}
+
+TEST_F(Line, RefusesBeforeItsBacklashIsTakenUp) {
+  std::vector<config::AxisConfig> axes{axisOf("x", 1000.0, 1.0, 2.0), axisOf("y", 1000.0, 1.0, 2.0),
+                                       axisOf("c", 1000.0, 1.0, 2.0)};
+  axes[1].backlash = 0.01;
+  build(axes);
+  EXPECT_NE(refusal([&] { start({{"x", "y"}, {1.0, 0.5}, false, 0.0, 0.1}); }), "");
+  advance(1.0);
+  EXPECT_EQ(bench->pulses("y"), 0);
 }
 
 TEST_F(Line, StopsAllOfItsAxesAlongThePath) {

@@ -133,12 +133,13 @@ TEST_F(Trajectory, TakesLinesWithinTheStartSpeed) {
   std::vector<config::AxisConfig> axes{trajectoryAxis("x"), trajectoryAxis("y")};
   for (config::AxisConfig& axis : axes) axis.start_speed = 0.2;
   build(axes);
-  const CoordinatedMove move = follow({{"x", "y"}, {{5.0, {0.5, -0.9}, {}, {}}}});
+  const CoordinatedMove move =
+      follow({{"x", "y"}, {{2.5, {0.25, -0.45}, {}, {}}, {5.0, {0.5, -0.9}, {}, {}}}});
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("y"), -900);
   expectClean();
   EXPECT_NE(refusal([&] {
-              follow({{"x", "y"}, {{1.0, {0.0, 0.0}, {}, {}}}});
+              follow({{"x", "y"}, {{0.5, {0.25, -0.45}, {}, {}}, {1.0, {0.0, 0.0}, {}, {}}}});
             }).find("jump of the velocity is"),
             std::string::npos);
 }
