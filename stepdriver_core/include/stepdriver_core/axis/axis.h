@@ -28,8 +28,9 @@ class Axis {
   /// or acceleration; the caller of the interrupted move is told. If the axis can't stop before its
   /// target, it overshoots and comes back; Move::overshoot says how far.
   ///
-  /// @param position [unit] absolute. If `relative`, it counts from where the axis stands, or, if
-  ///   the axis moves, from where that motion would have ended.
+  /// @param position [unit] absolute. If `relative`, it counts from the commanded position: the
+  ///   target of the last move, even during that move. After a stop, a fault, a homing, an endstop
+  ///   or setPosition() it counts from the position of the axis.
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
   /// @throw Refused if a number isn't finite, the target is beyond a soft limit, the velocity is
   ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or

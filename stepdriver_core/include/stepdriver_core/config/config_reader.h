@@ -118,10 +118,10 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///   x:                          # [a-zA-Z][a-zA-Z0-9_]*
 ///     driver: a4988             # a4988, drv8825 or tb6600
 ///     joint: x_joint            # default: the axis's name
-///     pins:                     # `chip:offset` or the name of a line; each once only, but enable
+///     pins:                     # `chip:offset` or the name of a line; each once, except enable
 ///       step: "gpiochip0:17"
 ///       dir: "gpiochip0:27"
-///       enable: "gpiochip0:22"  # this and all below: optional
+///       enable: "gpiochip0:22"  # optional, like all pins below
 ///       ms1: "gpiochip0:5"      # ms1 to ms3 all or none; m0 to m2 on a drv8825; not on a tb6600
 ///       ms2: "gpiochip0:6"
 ///       ms3: "gpiochip0:13"
@@ -130,20 +130,20 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     invert: {dir: true}       # of wired pins; default: false
 ///     common_anode: false       # tb6600: step, dir and enable inverted; then only dir in `invert`
 ///     microsteps: 16
-///     # one of the ways to scale the axis; `degree` and `deg` in place of `mm` on a rotary axis:
+///     # two ways to scale the axis; `degree` and `deg` instead of `mm` on a rotary axis:
 ///     steps_per_mm: 80.0        # [microsteps/mm] at `microsteps`; steps_per_degree
 ///     # or
 ///     full_steps_per_round: 200
-///     mm_per_round: 40.0        # [mm] per round behind the gear; linear axes only
-///     wheel_diameter_mm: 65.0   # in place of mm_per_round: a round travels pi times that
-///     gear_ratio: 1.0           # motor rounds per round behind the gear
-///     # end of the ways
-///     steps_per_round: 3200     # [microsteps] per motor round; default: from full_steps_per_round
+///     mm_per_round: 40.0        # [mm] per revolution of the gear's output; linear axes only
+///     wheel_diameter_mm: 65.0   # instead of mm_per_round
+///     gear_ratio: 1.0           # motor revolutions per revolution of the gear's output
+///     # end of the two ways
+///     steps_per_round: 3200     # [microsteps] per motor revolution; has a default
 ///     max_speed_mm_s: 100.0     # max_speed_deg_s, and so on
 ///     start_speed_mm_s: 0.0     # reached without a ramp; default: 0
 ///     acceleration_mm_s2: 500.0
 ///     deceleration_mm_s2: 500.0 # default: the acceleration
-///     backlash_mm: 0.0          # that a reversal loses, and that is made up for; default: 0
+///     backlash_mm: 0.0          # travel that a reversal loses; default: 0
 ///     min_position_mm: 0.0      # default: no limit
 ///     max_position_mm: 200.0
 ///     endstops:                 # both optional
@@ -156,7 +156,7 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     enable_on_start: false
 ///     disable_on_shutdown: true
 ///     align_on_microstep_change: false
-///     idle_timeout_s: 0.0       # at rest, then idle; 0: never
+///     idle_timeout_s: 0.0       # time at rest until the idle action; 0: never
 ///     idle_action: disable      # or sleep
 ///     holds_position_unpowered: false
 /// @endcode

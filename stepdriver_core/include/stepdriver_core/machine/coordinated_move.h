@@ -11,11 +11,11 @@ namespace stepdriver::machine {
 struct LineRequest {
   std::vector<std::string> names;  ///< of the axes, each once
   std::vector<double> positions;   ///< [unit] one for each name
-  bool relative = false;  ///< positions count from where the axes stand, see Machine::moveLine()
+  bool relative = false;           ///< positions are relative, see Machine::moveLine()
   /// Highest speed along the path; 0: as fast as the limits of all axes allow, and it must not be
-  /// above that. If a linear axis
-  /// moves, it is the root of the sum of the squared speeds of the linear axes [m/s], and rotary
-  /// axes follow. If only rotary axes move, it is the same of their speeds [rad/s].
+  /// above that. If a linear axis moves, it is the root of the sum of the squared speeds of the
+  /// linear axes [m/s], and rotary axes follow. If only rotary axes move, it is the same of their
+  /// speeds [rad/s].
   double velocity = 0.0;
   /// [s] Time that the line takes; 0: as fast as the limits of all axes allow. Not together with a
   /// velocity.

@@ -26,7 +26,7 @@ struct SimulatedWiring {
 /// How the rig of one axis is built, and what is wrong with it. Lengths are in mm on a linear axis,
 /// in degrees on a rotary one.
 struct SimulatedAxis {
-  double start = 0.0;              ///< [mm|deg] where the carriage stands at first
+  double start = 0.0;              ///< [mm|deg] position of the carriage at the start
   double switch_hysteresis = 0.0;  ///< [mm|deg]
   int bounces = 0;                 ///< extra on-off pairs after each change of a switch
   double bounce_ms = 0.2;          ///< [ms] from one bounce edge to the next
@@ -35,7 +35,7 @@ struct SimulatedAxis {
   std::optional<double> max_switch;
   SimulatedWiring wiring;
   sim::RigFaults faults;
-  /// [writes] To STEP that succeed before all others fail.
+  /// How many writes to STEP succeed before all others fail.
   std::optional<int> fail_step_write_after;
 };
 
@@ -51,12 +51,12 @@ struct SimulationConfig {
 ///
 /// @code{.yaml}
 /// simulation:
-///   speed: 1.0                   # seconds of the rig per second; 0: as fast as it goes
-///   trace: /tmp/axis.vcd         # where the pin trace goes; default: nowhere
+///   speed: 1.0                   # seconds of the rig per second; 0: as fast as possible
+///   trace: /tmp/axis.vcd         # path of the pin trace; default: no trace
 ///   emergency_stop: false        # true: the emergency-stop button is pressed at the start
 ///   axes:
-///     x:                         # `deg` in place of `mm` on a rotary axis
-///       start_mm: 0.0            # where the carriage stands at first
+///     x:                         # `deg` instead of `mm` on a rotary axis
+///       start_mm: 0.0            # position of the carriage at the start
 ///       min_switch_mm: -2.0      # default: 2 mm (2 degrees) outside the soft limit
 ///       max_switch_mm: 202.0
 ///       switch_hysteresis_mm: 0.0
@@ -71,7 +71,7 @@ struct SimulationConfig {
 ///         max_active_level: low
 ///       min_stuck: none          # active, inactive or none
 ///       max_stuck: none
-///       lose_every: 0            # every n-th step slips; 0: none
+///       lose_every: 0            # every n-th step slips; 0: no step
 ///       chip_fault_after: 1000        # steps of the motor; then the chip reports over-current
 ///       fail_step_write_after: 1000   # writes to STEP; those after them fail. Default: none fails
 /// @endcode
