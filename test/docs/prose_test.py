@@ -17,11 +17,11 @@ MOST_COLUMNS = 120
 # A condition takes "if" or "when"; "where" is for places.
 _CONDITION = (
     r"(?:(?<=[.:;|] )|(?<=- )|^)Where (?!does |do |is |are |an? [a-z ]+ (?:is|was) *$)|"
-    r"\b(?:only|and|but|or|0|false|true|empty|none) where\b|"
-    r"\bwhere (?:it|they|this|that|there|one|both|nothing|nobody|no one|none|no|possible|wait) |"
+    r"\b(?:only|(?<!How )and|but|or|0|false|true|empty|none) where\b|"
+    r"(?<!from )(?<!stays )(?<!place )(?<!position )\bwhere (?:it|they|this|that|there|one|both|nothing|nobody|no one|none|no|possible|wait) |"
     r"\bwhere (?:refused|given|configured|wired|needed|active|installed|asked)\b|"
     r"@throw [\w:]+ where\b|"
-    r"(?<!from )(?<!is )\bwhere [^.,;:|()]{0,50}(?:n't|\bnot|\bhas|\bhave|\bcan|\bmust|\bmay|\bfails?)\b"
+    r"(?<!from )(?<!is )(?<!place )(?<!point )(?<!position )(?<!stays )\bwhere [^.,;:|()]{0,50}(?:n't|\bnot|\bhas|\bhave|\bcan|\bmust|\bmay|\bfails?)\b"
 )
 
 # Name: what it matches, and how often it may occur in pages and comments together.

@@ -9,7 +9,7 @@
 /// The requirements of the driver chips. Data, no I/O.
 ///
 /// Sources: A4988: Allegro datasheet 4988-DS. DRV8825: TI datasheet SLVSA73F. TB6600 module:
-/// DFRobot's TB6600 manual V1.2; where it gives no figure, the needs of slower clones.
+/// DFRobot's TB6600 manual V1.2; if it gives no figure, the needs of slower clones.
 namespace stepdriver::driver {
 
 /// The known driver chips.

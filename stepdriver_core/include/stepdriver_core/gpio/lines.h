@@ -94,7 +94,7 @@ class Backend {
  public:
   virtual ~Backend() = default;
 
-  /// Requests all lines, or none of them if one fails.
+  /// Requests all lines; if one fails, none is held.
   ///
   /// @throw GpioError naming the line, the reason and the remedy.
   virtual std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
