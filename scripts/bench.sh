@@ -8,14 +8,15 @@ usage() {
   cat <<'END'
 usage: scripts/bench.sh [--quick]
 
-Installs what is missing, builds the benchmarks (bench/) for speed, runs them, and prints the table
-of bench/figures.txt: what was measured, its target, and whether that is held. The figures of each
-program, and the table, go to build/bench/*.json. Then paced runs: how late the engine's edges come
-on this machine against the steady clock, idle and busy, beside a plain clock_nanosleep() and, where
-linuxcnc-uspace is installed, its base thread; to build/bench/paced.json. Exit code 0: every target is
-held, and no pulse was shorter, no step closer than allowed.
+Installs missing packages, builds the benchmarks (bench/) for speed, runs them, and prints the table
+of bench/figures.txt: each measurement, its target, and whether the target was met. The figures of each
+program, and the table, go to build/bench/*.json. Paced runs follow: they measure how late the engine's
+edges come on this computer against the steady clock, idle and busy, compared with a plain
+clock_nanosleep() and, if linuxcnc-uspace is installed, its base thread; the results go to
+build/bench/paced.json. Exit code 0: every target was met, no pulse was shorter and no step closer than
+allowed.
 
-  --quick  fewer repetitions: only to see that all of it runs
+  --quick  fewer repetitions, only to see that everything runs
 END
 }
 

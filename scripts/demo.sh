@@ -8,12 +8,12 @@ usage() {
   cat <<'END'
 usage: scripts/demo.sh [--installed]
 
-Installs what is missing, builds the package into build/install, launches one axis on the simulated
-rig, enables it, moves it 1000 steps forward and back by rosservice call, and shows what was
-commanded, what the pins did and where the axis is. Writes the pin trace to a file. Exit code 0: all
-of that agrees.
+Installs missing packages, builds the package into build/install, launches one axis on the simulated
+rig, enables it, moves it 1000 steps forward and back with rosservice call, and shows the commands, the
+activity of the pins and the position of the axis. Writes the pin trace to a file. Exit code 0: all of
+these agree.
 
-  --installed  builds nothing: runs what is in build/install
+  --installed  builds nothing: uses build/install as it is
 END
 }
 

@@ -8,10 +8,10 @@ usage() {
   cat <<'END'
 usage: scripts/doxygen.sh
 
-Installs doxygen where it is missing, and makes pages of stepdriver_core/include in
-build/doxygen/html. Exit code 0: no warning; every class, struct and enumeration has a comment; and
-what comments name, as Machine::stop(), is there. What has a name that says all, a member most
-often, needs no comment.
+Installs doxygen if it is missing, and makes a manual of stepdriver_core/include in build/doxygen/html.
+Exit code 0: there is no warning; every class, struct and enumeration has a comment; and everything
+that comments name, such as Machine::stop(), exists. A member whose name says everything needs no
+comment.
 END
 }
 

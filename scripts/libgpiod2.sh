@@ -6,16 +6,16 @@ usage() {
   cat <<'END'
 usage: scripts/libgpiod2.sh [-h]
 
-Unpacks Debian's libgpiod 2 from the backports of this Debian into a folder beside the system, and
-prints that folder: the STEPDRIVER_GPIOD_ROOT of a build.
+Unpacks libgpiod 2 from the backports of this Debian into a folder outside the system, and prints that
+folder, for the STEPDRIVER_GPIOD_ROOT of a build.
 
     cmake -S stepdriver_core -B build/gpiod2 -DSTEPDRIVER_GPIOD=2 \
       -DSTEPDRIVER_GPIOD_ROOT="$(scripts/libgpiod2.sh)"
 
-Where the system's own libgpiod is version 2 it prints an empty line: then there is nothing to
-name. Nothing is installed, and apt's own lists and sources stay as they are. The folder is kept in
-~/.cache/stepdriver/libgpiod2 (or $XDG_CACHE_HOME/stepdriver/libgpiod2), one for each version; it is
-looked for there first. Exit status 77, and the reason, where it can't be had.
+If the system's own libgpiod is version 2, it prints an empty line. Nothing is installed, and apt's own
+lists and sources remain unchanged. The folder is kept in ~/.cache/stepdriver/libgpiod2 (or
+$XDG_CACHE_HOME/stepdriver/libgpiod2), one for each version, and used again. Exit status 77, with the
+reason, if libgpiod 2 isn't available.
 END
 }
 case ${1:-} in

@@ -8,12 +8,11 @@ usage() {
   cat <<'END'
 usage: scripts/motion_pictures.sh [--check]
 
-Builds the core's machine_tests, runs MotionPictures of them for its traces, and draws docs/pictures from
-them. Installs what is missing for that.
+Builds the core's machine_tests, runs their test MotionPictures, and draws docs/pictures from its traces.
+Installs missing packages.
 
-  --check  draws them elsewhere, and looks whether docs/motion.md shows each of them and no other.
-           Where matplotlib is that of Debian 12, which drew those in docs/pictures, they must be
-           the same
+  --check  draws the pictures into another folder, and checks that docs/motion.md shows each of them and
+           no other. With the matplotlib of Debian 12, which drew docs/pictures, they must be identical
 END
 }
 

@@ -8,12 +8,12 @@ usage() {
   cat <<'END'
 usage: scripts/node_bench.sh [AXES...]
 
-For each number of axes (default: 6 32) starts a node with that many on the simulated rig and writes to
-build/bench/node_AXES_bench.json how long it took to start, the processor time and the memory that it
-uses at rest, and how long its move_to takes next to an empty service. Then, to
-build/bench/node_preparing_bench.json, how long stop and emergency_stop take while two clients have a node
-with three axes prepare trajectories of 300,000 points. STEPDRIVER_CATKIN names a build of the package to
-take; without, it is built.
+For each number of axes (default: 6 32) starts a node with that many axes on the simulated rig. Writes its
+start time, the processor time and memory that it uses at rest, and the duration of move_to compared with
+an empty service to build/bench/node_AXES_bench.json. Then writes how long stop and emergency_stop take
+while a node with three axes prepares trajectories of 300,000 points for two clients to
+build/bench/node_preparing_bench.json. STEPDRIVER_CATKIN names a build of the package to use; without it,
+the script builds the package.
 END
 }
 

@@ -6,22 +6,22 @@ usage() {
   cat <<'END'
 usage: setup_system [--root DIR]
 
-Run from an install space, as root: rosrun stepdriver setup_system. Makes the groups gpio and
+Run it from an install space, as root: rosrun stepdriver setup_system. It creates the groups gpio and
 realtime and the user stepdriver, and installs
 
   /etc/sysusers.d/stepdriver.conf             these groups and the user
-  /etc/udev/rules.d/60-stepdriver-gpio.rules  /dev/gpiochip* belong to the group gpio, and
+  /etc/udev/rules.d/60-stepdriver-gpio.rules  gives /dev/gpiochip* to the group gpio, and
                                               /dev/cpu_dma_latency to the group realtime
   /etc/security/limits.d/stepdriver.conf      real-time scheduling for the group realtime
   /etc/systemd/system/stepdriver.service      the node, with the parameters of
                                               /etc/stepdriver/axes.yaml
-  /etc/systemd/system/stepdriver-roscore.service  a ROS master, where there is none yet
+  /etc/systemd/system/stepdriver-roscore.service  a ROS master, for a machine without one
 
-Nothing is enabled or started. It can be called again, after an update, say.
+It enables and starts nothing. Run it again after an update.
 
   --root DIR  sets up the system that is mounted there
 
-Exit codes: 0 done, 1 it couldn't be, 64 wrong usage.
+Exit codes: 0 done, 1 failed, 64 wrong usage.
 END
 }
 
@@ -70,7 +70,7 @@ if [[ -z $target && -d /run/systemd/system ]]; then
   udevadm trigger --sysname-match=cpu_dma_latency
 fi
 cat <<'END'
-Next: your configuration to /etc/stepdriver/axes.yaml, then
+Next: copy your configuration to /etc/stepdriver/axes.yaml, then run
   systemctl enable --now stepdriver-roscore stepdriver
-  usermod -aG gpio,realtime NAME    for whoever runs the node by hand; then log in again
+  usermod -aG gpio,realtime NAME    for each user who runs the node by hand; then log in again
 END

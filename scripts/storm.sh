@@ -8,11 +8,11 @@ usage() {
   cat <<'END'
 usage: scripts/storm.sh [--minutes MINUTES] [--seed SEED]
 
-Installs what is missing, builds the package, and lets four clients send random requests of every kind
+Installs missing packages, builds the package, and lets four clients send random requests of every kind
 (moves, lines, trajectories, jogs, homings, stops, holds, disables, emergency stops, settings) to a node
-with three axes on the simulated rig, for MINUTES (default: 5), from SEED (default: another one each time,
-which is printed). Then test/node/storm/oracle.h holds the rig's pin trace against the answers. Each
-broken promise is printed with the requests around it. Exit code 0: every promise was kept.
+with three axes on the simulated rig, for MINUTES (default: 5), from SEED (default: a new one each time,
+which is printed). Then the oracle (test/node/storm/oracle.h) compares the rig's pin trace with the
+answers. It prints each broken promise with the requests around it. Exit code 0: every promise was kept.
 END
 }
 

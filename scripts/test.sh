@@ -8,22 +8,23 @@ usage() {
   cat <<'END'
 usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize]
 
-Installs what is missing, builds, and runs the parts that are named; all of them by default.
+Installs missing packages, builds, and runs the named parts; all of them by default.
 
-  --lint  clang-format, clang-tidy and shellcheck over the project's own files; doxygen over the
-          public headers; links of the pages, and the files that they name; the English of pages and comments
-  --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that find
-          it installed; what of its benchmarks is exact; the pictures of docs/motion.md from what that
-          build does
-  --kernel  the GPIO backends, and whole machines, on a kernel of their own with simulated GPIO chips
-          (test/kernel), with each libgpiod that this Debian has; takes --core in
-  --ros   the catkin package, its rostests, its install space with all its commands and its service,
-          and a package that depends on it, and the trace of a move from there, read by sigrok-cli; the commands of the pages; with
-          --kernel also the whole node on that kernel's GPIO chips
+  --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
+          headers; the links of the pages, and the files that they name; the English of pages and
+          comments
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that use
+          the installed library; the exact results of its benchmarks; the pictures of docs/motion.md from
+          this build
+  --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
+          (test/kernel), with each libgpiod of this Debian; includes --core
+  --ros   the catkin package, its rostests, its install space with all commands and the service, a
+          package that depends on it, and the trace of a move, read by sigrok-cli; the commands of the
+          pages; with --kernel also the whole node on that kernel's GPIO chips
   --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
-          ThreadSanitizer; a node with each in a storm of requests
+          ThreadSanitizer; a node with each of them in a storm of requests
 
-A stage that fails doesn't keep the others from running. Exit code 0: every stage passed.
+If a stage fails, the others still run. Exit code 0: every stage passed.
 END
 }
 

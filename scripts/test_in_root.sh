@@ -9,17 +9,17 @@ usage() {
 usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--keep]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
-copies the checkout into a folder of it, and runs scripts/demo.sh, scripts/test.sh and the demo again
-there as root, without a terminal; on Ubuntu, whose own packages have no diagnostic_updater, only
-scripts/test.sh --core, which fails for now: its Google Benchmark is too old. Prints their exit
-codes, and is 0 where all are 0. Needs root.
+copies the checkout into it, and runs scripts/demo.sh, scripts/test.sh and the demo again there as root,
+without a terminal. On Ubuntu, whose own packages have no diagnostic_updater, it only runs
+scripts/test.sh --core, which currently fails because its Google Benchmark is too old. Prints their exit
+codes, and exits with 0 if all of them are 0. Needs root.
 
-The base root is kept in ~/.cache/stepdriver/roots (STEPDRIVER_ROOTS names another folder) for
-the next time; the copy that is worked in is removed at the end.
+The base root is kept in ~/.cache/stepdriver/roots (or in the folder that STEPDRIVER_ROOTS names) for
+the next time; the working copy is removed at the end.
 
-  --blank  into a folder whose path has a blank: catkin can't build there, and the build goes
+  --blank  uses a folder whose path contains a blank: catkin can't build there, so the build goes
            elsewhere
-  --keep   doesn't remove it, and says where it is
+  --keep   keeps the working copy, and prints its path
 END
 }
 

@@ -8,10 +8,10 @@ usage() {
   cat <<'END'
 usage: scripts/two_hosts.sh
 
-Makes two network namespaces, starts a master and four nodes of six axes on the one, and on the other a
-fifth node beside a client of all of them. Prints how long it took until each was there, the rates of
-their joint_states as the other host sees them, and what node_bench measures there. Needs root, and the
-build of scripts/node_bench.sh (STEPDRIVER_CATKIN names another one).
+Makes two network namespaces. Starts a master and four nodes of six axes in one of them, and a fifth node
+and a client of all nodes in the other. Prints how long it took until the client heard each node, the
+rates of their joint_states in the other namespace, and the figures of node_bench there. Needs root, and
+the build of scripts/node_bench.sh (STEPDRIVER_CATKIN names another one).
 END
 }
 

@@ -23,21 +23,21 @@ const char* const kUsage =
     R"(usage: stepdriver_check --config FILE [--backend NAME]
                         [--move [--axis NAME] [--distance D]]
 
-Says whether this machine can drive the axes of a configuration: its GPIO lines and who holds
-them, rights and real-time limits, what a write costs and how late the pulse thread wakes, and the
-step rates that follow. It takes the lines at their safe levels, measures for about half a second
-and releases them: no edge goes out, ENABLE is never asserted, and nothing moves without --move.
-Needs no ROS master; a node that holds the lines must be ended first.
+Checks whether this computer can drive the axes of a configuration. It shows the GPIO lines and who
+holds them, permissions and real-time limits, the cost of a write and the lateness of the pulse
+thread, and the step rates that follow from them. It requests the lines at their safe levels,
+measures for about half a second and releases them: no edge goes out, ENABLE is never asserted, and
+nothing moves without --move. It needs no ROS master. Stop a node that holds the lines first.
 
-  --config FILE    YAML as the node's parameters, see config/. Limits of a URDF aren't in it
-  --backend NAME   libgpiod or simulated, whatever gpio/backend says
-  --move           drives each axis forth and back at its top speed. Endstops stop it
-  --axis NAME      that axis only
-  --distance D     [mm|deg] 1 mm or 10 degrees by default; where negative, back comes first
+  --config FILE    YAML file with the node's parameters, see config/. Limits of a URDF are ignored
+  --backend NAME   libgpiod or simulated, overriding gpio/backend
+  --move           drives each axis forth and back at its top speed; endstops stop it
+  --axis NAME      only this axis
+  --distance D     [mm|deg] default: 1 mm or 10 degrees; if negative, the axis moves back first
 
-Exit codes: 0 all good, 1 the configuration is wrong, 2 a line can't be had, 3 an axis asks for
-more than this machine holds, or realtime: enforce would refuse, 4 a move failed or was
-interrupted, 64 wrong usage. Of several the lowest.
+Exit codes: 0 all good, 1 the configuration is wrong, 2 a line can't be requested, 3 an axis needs a
+higher step rate than this computer can sustain, or realtime: enforce would refuse to start, 4 a move
+failed or was interrupted, 64 wrong usage. If several apply, the lowest.
 )";
 
 Options parseOptions(const std::vector<std::string>& arguments) {

@@ -23,9 +23,9 @@ const char* const kUsage =
     R"(usage: console [--driver NAME] [--slow PERCENT] [--fast PERCENT] [name:=value ...]
        console --wizard [--driver NAME] [--axis NAME] [--output FILE] [--overwrite]
 
-A screen for whoever stands in front of a machine: the axes of a stepdriver_node, live, and keys to
-enable, jog, step and home them. It runs in any terminal, over ssh too (ssh -t), and gives it back
-as it was. Nothing moves when it starts, and nothing ever that isn't enabled.
+A screen for the person in front of the machine: it shows the axes of a stepdriver_node, live, and
+has keys to enable, jog, step and home them. It runs in any terminal, also over ssh (ssh -t), and
+restores the terminal when it ends. Nothing moves when it starts, and a disabled axis never moves.
 
   SPACE             emergency stop of all axes, at any time
   s, Esc            stop of all axes: they decelerate
@@ -34,26 +34,28 @@ as it was. Nothing moves when it starts, and nothing ever that isn't enabled.
   - +               one step of the motor
   e, d              enable, disable
   h, a              home the axis, home all
-  r                 recover from faults and an emergency stop; nothing moves by that
+  r                 recover from faults and an emergency stop; this moves nothing
   ?, q              all keys; quit
 
-A terminal tells of no key that is let go. A jog goes on while the key repeats, and ends 0.2 s after
-the last repeat; where the console or the connection dies, after the driver's jog_timeout.
+A terminal does not report that a key was released. A jog continues while the key repeats, and ends
+0.2 s after the last repeat; if the console or the connection dies, it ends after the driver's
+jog_timeout.
 
-  --driver NAME     of the node; default: stepdriver
-  --slow PERCENT    of an axis's highest speed to jog at; default: 5
-  --fast PERCENT    default: 50
+  --driver NAME     name of the node; default: stepdriver
+  --slow PERCENT    slow jog speed, in percent of an axis's highest speed; default: 5
+  --fast PERCENT    fast jog speed; default: 50
 
-The wizard is a first bring-up, line by line: do the switches read right, which way is plus, is the
-distance right? Each move comes after a question, is small and slow, and is stopped by Enter and by
-any switch that changes. It writes a configuration with what it has found; what runs isn't changed.
+The wizard guides you through a first bring-up, line by line: do the switches read right, which way
+is plus, is the distance right? Each move comes after a question, is small and slow, and ends if you
+press Enter or any switch changes. The wizard writes a configuration with its findings; the running
+node isn't changed.
 
-  --axis NAME       that axis only
+  --axis NAME       only this axis
   --output FILE     default: stepdriver_wizard.yaml
-  --overwrite       replaces a file that is there
+  --overwrite       replaces an existing file
 
 Exit codes: 0 ended as asked, 1 no master, no driver, no terminal, or a file that can't be written,
-2 the wizard was ended before it wrote a file, 64 wrong usage.
+2 the wizard ended before it wrote a file, 64 wrong usage.
 )";
 
 Options parseOptions(const std::vector<std::string>& arguments) {

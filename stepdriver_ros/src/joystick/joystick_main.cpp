@@ -32,10 +32,10 @@ constexpr double kMessagesInTimeout = 3.0;
 
 constexpr const char* kUsage = R"(usage: stepdriver_joystick [--help] [name:=value ...]
 
-Jogs the axes of a stepdriver_node by the sticks of a joystick.
+Jogs the axes of a stepdriver_node with the sticks of a joystick.
 
   topics      joy (subscribed)  DRIVER/jog
-  services    DRIVER/AXIS/enable (called, where disable_in_dead_band is configured)
+  services    DRIVER/AXIS/enable (called if disable_in_dead_band is set)
   parameters  ~driver  ~rate  ~joy_timeout  ~deadman_button  ~axes
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 64 wrong usage.

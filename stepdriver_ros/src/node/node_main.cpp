@@ -45,9 +45,9 @@ constexpr std::size_t kThreadStack = std::size_t{1} << 20;
 
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
 
-Drives the axes of the parameter ~axes by services, and publishes where they are.
-Ends on SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill`: decelerates, disables and releases the
-lines.
+Drives the axes of the parameter ~axes through services, and publishes their positions.
+On SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill` it decelerates, disables the axes, releases
+the lines and ends.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
               ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
@@ -61,8 +61,8 @@ lines.
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
               ~state_file  ~hardware_id  ~simulation  robot_description
 
-Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be had or written,
-3 the machine is too slow for its axes and ~realtime is enforce, 64 wrong usage.
+Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
+written, 3 the computer is too slow for its axes and ~realtime is enforce, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
