@@ -117,10 +117,11 @@ class Page:
     def start(self, entry, command):
         if command.startswith("roslaunch ") and not entry.get("beside"):
             self.end()
-            # As with a master of its own.
-            for name in {f"/{name.split('/')[1]}" for name in self.parameters.getParamNames()}:
-                self.parameters.deleteParam(name)
-            self.parameters.setParam("/stepdriver/simulation/speed", entry.get("speed", 1.0))
+            # Launch files clear what was set before them; a second one of the same roslaunch sets more.
+            speed = entry.get("speed", 1.0)
+            (self.folder / "speed.launch").write_text(
+                f'<launch><param name="/stepdriver/simulation/speed" value="{speed}"/></launch>')
+            command += " speed.launch"
         log = f"{len(os.listdir(self.folder))}.log"
         self.started.append(self.open(self.here(command), log))
         self.until(self.started[-1], entry["until"], self.folder / log)

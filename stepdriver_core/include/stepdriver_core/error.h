@@ -29,6 +29,9 @@ struct ConfigIssue {
   std::string key;  ///< full name of the parameter
   /// Its value and what is allowed; continues the sentence that the key begins.
   std::string message;
+  /// The parameter should not be there, or contradicts another one. It may be left over from an
+  /// earlier configuration.
+  bool may_be_left_over = false;
 };
 
 /// All mistakes in a configuration.

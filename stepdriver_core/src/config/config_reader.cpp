@@ -213,6 +213,10 @@ void ConfigReader::issue(const std::string& key, const std::string& message) {
   issues_.push_back({fullName(key), message});
 }
 
+void ConfigReader::contradiction(const std::string& key, const std::string& message) {
+  issues_.push_back({fullName(key), message, true});
+}
+
 void ConfigReader::allow(const std::string& key) { known_.insert(key); }
 
 void ConfigReader::rejectUnknown() {
@@ -222,9 +226,9 @@ void ConfigReader::rejectUnknown() {
     const std::string& key = entry.first;
     if (known_.count(key) > 0) continue;
     const std::string* meant = nearest(key, known);
-    issue(key, meant != nullptr ? fmt::format("is not known; did you mean {}?", *meant)
-               : known.empty()  ? "is not known; nothing is allowed here"
-                                : "is not known; known here: " + listText(known, "and"));
+    contradiction(key, meant != nullptr ? fmt::format("is not known; did you mean {}?", *meant)
+                       : known.empty()  ? "is not known; nothing is allowed here"
+                                        : "is not known; known here: " + listText(known, "and"));
   }
 }
 

@@ -125,9 +125,9 @@ class AxesReader {
     }
     const auto [user, is_new] = joints_.emplace(joint, axis.fullName(""));
     if (!is_new) {
-      axis.issue("joint",
-                 fmt::format("is \"{}\"{}, but must be another: it is the joint of {} already",
-                             joint, given ? "" : ", the axis's name", user->second));
+      axis.contradiction(
+          "joint", fmt::format("is \"{}\"{}, but must be another: it is the joint of {} already",
+                               joint, given ? "" : ", the axis's name", user->second));
     }
     return joint;
   }

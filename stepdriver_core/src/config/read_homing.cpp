@@ -53,7 +53,10 @@ class HomingReader {
     if (!which) return false;
     homing.at_max = *which == "max";
     if (homing.at_max ? config_.endstop_max : config_.endstop_min) return true;
-    mustBe("switch", fmt::format("a switch that the axis has: endstops/{} is missing", *which));
+    homing_.contradiction(
+        "switch",
+        fmt::format("is {}, but must be a switch that the axis has: endstops/{} is missing",
+                    homing_.shown("switch"), *which));
     return false;
   }
 
@@ -142,7 +145,7 @@ void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config
   if (axis.has("homing")) {
     if (kind) config.homing = HomingReader(axis, motionKeys(*kind), config).read();
   } else if (config.require_homing) {
-    axis.issue("require_homing", "is true, but must be false where there is no homing");
+    axis.contradiction("require_homing", "is true, but must be false where there is no homing");
   }
 }
 

@@ -34,9 +34,10 @@ std::optional<Kind> readKind(ConfigReader& axis) {
   const std::string linear = firstGiven(axis, motionKeys(Kind::kLinear));
   const std::string rotary = firstGiven(axis, motionKeys(Kind::kRotary));
   if (!linear.empty() && !rotary.empty()) {
-    axis.issue("", fmt::format("has {} and {}, but must be either linear, with all of it in mm, or "
-                               "rotary, with all of it in degrees",
-                               linear, rotary));
+    axis.contradiction(
+        "", fmt::format("has {} and {}, but must be either linear, with all of it in mm, or "
+                        "rotary, with all of it in degrees",
+                        linear, rotary));
     return {};
   }
   if (!linear.empty()) return Kind::kLinear;
@@ -79,12 +80,17 @@ class MotionReader {
     axis_.issue(key, fmt::format("is {}, but must be {}", axis_.shown(key), wanted));
   }
 
+  /// @param wanted names another key.
+  void contradicts(const std::string& key, const std::string& wanted) {
+    axis_.contradiction(key, fmt::format("is {}, but must be {}", axis_.shown(key), wanted));
+  }
+
   void readSpeeds(AxisConfig& config) {
     const auto max = axis_.findNumber(keys_.max_speed, Range::positive(), presence_);
     const auto min = axis_.findNumber(keys_.start_speed, Range::notNegative(), Presence::kOptional);
     if (min && max && *min > *max) {
-      mustBe(keys_.start_speed,
-             fmt::format("at most {}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
+      contradicts(keys_.start_speed, fmt::format("at most {}, which is {}", keys_.max_speed,
+                                                 axis_.shown(keys_.max_speed)));
     }
     if (max) checkRate(*max);
     config.max_speed = si(max.value_or(0.0));
@@ -123,9 +129,9 @@ class MotionReader {
     const auto& slowest = down ? down : up;
     if (stop && slowest && *stop < *slowest) {
       const std::string& key = down ? keys_.deceleration : keys_.acceleration;
-      mustBe(keys_.stop_deceleration,
-             fmt::format("at least {}, which is {}: a stop must not end beyond what it stops", key,
-                         axis_.shown(key)));
+      contradicts(keys_.stop_deceleration,
+                  fmt::format("at least {}, which is {}: a stop must not end beyond what it stops",
+                              key, axis_.shown(key)));
     }
     config.acceleration = si(up.value_or(0.0));
     config.deceleration = down ? si(*down) : config.acceleration;
@@ -169,8 +175,8 @@ class MotionReader {
     const auto min = readPosition(keys_.min_position);
     const auto max = readPosition(keys_.max_position);
     if (min && max && *min >= *max) {
-      mustBe(keys_.min_position, fmt::format("below {}, which is {}", keys_.max_position,
-                                             axis_.shown(keys_.max_position)));
+      contradicts(keys_.min_position, fmt::format("below {}, which is {}", keys_.max_position,
+                                                  axis_.shown(keys_.max_position)));
     }
     if (min) config.min_position = si(*min);
     if (max) config.max_position = si(*max);

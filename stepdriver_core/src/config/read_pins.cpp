@@ -118,9 +118,10 @@ class PinsReader {
     }
     const bool alias = name.drv8825_key != nullptr && reader_.has(name.drv8825_key);
     if (alias && !takesAliases()) {
-      reader_.issue(name.drv8825_key,
-                    fmt::format("is {}, but that is a name on the DRV8825; on the {} the pin is {}",
-                                reader_.shown(name.drv8825_key), chip_->title, name.key));
+      reader_.contradiction(
+          name.drv8825_key,
+          fmt::format("is {}, but that is a name on the DRV8825; on the {} the pin is {}",
+                      reader_.shown(name.drv8825_key), chip_->title, name.key));
       return;
     }
     if (alias && reader_.has(name.key)) {
@@ -141,14 +142,14 @@ class PinsReader {
     const Bias bias = readBias(axis_, "fault_bias");
     if (!reader_.has("fault")) {
       if (axis_.has("fault_bias")) {
-        axis_.issue("fault_bias",
-                    fmt::format("is {}, but pins/fault is missing", axis_.shown("fault_bias")));
+        axis_.contradiction("fault_bias", fmt::format("is {}, but pins/fault is missing",
+                                                      axis_.shown("fault_bias")));
       }
       return;
     }
     if (chip_ != nullptr && !chip_->has_fault) {
-      reader_.issue("fault", fmt::format("is {}, but the {} has no fault pin",
-                                         reader_.shown("fault"), chip_->title));
+      reader_.contradiction("fault", fmt::format("is {}, but the {} has no fault pin",
+                                                 reader_.shown("fault"), chip_->title));
       return;
     }
     if (const auto line = readLine(reader_, "fault", Presence::kOptional, used_)) {
@@ -159,14 +160,14 @@ class PinsReader {
   void refuse(const PinName& name, const std::string& why) {
     for (const char* key : {name.key, name.drv8825_key}) {
       if (key == nullptr || !reader_.has(key)) continue;
-      reader_.issue(key, fmt::format("is {}, but {}", reader_.shown(key), why));
+      reader_.contradiction(key, fmt::format("is {}, but {}", reader_.shown(key), why));
     }
   }
 
   static void refuseSecondName(ConfigReader& reader, const PinName& name) {
-    reader.issue(name.drv8825_key,
-                 fmt::format("is {}, but {}, the same pin, is given too; give one",
-                             reader.shown(name.drv8825_key), name.key));
+    reader.contradiction(name.drv8825_key,
+                         fmt::format("is {}, but {}, the same pin, is given too; give one",
+                                     reader.shown(name.drv8825_key), name.key));
   }
 
   void checkMicrostepPins() {
@@ -180,19 +181,21 @@ class PinsReader {
       (isNamed(name) ? named : missing).emplace_back(aliases ? name.drv8825_key : name.key);
     }
     if (named.empty() || missing.empty()) return;
-    reader_.issue(missing.front(),
-                  fmt::format("is missing; wire all three microstep pins, or none where the board "
-                              "is strapped to `microsteps` (wired: {})",
-                              listText(named, "and")));
+    reader_.contradiction(
+        missing.front(),
+        fmt::format("is missing; wire all three microstep pins, or none where the board "
+                    "is strapped to `microsteps` (wired: {})",
+                    listText(named, "and")));
   }
 
   bool readCommonAnode() {
     if (!axis_.boolean("common_anode", false)) return false;
     if (chip_ == nullptr || chip_->model == driver::Model::kTb6600) return true;
-    axis_.issue("common_anode",
-                fmt::format("is true, but must be false on the {}: only a tb6600 has inputs to be "
-                            "wired so; for single pins there is invert",
-                            chip_->title));
+    axis_.contradiction(
+        "common_anode",
+        fmt::format("is true, but must be false on the {}: only a tb6600 has inputs to be "
+                    "wired so; for single pins there is invert",
+                    chip_->title));
     return false;
   }
 
@@ -221,14 +224,16 @@ class PinsReader {
     if (!inverted) return;
     if (!isNamed(name)) {
       if (isRequired(name) || !reader_.isMap()) return;
-      invert.issue(key, fmt::format("is {}, but only a wired pin may be named here; {} is missing",
-                                    invert.shown(key), reader_.fullName(key)));
+      invert.contradiction(
+          key, fmt::format("is {}, but only a wired pin may be named here; {} is missing",
+                           invert.shown(key), reader_.fullName(key)));
       return;
     }
     if (common_anode && (name.pin == &Pins::step || name.pin == &Pins::enable)) {
-      invert.issue(key, fmt::format("is {}, but common_anode inverts it already; with common_anode "
-                                    "only dir may be named here, to turn the direction round",
-                                    invert.shown(key)));
+      invert.contradiction(
+          key, fmt::format("is {}, but common_anode inverts it already; with common_anode "
+                           "only dir may be named here, to turn the direction round",
+                           invert.shown(key)));
       return;
     }
     Pin& pin = pins_.*name.pin;

@@ -21,9 +21,9 @@ void readPower(ConfigReader& axis, bool pins_are_right, AxisConfig& config) {
   const bool sleeps = config.idle_action == IdleAction::kSleep;
   if ((sleeps ? config.pins.sleep : config.pins.enable).wired()) return;
   const std::string pin = axis.fullName(sleeps ? "pins/sleep" : "pins/enable");
-  axis.issue("idle_timeout_s",
-             fmt::format("is {}, but with idle_action {} that needs {}, which isn't wired",
-                         axis.shown("idle_timeout_s"), action, pin));
+  axis.contradiction("idle_timeout_s",
+                     fmt::format("is {}, but with idle_action {} that needs {}, which isn't wired",
+                                 axis.shown("idle_timeout_s"), action, pin));
 }
 
 }  // namespace stepdriver::config

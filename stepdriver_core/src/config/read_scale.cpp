@@ -81,10 +81,11 @@ class ScaleReader {
     const auto diameter =
         axis_.findNumber(keys_.wheel_diameter, Range::positive(), Presence::kOptional);
     if (by_wheel && by_travel) {
-      axis_.issue(keys_.wheel_diameter,
-                  fmt::format("is {}, but {} must not be given with it: a round travels either "
-                              "that or pi times the diameter",
-                              axis_.shown(keys_.wheel_diameter), keys_.per_round));
+      axis_.contradiction(
+          keys_.wheel_diameter,
+          fmt::format("is {}, but {} must not be given with it: a round travels either "
+                      "that or pi times the diameter",
+                      axis_.shown(keys_.wheel_diameter), keys_.per_round));
       return {};
     }
     if (diameter) return kPi * static_cast<long double>(*diameter);
@@ -109,9 +110,10 @@ class ScaleReader {
     const auto scale = axis_.findNumber(key, Range::positive(), presence_);
     if (by_rounds.empty()) return scale;
     readTravel(Presence::kOptional);
-    axis_.issue(key, fmt::format("is {}, but {} must not be given with it: the axis is scaled by "
-                                 "either (the motor's own steps can be given as {})",
-                                 axis_.shown(key), listText(by_rounds, "and"), kStepsPerRound));
+    axis_.contradiction(
+        key, fmt::format("is {}, but {} must not be given with it: the axis is scaled by "
+                         "either (the motor's own steps can be given as {})",
+                         axis_.shown(key), listText(by_rounds, "and"), kStepsPerRound));
     return {};
   }
 
@@ -128,13 +130,15 @@ double readStepsPerRound(ConfigReader& axis, std::optional<int> full_steps,
   const bool by_full_steps = full_steps && microsteps;
   const int product = by_full_steps ? *full_steps * *microsteps : 0;
   if (steps && by_full_steps && *steps != product) {
-    axis.issue(kStepsPerRound, fmt::format("is {}, but must be {}: {} ({}) times microsteps ({})",
-                                           axis.shown(kStepsPerRound), product, kFullSteps,
-                                           *full_steps, *microsteps));
+    axis.contradiction(
+        kStepsPerRound,
+        fmt::format("is {}, but must be {}: {} ({}) times microsteps ({})",
+                    axis.shown(kStepsPerRound), product, kFullSteps, *full_steps, *microsteps));
   } else if (steps && microsteps && *steps % *microsteps != 0) {
-    axis.issue(kStepsPerRound, fmt::format("is {}, but must be a multiple of microsteps, which is "
-                                           "{}: it counts the microsteps of whole full steps",
-                                           axis.shown(kStepsPerRound), *microsteps));
+    axis.contradiction(kStepsPerRound,
+                       fmt::format("is {}, but must be a multiple of microsteps, which is "
+                                   "{}: it counts the microsteps of whole full steps",
+                                   axis.shown(kStepsPerRound), *microsteps));
   }
   return steps.value_or(product);
 }

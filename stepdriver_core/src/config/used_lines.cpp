@@ -16,16 +16,19 @@ void UsedLines::addEnable(const std::string& key, const std::string& line, std::
   if (!user.enables) return refuse(key, line, user);
   if (!on || !user.on || *on == *user.on) return;
   const auto name = [](bool level) { return level ? "high" : "low"; };
-  issues_.push_back(
-      {key, fmt::format("is \"{}\", which is {} too, but its axis is enabled by {} "
-                        "and the other by {}; axes that share a line need the same level",
-                        line, user.key, name(*on), name(*user.on))});
+  issues_.push_back({key,
+                     fmt::format("is \"{}\", which is {} too, but its axis is enabled by {} "
+                                 "and the other by {}; axes that share a line need the same level",
+                                 line, user.key, name(*on), name(*user.on)),
+                     true});
 }
 
 void UsedLines::refuse(const std::string& key, const std::string& line, const User& user) {
-  issues_.push_back({key, fmt::format("is \"{}\", which is used twice: it is {} already, "
-                                      "and each pin needs a line of its own",
-                                      line, user.key)});
+  issues_.push_back({key,
+                     fmt::format("is \"{}\", which is used twice: it is {} already, "
+                                 "and each pin needs a line of its own",
+                                 line, user.key),
+                     true});
 }
 
 }  // namespace stepdriver::config

@@ -86,16 +86,17 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   config.emergency_stop = config::readInputSwitch(reader, "emergency_stop", used);
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !reader.has("emergency_stop")) {
-    simulation.issue("emergency_stop",
-                     fmt::format("is {}, but {} is missing", simulation.shown("emergency_stop"),
-                                 reader.fullName("emergency_stop")));
+    simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",
+                                                           simulation.shown("emergency_stop"),
+                                                           reader.fullName("emergency_stop")));
   }
   config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right);
   if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {
-    reader.issue("simulation/trace",
-                 fmt::format("is \"{}\", but only the simulated rig has a trace, and gpio/backend "
-                             "is libgpiod; leave it out or empty",
-                             config.simulation.trace));
+    reader.contradiction(
+        "simulation/trace",
+        fmt::format("is \"{}\", but only the simulated rig has a trace, and gpio/backend "
+                    "is libgpiod; leave it out or empty",
+                    config.simulation.trace));
   }
   return config;
 }

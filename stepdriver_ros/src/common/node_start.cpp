@@ -43,13 +43,21 @@ config::ConfigValue privateParameters(const ros::NodeHandle& private_node) {
   return configValue(tree);
 }
 
-void explain(const ConfigError& error, const std::string& what_follows) {
+void explain(const ConfigError& error, const std::string& node_name,
+             const std::string& what_follows) {
   const std::size_t count = error.issues().size();
   ROS_FATAL_NAMED("node", "%s: %zu %s wrong in the parameters", what_follows.c_str(), count,
                   count == 1 ? "thing is" : "things are");
+  bool left_over = false;
   for (const ConfigIssue& issue : error.issues()) {
     ROS_ERROR_NAMED("node", "%s %s", issue.key.c_str(), issue.message.c_str());
+    left_over = left_over || issue.may_be_left_over;
   }
+  if (!left_over) return;
+  ROS_ERROR_NAMED("node",
+                  "Parameters of an earlier launch may still be on the master. To delete them: "
+                  "rosparam delete %s; then load yours again",
+                  node_name.c_str());
 }
 
 }  // namespace stepdriver::ros_node

@@ -28,9 +28,12 @@ bool waitForMaster(EndRequests& end_requests);
 /// @return the node's private parameters as one map, empty where there are none.
 config::ConfigValue privateParameters(const ros::NodeHandle& private_node);
 
-/// Logs everything that is wrong in the parameters.
+/// Logs everything that is wrong in the parameters. If some of them may be left over from an
+/// earlier launch, it says how to delete them.
 ///
+/// @param node_name full name of the node.
 /// @param what_follows how the first line begins: "Not started".
-void explain(const ConfigError& error, const std::string& what_follows);
+void explain(const ConfigError& error, const std::string& node_name,
+             const std::string& what_follows);
 
 }  // namespace stepdriver::ros_node

@@ -35,7 +35,7 @@ void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
     const auto found = axes->find(axis.name);
     if (found == axes->end()) {
       issues.push_back(
-          {key, fmt::format("is no axis of {}, which has {}", driver, namesOf(*axes))});
+          {key, fmt::format("is no axis of {}, which has {}", driver, namesOf(*axes)), true});
       continue;
     }
     const auto* own = found->second.as<ConfigValue::Map>();

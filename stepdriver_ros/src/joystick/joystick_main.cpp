@@ -98,7 +98,7 @@ int run(EndRequests& end_requests) {
     ros::shutdown();  // also ends the calls that nobody answers
     return ros_node::kExitOk;
   } catch (const ConfigError& error) {
-    ros_node::explain(error, "Not started");
+    ros_node::explain(error, private_node.getNamespace(), "Not started");
   } catch (const std::exception& error) {
     ROS_FATAL_NAMED("joystick", "Not started: %s", error.what());
   }

@@ -186,7 +186,7 @@ int runOrExplain(EndRequests& end_requests) {
   try {
     return run(node, private_node, end_requests);
   } catch (const ConfigError& error) {
-    explain(error, "Not started, no line was touched");
+    explain(error, private_node.getNamespace(), "Not started, no line was touched");
     return kExitConfig;
   } catch (const GpioError& error) {
     ROS_FATAL_NAMED("node", "Not started: %s", error.what());

@@ -244,6 +244,23 @@ TEST(ConfigReader, RejectsEveryKeyWhereNothingIsKnown) {
   EXPECT_EQ(key.lines(), Lines{"/n/key: is not known; nothing is allowed here"});
 }
 
+TEST(ConfigReader, TellsWhatMayBeLeftOverFromWhatIsOnlyWrong) {
+  const ConfigValue value = mapOf({{"a", "x"}, {"b", 1}, {"c", 2}});
+  std::vector<ConfigIssue> issues;
+  ConfigReader reader(value, "/n", issues);
+  reader.number("a", {});
+  reader.number("d", {});
+  reader.allow("b");
+  reader.contradiction("b", "is 1, but must be 2");
+  reader.rejectUnknown();
+  std::vector<std::string> left_over;
+  for (const ConfigIssue& issue : issues) {
+    if (issue.may_be_left_over) left_over.push_back(issue.key);
+  }
+  EXPECT_EQ(issues.size(), 4U);
+  EXPECT_EQ(left_over, (std::vector<std::string>{"/n/b", "/n/c"}));
+}
+
 TEST(ConfigReader, NamesParametersInFullAtEveryDepth) {
   const ConfigValue value = mapOf({{"a", mapOf({{"b", mapOf({{"c", "x"}})}})}});
   std::vector<ConfigIssue> issues;

@@ -86,6 +86,9 @@ class ConfigReader {
   /// @param message continues the sentence that the name of the parameter begins.
   void issue(const std::string& key, const std::string& message);
 
+  /// Reports a key that should not be there, or that contradicts another one.
+  void contradiction(const std::string& key, const std::string& message);
+
   /// All issues so far, also those of other readers.
   std::vector<ConfigIssue>& issues() const { return issues_; }
 
