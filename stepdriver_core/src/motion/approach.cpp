@@ -15,7 +15,7 @@ DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& 
   return path.length();
 }
 
-// How far a motion comes that leaves a phase at the time t for the fastest way to rest.
+// The distance of a motion that leaves a phase at the time t and stops as fast as possible.
 DoubleDouble endAfter(const Phase& phase, DoubleDouble t, const MotionLimits& limits) {
   const DoubleDouble v = phase.v + t * (phase.a + t * DoubleDouble(phase.j * 0.5));
   const DoubleDouble a = phase.a + t * DoubleDouble(phase.j);
@@ -47,7 +47,7 @@ Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const Mot
   const double sign = beyond.hi > 0.0 ? 1.0 : -1.0;
   Path fastest(v, a);
   changeToMaximum(fastest, sign, limits);
-  DoubleDouble left = length;  // of the way, at the beginning of a phase
+  DoubleDouble left = length;  // of the distance, at the beginning of a phase
   for (std::size_t i = 0; i < fastest.size(); ++i) {
     const Phase& phase = fastest[i];
     const auto missing = [&](DoubleDouble t) {

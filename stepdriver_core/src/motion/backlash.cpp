@@ -21,7 +21,7 @@ constexpr double kNoWay = 0.5;     // microsteps
 constexpr double kNoRoom = 0.001;  // of a limit
 constexpr double kLonger = 1.1;
 
-// The joint goes the other way from a time on.
+// The joint reverses at a time.
 struct Turn {
   double time_s;
   double sign;
@@ -62,8 +62,8 @@ class Turns {
     }
   }
 
-  DoubleDouble furthest_;  // in the direction of now
-  double time_s_ = 0.0;    // when it came there
+  DoubleDouble furthest_;  // in the current direction
+  double time_s_ = 0.0;    // when it reached it
   double sign_ = 0.0;
   std::vector<Turn> found_;
 };
@@ -83,7 +83,8 @@ std::vector<Turn> turnsOf(const Profile& joint) {
 // The joint's highest values between two times.
 using PeaksBetween = std::function<Highest(DoubleDouble, DoubleDouble)>;
 
-// What the joint leaves of the limits between two times; nothing if that is next to nothing.
+// The part of the limits that the joint leaves free between two times; empty if there is almost no
+// room.
 std::optional<MotionLimits> roomBeside(const PeaksBetween& joint, double from, double to,
                                        const MotionLimits& limits) {
   const Highest meanwhile = joint(from, to);
@@ -97,7 +98,7 @@ std::optional<MotionLimits> roomBeside(const PeaksBetween& joint, double from, d
   return MotionLimits{0.0, speed, acceleration, acceleration, jerk};
 }
 
-// Moves what is taken up, in the time that it needs itself; none where there is no room.
+// Changes the part that is taken up, within the time that this takes; empty if there is no room.
 std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const MotionState& from,
                               std::int64_t to, const MotionLimits& limits) {
   double until = time_s + 1e-6;
@@ -110,7 +111,7 @@ std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const Mo
   return std::nullopt;
 }
 
-// What is taken up of the backlash, as it is moved to at one turn after the other.
+// The motions that take up the backlash, one reversal after the other.
 class TakeUps {
  public:
   TakeUps(double slack, std::int64_t backlash, const MotionLimits& limits, PeaksBetween joint)
@@ -118,14 +119,14 @@ class TakeUps {
 
   std::int64_t wanted(const Turn& turn) const { return turn.sign > 0.0 ? backlash_ : 0; }
   MotionState stateAt(const Turn& turn) const { return last_.stateAt(nanoseconds(turn.time_s)); }
-  /// Whether it rests where it would be, were all done that the turn before asks for.
+  /// Whether it rests at the position that the previous reversal asked for.
   bool restsAt(std::int64_t slack, const Turn& turn) const {
     const MotionState state = stateAt(turn);
     return state.velocity == 0.0 && std::abs((state.position - fromInteger(slack)).hi) < kNear;
   }
 
-  /// What the turn begins, until the next one at the latest; none if there is nothing to do.
-  /// Without room it is nothing either, and noRoom() says so.
+  /// The motion that a reversal starts, until the next one at the latest; empty if there is nothing
+  /// to do. If there is no room it is empty too, and noRoom() says so.
   std::optional<Profile> at(const Turn& turn, const Turn* next) {
     const MotionState from = stateAt(turn);
     const std::int64_t to = wanted(turn);
@@ -189,8 +190,9 @@ MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
 
 struct MotorTail::Plan {
   std::vector<Turn> turns;      // of the tail alone, after its beginning
-  std::size_t moves_after = 0;  // pieces: then the first of them is found
-  std::vector<bool> from_rest;  // whether all was done before a turn that the one before asks for
+  std::size_t moves_after = 0;  // pieces up to the first reversal
+  // for each reversal: whether the motion for the previous one had ended
+  std::vector<bool> from_rest;
   PeakTree peaks;
 
   explicit Plan(const Profile& joint) : peaks(joint) {
@@ -231,12 +233,12 @@ MotorTail::~MotorTail() = default;
 
 namespace {
 
-// More of them aren't looked at to join a motion to a tail.
+// Joining a motion to a tail examines no more than this.
 constexpr std::size_t kMostPieces = 1000;
 constexpr std::size_t kMostTurns = 64;
 
-// The sections of a motor's motion: the joint's, shifted by what rests of the backlash, and sums of
-// both where it is being taken up.
+// The sections of a motor's motion: the joint's motion, shifted by the part that is taken up, and
+// sums of both while that part changes.
 class MotorSections {
  public:
   MotorSections(std::shared_ptr<const Profile> joint, double slack)
@@ -293,7 +295,7 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
   const std::size_t looked_at = std::min(joint_.pieceCount(), kMostPieces + first_move);
   bool coincide = false;
   for (std::size_t i = 0; i < looked_at && !coincide; ++i) {
-    // Next to nothing moves for long: what does so first is what counts.
+    // A tail may begin with many pieces that hardly move: skip to its first reversal.
     if (i > kMostPieces && i < first_move) i = first_move;
     if (i >= looked_at) break;
     const double start = joint_.pieceStart(i).value();

@@ -10,33 +10,33 @@
 
 namespace stepdriver::motion {
 
-/// What a motor does so that a joint behind a backlash makes a motion.
+/// The motion of a motor whose joint behind a backlash makes a given motion.
 struct MotorPlan {
   Profile profile;
-  /// [s] after the start: where the joint turns with so much speed, acceleration or jerk after it
-  /// that the limits leave nothing to take the backlash up with. The profile is then the joint's.
+  /// [s] after the start: the reversal after which the joint has so much speed, acceleration or
+  /// jerk that the limits leave no room to take up the backlash. The profile is then the joint's.
   std::optional<double> no_room;
 };
 
-/// The joint's motion and, upon that, what takes the backlash up: all of it on a way up, none of it
-/// on a way down. From where the joint has come to its last turning point on, that is moved to as
-/// fast as the limits leave room beside the joint's own speed, acceleration and jerk in that time,
-/// which is when the joint lags behind. Turns of less than half a microstep are none: no step comes
-/// of them.
+/// The joint's motion plus the motion that takes up the backlash: all of the backlash is taken up
+/// while the joint moves up, nothing while it moves down. From the joint's last turning point on,
+/// the added motion is as fast as the limits allow in addition to the joint's own speed,
+/// acceleration and jerk in that time; the joint lags behind until it is done. Reversals of less
+/// than half a microstep are ignored: they make no step.
 ///
-/// @param joint [microsteps] from its own start on. The motor's begins then too, and ends when that
-///   ends, or later: when the backlash is taken up.
-/// @param slack [microsteps] of the backlash, what is taken up at the start: from 0 to all.
-/// @param limits of the motor; its deceleration isn't looked at, as a motor that speeds up on one
+/// @param joint [microsteps] from its own start on. The motor's motion begins at the same time. It
+///   ends at the same time or later, when the backlash is taken up.
+/// @param slack [microsteps] part of the backlash that is taken up at the start: from 0 to all.
+/// @param limits of the motor. The deceleration is ignored, because a motor that speeds up on one
 ///   side of the backlash slows down on the other.
 MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
                     const MotionLimits& limits);
 
-/// A motor's plan for a joint's motion whose first part wasn't known when the rest was planned.
+/// A motor's plan for a joint's motion whose first part was unknown when the rest was planned.
 struct JoinedMotor {
   Profile profile;
-  /// [s] after the start: what of the profile wasn't planned beforehand. The first is all up to
-  /// the tail.
+  /// [s] after the start: parts of the profile that weren't planned in advance. The first one is
+  /// everything up to the tail.
   struct Stretch {
     double from;
     double to;
@@ -45,8 +45,9 @@ struct JoinedMotor {
   std::optional<double> no_room;  ///< as in MotorPlan
 };
 
-/// What a motor does for the tail of a joint's motion, made beforehand: as planMotor() from the
-/// first turn on before which all of the backlash was taken up, or none. Never changed once made.
+/// A motor's motion for the tail of a joint's motion, planned in advance: as planMotor() from the
+/// first reversal on before which the backlash was completely taken up or completely free.
+/// Immutable.
 class MotorTail {
  public:
   /// @param joint the tail's, from its own beginning on; outlives this.
@@ -55,18 +56,18 @@ class MotorTail {
   MotorTail(const MotorTail&) = delete;
   MotorTail& operator=(const MotorTail&) = delete;
 
-  /// The motor's motion, as if the backlash were taken up already where it first moves.
+  /// The motor's motion, as if the backlash were already taken up when it first moves.
   const Profile& profile() const { return motor_; }
-  /// As in MotorPlan, after the tail's beginning; then nothing can be joined.
+  /// As in MotorPlan, after the tail's beginning; if set, nothing can be joined.
   std::optional<double> noRoom() const { return no_room_; }
 
-  /// The plan for a head and the tail. It takes up the backlash from the start on until that
-  /// coincides with what was planned beforehand: mostly at the first turn.
+  /// The plan for a head and the tail. It takes up the backlash from the start on until the result
+  /// coincides with the tail's plan, mostly at the first reversal.
   ///
   /// @param own the owner of this, which the profile shares.
-  /// @param joint all of the joint's motion, the tail from `begin` [s] on.
+  /// @param joint the joint's whole motion, with the tail from `begin` [s] on.
   /// @param slack as planMotor().
-  /// @return none where the two don't coincide within a bounded number of turns and pieces.
+  /// @return empty if the two don't coincide within a bounded number of reversals and pieces.
   std::optional<JoinedMotor> join(const std::shared_ptr<const MotorTail>& own,
                                   const std::shared_ptr<const Profile>& joint, DoubleDouble begin,
                                   double slack) const;

@@ -13,14 +13,14 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kNoTime = 1e-15;  // s
-constexpr int kSlices = 8;         // of a part, to look at
+constexpr int kSlices = 8;         // points of a part to examine
 
 DoubleDouble velocityOf(const Piece& piece) { return {piece.v0, piece.v0_rest}; }
 DoubleDouble accelerationOf(const Piece& piece) { return {piece.a, piece.a_rest}; }
 
 bool hasConstantRate(const Piece& path) { return path.a == 0.0 && path.j == 0.0; }
 
-// A part of a piece of a course, and the part of a piece of the path that runs through it.
+// A part of a piece of a course, and the corresponding part of a piece of the path.
 struct Part {
   Piece course;
   DoubleDouble from;  // s in the course's piece
@@ -34,7 +34,7 @@ struct Part {
   }
 };
 
-// Of q(s(t)), and of its absolute value, from above.
+// An upper bound of the absolute value for q(s(t)).
 double largestFourthDerivative(const Part& part) {
   const auto largest = [](double a, double b) { return std::max(std::abs(a), std::abs(b)); };
   const Piece& path = part.path;
@@ -69,7 +69,7 @@ void appendCubics(std::vector<Piece>& pieces, const Part& part) {
   }
 }
 
-// A cubic's way in doubles: what tells how it keeps to a motor's limits needs no more.
+// A cubic in doubles, which are precise enough to check a motor's limits.
 struct Rough {
   double v0, a, j;
 
@@ -79,8 +79,8 @@ struct Rough {
   double acceleration(double t) const { return a + t * j; }
 };
 
-// The time at which a piece of the path has gone so far, to a double's precision. It only goes
-// forwards: Newton's steps, kept inside a bracket.
+// The time at which a piece of the path has covered a distance, to a double's precision. The path
+// only goes forwards: Newton's steps, kept inside a bracket.
 double roughTimeTo(const Rough& path, double way, double duration) {
   double low = 0.0;
   double high = duration;
@@ -97,7 +97,7 @@ double roughTimeTo(const Rough& path, double way, double duration) {
   return t;
 }
 
-// The time in a piece of the path, from its beginning, at which it has gone so far.
+// The time from the beginning of a piece of the path at which it has covered a distance.
 DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
   if (path.j != 0.0) {
     // Two of Newton's steps give all bits, unless the path is nearly at rest there.
@@ -114,13 +114,13 @@ DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
     return rootOf(left, path.duration.value());
   }
   const DoubleDouble rate = velocityOf(path);
-  // Of the two roots the stable form gives the one that comes first.
+  // The stable form gives the first one of the two roots.
   const DoubleDouble under = rate * rate + DoubleDouble(2.0) * accelerationOf(path) * way;
   const DoubleDouble root = under.hi > 0.0 ? sqrt(under) : DoubleDouble();
   return DoubleDouble(2.0) * way / (rate + root);
 }
 
-// What a piece of the path makes of the course, if its rate changes.
+// The motion along the course during a piece of the path whose rate changes.
 std::vector<Piece> cubicsAlong(const Profile& course, const Piece& stretch) {
   std::vector<Piece> pieces;
   const DoubleDouble end = stretch.positionAt(stretch.duration);
@@ -151,7 +151,7 @@ double highestSpeed(const Rough& cubic, double from, double to) {
   return level > from && level < to ? largest(ends, cubic.velocity(level)) : ends;
 }
 
-// The same parts, for a look at the limits.
+// The same parts, for checking the limits.
 struct RoughPart {
   Rough course;
   double from;
@@ -169,7 +169,7 @@ struct RoughPart {
   }
 
  private:
-  // By the largest value that each factor has anywhere in it.
+  // Uses the largest value of each factor anywhere in the part.
   bool surelyKeeps(const MotorBounds& bounds) const {
     const double to = from + length;
     const double q1 = highestSpeed(course, from, to);

@@ -6,9 +6,10 @@ namespace stepdriver::motion {
 
 /// The unevaluated sum of two doubles: about 106 bits of mantissa.
 ///
-/// A move may be 2^40 steps long and last for years, and yet each step is wanted to the nanosecond:
-/// that takes more than a double's 53 bits. Algorithms: error-free sum and product after Knuth and
-/// Dekker (T. J. Dekker, A floating-point technique for extending the available precision, 1971).
+/// A move may be 2^40 steps long and last for years, and yet the time of each step must be exact to
+/// the nanosecond: that takes more than a double's 53 bits. Algorithms: error-free sum and product
+/// after Knuth and Dekker (T. J. Dekker, A floating-point technique for extending the available
+/// precision, 1971).
 struct DoubleDouble {
   double hi = 0.0;
   double lo = 0.0;
@@ -21,7 +22,7 @@ struct DoubleDouble {
   double value() const { return hi + lo; }
 };
 
-/// Every integer of 64 bits is one exactly.
+/// Exact for every integer of 64 bits.
 DoubleDouble fromInteger(std::int64_t value);
 
 DoubleDouble operator+(DoubleDouble a, DoubleDouble b);
@@ -34,7 +35,7 @@ DoubleDouble abs(DoubleDouble a);
 /// @pre a >= 0
 DoubleDouble sqrt(DoubleDouble a);
 
-/// A number as the nearest integer and what is left, at most a half.
+/// A number as the nearest integer and the remainder, at most a half.
 struct Split {
   std::int64_t whole = 0;
   double rest = 0.0;
@@ -46,7 +47,7 @@ Split split(DoubleDouble value);
 /// Nanoseconds in seconds.
 DoubleDouble secondsOf(std::int64_t nanoseconds);
 
-/// Seconds as whole nanoseconds and the fraction of one that is left.
+/// Seconds as whole nanoseconds and the remaining fraction.
 Split splitNanoseconds(DoubleDouble seconds);
 
 }  // namespace stepdriver::motion

@@ -50,7 +50,7 @@ bool MotionBuilder::turnAt(std::int64_t target, double sign, const MotionLimits&
     turn(path, sign, a_end, limits);
     return path;
   };
-  // How far the turning point lies beyond the target.
+  // The distance of the turning point beyond the target.
   const auto beyond = [&](DoubleDouble a_end) {
     return DoubleDouble(-sign) * (position_ + turned(a_end).length() - end);
   };

@@ -9,22 +9,22 @@
 
 namespace stepdriver::motion {
 
-/// A motion put together from a state on, part by part.
+/// Builds a motion from a state, part by part.
 class MotionBuilder {
  public:
   MotionBuilder(const MotionState& from, const MotionLimits& limits);
 
-  /// The fastest way to rest on `target`.
+  /// Comes to rest on `target` as fast as possible.
   void moveTo(std::int64_t target, const MotionLimits& limits);
-  /// Turns round at `target`, which it comes to against the direction `sign`, with the acceleration
-  /// that needs. @return false where the turning point lies beyond the target; nothing is added.
+  /// Turns at `target`, which it reaches against the direction `sign`, with the acceleration that
+  /// this needs. @return false if the turning point lies beyond the target; nothing is added.
   bool turnAt(std::int64_t target, double sign, const MotionLimits& limits);
-  /// Changes the velocity to the maximum and holds it.
+  /// Changes the velocity to the maximum and keeps it.
   void moveOn(double sign, const MotionLimits& limits);
 
   /// The sign of the direction from which it comes to rest.
   double heading(const MotionLimits& limits) const;
-  /// The first whole microstep that it can rest on without turning round.
+  /// The first whole microstep on which it can come to rest without turning.
   std::int64_t nextRest(const MotionLimits& limits) const;
 
   DoubleDouble position() const { return position_; }
@@ -34,8 +34,8 @@ class MotionBuilder {
   Profile profile(std::int64_t start_ns) const;
 
  private:
-  // Takes the velocity that a change to one of the limits, or to rest, has at its acceleration for
-  // the one that the rounding to doubles has left beside it: there would be slivers else.
+  // Corrects a velocity that only rounding to doubles has moved off that of a change to a limit or
+  // to rest: otherwise there would be slivers.
   void unround(const MotionLimits& limits);
   void add(const Approach& part, DoubleDouble end);
 

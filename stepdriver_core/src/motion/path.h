@@ -8,7 +8,7 @@
 
 namespace stepdriver::motion {
 
-/// A time of constant jerk, with the velocity and acceleration that it begins with.
+/// A time of constant jerk, with the velocity and acceleration at its beginning.
 struct Phase {
   DoubleDouble duration;  // s, above 0
   DoubleDouble v;         // microsteps/s
@@ -16,19 +16,19 @@ struct Phase {
   double j = 0.0;         // microsteps/s^3
 };
 
-/// Phases in a row, built one after the other from a velocity and an acceleration: a motion before
-/// it knows where it lies and when it begins. Doesn't allocate.
+/// A sequence of phases, built from a velocity and an acceleration: a motion whose position and
+/// start time are still unknown. Doesn't allocate.
 class Path {
  public:
   Path(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
 
-  /// A phase of jerk `j` from where the path has come to. It joins the phase before it where the
-  /// two are one motion; one of no duration is none: less than a millionth of a nanosecond is only
-  /// rounding.
+  /// Appends a phase of jerk `j`. It is merged with the phase before it if the two are one motion.
+  /// A phase of less than a millionth of a nanosecond is only rounding and is ignored.
   void run(double j, DoubleDouble duration);
-  /// Goes on from another velocity and acceleration: a jump, or the exact value for a rounded one.
+  /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded
+  /// one.
   void settle(DoubleDouble v, DoubleDouble a);
-  /// Runs as `other` does from where it began up to phase `count`.
+  /// Appends the phases of `other` up to phase `count`.
   void append(const Path& other, std::size_t count);
 
   DoubleDouble v() const { return v_; }
@@ -46,15 +46,16 @@ class Path {
   std::size_t size_ = 0;
   DoubleDouble v_;
   DoubleDouble a_;
-  DoubleDouble end_v_;  // of the last phase, as it comes out of its polynomial
+  DoubleDouble end_v_;  // of the last phase, from its polynomial
   DoubleDouble end_a_;
   DoubleDouble length_;
 };
 
-/// What double-double arithmetic leaves of a difference that is none, relative to the operands.
+/// The rounding error of double-double arithmetic in a difference that should be 0, relative to the
+/// operands.
 constexpr double kExact = 1e-29;
 
-/// The way of a phase in the time `t` from its beginning.
+/// The distance of a phase in the time `t` from its beginning.
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t);
 
 Piece pieceOf(const Phase& phase, DoubleDouble position);

@@ -34,7 +34,7 @@ PeakTree::PeakTree(const Profile& profile)
 
 Highest PeakTree::between(DoubleDouble from, DoubleDouble to) const {
   if (leaves_ == 0 || !(from < profile_.duration())) return {};
-  // What rounding leaves of a piece is none.
+  // A piece that is only a rounding error is ignored.
   std::size_t first = profile_.pieceAt(from);
   std::size_t last = profile_.pieceAt(to);
   if (first < last && !((profile_.pieceStart(first + 1) - from).hi > kNoTime)) ++first;
@@ -49,7 +49,8 @@ Highest PeakTree::between(DoubleDouble from, DoubleDouble to) const {
   return first + 1 < last ? larger(ends, ofPieces(first + 1, last)) : ends;
 }
 
-// From the leaves upwards: at each level what isn't the whole of a parent is taken by itself.
+// From the leaves upwards: at each level, nodes that don't make up a whole parent are taken
+// individually.
 Highest PeakTree::ofPieces(std::size_t begin, std::size_t end) const {
   Highest highest;
   for (begin += leaves_, end += leaves_; begin < end; begin /= 2, end /= 2) {

@@ -17,13 +17,14 @@ struct Highest {
 Highest highestOf(const Piece& piece);
 Highest larger(const Highest& a, const Highest& b);
 
-/// Tells the highest values of a profile over any time, in O(log n) of its pieces.
+/// Finds the highest values of a profile over any time, in O(log n) of its pieces.
 class PeakTree {
  public:
   /// @param profile outlives the tree.
   explicit PeakTree(const Profile& profile);
 
-  /// @param from, to [s] after the profile's start; from < to. Beyond its end it rests.
+  /// @param from, to [s] after the profile's start; from < to. Beyond its end the profile is at
+  ///   rest.
   Highest between(DoubleDouble from, DoubleDouble to) const;
 
  private:

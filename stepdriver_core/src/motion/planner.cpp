@@ -9,7 +9,7 @@
 namespace stepdriver::motion {
 namespace {
 
-// How far a profile goes beyond its target, seen from where it begins.
+// How far a profile goes beyond its target, as seen from its beginning.
 double farthestBeyond(const Profile& profile, const MotionState& from, DoubleDouble target) {
   const double way = (target - from.position).hi;
   double farthest = 0.0;
@@ -35,7 +35,7 @@ double speedWithinMicrostep(const MotionLimits& limits) {
   return std::sqrt(2.0 * a * (d / (a + d)));
 }
 
-// The limits of a stop: as fast as it is, but no slower than a crawl.
+// The limits of a stop: the current speed is the maximum, but at least a crawl.
 MotionLimits stopping(const MotionBuilder& motion, const MotionLimits& limits) {
   const double level = std::abs(levelVelocity({motion.v(), motion.a()}, limits).value());
   const double crawl = std::max(speedWithinMicrostep(limits), limits.start_speed);
@@ -50,7 +50,7 @@ void restBeforeTurn(MotionBuilder& motion, double sign, const MotionLimits& limi
   motion.moveTo(motion.nextRest(limits), stopping(motion, limits));
 }
 
-// The fastest motion to rest on the target, which it may pass.
+// The fastest motion to rest on the target, which it may overshoot.
 Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
                  const MotionLimits& limits) {
   const DoubleDouble end = fromInteger(target);
@@ -75,7 +75,7 @@ Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t targe
   const double way = (fromInteger(target) - from.position).hi;
   const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && way != 0.0;
   if (!fastest.overshoots() || !may_turn) return fastest;
-  // The fastest motion eases its deceleration before it turns. Without that it may turn in time.
+  // The fastest motion reduces its deceleration before it turns. Without that it may turn in time.
   MotionBuilder motion(from, limits);
   if (!motion.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return fastest;
   motion.moveTo(target, limits);

@@ -20,7 +20,7 @@ double peakSpeedOf(const Piece& piece) {
 }  // namespace
 
 DoubleDouble Piece::positionAt(DoubleDouble t) const {
-  // Horner, without the terms that are not there: most pieces have no jerk, many no acceleration.
+  // Horner's method without zero terms: most pieces have no jerk, and many have no acceleration.
   DoubleDouble slope(v0, v0_rest);
   if (a != 0.0) slope = slope + t * DoubleDouble(a / 2.0, a_rest / 2.0);
   if (j != 0.0) slope = slope + t * t * DoubleDouble(j) / DoubleDouble(6.0);
@@ -113,7 +113,7 @@ void Profile::add(const Excerpt& excerpt) {
   section.to = excerpt.to;
   section.rate = excerpt.rate;
   section.shift = excerpt.shift;
-  // What is left of a piece by rounding is no piece.
+  // A piece that is only a rounding error is ignored.
   std::size_t first = of.pieceAt(excerpt.from);
   if (first + 1 < of.pieceCount() && !((of.pieceStart(first + 1) - excerpt.from).hi > kNoTime)) {
     ++first;

@@ -18,10 +18,10 @@ struct Piece {
   double v0 = 0.0;        ///< [microsteps/s]
   double a = 0.0;         ///< [microsteps/s^2]
   double j = 0.0;         ///< [microsteps/s^3]
-  double v0_rest = 0.0;   ///< what v0 leaves of the exact speed
-  double a_rest = 0.0;    ///< what a leaves of the exact acceleration
+  double v0_rest = 0.0;   ///< the exact speed minus v0
+  double a_rest = 0.0;    ///< the exact acceleration minus a
 
-  /// At t [s] from the beginning of the piece; in the units of p0, v0 and a.
+  /// At t [s] from the beginning of the piece, in the units of p0, v0 and a.
   DoubleDouble positionAt(DoubleDouble t) const;
   DoubleDouble velocityAt(DoubleDouble t) const;
   DoubleDouble accelerationAt(DoubleDouble t) const;
@@ -31,7 +31,7 @@ struct Piece {
   double firstTurn(double after) const;
 };
 
-/// Where a motion is at one time.
+/// The state of a motion at one time.
 struct MotionState {
   DoubleDouble position;      ///< [microsteps]
   double velocity = 0.0;      ///< [microsteps/s]
@@ -40,18 +40,17 @@ struct MotionState {
 
 class Profile;
 
-/// A part of a profile that others share, run through at a constant rate: the pieces from `from` to
-/// `to`, each `rate` times as fast. It costs the same memory however long it is; its pieces are
-/// computed when they are asked for.
+/// A part of a shared profile, at a constant rate: the pieces from `from` to `to`, each `rate`
+/// times as fast. It takes the same memory however long it is; its pieces are computed on demand.
 struct Excerpt {
   std::shared_ptr<const Profile> of;  ///< moves
   DoubleDouble from;                  ///< [s] after its start, before its end
-  DoubleDouble to;                    ///< [s] later; its end, but for rounding, or earlier
+  DoubleDouble to;                    ///< [s] later; at most its end, apart from rounding
   DoubleDouble rate = 1.0;            ///< above 0
   DoubleDouble shift = {};            ///< [microsteps] added to its positions
 };
 
-/// What a motion consists of, in the order of time: pieces and excerpts.
+/// The parts of a motion, in the order of time: pieces and excerpts.
 class Sections {
  public:
   void add(const Piece& piece) { add(std::vector<Piece>{piece}); }
@@ -64,35 +63,35 @@ class Sections {
   std::vector<std::variant<std::vector<Piece>, Excerpt>> sections_;
 };
 
-/// A motion: pieces in a row from a start time on, at rest before and after. Times are motion time,
-/// in nanoseconds. Never changed once made, so any thread may read it; reading allocates nothing.
+/// A motion: a sequence of pieces from a start time on, at rest before and after. Times are motion
+/// time, in nanoseconds. It is immutable, so any thread may read it; reading allocates nothing.
 ///
-/// Of an excerpt, a profile keeps the place and the rate only. Finding a piece by its number or by
-/// its time takes O(log n) then as well.
+/// For an excerpt, a profile stores only the position and the rate. Finding a piece by its number
+/// or its time still takes O(log n).
 class Profile {
  public:
   /// No motion: rest at `position`.
   Profile(std::int64_t start_ns, DoubleDouble position);
 
   /// @param pieces each begins where the one before it ends; at least one.
-  /// @throw std::range_error where the motion takes longer than kLongest.
+  /// @throw std::range_error if the motion takes longer than kLongest.
   Profile(std::int64_t start_ns, std::vector<Piece> pieces);
 
   /// @param sections not empty; each begins where the one before it ends.
   /// @throw std::range_error if the motion takes longer than kLongest.
   Profile(std::int64_t start_ns, Sections sections);
 
-  static constexpr double kLongest = 4.0e9;  ///< [s] a good 126 years; nanoseconds stay in int64
+  static constexpr double kLongest = 4.0e9;  ///< [s] more than 126 years; nanoseconds fit in int64
 
   /// Motion time at which the first piece begins.
   std::int64_t startNs() const { return start_ns_; }
-  /// When the motion is over, to the nearest nanosecond; no step is later.
+  /// The end of the motion, to the nearest nanosecond; no step is later.
   std::int64_t endNs() const { return end_ns_; }
   DoubleDouble duration() const { return duration_; }  ///< [s]
-  /// Where it rests in the end [microsteps].
+  /// The final position [microsteps].
   DoubleDouble endPosition() const { return end_position_; }
-  /// Highest speed on the way [microsteps/s]. An excerpt counts with the highest speed of the whole
-  /// profile that it is of.
+  /// The highest speed [microsteps/s]. For an excerpt, the highest speed of its whole profile
+  /// counts.
   double peakSpeed() const { return peak_speed_; }
 
   /// At rest before the start and after the end.
@@ -100,18 +99,18 @@ class Profile {
 
   std::size_t pieceCount() const { return piece_count_; }
   Piece piece(std::size_t index) const;
-  /// When a piece begins, counted from the start [s]; one more than there are pieces: the end.
+  /// When a piece begins, counted from the start [s]; for the index after the last piece: the end.
   DoubleDouble pieceStart(std::size_t index) const;
-  /// The piece that is under way at a time after the start [s]; before that the first, after the
-  /// end the last. @pre there are pieces.
+  /// The piece at a time after the start [s]; before the start it is the first, after the end the
+  /// last. @pre there are pieces.
   std::size_t pieceAt(DoubleDouble time) const;
 
   class Pieces;
-  /// In the order of time; empty if nothing moves. Not to be used when the profile is gone.
+  /// In the order of time; empty if nothing moves. The profile must outlive them.
   Pieces pieces() const;
 
  private:
-  // What makes the pieces from `first` on: `of`, or if that is null, pieces_ from `own` on.
+  // The source of the pieces from `first` on: `of`, or if that is null, pieces_ from `own` on.
   struct Section {
     std::size_t first = 0;
     DoubleDouble start;  // s
@@ -140,11 +139,10 @@ class Profile {
   std::size_t piece_count_ = 0;
   std::vector<Piece> pieces_;
   std::vector<DoubleDouble> starts_;  // of pieces_
-  std::vector<Section> sections_;     // none: pieces_ are all
+  std::vector<Section> sections_;     // empty: all pieces are in pieces_
 };
 
-/// The pieces of a profile as a container shows its elements, which are made when they are asked
-/// for.
+/// The pieces of a profile as a container that makes its elements on demand.
 class Profile::Pieces {
  public:
   /// Goes from piece to piece.

@@ -24,11 +24,11 @@ class Walk {
     while (index_ < count && !(left().hi > kNoTime)) ++index_;
   }
 
-  /// How long the polynomial of now goes on; none where the motion is over.
+  /// How long the current polynomial lasts; empty if the motion has ended.
   bool moves() const { return index_ < profile_.pieces().size(); }
   DoubleDouble left() const { return profile_.pieceStart(index_ + 1) - time_; }
 
-  /// The next of it.
+  /// The next part of it.
   Piece take(DoubleDouble duration) {
     if (!moves()) return {duration, profile_.endPosition()};
     const DoubleDouble t = time_ - profile_.pieceStart(index_);

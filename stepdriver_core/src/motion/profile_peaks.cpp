@@ -17,7 +17,7 @@ void takePosition(ProfilePeaks& peaks, double position, double time_s) {
   if (position > peaks.highest.value) peaks.highest = {position, time_s};
 }
 
-// Where the velocity is 0 inside the piece, the position may have an extremum.
+// At a velocity of 0 inside the piece, the position may have an extremum.
 void takeTurns(ProfilePeaks& peaks, const Piece& piece, double start) {
   const double end = piece.duration.value();
   const auto consider = [&](double t) {
@@ -29,7 +29,7 @@ void takeTurns(ProfilePeaks& peaks, const Piece& piece, double start) {
   }
   const double discriminant = piece.a * piece.a - 2.0 * piece.j * piece.v0;
   if (discriminant < 0.0) return;
-  // Without the difference of two close numbers that the textbook's formula has.
+  // Avoids the textbook formula's difference of two close numbers.
   const double q = -(piece.a + std::copysign(std::sqrt(discriminant), piece.a));
   consider(q / piece.j);
   if (q != 0.0) consider(2.0 * piece.v0 / q);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNoWay = 1e-12;  // s
 
-// Ends the slope of now without leaving the rates from 0 to 1.
+// Ends the current slope without leaving the rates from 0 to 1.
 void level(Path& path, double jerk) {
   const double slope = path.a().value();
   const double rate = path.v().value();

@@ -6,23 +6,23 @@
 
 namespace stepdriver::motion {
 
-/// How fast the rate may change at which a course is run through.
+/// The limits for changes of the rate along a course.
 struct RateLimits {
   double slope = 0.0;  ///< [1/s]
-  double jerk = 0.0;   ///< [1/s^2] of the slope; 0: none, the slope may jump
+  double jerk = 0.0;   ///< [1/s^2] of the slope; 0: no limit, the slope may jump
 };
 
-/// How a course is run through from now on, s(t) in seconds of the course, as composeAlong() takes
-/// it: at the rate of now for a time, then with the fastest change that the limits allow to another
-/// rate, and on at that to the course's end; at a rate of 0 to rest.
+/// The path s(t) along a course, in seconds of the course, for composeAlong(): it keeps the current
+/// rate for a time, then changes to another rate as fast as the limits allow, and keeps that rate
+/// to the course's end; a rate of 0 comes to rest.
 ///
-/// The rate stays from 0 to 1: where there is a jerk limit, a slope of now that it could not end
-/// before is ended by as much more as that takes, first of all.
+/// The rate stays between 0 and 1: if a jerk limit wouldn't let the current slope end in time, the
+/// jerk is raised first, by as much as that takes.
 ///
-/// @param from the place [s], the rate and its slope [1/s] of now. Without a jerk limit the slope
-///   doesn't count.
-/// @param after [s] how long it stays at the rate of now.
-/// @param end [s] the place of the course's end.
+/// @param from the current position [s], rate and slope of the rate [1/s]. Without a jerk limit the
+///   slope doesn't count.
+/// @param after [s] how long it keeps the current rate.
+/// @param end [s] the end of the course.
 /// @pre rates from 0 to 1
 Profile planRate(std::int64_t start_ns, const MotionState& from, double rate,
                  const RateLimits& limits, double after, DoubleDouble end);

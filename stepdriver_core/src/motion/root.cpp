@@ -20,7 +20,7 @@ struct Bracket {
   }
 };
 
-// A bracket whose ends have the root's order of magnitude: its halves then have the root's bits.
+// A bracket whose ends have the root's order of magnitude, so that its halves have enough bits.
 Bracket bracketOf(const Function& f, double high) {
   Bracket bracket{0.0, high, 0.0, f(high).hi};
   for (double t = high / 16.0; t > 1e-300; t /= 16.0) {

@@ -6,7 +6,7 @@
 
 namespace stepdriver::motion {
 
-/// Where a continuous function that falls from above 0 at 0 to 0 or less at `high` is 0, to more
+/// The root of a continuous function that falls from above 0 at 0 to 0 or less at `high`, to more
 /// bits than a double has.
 ///
 /// Ridders' method (C. J. F. Ridders, A new algorithm for computing a single root of a real

@@ -91,7 +91,7 @@ Ends takeJerk(SplineJerk& worst, const Segment& segment) {
   return {*segment.begin.acceleration, *segment.end.acceleration};
 }
 
-// Takes in what one segment after the other asks for.
+// Collects the demands of one segment after the other.
 class JerkMeter {
  public:
   explicit JerkMeter(double acceleration_before) : before_(acceleration_before) {}

@@ -14,7 +14,7 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument(why); }
 
-// An owner is a function that makes its name, "waypoint 3" or "the motion's start", for a refusal.
+// An owner is a function that returns a name, "waypoint 3" or "the motion's start", for a refusal.
 template <typename Owner>
 void requireFinite(const Owner& owner, const char* quantity, double value) {
   if (!std::isfinite(value)) {

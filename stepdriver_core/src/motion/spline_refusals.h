@@ -7,16 +7,16 @@
 
 namespace stepdriver::motion {
 
-/// All that planSpline() asks of its arguments.
-/// @throw std::invalid_argument, std::range_error as it does.
+/// Checks everything that planSpline() requires of its arguments.
+/// @throw std::invalid_argument, std::range_error as planSpline().
 void requirePlannable(const MotionState& from, const std::vector<Waypoint>& waypoints);
 
-/// The same of the waypoints, and of where the motion begins.
+/// The same for the waypoints, and for the beginning of the motion.
 void requireWaypoints(const std::vector<Waypoint>& waypoints);
 void requireStart(const MotionState& from);
 
-/// @param reach what the curve up to waypoint `index` may have in it [microsteps].
-/// @throw std::invalid_argument where a double has no half microsteps there.
+/// @param reach bound of the curve up to waypoint `index` [microsteps].
+/// @throw std::invalid_argument if a double has no half microsteps there.
 void requireReach(double reach, std::size_t index);
 
 }  // namespace stepdriver::motion

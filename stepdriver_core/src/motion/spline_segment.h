@@ -25,18 +25,18 @@ struct Quintic {
   DoubleDouble positionAt(DoubleDouble u) const;
   DoubleDouble slopeAt(DoubleDouble u) const;
   double thirdDerivativeAt(double u) const;
-  /// Of an absolute value, over all of it.
+  /// The largest absolute value over the whole quintic.
   double largestFourthDerivative() const;
   double reach() const;
 };
 
-/// What makes the curve of a segment, as planSpline() says.
+/// The kind of curve of a segment, see planSpline().
 enum class SegmentKind { kLine, kCubic, kQuintic };
 
 struct Segment {
   Knot begin;
   Knot end;
-  std::size_t index = 0;  ///< of the waypoint that it leads to
+  std::size_t index = 0;  ///< of the waypoint at its end
 
   SegmentKind kind() const;
   DoubleDouble duration() const;  ///< [s]
@@ -44,8 +44,8 @@ struct Segment {
   Quintic quintic() const;
 };
 
-/// The segments of a trajectory, each made when it is asked for. The first one begins where the
-/// motion is at its start, each other one at a waypoint.
+/// The segments of a trajectory, each made on demand. The first one begins at the start of the
+/// motion, each other one at a waypoint.
 class Segments {
  public:
   /// @param waypoints outlive this. @pre requirePlannable()
@@ -60,7 +60,7 @@ class Segments {
   Knot knot(std::size_t waypoint) const;
 
   const std::vector<Waypoint>& waypoints_;
-  std::size_t skipped_;  // waypoints: one at time 0 is over when the motion starts
+  std::size_t skipped_;  // waypoints: one at time 0 has passed when the motion starts
 };
 
 }  // namespace stepdriver::motion

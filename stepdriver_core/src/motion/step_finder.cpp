@@ -6,10 +6,10 @@
 namespace stepdriver::motion {
 namespace {
 
-// From this time on a double's 53 bits leave more than 1/32 ns of doubt.
+// From this time on, the error of a double with 53 bits exceeds 1/32 ns.
 constexpr double kFar = 281474.976710656;  // s, 2^48 ns, 78 hours
 
-// Up to this time the rounding of a stretch's reciprocals leaves less than 1/64 ns of doubt.
+// Up to this time, the rounding of a stretch's reciprocals causes an error below 1/64 ns.
 constexpr double kShort = 20000.0;  // s
 
 // Nearest integer of a number below 2^51: the sum has no bits left for a fraction. (llrint() is a
@@ -34,11 +34,11 @@ StepFinder::StepFinder(const Profile& profile, std::int64_t count) : profile_(&p
   stretch_.anchor_count = count;
 }
 
-// Inline: these two are the way of each step.
+// Inline, because every step uses these two.
 inline double StepFinder::cubicTime(double way) {
   constexpr double kNear = 1e-13;  // s
   Stretch& s = stretch_;
-  // In the order that keeps what waits for the last step short.
+  // This order shortens the chain of operations that wait for the last step.
   const double before = 4.0 * s.last[2] - 6.0 * s.last[1] - s.last[3];
   double t = before + 4.0 * s.last[0];
   const double bend = t * s.j;
@@ -77,7 +77,7 @@ inline bool StepFinder::give(Step& step, std::int64_t time_ns) {
   return true;
 }
 
-// What is rare or long stays out of here: so there is no stack frame.
+// Rare or long code stays out of here, so that there is no stack frame.
 bool StepFinder::next(Step& step) {
   const Stretch& s = stretch_;
   if (s.way == s.way_end) return nextOfNewStretch(step);
@@ -189,7 +189,7 @@ double StepFinder::bracketedTime(double way) const {
 
   double t = s.last[0];
   double speed = speed_at(t);
-  // 100 halvings end at the last bit wherever Newton's steps leave the bracket every time.
+  // 100 halvings reach the last bit even if Newton's steps leave the bracket every time.
   for (int i = 0; i < 100; ++i) {
     const double error = way_at(t) - way;
     if (error == 0.0) return t;

@@ -14,51 +14,53 @@ struct Step {
   int direction = 0;         ///< +1 or -1
 };
 
-/// Finds the steps of a profile, one after the other, each when it is asked for.
+/// Finds the steps of a profile, one after the other, on demand.
 ///
 /// The count goes from k - 1 to k when the curve crosses k - 1/2 upwards, and back when it crosses
 /// it downwards; a curve that only touches the line makes no step. Each step's time comes from the
-/// curve itself, never from the step before: errors do not add up. Times are right to the
-/// nanosecond they are rounded to.
+/// curve itself, never from the step before: errors do not accumulate. Times are exact to the
+/// nanosecond to which they are rounded.
 ///
 /// The curve is followed in stretches in which the speed only rises or only falls, each from its
-/// slow end. Without a jerk all terms of the equation have one sign there, and the root in the form
-/// 2 x / (v + sqrt(v^2 + 2 a x)) cancels nothing. The form (sqrt(v^2 + 2 a x) - v)/a, which needs
-/// no division, is off by some 2^-52 V/a, with V the speed at the fast end: it serves where the
-/// motor takes less than hours from rest to V. With a jerk it is Newton's method, from where the
-/// cubic through the last four steps' times expects the next step: that is mostly so near that one
-/// iteration is enough, which the second term of its error, a dt^2/(2 v), tells without another
-/// evaluation. Else more of them follow, from the last step's time, kept inside a bracket.
+/// slow end. Without a jerk all terms of the equation have the same sign there, and the root in the
+/// form 2 x / (v + sqrt(v^2 + 2 a x)) has no cancellation. The form (sqrt(v^2 + 2 a x) - v)/a,
+/// which needs no division, has an error of about 2^-52 V/a, with V the speed at the fast end: it
+/// is used if the motor takes less than hours from rest to V. With a jerk the finder uses Newton's
+/// method, starting at the time that the cubic through the last four steps' times predicts. That is
+/// mostly so near that one iteration is enough; the second term of its error, a dt^2/(2 v), shows
+/// this without another evaluation. Otherwise more iterations follow, from the last step's time and
+/// inside a bracket.
 ///
-/// Doesn't allocate or throw. Not for use from two threads at once.
+/// Doesn't allocate or throw. Only one thread may use it at a time.
 class StepFinder {
  public:
   StepFinder() = default;
 
   /// @param profile outlives the finder.
-  /// @param count where the axis stands: within one step of the profile's beginning.
+  /// @param count the position of the axis: within one step of the profile's beginning.
   StepFinder(const Profile& profile, std::int64_t count);
 
-  /// @return false where no step is left; `step` is untouched then.
+  /// @return false if no step is left; `step` is then unchanged.
   bool next(Step& step);
 
-  /// Where the axis stands after the steps that next() has given.
+  /// The position of the axis after the steps that next() has returned.
   std::int64_t count() const { return stretch_.anchor_count + stretch_.away * stretch_.way; }
 
  private:
-  // A part of a piece in which the speed only rises or only falls, as seen from its slow end
-  // ("anchor"): the way from there is v t + a t^2/2 + j t^3/6 with t away from the anchor.
+  // A part of a piece in which the speed only rises or only falls, seen from its slow end
+  // ("anchor"): the distance from there is v t + a t^2/2 + j t^3/6, with t counted away from the
+  // anchor.
   struct Stretch {
-    // The first two for all but the longest stretches.
+    // The first two are for all except the longest stretches.
     enum class Curve { kShortLine, kShortParabola, kLine, kParabola, kCubic };
     Curve curve = Curve::kLine;
     int direction = 0;       // of the motion
     double time_sign = 1.0;  // +1: the anchor is the beginning, -1: it is the end
     Split anchor_ns;         // motion time
     std::int64_t anchor_count = 0;
-    std::int64_t away = 1;  // of the count, where it goes away from the anchor: +1 or -1
-    // Steps from the anchor. It is all that a step without a jerk changes: what each step stores
-    // and the next one loads is what steps of several finders in turn wait for.
+    std::int64_t away = 1;  // direction of the count away from the anchor: +1 or -1
+    // Steps from the anchor. A step without a jerk changes nothing else: with several finders in
+    // turn, each step waits for what the one before it stored.
     std::int64_t way = 0;
     std::int64_t way_step = 0;
     std::int64_t way_end = 0;

@@ -24,7 +24,7 @@ struct Mirrored {
 };
 
 // Rises to the velocity `v_end` and the acceleration `a_end` >= 0 under one acceleration limit. An
-// acceleration above the limit falls to it first; an `a_end` above it is only there because the
+// acceleration above the limit falls to it first; an `a_end` above it is possible only because the
 // acceleration can't fall any faster.
 void rise(Mirrored m, DoubleDouble v_end, DoubleDouble a_end, double limit, double jerk) {
   const DoubleDouble change = v_end - m.v();
@@ -54,7 +54,7 @@ void rise(Mirrored m, DoubleDouble v_end, DoubleDouble a_end, double limit, doub
   m.settle(v_end, a_end);
 }
 
-// Brings an acceleration against the change to 0.
+// Reduces an acceleration against the change to 0.
 void level(Mirrored m, double jerk) {
   if (jerk == 0.0 || !(m.a() < 0.0)) return;
   const DoubleDouble v = m.v() - square(m.a()) * kHalf / DoubleDouble(jerk);
@@ -62,8 +62,8 @@ void level(Mirrored m, double jerk) {
   m.settle(v, 0.0);
 }
 
-// The square of the acceleration that the fastest change may have at standstill, on its way from
-// the path's state (a >= 0) to `v_end` > 0: all lines of the envelope taken at v = 0.
+// The square of the acceleration that the fastest change may have at standstill, going from the
+// path's state (a >= 0) to `v_end` > 0: all lines of the envelope at v = 0.
 DoubleDouble squareAtStandstill(Mirrored m, DoubleDouble v_end, const MotionLimits& limits) {
   const DoubleDouble j2(2.0 * limits.jerk);
   const DoubleDouble limit = std::min(limits.acceleration, limits.deceleration);
@@ -72,8 +72,8 @@ DoubleDouble squareAtStandstill(Mirrored m, DoubleDouble v_end, const MotionLimi
   return std::max(std::min(highest, square(limit)), lowest);
 }
 
-// Where the acceleration falls too fast to be 0 at the start speed: it ends there all the same,
-// with the jump.
+// If the acceleration falls too fast to be 0 at the start speed, it still ends there, with the
+// jump.
 bool dropToStartSpeed(Mirrored m, double start, const MotionLimits& limits) {
   const DoubleDouble above = m.v() - DoubleDouble(start);
   if (limits.jerk == 0.0 || !(m.a() < 0.0)) return false;
@@ -95,7 +95,7 @@ void changeVelocity(Path& path, DoubleDouble velocity, const MotionLimits& limit
   const DoubleDouble at_level = levelVelocity(path, limits);
   const DoubleDouble scale = std::max(abs(path.v()), abs(at_level));
   if (std::abs((velocity - at_level).hi) <= kExact * scale.hi) {
-    // As good as there, once the acceleration is gone.
+    // The velocity is practically reached once the acceleration is 0.
     if (path.a().hi != 0.0) level({path, path.a().hi > 0.0 ? -1.0 : 1.0}, limits.jerk);
     path.settle(velocity, 0.0);
     return;

@@ -5,38 +5,38 @@
 
 namespace stepdriver::motion {
 
-/// The fastest changes of velocity, from whatever velocity and acceleration a path has come to.
+/// The fastest changes of velocity, from any velocity and acceleration at the end of a path.
 ///
 /// Over a change in one direction the acceleration is a function of the velocity, and a jerk is the
 /// slope of half its square: d(a^2/2)/dv = a da/dv = j. So in the plane of v and a^2/2 a phase of
 /// constant jerk is a straight line of slope +-j, one of constant acceleration is level, and as the
-/// time is the integral of dv/a, the fastest change is the highest curve that keeps below the
+/// time is the integral of dv/a, the fastest change is the highest curve that stays below the
 /// limits and is nowhere steeper than the jerk: the lower envelope of a few lines. Its corners give
-/// the phases; without a jerk limit only the levels remain.
+/// the phases; without a jerk limit only the level lines remain.
 
-/// The velocity at which the acceleration comes to 0 as soon as the jerk allows.
+/// The velocity at which the acceleration reaches 0 as soon as the jerk allows.
 DoubleDouble levelVelocity(const Path& path, const MotionLimits& limits);
 
 /// Changes the velocity to `velocity`, with no acceleration there. An acceleration beyond the limit
-/// is brought back at the jerk limit first.
+/// is first reduced at the jerk limit.
 void changeVelocity(Path& path, DoubleDouble velocity, const MotionLimits& limits);
 
-/// The accelerations, away from the motion, that a motion which turns round can have at its turning
-/// point. Jerk above 0; the motion has the direction `-sign`, or will have.
+/// The accelerations, against the motion, that a motion can have at its turning point. Jerk above
+/// 0; the motion has the direction `-sign`, or will have it.
 struct TurnRange {
   DoubleDouble softest;
-  DoubleDouble hardest;  ///< turns the earliest; the way back stays below the maximum speed
+  DoubleDouble hardest;  ///< turns the earliest; the motion back stays below the maximum speed
 };
 TurnRange turnRange(const Path& path, double sign, const MotionLimits& limits);
 
-/// Comes to the turning point with an acceleration of that range, `sign * a_end`.
+/// Reaches the turning point with an acceleration of that range, `sign * a_end`.
 void turn(Path& path, double sign, DoubleDouble a_end, const MotionLimits& limits);
 
-/// Comes to rest: to no velocity, or to the start speed and then at once to none.
+/// Comes to rest: to a velocity of 0, or to the start speed and from there at once to 0.
 void comeToRest(Path& path, const MotionLimits& limits);
 
-/// Changes the velocity to the maximum in the direction `sign`. Where there is a start speed the
-/// motion has that direction already, or is at most that fast.
+/// Changes the velocity to the maximum in the direction `sign`. With a start speed, the motion
+/// already has that direction, or is at most that fast.
 void changeToMaximum(Path& path, double sign, const MotionLimits& limits);
 
 double startSpeed(const MotionLimits& limits);
