@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kRoughDigits = 6;
 
-/// What doesn't change through text and back; the printing and the reading are in one locale, and
-/// so the locale doesn't matter.
+/// The number of digits that survive the conversion to text and back. Printing and reading use the
+/// same locale, so it doesn't matter.
 int digitsOf(double number) {
   for (const int digits : {15, 16}) {
     char text[40];
@@ -33,7 +33,7 @@ double roughly(double number, double (*round)(double)) {
   return std::isfinite(rounded) ? rounded : number;
 }
 
-/// How many letters must be changed, put in, left out or swapped with their neighbour.
+/// How many letters must be changed, inserted, removed or swapped with their neighbour.
 std::size_t distance(const std::string& from, const std::string& to) {
   std::vector<std::size_t> before(to.size() + 1);
   std::vector<std::size_t> last(to.size() + 1);
@@ -66,7 +66,7 @@ std::string millisecondsText(std::int64_t nanoseconds) {
   return fmt::format("{:.3g} ms", static_cast<double>(nanoseconds) * 1e-6);
 }
 
-// The slack keeps a bound that is a round number but for its last bit.
+// The slack keeps a bound that is a round number except for its last bit.
 std::string lowerBoundText(double bound) {
   return numberText(roughly(bound, [](double scaled) { return std::ceil(scaled - 1e-5); }));
 }

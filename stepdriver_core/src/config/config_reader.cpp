@@ -14,7 +14,7 @@ namespace {
 
 const ConfigValue::Map kEmptyMap;
 
-/// "above 0", to read on from "must be"; empty where all numbers are right.
+/// "above 0", to continue "must be"; empty if all numbers are allowed.
 std::string boundsText(const Range& range) {
   const bool has_min = range.min > -std::numeric_limits<double>::infinity();
   const bool has_max = range.max < std::numeric_limits<double>::infinity();
@@ -36,7 +36,7 @@ std::string wantedText(const std::string& noun, const Range& range) {
   return noun + (adverb ? " " : " of ") + bounds;
 }
 
-/// The value with its type, where the value alone doesn't say it.
+/// The value, with its type unless the value alone shows it.
 std::string shownWithType(const ConfigValue& value) {
   if (value.as<int>() != nullptr) return value.shown() + " (an integer)";
   if (value.as<double>() != nullptr) return value.shown() + " (a number with a decimal point)";

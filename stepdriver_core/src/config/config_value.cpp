@@ -5,7 +5,7 @@
 namespace stepdriver::config {
 namespace {
 
-/// With a point where the text alone would look like an int's: the difference matters here.
+/// Adds a decimal point if the text would look like an int: the difference matters here.
 std::string doubleText(double number) {
   const std::string text = numberText(number);
   return text.find_first_not_of("-0123456789") == std::string::npos ? text + ".0" : text;

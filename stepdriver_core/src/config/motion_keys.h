@@ -11,10 +11,10 @@ namespace stepdriver::config {
 struct MotionKeys {
   Kind kind;
   std::string unit;               ///< as in messages
-  long double units_per_si_unit;  ///< mm in a m, degrees in a rad
+  long double units_per_si_unit;  ///< mm per m, degrees per rad
   long double units_per_round;    ///< 360 degrees; 0: given by per_round or wheel_diameter
   std::string steps_per_unit;
-  std::string per_round, wheel_diameter;  ///< empty: there is none
+  std::string per_round, wheel_diameter;  ///< empty: no such key
   std::string max_speed, start_speed;
   std::string acceleration, deceleration, stop_deceleration, jerk;
   std::string backlash;

@@ -22,7 +22,7 @@ constexpr double kNsPerUs = 1e3;
 constexpr double kNsPerMs = 1e6;
 constexpr double kLongestUs = 1e6;
 constexpr double kLongestMs = 1e4;
-// A nanosecond: a shorter pulse would be none at all.
+// A nanosecond: a shorter pulse would be no pulse.
 constexpr double kShortestPulseUs = 1e-3;
 
 struct TimingKey {
@@ -55,7 +55,7 @@ bool isAxisName(const std::string& name) {
   return true;
 }
 
-/// Overrides the chip's timings. @return none where one is wrong.
+/// Overrides the chip's timings. @return empty if one is wrong.
 std::optional<driver::Timing> readTiming(ConfigReader& axis, const driver::Timing& of_chip) {
   ConfigReader reader = axis.map("timing");
   driver::Timing timing = of_chip;
@@ -116,7 +116,7 @@ class AxesReader {
  private:
   std::string readJoint(const std::string& axis_name, ConfigReader& axis) {
     const auto given = axis.findText("joint", Presence::kOptional);
-    // What is wrong with the joint or with the axis's name has been said.
+    // A wrong joint or axis name has been reported already.
     if (axis.has("joint") ? !given : axis_name.empty()) return axis_name;
     std::string joint = given.value_or(axis_name);
     if (joint.empty()) {

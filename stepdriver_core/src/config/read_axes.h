@@ -10,7 +10,7 @@
 
 namespace stepdriver::config {
 
-/// As readAxes() without `used`.
+/// Like readAxes() without `used`.
 ///
 /// @param used the lines of the axes are added here, for other keys that name lines.
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,

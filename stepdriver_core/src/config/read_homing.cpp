@@ -72,7 +72,7 @@ class HomingReader {
     const auto seek =
         readSpeed(seek_key, units(config_.max_speed),
                   fmt::format("{}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
-    // Only at a speed from which the motor stops at once does the count stay true at the switch.
+    // The count stays correct at the switch only at a speed from which the motor stops at once.
     const bool known = config_.steps_per_unit > 0.0 && config_.acceleration > 0.0;
     const double restart = known ? units(restartSpeed(config_)) : 0.0;
     const auto latch = readSpeed(latch_key, restart,
@@ -111,7 +111,7 @@ class HomingReader {
     if (has_switch && all_right) checkRest(homing, offset_key);
   }
 
-  /// Where it stands when it is homed it must be able to move from.
+  /// The axis must be able to move from its position after the homing.
   void checkRest(const HomingConfig& homing, const std::string& offset_key) {
     const double rest = homing.offset + (homing.at_max ? -homing.pull_off : homing.pull_off);
     const std::string stands =

@@ -8,10 +8,9 @@ namespace stepdriver::config {
 
 /// Reads `homing` and `require_homing`.
 ///
-/// @param kind of the axis; none: it isn't known, which has been reported, and nothing is said
-/// about
-///   what depends on it.
-/// @param config has the endstops, speeds and soft limits that the homing is checked against.
+/// @param kind of the axis; empty: unknown, which has been reported, so nothing that depends on it
+///   is reported.
+/// @param config the endstops, speeds and soft limits for checking the homing.
 void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config);
 
 }  // namespace stepdriver::config

@@ -15,13 +15,13 @@
 namespace stepdriver::config {
 namespace {
 
-// Far beyond any machine, and well inside what the motion can count and time in 64 bits.
+// Far beyond any machine, and well within what the motion can count and time in 64 bits.
 constexpr double kHighestAcceleration = 1e12;
 constexpr double kMostBacklash = 1e6;  // steps
 constexpr double kHighestJerk = 1e15;
-constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: each step is a double of its own
+constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: doubles represent each step exactly
 
-/// The first key of this unit that is given; empty: none.
+/// The first given key of this unit; empty: there is none.
 std::string firstGiven(const ConfigReader& axis, const MotionKeys& keys) {
   for (const std::string& key : keys.all()) {
     if (axis.has(key)) return key;
@@ -29,7 +29,7 @@ std::string firstGiven(const ConfigReader& axis, const MotionKeys& keys) {
   return {};
 }
 
-/// @return nullopt where the keys don't tell, which is an issue.
+/// @return nullopt if the keys don't determine it, which is an issue.
 std::optional<Kind> readKind(ConfigReader& axis) {
   const std::string linear = firstGiven(axis, motionKeys(Kind::kLinear));
   const std::string rotary = firstGiven(axis, motionKeys(Kind::kRotary));
@@ -51,17 +51,17 @@ std::optional<Kind> readKind(ConfigReader& axis) {
   return {};
 }
 
-/// Reads what is given in one unit.
+/// Reads the keys in one unit.
 class MotionReader {
  public:
-  /// @param presence kOptional: what is missing isn't to be reported.
+  /// @param presence kOptional: a missing key isn't reported.
   MotionReader(ConfigReader& axis, const MotionContext& context, Kind kind, Presence presence)
       : axis_(axis), context_(context), keys_(motionKeys(kind)), presence_(presence) {}
 
   void read(const Rounds& rounds, AxisConfig& config) {
     config.kind = keys_.kind;
     const auto scale = readScale(axis_, keys_, rounds, presence_);
-    // Where the unit isn't certain, nothing is computed from it.
+    // If the unit isn't certain, nothing is computed from it.
     if (scale && presence_ == Presence::kRequired) {
       config.steps_per_unit = static_cast<double>(*scale * keys_.units_per_si_unit);
       steps_per_unit_ = static_cast<double>(*scale);
@@ -213,7 +213,7 @@ std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
     MotionReader(axis, context, *kind, Presence::kRequired).read(rounds, config);
     return kind;
   }
-  // Each value that is there can be right or wrong by itself.
+  // Each given value can be right or wrong by itself.
   for (const Kind each : {Kind::kLinear, Kind::kRotary}) {
     MotionReader(axis, context, each, Presence::kOptional).read(rounds, config);
   }

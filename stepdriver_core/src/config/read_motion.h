@@ -7,11 +7,12 @@
 
 namespace stepdriver::config {
 
-/// What is beyond a limit only by the rounding of units, or of the bound in a message, isn't.
+/// Tolerance for limits: the rounding of units, or of the bound in a message, doesn't count as
+/// exceeding a limit.
 constexpr double kSlack = 1.0 + 1e-9;
 
-/// What the motion of an axis is checked against. A member is empty where it isn't known because
-/// something is wrong with it; then nothing is said about what depends on it.
+/// The facts for checking the motion of an axis. A member is empty if it is wrong and therefore
+/// unknown; nothing that depends on it is then reported.
 struct MotionContext {
   std::optional<int> microsteps;
   std::optional<driver::Timing> timing;  ///< with the configuration's overrides
@@ -20,9 +21,9 @@ struct MotionContext {
 
 /// Reads the kind of the axis, its scale, speeds, accelerations and soft limits.
 ///
-/// The unit of the keys tells the kind; in the configuration a unit is mm or a degree.
+/// The unit of the keys determines the kind; in the configuration a unit is mm or a degree.
 ///
-/// @return the kind; none where it can't be told, which is an issue.
+/// @return the kind; empty if it can't be determined, which is an issue.
 std::optional<Kind> readMotion(ConfigReader& axis, const MotionContext& context,
                                AxisConfig& config);
 

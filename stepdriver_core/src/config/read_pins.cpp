@@ -13,7 +13,7 @@ namespace {
 
 struct PinName {
   const char* key;
-  const char* drv8825_key;  ///< the DRV8825's own name of it; nullptr: the same
+  const char* drv8825_key;  ///< the DRV8825's own name for it; nullptr: the same
   Pin Pins::*pin;
 };
 
@@ -37,7 +37,7 @@ bool isLine(const std::string& line) {
   const auto colon = line.rfind(':');
   if (colon == std::string::npos) return true;
   const std::string offset = line.substr(colon + 1);
-  // Nine digits are more than any chip has lines, and fit into an int.
+  // Nine digits exceed the number of lines of any chip, and fit into an int.
   return colon > 0 && !offset.empty() && offset.size() <= 9 &&
          offset.find_first_not_of("0123456789") == std::string::npos;
 }
@@ -68,7 +68,7 @@ Bias readBias(ConfigReader& reader, const std::string& key) {
   return biases.at(reader.oneOf(key, {"as_is", "pull_up", "pull_down", "disabled"}, "as_is"));
 }
 
-/// Why the chip has no such pin; empty where it has.
+/// Why the chip has no such pin; empty if it has one.
 std::string whyMissing(const driver::DriverChip& chip, const PinName& name) {
   if (isMicrostepPin(name) && chip.modes.empty()) {
     return "the " + chip.title + " has no microstep pins: its microsteps are set by switches";
@@ -78,8 +78,8 @@ std::string whyMissing(const driver::DriverChip& chip, const PinName& name) {
   return {};
 }
 
-/// Reads the pins of one axis and remembers which of them were named, rightly or not: what is wrong
-/// with a pin is said once, not again as a pin that isn't wired.
+/// Reads the pins of one axis and remembers which of them were named, rightly or not: a mistake in
+/// a pin is reported once, and not again as a pin that isn't wired.
 class PinsReader {
  public:
   PinsReader(ConfigReader& axis, const driver::DriverChip* chip, UsedLines& used)
@@ -128,7 +128,7 @@ class PinsReader {
       refuseSecondName(reader_, name);
       return;
     }
-    if (name.pin == &Pins::enable) {  // its level must be known before its line is
+    if (name.pin == &Pins::enable) {  // its level must be known before its line
       pins_.enable.line = readLineName(reader_, name.key, Presence::kOptional).value_or("");
       return;
     }

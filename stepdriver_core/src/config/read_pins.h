@@ -7,7 +7,7 @@ namespace stepdriver::config {
 
 /// Reads `pins`, `fault_bias`, `invert` and `common_anode`.
 ///
-/// @param chip nullptr where it isn't known; then what depends on it is let pass.
+/// @param chip nullptr if it isn't known; then nothing that depends on it is checked.
 void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
               UsedLines& used);
 

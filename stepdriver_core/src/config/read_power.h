@@ -4,9 +4,9 @@
 
 namespace stepdriver::config {
 
-/// Reads when the motor has current, and what its absence means.
+/// Reads when the motor has current, and what happens without it.
 ///
-/// @param pins_are_right false: what depends on AxisConfig::pins isn't judged.
+/// @param pins_are_right false: nothing that depends on AxisConfig::pins is checked.
 void readPower(ConfigReader& axis, bool pins_are_right, AxisConfig& config);
 
 }  // namespace stepdriver::config

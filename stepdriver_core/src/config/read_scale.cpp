@@ -11,7 +11,7 @@
 namespace stepdriver::config {
 namespace {
 
-// Far beyond any machine, and well inside what the motion can count in 64 bits.
+// Far beyond any machine, and well within what the motion can count in 64 bits.
 constexpr double kLowestScale = 1e-9;  // [steps/unit]
 constexpr double kHighestScale = 1e9;
 constexpr int kMostFullSteps = 1'000'000;
@@ -25,7 +25,7 @@ class ScaleReader {
   ScaleReader(ConfigReader& axis, const MotionKeys& keys, const Rounds& rounds, Presence presence)
       : axis_(axis), keys_(keys), rounds_(rounds), presence_(presence) {}
 
-  /// @return [microsteps/unit]; none where something that it needs is missing or wrong.
+  /// @return [microsteps/unit]; empty if a key that it needs is missing or wrong.
   std::optional<long double> read() {
     const std::vector<std::string> by_rounds = givenOfRounds();
     if (axis_.has(keys_.steps_per_unit) || by_rounds.empty()) return readDirectScale(by_rounds);
@@ -40,7 +40,7 @@ class ScaleReader {
            *per_round;
   }
 
-  /// Whether it is one that the motion can count with.
+  /// Whether the motion can count with this scale.
   bool check(long double scale) {
     if (scale >= kLowestScale && scale <= kHighestScale) return true;
     std::string key = kFullSteps;
@@ -57,7 +57,7 @@ class ScaleReader {
  private:
   bool scaleIsGivenBy(const std::string& key) const { return !key.empty() && axis_.has(key); }
 
-  /// Those of the keys of a scale by rounds that are given.
+  /// The given keys of a scale by revolutions.
   std::vector<std::string> givenOfRounds() const {
     std::vector<std::string> given;
     for (const std::string& key :
@@ -67,7 +67,7 @@ class ScaleReader {
     return given;
   }
 
-  /// @return [unit] what one round behind the gear travels; none where that is missing or wrong.
+  /// @return [unit] travel per revolution of the gear's output; empty if it is missing or wrong.
   std::optional<long double> readTravel(Presence presence) {
     if (keys_.per_round.empty()) return keys_.units_per_round;
     const bool by_wheel = axis_.has(keys_.wheel_diameter);
@@ -92,7 +92,8 @@ class ScaleReader {
     return travel;
   }
 
-  /// @param by_rounds the keys of the other way that are given; they are not to be.
+  /// @param by_rounds the given keys of the other way to scale the axis, which are not allowed
+  ///   here.
   std::optional<long double> readDirectScale(const std::vector<std::string>& by_rounds) {
     const std::string& key = keys_.steps_per_unit;
     if (!axis_.has(key)) {

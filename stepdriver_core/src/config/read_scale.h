@@ -7,22 +7,22 @@
 
 namespace stepdriver::config {
 
-/// A round of the motor, and the gear behind it. A member is empty where something is wrong with
-/// it.
+/// A revolution of the motor, and the gear behind it. A member is empty if its value is wrong.
 struct Rounds {
   std::optional<int> microsteps;
-  std::optional<int> full_steps;  ///< or it isn't given
-  std::optional<double> gear;     ///< rounds of the motor in one behind the gear: 1 by default
-  double steps = 0.0;             ///< [microsteps/round]; 0: not known
+  std::optional<int> full_steps;  ///< also empty if it isn't given
+  /// Motor revolutions per revolution of the gear's output: 1 by default.
+  std::optional<double> gear;
+  double steps = 0.0;  ///< [microsteps per revolution]; 0: not known
 };
 
 Rounds readRounds(ConfigReader& axis, std::optional<int> microsteps);
 
-/// Reads how many microsteps make a unit of the configuration: as such, or by the round of the
-/// motor and what that travels.
+/// Reads the number of microsteps per unit of the configuration: directly, or from the steps and
+/// the travel of a motor revolution.
 ///
-/// @param presence kOptional: what is missing isn't to be reported.
-/// @return [microsteps/unit]; none where something that it needs is missing or wrong.
+/// @param presence kOptional: a missing key isn't reported.
+/// @return [microsteps/unit]; empty if a key that it needs is missing or wrong.
 std::optional<long double> readScale(ConfigReader& axis, const MotionKeys& keys,
                                      const Rounds& rounds, Presence presence);
 

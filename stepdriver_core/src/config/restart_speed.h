@@ -7,8 +7,8 @@
 
 namespace stepdriver::config {
 
-/// The speed that the motor takes and leaves without a ramp [unit/s]: the start speed, but at least
-/// what a ramp from rest has after its first full step.
+/// The speed at which the motor starts and stops without a ramp [unit/s]: the start speed, but at
+/// least the speed that a ramp from rest reaches after its first full step.
 inline double restartSpeed(const AxisConfig& config) {
   const double full_step = config.microsteps / config.steps_per_unit;
   return std::max(config.start_speed,

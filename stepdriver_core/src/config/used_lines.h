@@ -9,18 +9,18 @@
 
 namespace stepdriver::config {
 
-/// The lines of the whole configuration: each may serve one purpose only, but ENABLE lines.
+/// The lines of the whole configuration: each may serve only one purpose, except ENABLE lines.
 class UsedLines {
  public:
-  /// @param issues where a line with two purposes is told of; outlives this.
+  /// @param issues a line with two purposes is reported here; outlives this.
   explicit UsedLines(std::vector<ConfigIssue>& issues) : issues_(issues) {}
 
   /// @param key full name of the parameter that names the line.
   void add(const std::string& key, const std::string& line);
 
-  /// An ENABLE line, which several axes may share where all of them are enabled by one level.
+  /// An ENABLE line, which several axes may share if the same level enables all of them.
   ///
-  /// @param on that level; none where it isn't known.
+  /// @param on that level; empty if it isn't known.
   void addEnable(const std::string& key, const std::string& line, std::optional<bool> on);
 
  private:

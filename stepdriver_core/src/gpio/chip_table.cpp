@@ -21,7 +21,7 @@ struct ErrorWords {
   const char* words;
 };
 
-/// What the calls of GPIO lines fail with; 524 is the kernel's own and has no name outside.
+/// The errors of GPIO calls; 524 is the kernel's own and has no name outside.
 constexpr ErrorWords kErrors[] = {
     {EACCES, "EACCES, permission denied"},
     {EBUSY, "EBUSY, device or resource busy"},
@@ -52,7 +52,7 @@ std::optional<Place> placeIn(const std::string& line) {
   return Place{line.substr(0, colon), offset};
 }
 
-/// Makes `a, b` of `a`.
+/// Turns `a` into `a, b`.
 void append(std::string& list, const std::string& word) {
   list += (list.empty() ? "" : ", ") + word;
 }
@@ -61,7 +61,7 @@ std::string labelOf(const ChipInfo& chip) {
   return chip.label.empty() ? "no label" : '"' + chip.label + '"';
 }
 
-/// What there is instead; with what couldn't be looked at, since it may be there.
+/// Lists the existing ones, and the chips that couldn't be read, because the line may be there.
 std::string whatThereIs(const std::vector<ChipInfo>& chips) {
   if (chips.empty()) return " This machine has no GPIO chip (no /dev/gpiochip*).";
   std::string found;
@@ -93,7 +93,7 @@ LineAddress lineOf(const std::vector<ChipInfo>& chips, std::size_t index, const 
   return {index, static_cast<unsigned>(offset)};
 }
 
-/// The chips that a predicate is true for.
+/// The chips for which a predicate is true.
 template <typename Predicate>
 std::vector<std::size_t> chipsThat(const std::vector<ChipInfo>& chips, const Predicate& predicate) {
   std::vector<std::size_t> found;
@@ -156,7 +156,7 @@ std::vector<LineAddress> findLines(const std::vector<ChipInfo>& chips,
                                    const std::vector<OutputRequest>& outputs,
                                    const std::vector<InputRequest>& inputs) {
   std::vector<LineAddress> addresses;
-  std::map<std::pair<std::size_t, unsigned>, std::string> taken;  // -> by which name
+  std::map<std::pair<std::size_t, unsigned>, std::string> taken;  // -> the name used
   const auto add = [&](const std::string& line) {
     const LineAddress address = findLine(chips, line);
     const auto twin = taken.emplace(std::make_pair(address.chip, address.offset), line);

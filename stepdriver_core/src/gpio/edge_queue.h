@@ -10,8 +10,8 @@
 
 namespace stepdriver::gpio {
 
-/// Edges of simulated inputs on their way to who waits for them. As the kernel's, it holds a few
-/// and then loses the oldest. Safe from any thread.
+/// Edges of simulated inputs on their way to the waiting thread. Like the kernel's queue, it keeps
+/// a few and then loses the oldest. Safe from any thread.
 class EdgeQueue {
  public:
   void add(const EdgeEvent& edge) {

@@ -18,11 +18,11 @@ std::int64_t steadyNow() {
 
 }  // namespace
 
-// What the threads share; it outlives whoever hangs in a write.
+// Shared by the threads; it outlives a thread that hangs in a write.
 struct LineWriters::Shared {
   std::shared_ptr<Lines> lines;
   std::mutex mutex;
-  std::function<void()> told;  // empty: nobody listens any more
+  std::function<void()> told;  // empty: nobody listens anymore
   std::vector<Done> done;
 };
 
@@ -74,7 +74,7 @@ void LineWriters::write(std::uint64_t id, const LineWrite& write) {
     chip->thread = std::thread([shared = shared_, chip] { run(shared, chip); });
   }
   const std::lock_guard<std::mutex> lock(shared_->mutex);
-  // Behind one that hangs its time begins too: whoever waits for it is told in time.
+  // The time also counts behind a write that hangs: its caller is told in time.
   chip->jobs.push_back({id, write, steadyNow() + timeout_ns_});
   chip->changed.notify_all();
 }
@@ -87,7 +87,7 @@ void LineWriters::run(const std::shared_ptr<Shared>& shared, const std::shared_p
     if (chip->jobs.empty()) break;
     const Job job = chip->jobs.front();
     int error = ETIMEDOUT;
-    // What waited behind a write that hung isn't wanted any more.
+    // Writes that waited behind one that hung are dropped.
     if (!job.told) {
       lock.unlock();
       error = shared->lines->write(&job.write, 1);

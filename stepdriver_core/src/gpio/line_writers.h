@@ -16,32 +16,32 @@
 
 namespace stepdriver::gpio {
 
-/// Writes the lines that aren't timed by the pulse thread: one thread for each GPIO chip, so that a
-/// chip that hangs delays nobody but itself. Writes to one chip are done in their order.
+/// Writes the lines that the pulse thread doesn't time. Each GPIO chip has a thread of its own, so
+/// that a chip that hangs delays only itself. Writes to one chip keep their order.
 class LineWriters {
  public:
-  /// A write that is over.
+  /// A write that has ended.
   struct Done {
     std::uint64_t id = 0;
-    int error = 0;  ///< errno; ETIMEDOUT: it has not returned in time. 0: it was done.
+    int error = 0;  ///< errno; ETIMEDOUT: it has not returned in time; 0: it succeeded.
   };
 
-  /// @param threaded else write() writes at once.
+  /// @param threaded false: write() writes at once.
   /// @param timeout_ns on the steady clock: a write that takes longer counts as failed.
   /// @param told called from a writing thread when there is something to collect.
   LineWriters(std::shared_ptr<Lines> lines, bool threaded, std::int64_t timeout_ns,
               std::function<void()> told);
-  /// Threads whose write hangs are left behind; they keep the lines.
+  /// Threads whose write hangs are abandoned; they keep the lines.
   ~LineWriters();
   LineWriters(const LineWriters&) = delete;
   LineWriters& operator=(const LineWriters&) = delete;
 
   void write(std::uint64_t id, const LineWrite& write);
 
-  /// What is over since this was called last, with what has timed out by now.
+  /// The writes that have ended or timed out since the last call.
   std::vector<Done> collect();
 
-  /// Steady time at which the next write times out; none if none is under way.
+  /// Steady time at which the next write times out; empty if no write is in progress.
   std::optional<std::int64_t> deadline() const;
   bool idle() const { return !deadline(); }
 
@@ -50,7 +50,7 @@ class LineWriters {
     std::uint64_t id = 0;
     LineWrite write{};
     std::int64_t deadline_ns = 0;
-    bool told = false;  // that it has timed out
+    bool told = false;  // its timeout has been reported
   };
   struct Shared;
   struct Chip;

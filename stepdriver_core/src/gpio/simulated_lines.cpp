@@ -21,7 +21,7 @@ struct SimulatedBackend::Shared {
   Board& board;
   const TimeSource now;
   std::mutex mutex;  // serializes the calls of the board, and so their times
-  std::unordered_map<std::string, std::string> held;  // line -> what it is held as
+  std::unordered_map<std::string, std::string> held;  // line -> kind of request that holds it
 };
 
 class SimulatedBackend::HeldLines : public Lines {
@@ -45,7 +45,7 @@ class SimulatedBackend::HeldLines : public Lines {
     }
   }
 
-  /// Tells the board of the levels that the request gave the outputs.
+  /// Reports to the board the levels that the request gave the outputs.
   void begin() {
     const std::int64_t time_ns = shared_->now();
     for (const Output& output : outputs_) {

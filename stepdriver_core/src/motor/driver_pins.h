@@ -6,7 +6,7 @@
 
 namespace stepdriver::motor {
 
-/// What to write to a chip's pins, and how long to wait after each, to have it do something.
+/// The writes to a chip's pins, with the wait after each, that carry out an operation of the chip.
 class DriverPins {
  public:
   /// @param config outlives the pins.
@@ -17,14 +17,16 @@ class DriverPins {
   bool hasReset() const { return lines_.reset >= 0; }
   bool hasMode() const { return lines_.mode[0] >= 0; }
 
-  /// From the safe levels to awake and out of reset. Empty if neither pin is wired.
+  /// Wakes the chip and releases it from reset, starting at the safe levels. Empty if neither pin
+  /// is wired.
   PinSequence bringUp() const;
   PinSequence enable(bool on) const;
   PinSequence sleep(bool asleep) const;
   PinSequence reset() const;
-  /// One pin at a time, over defined codes only.
+  /// One pin at a time, through defined codes only.
   PinSequence mode(int from_microsteps, int to_microsteps) const;
-  /// STEP inactive, and the other pins as they should be, whatever they are.
+  /// Sets STEP inactive and the other pins to their intended levels, whatever their present levels
+  /// are.
   PinSequence restore(bool enabled, bool asleep) const;
 
  private:

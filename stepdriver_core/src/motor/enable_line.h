@@ -6,8 +6,8 @@
 
 namespace stepdriver::motor {
 
-/// An ENABLE line and the axes that it energizes: one, or several that share it. It is asserted
-/// while any of them wants to be enabled. Under the mutex of the machine's axes.
+/// An ENABLE line and the axes that it energizes: one axis, or several that share it. It is
+/// asserted while any of them wants to be enabled. Protected by the mutex of the machine's axes.
 class EnableLine {
  public:
   /// @return the number of the axis on this line.
@@ -16,7 +16,7 @@ class EnableLine {
     return wanted_.size() - 1;
   }
 
-  /// Whether the line stays asserted where this axis lets go of it.
+  /// Whether the line stays asserted if this axis releases it.
   bool isWantedByOthers(std::size_t member) const {
     for (std::size_t i = 0; i < wanted_.size(); ++i) {
       if (i != member && wanted_[i]) return true;
@@ -24,14 +24,14 @@ class EnableLine {
     return false;
   }
 
-  /// The line has been written, where that was needed.
+  /// The line has been written, if that was needed.
   void note(std::size_t member, bool wanted) {
     const bool released = wanted_[member] && !wanted && !isWantedByOthers(member);
     wanted_[member] = wanted;
     if (released) ++releases_;
   }
 
-  /// Times that the last axis let go: from then on nothing held any of the motors.
+  /// How often the last axis released the line: from then on nothing held any of the motors.
   std::uint64_t releases() const { return releases_; }
 
  private:

@@ -14,25 +14,27 @@ namespace stepdriver::motor {
 /// A profile that was ordered from the pulse engine.
 struct Motion {
   std::uint64_t serial = 0;
-  std::optional<std::int64_t> target;  ///< [microsteps of the joint] of a move; none: it has no end
-  bool slows_down = false;             ///< it only comes to rest, wherever that is
-  double overshoot = 0.0;  ///< [microsteps] how far it passes its end before it comes back
+  /// [microsteps of the joint] Of a move; empty: it has no end.
+  std::optional<std::int64_t> target;
+  bool slows_down = false;  ///< it only comes to rest, at any position
+  double overshoot = 0.0;   ///< [microsteps] how far it overshoots its end before it comes back
   std::shared_ptr<const motion::Profile> profile;
-  /// What the engine reads until it has taken the order.
+  /// The data that the engine reads until it has handled the order.
   std::shared_ptr<const void> order;
 };
 
-/// The profiles of one channel that the engine may still look at: from the one that it follows, or
-/// that ended last, to the one that was ordered last. Owns them until the engine has left them.
+/// The profiles of one channel that the engine may still read: from the one that it follows, or
+/// that ended last, to the one that was ordered last. Owns them until the engine no longer uses
+/// them.
 class Motions {
  public:
   void add(Motion motion) { motions_.push_back(std::move(motion)); }
 
-  /// Forgets what the engine has refused, and what is older than the profile that it follows or
-  /// that ended last.
+  /// Drops the motions that the engine has refused, and those older than the profile that it
+  /// follows or that ended last.
   void take(const pulse::ChannelState& state);
 
-  /// The engine follows a profile, or has not yet said what becomes of an order.
+  /// The engine follows a profile, or has not yet answered an order.
   bool moving() const { return following_ != 0 || inFlight(); }
   bool inFlight() const { return !motions_.empty() && motions_.back().serial > taken_; }
 

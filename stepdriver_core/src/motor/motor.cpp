@@ -21,7 +21,7 @@ void Motor::take(const pulse::ChannelState& state) {
 motion::MotionState Motor::stateAt(std::int64_t at) const {
   if (const Motion* motion = motions_.latest()) return motion->profile->stateAt(at);
   const motion::DoubleDouble count = motion::fromInteger(state_.count);
-  // A stop on a path rests between two microsteps: the next motion goes on from there.
+  // A stop on a path ends between two microsteps: the next motion continues from there.
   const Motion* last = motions_.find(state_.ended);
   if (last == nullptr || state_.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
   const motion::DoubleDouble rest = last->profile->endPosition();

@@ -15,7 +15,7 @@
 namespace stepdriver::motor {
 
 /// One driver chip and its channel of the pulse engine, as the controller knows them. It counts in
-/// microsteps; what they are on the axis it doesn't know.
+/// microsteps and doesn't know the scale of the axis.
 class Motor {
  public:
   /// @param config outlives the motor.
@@ -25,17 +25,17 @@ class Motor {
   const MotorLines& lines() const { return lines_; }
   const DriverPins& pins() const { return pins_; }
 
-  /// What the engine has said of the channel last.
+  /// The engine's last report on the channel.
   const pulse::ChannelState& state() const { return state_; }
   void take(const pulse::ChannelState& state);
 
   bool moving() const { return motions_.moving(); }
   const Motions& motions() const { return motions_; }
   void ordered(Motion motion) { motions_.add(std::move(motion)); }
-  /// Of an order to the engine.
+  /// The serial of a new order to the engine.
   std::uint64_t nextSerial() { return ++serial_; }
 
-  /// [microsteps] Where the motor will be at a motion time.
+  /// [microsteps] The state of the motor at a motion time.
   motion::MotionState stateAt(std::int64_t at) const;
 
   Power& power() { return power_; }
@@ -48,12 +48,11 @@ class Motor {
   /// @{
   bool enableIsHeldByOthers() const;
   void noteEnable(bool wanted);
-  /// @return whether the shared line was released since this was asked last: nothing held the motor
-  /// then.
+  /// @return whether the shared line was released since the last call: nothing held the motor then.
   bool takeReleases();
   /// @}
 
-  /// A write of a pin has failed: the pins may be as they should or not.
+  /// A write of a pin has failed: the levels of the pins are unknown.
   bool pinsAreDoubtful() const { return pins_doubtful_; }
   void doubtPins() { pins_doubtful_ = true; }
   /// A change of the mode whose pins could not all be written.

@@ -6,7 +6,7 @@ namespace stepdriver::motor {
 
 namespace {
 
-/// The axis that this ENABLE line was requested for; nullptr: none yet.
+/// The axis for which this ENABLE line was requested; nullptr: no axis yet.
 const MotorLines* sharerOf(const config::Pin& enable, const std::vector<MotorLines>& others,
                            const std::vector<gpio::OutputRequest>& outputs) {
   for (const MotorLines& other : others) {

@@ -11,7 +11,7 @@
 
 namespace stepdriver::motor {
 
-/// Where the lines of an axis are in the request of all axes. -1: not wired.
+/// The indices of an axis's lines in the request for all axes. -1: not wired.
 struct MotorLines {
   int step = -1;
   int dir = -1;
@@ -26,9 +26,9 @@ struct MotorLines {
 };
 
 /// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and
-/// the configured microstep mode. An axis that stays enabled over a shutdown keeps its chip awake.
+/// the configured microstep mode. An axis that stays enabled after a shutdown keeps its chip awake.
 ///
-/// @param others the axes that the request has already: an ENABLE line of theirs is shared.
+/// @param others the axes that are already in the request: their ENABLE lines can be shared.
 MotorLines requestLines(const config::AxisConfig& config, const std::vector<MotorLines>& others,
                         std::vector<gpio::OutputRequest>& outputs,
                         std::vector<gpio::InputRequest>& inputs);

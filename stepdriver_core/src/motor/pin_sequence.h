@@ -8,9 +8,9 @@
 namespace stepdriver::motor {
 
 /// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
-/// before what comes next: the next write, or the first step.
+/// before the next write or the first step.
 struct PinSequence {
-  /// One write of a pin, and how long nothing else of the chip goes out after it.
+  /// One write of a pin, and how long nothing else may be written to the chip after it.
   struct Write {
     int line;
     bool level;

@@ -4,8 +4,8 @@
 
 namespace stepdriver::motor {
 
-/// Whether a motor has its current: what was commanded, and what a rest for its idle timeout has
-/// made of that. The pins are written by whoever changes it.
+/// Whether a motor has current: what was commanded, and whether the idle timeout has overridden
+/// that. The caller that changes this writes the pins.
 class Power {
  public:
   /// @param always_enabled ENABLE isn't wired.
@@ -16,7 +16,7 @@ class Power {
   bool wantsEnabled() const { return enabled_; }
   bool wantsSleep() const { return asleep_; }
 
-  /// As the pins have it.
+  /// The state of the pins.
   bool isEnabled() const {
     return enabled_ && !(idle_ && idle_action_ == config::IdleAction::kDisable);
   }

@@ -22,10 +22,10 @@ namespace {
 
 constexpr Nanoseconds kBetweenWakeUps = 1'000'000;
 constexpr Nanoseconds kLongestWaits = 1'000'000'000;
-// A chip behind I2C takes its time.
+// A chip behind I2C is slow.
 constexpr Nanoseconds kLongestCalls = 20'000'000;
 
-/// Takes samples, for no longer than that, but one.
+/// Takes samples for no longer than that, but at least one.
 template <typename Sample>
 Spread spreadOfMany(Clock& clock, int count, Nanoseconds longest, const Sample& sample) {
   std::vector<Nanoseconds> samples;
@@ -47,7 +47,7 @@ Spread latenessOf(Clock& clock, Wait wait, int count) {
   });
 }
 
-/// The calls of one channel after the other, up to one that fails.
+/// Measures the calls of one channel after the other, until one fails.
 class CallMeter {
  public:
   CallMeter(gpio::Lines& lines, Clock& clock) : lines_(lines), clock_(clock) {}
@@ -66,7 +66,7 @@ class CallMeter {
     return costs;
   }
 
-  /// The call that failed, in words; empty: none.
+  /// The call that failed, in words; empty: no failure.
   const std::string& failure() const { return failure_; }
 
  private:
@@ -81,7 +81,7 @@ class CallMeter {
       }
       return clock_.now() - begin;
     };
-    timed();  // brings the code into the caches
+    timed();  // loads the code into the caches
     return spreadOfMany(clock_, kMeasuredCalls, kLongestCalls, timed);
   }
 
@@ -106,7 +106,7 @@ Capability asPulseThread(Clock& clock, const std::string& latency_device,
     capability.lateness = latenessOf(clock, &Clock::waitUntil, kMeasuredWakeUps);
     capability.sleep_lateness = latenessOf(clock, &Clock::sleepUntil, kMeasuredSleeps);
   }).join();
-  capability.guard = clock.guard();  // as it is after the wake-ups that it may learn from
+  capability.guard = clock.guard();  // after the wake-ups from which it learns
   return capability;
 }
 

@@ -7,13 +7,13 @@
 
 namespace stepdriver::pulse {
 
-/// A line by its index in the gpio::Lines, and the level at which it does what it is named for.
+/// A line by its index in the gpio::Lines, and its active level.
 struct Signal {
   int line = -1;
   bool active = true;
 };
 
-/// What the engine needs to know of an axis.
+/// What the engine needs to know about an axis.
 struct ChannelConfig {
   Signal step;
   Signal dir;  ///< active: forward, the count rises
@@ -24,8 +24,7 @@ struct ChannelConfig {
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
-  std::int64_t backlash =
-      0;  ///< microsteps that the motor makes at a reversal before the joint moves
+  std::int64_t backlash = 0;  ///< [microsteps] of the motor at a reversal before the joint moves
 };
 
 enum class EndReason {
@@ -34,37 +33,37 @@ enum class EndReason {
   kEndstopMax,
   kEmergencyStop,
   kChipFault,  ///< the chip's fault line became active
-  kTooLate,    ///< a pulse came too late to go on at this speed
+  kTooLate,    ///< a pulse came too late to continue at this speed
   kLineError,  ///< a line could not be written or read
   kCompanion,  ///< another channel of the group was ended
 };
 
 /// A write or a read that failed.
 struct LineFailure {
-  int error = 0;       ///< errno; 0: none did
+  int error = 0;       ///< errno; 0: no failure
   int line = -1;       ///< by its index in the gpio::Lines
-  bool input = false;  ///< it was read; else it was written
+  bool input = false;  ///< true: it was read; false: it was written
 };
 
-/// What a channel does and has done.
+/// The state of a channel.
 struct ChannelState {
-  std::int64_t count = 0;  ///< microsteps: active STEP edges forward less those backward
-  /// Of the backlash, what is taken up towards max: from 0 to all of it. The joint stands at count
-  /// less this.
+  std::int64_t count = 0;  ///< [microsteps] active STEP edges forward minus those backward
+  /// The part of the backlash that is taken up towards max: from 0 to all of it. The position of
+  /// the joint is count minus this.
   std::int64_t slack = 0;
   std::uint64_t pulses = 0;     ///< active STEP edges
-  std::uint64_t taken = 0;      ///< serial of the last command that was dealt with
+  std::uint64_t taken = 0;      ///< serial of the last command that was handled
   std::uint64_t accepted = 0;   ///< serial of the last command that was not refused
-  std::uint64_t following = 0;  ///< serial of the profile under way; 0: at rest
+  std::uint64_t following = 0;  ///< serial of the current profile; 0: at rest
   std::uint64_t ended = 0;      ///< serial of the last profile that ended
   EndReason end = EndReason::kDone;
   LineFailure failure;            ///< the last one
   Nanoseconds end_time = 0;       ///< motion time at which it ended
   bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
   Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
-  std::uint64_t epoch = 0;        ///< times that the scale of `count` has changed
+  std::uint64_t epoch = 0;        ///< how many times the scale of `count` has changed
   Nanoseconds rose = 0;           ///< clock time by which the last active STEP edge had happened
-  std::uint64_t chip_faults = 0;  ///< times that the fault line became active
+  std::uint64_t chip_faults = 0;  ///< how many times the fault line became active
   std::uint64_t line_errors = 0;  ///< failed writes and reads
   Nanoseconds ready = 0;          ///< clock time before which no step goes out
 };

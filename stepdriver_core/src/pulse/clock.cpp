@@ -20,7 +20,8 @@ Nanoseconds steadyNow() {
   return static_cast<Nanoseconds>(time.tv_sec) * 1'000'000'000 + time.tv_nsec;
 }
 
-// Sleeps until the time of CLOCK_MONOTONIC, or while the word has this value, or less.
+// Sleeps until the time of CLOCK_MONOTONIC or until the word changes from this value, or for a
+// shorter time.
 void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32_t value) {
   timespec deadline{};
   deadline.tv_sec = static_cast<time_t>(time / 1'000'000'000);
@@ -29,7 +30,7 @@ void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32
           time == kNever ? nullptr : &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
 }
 
-// The calling thread, as HybridWait wants it.
+// The calling thread, as a system for HybridWait.
 struct WakeableThread {
   std::atomic<std::uint32_t>& wakes;
   const std::uint32_t seen;
@@ -69,7 +70,7 @@ void SteadyClock::wake() {
 
 VirtualClock::VirtualClock(double speed) : speed_(speed), started_(steadyNow()) {}
 
-// Where the pace would have the clock; it is never further than the event that is waited for.
+// The time of the clock according to its pace, but never later than the awaited event.
 Nanoseconds VirtualClock::current() const {
   if (!waiting_ || holds_ > 0 || speed_ == 0.0) return now_;
   return std::clamp(paced(), now_, std::max(now_, awaited_));
@@ -96,7 +97,7 @@ void VirtualClock::waitUntil(Nanoseconds time) {
     } else {
       now_ = current();
       if (now_ >= time) break;
-      // An event years ahead is waited for in parts: the sum with now() must not overflow.
+      // A wait for an event years ahead is split: the sum with now() must not overflow.
       const double wall_ns = std::min(3.6e12, static_cast<double>(time - now_) / speed_);
       changed_.wait_for(lock, std::chrono::nanoseconds(std::llround(wall_ns)));
     }

@@ -9,23 +9,23 @@
 
 namespace stepdriver::pulse {
 
-/// A profile that a channel is to follow from its start time on, instead of the one before it. The
-/// engine refuses it if what it was planned from is no longer so.
+/// A profile for a channel to follow from its start time on, replacing the one before it. The
+/// engine refuses it if the state that it was planned from has changed.
 struct Follow {
   int channel = 0;
   std::uint64_t serial = 0;
-  const motion::Profile* profile = nullptr;  ///< lives until the channel follows another or none
+  const motion::Profile* profile = nullptr;  ///< lives until the channel stops following it
   /// Serial of the profile that this one was planned to continue, the last one that was ordered;
   /// 0: from rest. If the channel has ended that one, this one is refused.
   std::uint64_t continues = 0;
   /// Steps planned closer than this are at a speed that the motor can't start from or stop at
   /// without a ramp.
   Nanoseconds restart_interval = 0;
-  /// Channels of one group that isn't 0 end together: what ends one of them before its time ends
-  /// all others at once.
+  /// Channels of the same group end together, unless it is 0: anything that ends one of them early
+  /// ends all others at once.
   std::uint64_t group = 0;
   /// PulseEngine::stopsServed() as it was known when this was planned. If an emergency stop has
-  /// been asked for since, this one is refused.
+  /// been requested since, this one is refused.
   std::uint64_t stops = 0;
 };
 
@@ -33,18 +33,18 @@ struct Follow {
 struct Command {
   /// What it orders.
   enum class Kind {
-    kFollow,   ///< follow the profiles: all of them, or none if one can't be taken
-    kReserve,  ///< somebody writes the chip's other pins: no step, no look at its fault line
-    kRelease,  ///< that is over
+    kFollow,   ///< follow the profiles: all of them, or none if one can't be accepted
+    kReserve,  ///< the chip's other pins are being written: make no step, ignore the fault line
+    kRelease,  ///< ends a reservation
   };
 
   Kind kind = Kind::kFollow;
-  const Follow* follows = nullptr;  ///< of kFollow; live until the channels have taken the order
+  const Follow* follows = nullptr;  ///< of kFollow; live until the channels have handled the order
   std::size_t follow_count = 0;
-  int channel = 0;  ///< of kReserve and kRelease, as all below
+  int channel = 0;  ///< of kReserve and kRelease, like all below
   std::uint64_t serial = 0;
   Nanoseconds ready = 0;  ///< of kRelease: clock time before which no step goes out
-  /// Where the motor stands, in the microsteps of a new mode.
+  /// The position of the motor in the microsteps of a new mode.
   struct Scale {
     std::int64_t count = 0;
     std::int64_t slack = 0;

@@ -6,7 +6,7 @@
 
 namespace stepdriver::pulse {
 
-/// Holds kCpuLatencyDevice open, with a latency of 0, for as long as it lives.
+/// Keeps kCpuLatencyDevice open, with a latency of 0, during its lifetime.
 class CpuLatencyHold {
  public:
   explicit CpuLatencyHold(const std::string& device = kCpuLatencyDevice);
@@ -14,7 +14,7 @@ class CpuLatencyHold {
   CpuLatencyHold(const CpuLatencyHold&) = delete;
   CpuLatencyHold& operator=(const CpuLatencyHold&) = delete;
 
-  /// @return 0 if it is held, or the errno of the refusal.
+  /// @return 0 if it is open, or the errno of the refusal.
   int error() const { return error_; }
 
  private:

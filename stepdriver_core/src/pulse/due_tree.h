@@ -8,22 +8,22 @@
 
 namespace stepdriver::pulse {
 
-/// The times at which channels are due, with the earliest of them at hand: a binary tree in which
-/// each node is the earlier one of the two below it. A change costs log2 of the number of channels
-/// at most, and who is due is found without a look at those that aren't.
+/// The times at which channels are due, as a binary tree in which each node is the earlier of the
+/// two below it. A change costs at most log2 of the number of channels, and the due channels are
+/// found without examining the others.
 class DueTree {
  public:
-  /// @param count of the channels; all are due never.
+  /// @param count of the channels; initially no channel is ever due.
   explicit DueTree(std::size_t count) {
     while (leaves_ < count) leaves_ *= 2;
     nodes_.assign(2 * leaves_, kNever);
   }
 
-  /// Of all channels; kNever where none is due.
+  /// The earliest time of all channels; kNever if none is due.
   Nanoseconds earliest() const { return nodes_[1]; }
   Nanoseconds operator[](std::size_t channel) const { return nodes_[leaves_ + channel]; }
 
-  /// Gives a channel another time.
+  /// Changes the time of a channel.
   void set(std::size_t channel, Nanoseconds due) {
     std::size_t node = leaves_ + channel;
     nodes_[node] = due;
@@ -34,11 +34,11 @@ class DueTree {
     }
   }
 
-  /// Adds those that are due at `now` to `channels`, in their order.
+  /// Adds the channels that are due at `now` to `channels`, in their order.
   void collect(Nanoseconds now, std::vector<std::size_t>& channels) const {
     if (nodes_[1] > now) return;
-    // The way down to the first of them has no branch on the times: no processor can foretell which
-    // channel comes next, and one wrong guess costs more than all of it.
+    // The descent to the first of them has no branch on the times: no processor can predict which
+    // channel comes next, and one wrong prediction costs more than the whole descent.
     std::size_t node = 1;
     std::size_t several = 0;
     while (node < leaves_) {

@@ -33,7 +33,7 @@ void EngineChannel::follow(const Follow& order) {
 bool EngineChannel::reserve() {
   if (profile != nullptr || reserved) return false;
   reserved = true;
-  faulty = false;  // to be read anew when the pins have done what they do
+  faulty = false;  // it must be read again when the pins have been written
   return true;
 }
 
@@ -62,7 +62,7 @@ void EngineChannel::countStep() {
 }
 
 void EngineChannel::endMotion(EndReason reason, Nanoseconds motion_now) {
-  // What fails after the motion was over leaves that motion's end as it was.
+  // A failure after the end of a motion doesn't change how that motion ended.
   if (profile != nullptr) {
     state.end = reason;
     state.end_abrupt = isFast();

@@ -12,9 +12,9 @@
 
 namespace stepdriver::pulse {
 
-/// What the pulse thread knows of one channel: the motion that it follows, and its last edges.
+/// The pulse thread's state of one channel: the motion that it follows, and its last edges.
 struct EngineChannel {
-  /// What it does when it is due.
+  /// What to do when the channel is due.
   enum class Action { kNothing, kFall, kTurn, kRise, kFinish };
 
   Action action() const {
@@ -23,19 +23,18 @@ struct EngineChannel {
     return profile != nullptr ? Action::kFinish : Action::kNothing;
   }
 
-  /// Of the plan, between the last step and the next one. @pre There is a next one.
+  /// The planned interval between the last step and the next one. @pre There is a next one.
   Nanoseconds interval() const { return next->time_ns - last_planned; }
 
-  /// It moves at a speed that the motor can't start from or stop at at once.
+  /// It moves at a speed at which the motor can't start or stop at once.
   bool isFast() const { return running && next && interval() < restart_interval; }
 
-  /// The step that comes next, if any, is none any more: it would come when the first successor
-  /// has begun.
+  /// The next step is obsolete: it would come after the first successor has begun.
   bool isSucceeded() const {
     return !successors.empty() && (!next || next->time_ns >= successors.first().profile->startNs());
   }
 
-  /// Serial of the profile that the next one has to go on from; 0: it is at rest.
+  /// Serial of the profile that the next one must continue; 0: the channel is at rest.
   std::uint64_t latest() const {
     return successors.empty() ? state.following : successors.last().serial;
   }
@@ -44,7 +43,7 @@ struct EngineChannel {
   void pullNext();
   void adopt(const motion::Profile& followed, std::uint64_t serial);
   void follow(const Follow& order);
-  /// @return whether it can: it is at rest, and nobody has reserved it.
+  /// @return whether it could be reserved: it is at rest, and not reserved yet.
   bool reserve();
   void release(const Command& command);
   /// A pulse has gone out.
@@ -53,23 +52,23 @@ struct EngineChannel {
 
   std::size_t index = 0;
   bool high = false;       // the pulse is out
-  bool running = false;    // the motion under way has made a step
-  bool changed = false;    // it is to be scheduled
-  bool faulty = false;     // as the fault line read last
-  bool unchecked = false;  // its fault line is to be read before the next step
-  bool reserved = false;   // somebody writes the chip's other pins
-  int direction = -1;      // as the DIR line has it
+  bool running = false;    // the current motion has made a step
+  bool changed = false;    // it must be scheduled
+  bool faulty = false;     // the last reading of the fault line
+  bool unchecked = false;  // its fault line must be read before the next step
+  bool reserved = false;   // the chip's other pins are being written
+  int direction = -1;      // the direction on the DIR line
   std::optional<motion::Step> next;
   Nanoseconds last_planned = 0;  // motion time of the step before, or of the profile's start
-  Nanoseconds late = 0;          // of the next step, as far as it is by now
+  Nanoseconds late = 0;          // of the next step, so far
 
-  // Clock times by which the last edges had happened.
+  // Clock times at which the writes of the last edges had ended.
   Nanoseconds rose = 0;
   Nanoseconds fell = 0;
   Nanoseconds turned = 0;
 
   const motion::Profile* profile = nullptr;  // the one that is followed
-  std::uint64_t group = 0;                   // of the order that came last; 0: alone
+  std::uint64_t group = 0;                   // of the last order; 0: no group
   Nanoseconds restart_interval = 0;
   ChannelState state;
   Snapshot<ChannelState> published;

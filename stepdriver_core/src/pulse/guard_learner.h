@@ -6,21 +6,21 @@
 
 namespace stepdriver::pulse {
 
-/// Learns how long before its time a wait must stop sleeping, from how late its sleeps have ended:
-/// so that kPart of them end in time.
+/// Learns from the lateness of sleeps how long before its deadline a wait must stop sleeping, so
+/// that kPart of the sleeps end in time.
 ///
-/// A sleep that ends later than the guard raises it by a twentieth, one that doesn't lowers it by a
-/// 2048th: it is at rest where the first come once in a hundred. However late one sleep ended, it
-/// counts as one, so that a machine that stalls doesn't drive it up.
+/// A sleep that is later than the guard raises it by a twentieth, any other lowers it by a 2048th:
+/// it settles when one sleep in a hundred is later. However late a sleep is, it counts only once,
+/// so that a computer that stalls doesn't drive the guard up.
 class GuardLearner {
  public:
   static constexpr double kPart = 0.99;
   static constexpr Nanoseconds kFirst = 60'000;
   static constexpr Nanoseconds kShortest = 5'000;
-  /// At 1000 waits in a second the spin is 20 % of the time then.
+  /// At 1000 waits per second, spinning then takes 20 % of the time.
   static constexpr Nanoseconds kLongest = 200'000;
 
-  /// @param late by how much the sleep ended after the time that it was to end at.
+  /// @param late how long after its intended end the sleep ended.
   void slept(Nanoseconds late) {
     const double step = kStep * guard_;
     guard_ += late > guard() ? step * kPart / (1.0 - kPart) : -step;

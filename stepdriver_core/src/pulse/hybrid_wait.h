@@ -9,23 +9,23 @@
 
 namespace stepdriver::pulse {
 
-/// Waits of one thread that come to their times exactly: sleeps up to a guard before the time, then
-/// spins. It spins for no longer than kMostSpinning of the time, and leaves the other threads
-/// theirs: see RunningShare. Without a clock of its own, so that any can be under it.
+/// Exact waits of one thread: it sleeps until a guard time before the deadline, then spins. It
+/// spins for at most kMostSpinning of the time, and leaves time for the other threads: see
+/// RunningShare. It has no clock of its own, so that it works with any.
 class HybridWait {
  public:
-  /// A real-time thread that spins on is stopped for the rest of the second by the kernel
+  /// If a real-time thread keeps spinning, the kernel stops it for the rest of the second
   /// (sched_rt_runtime_us), which costs far more than one late wake-up.
   static constexpr double kMostSpinning = 0.8;
 
-  /// @param guard how long before the time the sleep ends; none: as GuardLearner learns it.
+  /// @param guard how long before the deadline the sleep ends; empty: GuardLearner learns it.
   explicit HybridWait(std::optional<Nanoseconds> guard) : fixed_guard_(guard) {}
 
   Nanoseconds guard() const { return fixed_guard_.value_or(learner_.guard()); }
 
-  /// Returns when the time has come, or earlier where the system is woken.
+  /// Returns at the given time, or earlier if the system is woken.
   ///
-  /// @param system has now(), woken(), and sleepUntil(time), which ends when it is woken.
+  /// @param system has now(), woken(), and sleepUntil(time), which returns early if it is woken.
   template <typename System>
   void waitUntil(System& system, Nanoseconds time, bool may_spin = true) {
     Nanoseconds now = system.now();
@@ -44,7 +44,7 @@ class HybridWait {
  private:
   static constexpr Nanoseconds kWindow = 100'000'000;
 
-  // Returns when the sleep is to end.
+  // Returns the time at which the sleep must end.
   Nanoseconds begin(Nanoseconds now, Nanoseconds time, bool may_spin) {
     if (running_since_) share_.ran(now - *running_since_);
     running_since_ = now;
@@ -62,13 +62,13 @@ class HybridWait {
   void slept(Nanoseconds from, Nanoseconds wake, Nanoseconds now) {
     share_.slept(now - from);
     running_since_ = now;
-    if (now >= wake) learner_.slept(now - wake);  // else it was woken
+    if (now >= wake) learner_.slept(now - wake);  // otherwise it was woken
   }
 
   const std::optional<Nanoseconds> fixed_guard_;
   GuardLearner learner_;
   RunningShare share_;
-  std::optional<Nanoseconds> running_since_;  // what ran before that is in share_
+  std::optional<Nanoseconds> running_since_;  // the time before that is in share_
   Nanoseconds window_ = 0;  // start of the window in which spun_ was spent spinning
   Nanoseconds spun_ = 0;
 };

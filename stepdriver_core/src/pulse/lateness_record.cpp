@@ -6,12 +6,12 @@
 namespace stepdriver::pulse {
 namespace {
 
-constexpr unsigned kBitsOfBucket = 4;  // sixteen buckets to a power of two
+constexpr unsigned kBitsOfBucket = 4;  // sixteen buckets per power of two
 constexpr Nanoseconds kLongest = (Nanoseconds{1} << 36) - 1;
 constexpr Nanoseconds kSecond = 1'000'000'000;
 
 void addOne(std::atomic<std::uint64_t>& count) {
-  // There is one writer: no need of an addition that others can't get between.
+  // There is only one writer, so the addition needn't be atomic.
   count.store(count.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
 }
 
@@ -87,7 +87,7 @@ LatenessFigures LatenessRecord::lastSecond(Nanoseconds now) const {
   const Window& window = windows_[static_cast<std::size_t>(second) % windows_.size()];
   if (window.second.load(std::memory_order_acquire) != second) return {};
   const LatenessFigures figures = window.histogram.figures();
-  // Whoever needs more than a second for this reads what is of no use any more.
+  // A reader that needs more than a second for this gets outdated figures.
   std::atomic_thread_fence(std::memory_order_acquire);
   return window.second.load(std::memory_order_relaxed) == second ? figures : LatenessFigures{};
 }

@@ -10,10 +10,11 @@
 
 namespace stepdriver::pulse {
 
-/// Counts times in buckets of a fixed width relative to the time: sixteen to each power of two.
+/// Counts times in buckets of a fixed relative width: sixteen per power of two.
 ///
-/// add() and clear() are for one thread, figures() is for any: none of them waits, locks or
-/// allocates. What is added while it reads is in the figures or not, all that came before is.
+/// add() and clear() are for one thread, figures() is for any thread. They never wait, lock or
+/// allocate. The figures contain everything that was added before the call; what is added during
+/// the call may be missing.
 class LatenessHistogram {
  public:
   /// @param time 0 or more; from a minute on it counts as a minute.
@@ -35,12 +36,12 @@ class LatenessHistogram {
 /// LatenessHistogram.
 class LatenessRecord {
  public:
-  /// @param now, late clock time of a pulse, and by how much it was late.
+  /// @param now, late clock time of a pulse, and its lateness.
   void add(Nanoseconds now, Nanoseconds late);
 
   LatenessFigures sinceStart() const { return since_start_.figures(); }
 
-  /// Of the second before the one that `now` is in: seconds begin at whole ones of the clock.
+  /// For the second before the current one: seconds begin at whole seconds of the clock.
   LatenessFigures lastSecond(Nanoseconds now) const;
 
  private:
@@ -52,7 +53,7 @@ class LatenessRecord {
   };
 
   LatenessHistogram since_start_;
-  // While one is read the next one is written, and there is a second until that is over.
+  // While one is read, the next one is written, and that takes a second.
   std::array<Window, 3> windows_;
   Window* current_ = &windows_[0];
   Nanoseconds current_end_ = 0;

@@ -10,7 +10,7 @@ namespace stepdriver::pulse {
 template <typename T, std::size_t kCapacity>
 class Mailbox {
  public:
-  /// @return false where it is full; nothing was added then.
+  /// @return false if it is full; nothing was added then.
   bool push(const T& item) {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - head_.load(std::memory_order_acquire) == kCapacity) return false;
@@ -19,7 +19,7 @@ class Mailbox {
     return true;
   }
 
-  /// @return the oldest item, nullptr where there is none. It stays valid until pop().
+  /// @return the oldest item, or nullptr if it is empty. The item stays valid until pop().
   const T* front() const {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head == tail_.load(std::memory_order_acquire)) return nullptr;

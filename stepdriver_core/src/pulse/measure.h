@@ -17,12 +17,11 @@ constexpr int kMeasuredWakeUps = 300;  // a millisecond each
 constexpr int kMeasuredSleeps = 100;   // a millisecond each
 constexpr int kMeasuredCalls = 200;    // of each line; fewer if they take more than 20 ms
 
-/// Measures like measureWakeUps(), and what the calls cost. Nothing moves: STEP lines are written
-/// the level that they have, and no other line is written.
+/// Measures the same as measureWakeUps(), and the costs of the calls. Nothing moves: STEP lines are
+/// written with their current level, and no other line is written.
 ///
-/// @param lines not used by anyone else meanwhile; the STEP lines of the channels are at their
-/// inactive
-///   level.
+/// @param lines nobody else may use them meanwhile; the STEP lines of the channels are at their
+///   inactive level.
 /// @throw GpioError if a line can't be written or read.
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
                              const std::vector<ChannelConfig>& channels,

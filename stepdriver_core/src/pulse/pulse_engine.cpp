@@ -78,7 +78,7 @@ void PulseEngine::takeMail(Nanoseconds now) {
     mail_.pop();
   }
   news_ = true;
-  // An order may slide the timeline, and then no step may go out by its old time.
+  // An order may slide the timeline; then no step may go out at its old time.
   scheduleChanged();
 }
 
@@ -110,7 +110,7 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
       changed(channel);
     }
   }
-  // What they wait for is there for all at once: `follows` is not read any more.
+  // The sender sees all of them accepted at once: `follows` is no longer read.
   for (std::size_t i = command.follow_count; i-- > 0;) {
     const Follow& order = command.follows[i];
     Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
@@ -136,8 +136,8 @@ std::uint64_t PulseEngine::emergencyStop() {
   return asked;
 }
 
-// Every motion of a stop that was asked for before this pass has ended by now; the pulses that were
-// out then may still be high.
+// Every motion has ended by now if its stop was requested before this pass; the pulses of that time
+// may still be high.
 void PulseEngine::serveStops() {
   const std::uint64_t asked = stopsAsked();
   if (asked == stopsServed()) return;
@@ -157,7 +157,7 @@ void PulseEngine::readEmergencyStop() {
   if (!emergency_input_) return;
   const int level = lines_.read(emergency_input_->line);
   const bool active = level < 0 || (level != 0) == emergency_input_->active;
-  // Active still after a clear: that is a stop of its own.
+  // If it is still active after a clear, that is another stop.
   if (active && !(emergency_input_active_ && emergencyStopped())) {
     input_stops_.fetch_add(1, std::memory_order_release);
     stops_.ask();
@@ -223,7 +223,7 @@ void PulseEngine::collectDue(Nanoseconds now) {
   dues_.collect(now, due_);
 }
 
-// Returns whether the timeline was slid, and others are due now.
+// Returns whether the timeline slid, so that other channels are due now.
 bool PulseEngine::meetLateness(Nanoseconds now) {
   Nanoseconds excess = 0;
   for (const std::size_t index : due_) {
@@ -255,13 +255,13 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     const bool fall = action == Action::kFall;
     if (!fall && !(action == Action::kRise && mayStep(channel, now))) continue;
     const Signal& step = channel.config.step;
-    // Member by member: a pair that is made first and then copied whole has the processor wait.
+    // Member by member: copying a complete pair would make the processor wait.
     gpio::LineWrite& write = writes_.emplace_back();
     write.output = step.line;
     write.level = step.active != fall;
     writers_.push_back(&channel);
   }
-  // The reads of the switches took time, and a stop may have come in it; and what ended one channel
+  // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
   // may have ended others.
   if (emergencyStopped()) stopAll(now);
   dropEnded();
@@ -288,7 +288,8 @@ void PulseEngine::dropEnded() {
   writers_.resize(kept);
 }
 
-// One by one it shows whose line it is. What the write that failed has set already keeps its level.
+// Writing one by one shows whose line fails. Lines that the failed write has already set keep their
+// level.
 void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     Channel& channel = *writers_[i];
@@ -394,8 +395,7 @@ void PulseEngine::scheduleChanged() {
 }
 
 void PulseEngine::scheduleAll() {
-  // A slide moves what was scheduled before it; it can't be followed by another for the same
-  // reason.
+  // A slide moves everything scheduled before it; no second slide follows for the same reason.
   bool slid = true;
   while (slid) {
     slid = false;
@@ -418,7 +418,8 @@ bool PulseEngine::schedule(Channel& channel) {
       break;
     case Action::kFall:
       due = channel.rose + channel.config.step_high;
-      // What a slow write takes from the next interval belongs to the same slip as its lateness.
+      // The time that a slow write takes from the next interval belongs to the same slip as its
+      // lateness.
       slid = channel.next && !channel.isSucceeded() &&
              slideUpTo(closestRise(channel), channel.next->time_ns + state_.slipped);
       break;
@@ -433,7 +434,7 @@ bool PulseEngine::schedule(Channel& channel) {
   return slid;
 }
 
-// As near as the next step may come to the last one.
+// The earliest time at which the next step may follow the last one.
 Nanoseconds PulseEngine::closestRise(const Channel& channel) {
   return channel.rose +
          static_cast<Nanoseconds>(kClosest * static_cast<double>(channel.interval()));

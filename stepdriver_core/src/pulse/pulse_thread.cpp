@@ -42,7 +42,7 @@ void PulseThread::run() {
     const Nanoseconds due = engine_.serve();
     Nanoseconds alarm = alarm_.load(std::memory_order_acquire);
     if (alarm != kNever && listener_ != nullptr && clock_.now() >= alarm) {
-      // It goes off once; one that was set meanwhile is looked at in the next pass.
+      // It goes off once; an alarm that was set meanwhile is checked in the next pass.
       if (alarm_.compare_exchange_strong(alarm, kNever)) listener_->onNews();
       continue;
     }

@@ -12,19 +12,19 @@
 
 namespace stepdriver::pulse {
 
-/// A thread that keeps an engine served.
+/// A thread that serves an engine.
 ///
-/// It asks for SCHED_FIFO 50, locked memory and processors that don't sleep if the clock says that
-/// being late matters. If that is refused it works without, and rights() says so.
+/// It requests SCHED_FIFO 50, locked memory and processors that don't sleep if the clock is a
+/// real-time one. If any of these is refused, it works without it, and rights() says so.
 class PulseThread {
  public:
-  /// @param engine, clock outlive the thread. @param listener is told when an alarm goes off;
-  ///   nullptr: nobody.
+  /// @param engine, clock outlive the thread. @param listener is told when an alarm goes off; may
+  ///   be nullptr.
   /// @param latency_device see CpuLatencyHold; empty: the processors may sleep.
   PulseThread(PulseEngine& engine, Clock& clock, NewsListener* listener = nullptr,
               const std::string& latency_device = kCpuLatencyDevice);
 
-  /// stop(), if that wasn't called.
+  /// Calls stop() if that wasn't called.
   ~PulseThread();
   PulseThread(const PulseThread&) = delete;
   PulseThread& operator=(const PulseThread&) = delete;
@@ -32,12 +32,11 @@ class PulseThread {
   /// Ends the thread; no pulse goes out from then on.
   void stop();
 
-  /// The listener is told when the clock has come to this time: a virtual clock, which goes from
-  /// event to event, doesn't jump past it. Replaces the alarm before it; kNever: none. From any
-  /// thread.
+  /// The listener is told when the clock reaches this time: a virtual clock doesn't jump past it.
+  /// Replaces the previous alarm; kNever: no alarm. Safe from any thread.
   void setAlarm(Nanoseconds time);
 
-  /// What the thread asked for and was given.
+  /// What the thread requested and was granted.
   RealtimeRights rights() const;
 
  private:
@@ -48,7 +47,7 @@ class PulseThread {
   NewsListener* const listener_;
   std::atomic<Nanoseconds> alarm_{kNever};
   std::atomic<bool> stopping_{false};
-  std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not asked for
+  std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not requested
   std::atomic<int> lock_error_{-1};
   std::optional<CpuLatencyHold> latency_;
   std::thread thread_;

@@ -33,11 +33,11 @@ std::string latencyText(int error) {
   return fmt::format("{} can't be held ({})", text, std::strerror(error));
 }
 
-// The pulse thread's code has smaller ones. This keeps out the tables of libraries that it doesn't
-// call: ICU's, which the log library brings along, take 30 MB.
+// The constants of the pulse thread's own code are smaller. This keeps out the tables of libraries
+// that it doesn't call: ICU's, which the log library depends on, take 30 MB.
 constexpr std::size_t kLargestConstants = 4 << 20;
 
-/// Brings the code and the data of a program or library into memory, for dl_iterate_phdr().
+/// Loads the code and the data of a program or library into memory, for dl_iterate_phdr().
 /// @return 0, or the errno of the refusal.
 int bringIn(dl_phdr_info* object, std::size_t /*size*/, void* /*data*/) {
   for (int i = 0; i < object->dlpi_phnum; ++i) {
@@ -52,13 +52,13 @@ int bringIn(dl_phdr_info* object, std::size_t /*size*/, void* /*data*/) {
   return 0;
 }
 
-/// [bytes] More than the pulse thread's calls take of its stack.
+/// [bytes] More than the pulse thread uses of its stack.
 constexpr std::size_t kStackDepth = 64 << 10;
 
 }  // namespace
 
 int askForScheduler() {
-  // Half of the lateness of a wake-up is the default slack of 50 us.
+  // The default slack of 50 us is half of the lateness of a wake-up.
   prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
   sched_param parameters{};
   parameters.sched_priority = kRealtimePriority;
@@ -66,7 +66,7 @@ int askForScheduler() {
 }
 
 int lockMemory() {
-  // Root may lift it, and anyone as far as his hard limit goes.
+  // Root may lift it, and any user may raise it up to the hard limit.
   const rlimit none{RLIM_INFINITY, RLIM_INFINITY};
   rlimit limit{};
   if (getrlimit(RLIMIT_MEMLOCK, &limit) != 0) return errno;

@@ -6,13 +6,13 @@
 
 namespace stepdriver::pulse {
 
-/// Keeps a thread that outranks all others from taking all of the time where it can't keep up: of
-/// each second it runs for at most 0.91. It owes sleep for what it runs, a ninth of it, and what it
-/// sleeps pays that back; where it owes kAllowed, it is to rest.
+/// Keeps a thread that outranks all others from taking all of the time if it can't keep up: it runs
+/// for at most 0.91 of each second. It owes a ninth of its running time as sleep, and sleeping pays
+/// that back; when it owes kAllowed, it must rest.
 ///
-/// The rests are short: a pulse that one of them makes late is late by far less than what a motor
-/// must stop for, and the timeline slides by it as by any lateness. So of a long run, or of a stall
-/// of the machine that looks like one, no more than kLongestRest is made good.
+/// The rests are short: a pulse that one of them delays is late by far less than the lateness at
+/// which a motor must stop, and slides the timeline like any other late pulse. For a long run, or a
+/// stall of the computer that looks like one, no more than kLongestRest is repaid.
 class RunningShare {
  public:
   static constexpr double kMost = 0.9;
@@ -27,7 +27,7 @@ class RunningShare {
   }
   void slept(Nanoseconds time) { owed_ = std::max(0.0, owed_ - static_cast<double>(time)); }
 
-  /// How long it is to sleep now at least; 0: it need not.
+  /// How long it must sleep now at least; 0: it needn't.
   Nanoseconds rest() const {
     const auto owed = static_cast<Nanoseconds>(owed_);
     return owed < kAllowed ? 0 : owed - kAllowed + kRest;

@@ -9,8 +9,8 @@
 
 namespace stepdriver::pulse {
 
-/// A value that one thread writes without ever waiting and any thread reads whole (a sequence lock:
-/// a reader that meets a write tries again).
+/// A value that one thread writes without ever waiting and any thread reads consistently (a
+/// sequence lock: a reader that meets a write tries again).
 template <typename T>
 class Snapshot {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -23,7 +23,7 @@ class Snapshot {
     const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);
     sequence_.store(sequence + 1, std::memory_order_relaxed);
     std::atomic_thread_fence(std::memory_order_release);
-    // Word by word from where it is: a copy of the whole would cost as much again.
+    // Word by word from the original: copying the whole first would double the cost.
     const auto* bytes = reinterpret_cast<const unsigned char*>(&value);
     for (std::size_t i = 0; i < kWords; ++i) {
       std::uint64_t word = 0;

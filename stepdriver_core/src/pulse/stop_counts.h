@@ -5,20 +5,20 @@
 
 namespace stepdriver::pulse {
 
-/// The emergency stops of an engine, in three counts: those that were asked for, by anyone; those
-/// that were served, when the pulse that was out has fallen and every motion has ended; and those
-/// that were cleared. The engine is stopped while more were asked for than cleared, so a stop that
+/// The emergency stops of an engine, in three counts: those that were requested, by any thread;
+/// those that were served, when the current pulse has fallen and every motion has ended; and those
+/// that were cleared. The engine is stopped while more were requested than cleared, so a stop that
 /// comes while an earlier one is being cleared is never lost.
 ///
 /// ask() may be called from any thread, serve() from the pulse thread, clear() from one thread at a
 /// time.
 class StopCounts {
  public:
-  /// @return the count of stops asked for, with this one.
+  /// @return the count of requested stops, including this one.
   std::uint64_t ask() { return asked_.fetch_add(1, std::memory_order_acq_rel) + 1; }
-  /// All that were asked for up to this count are served.
+  /// All stops that were requested up to this count have been served.
   void serve(std::uint64_t asked) { served_.store(asked, std::memory_order_release); }
-  /// All that were served up to this count are over.
+  /// All stops that were served up to this count are cleared.
   void clear(std::uint64_t served) { cleared_.store(served, std::memory_order_release); }
 
   std::uint64_t asked() const { return asked_.load(std::memory_order_acquire); }

@@ -9,8 +9,8 @@
 
 namespace stepdriver::pulse {
 
-/// Profiles that take over, one after the other, each at its start time. One that was planned
-/// before another has taken over goes on from that other: none may be left out.
+/// Profiles that take over, one after the other, each at its start time. Each was planned to
+/// continue the one before it, so none may be left out.
 class Successors {
  public:
   struct Entry {
@@ -22,7 +22,8 @@ class Successors {
   const Entry& first() const { return entries_[0]; }
   const Entry& last() const { return entries_[size_ - 1]; }
 
-  /// Room for one that begins then: those that would begin no earlier have no time left.
+  /// Whether there is room for a profile that begins at this time: those that would begin at or
+  /// after it are dropped.
   bool hasRoom(Nanoseconds start) const {
     return size_ < kCapacity || last().profile->startNs() >= start;
   }

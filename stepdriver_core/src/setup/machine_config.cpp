@@ -22,7 +22,7 @@ constexpr double kLongestTimeoutMs = 60'000.0;
 
 const std::vector<std::string> kPolicies = {"warn", "enforce"};
 
-/// Keys of a configuration that mean something to the ROS node alone.
+/// Keys of a configuration that only the ROS node uses.
 constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout", "hardware_id"};
 
 void readGpio(ConfigReader gpio, MachineConfig& config) {
@@ -112,7 +112,7 @@ void chooseBackend(ConfigValue& tree, BackendChoice choice) {
   }
   const bool simulated = choice == BackendChoice::kSimulated;
   (*gpio)["backend"] = simulated ? "simulated" : "libgpiod";
-  // GPIO lines have no trace, and that is an issue: here nobody asked for both.
+  // A trace with GPIO lines is an issue, but here the user did not ask for both.
   const auto simulation = simulated ? map->end() : map->find("simulation");
   if (simulation == map->end()) return;
   if (auto* keys = simulation->second.as<ConfigValue::Map>()) keys->erase("trace");
@@ -125,7 +125,7 @@ MachineConfig machineConfigOf(ConfigValue tree, BackendChoice choice) {
   for (const char* key : kNodeKeys) reader.allow(key);
   MachineConfig config = readMachineConfig(reader);
   reader.rejectUnknown();
-  // How the rig is built can be judged only if the axes are right.
+  // The rig can be checked only if the axes are right.
   if (issues.empty() && config.backend == GpioBackend::kSimulated) {
     checkSimulation(config.axes, config.simulation, "simulation", issues);
   }

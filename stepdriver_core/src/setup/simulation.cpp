@@ -17,9 +17,9 @@ namespace {
 using config::AxisConfig;
 using config::Kind;
 
-// A switch that no parameter places stands this far outside of the soft limit,
+// A switch without a configured position is this far outside the soft limit,
 constexpr double kSwitchMargin = 2.0;  // [mm|deg]
-// or, where there is none, this far from the origin or from the other soft limit.
+// or, if there is no soft limit, this far from the origin or from the other soft limit.
 constexpr double kFarLinear = 100.0;  // [mm]
 constexpr double kFarRotary = 360.0;  // [deg]
 
@@ -56,7 +56,7 @@ std::optional<sim::SwitchSpec> switchOf(const std::optional<config::Endstop>& en
   return spec;
 }
 
-/// The axis as it really is.
+/// The axis as it is really wired.
 AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
   if (wiring.dir_inverted) axis.pins.dir.inverted = *wiring.dir_inverted;
   if (wiring.steps_per_unit) {

@@ -18,7 +18,7 @@ constexpr int kMostWrites = std::numeric_limits<int>::max();
 /// Reads the rig of one axis.
 class SimulatedAxisReader {
  public:
-  /// @param unit suffix of the keys with a length; empty: not certain, either is taken.
+  /// @param unit suffix of the keys with a length; empty: uncertain, so both are accepted.
   SimulatedAxisReader(ConfigReader reader, std::string unit)
       : reader_(std::move(reader)), unit_(std::move(unit)) {}
 

@@ -163,11 +163,11 @@ std::optional<int> ChipModel::decodedMicrosteps() const {
 }
 
 std::int64_t ChipModel::advance(bool forward) {
-  // Where nobody knows what the pins select, the mode before is as good a guess as any.
+  // If the pins select an undefined mode, assume the previous one.
   microsteps_ = decoded_.value_or(microsteps_);
   const std::int64_t unit = finest_ / microsteps_;
   const std::int64_t before = translator_;
-  // From a place that a coarser mode doesn't have, it goes to the next one that the mode has.
+  // From a position that a coarser mode doesn't have, it goes to the next one that the mode has.
   translator_ =
       forward ? (floorDivide(before, unit) + 1) * unit : -(floorDivide(-before, unit) + 1) * unit;
   return translator_ - before;

@@ -15,18 +15,18 @@ namespace stepdriver::sim {
 enum class Pin { kStep, kDir, kEnable, kMs1, kMs2, kMs3, kSleep, kReset };
 constexpr std::size_t kPinCount = 8;
 
-/// How a pin is called in traces.
+/// The name of a pin in traces.
 const char* nameOf(Pin pin);
 const Wire& wireOf(const RigAxisSpec& spec, Pin pin);
 
-/// A driver chip: pins in, translator out. It knows the times of all edges and counts what breaks
-/// the datasheet. Levels given to it are those of the lines.
+/// A driver chip: pins in, translator out. It knows the times of all edges and counts violations of
+/// the datasheet. Its input levels are those of the lines.
 class ChipModel {
  public:
-  /// A pulse that came in: where DIR pointed, and what the translator made of it.
+  /// A pulse: the direction of DIR, and the resulting step of the translator.
   struct Pulse {
     bool forward;
-    std::int64_t moved;  ///< microsteps of the finest mode; 0 where the chip ignored it
+    std::int64_t moved;  ///< microsteps of the finest mode; 0 if the chip ignored it
   };
 
   explicit ChipModel(const RigAxisSpec& spec);
@@ -82,7 +82,7 @@ class ChipModel {
   std::int64_t step_inactive_ns_ = kForEver;
   std::int64_t mode_changed_ns_ = kForEver;
   std::int64_t translator_ = 0;
-  std::optional<int> decoded_;  // of the levels on the microstep pins
+  std::optional<int> decoded_;  // mode selected by the microstep pins
   int microsteps_;
   std::map<Violation, std::int64_t> violations_;
 };

@@ -26,16 +26,16 @@ struct WriteFault {
   int error;
 };
 
-/// What is on a line: pins that it drives, or contacts that drive it.
+/// A line: the pins that it drives, or the contacts that drive it.
 struct Line {
   std::vector<PinOnLine> pins;
   std::vector<const SwitchModel*> contacts;
   bool other_level = false;  // of an input that no axis has
   std::optional<WriteFault> write_fault;
   gpio::EdgeListener listener;
-  bool told_level = false;  // what the listener knows
+  bool told_level = false;  // the last level that the listener was told
 
-  /// The level of an input by what each of its switches is.
+  /// The level of an input, from the state of each of its switches.
   template <typename Active>
   bool level(const Active& active) const {
     if (contacts.empty()) return other_level;
@@ -75,7 +75,7 @@ class Rig::Impl {
     throw std::out_of_range("The rig has no axis named " + name + ".");
   }
 
-  /// @return the time, not before any that came in earlier; bounces up to it are in the trace.
+  /// @return the time, but not before any earlier one; bounces up to it are in the trace.
   std::int64_t advance(std::int64_t time_ns) {
     latest_ns = std::max(latest_ns, time_ns);
     feed.advance(latest_ns);
@@ -90,7 +90,7 @@ class Rig::Impl {
   Line& lineOf(const std::string& line) { return at(indexOf(line)); }
   Line& at(int line) { return lines[static_cast<std::size_t>(line)]; }
 
-  /// Tells the trace and whoever watches what switches did just now.
+  /// Reports the latest changes of switches to the trace and the listeners.
   void switchesMoved(std::int64_t time_ns) {
     feed.switchesMoved(time_ns);
     for (const int index : watched) {
@@ -112,7 +112,7 @@ class Rig::Impl {
   std::vector<std::unique_ptr<RigAxis>> axes;
   TraceFeed feed;
   std::vector<Line> lines;
-  std::vector<int> watched;           // of them, those that someone listens to
+  std::vector<int> watched;           // those of them with a listener
   std::atomic<int> failing_lines{0};  // those with a write_fault: each write asks
   std::int64_t latest_ns = kForEver;
 

@@ -5,8 +5,7 @@
 
 namespace stepdriver::sim {
 
-/// Before any time that a clock shows, and still far enough from the end of the range for
-/// differences.
+/// Earlier than any time of a clock, and far enough from the end of the range for differences.
 constexpr std::int64_t kForEver = std::numeric_limits<std::int64_t>::min() / 2;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 

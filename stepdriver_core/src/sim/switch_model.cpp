@@ -5,8 +5,8 @@
 namespace stepdriver::sim {
 namespace {
 
-// Positions are written in decimals and reached in steps that binary fractions can't hold: a
-// picometre keeps a carriage that stands exactly on the switch from being a rounding error short.
+// Positions are decimal and are reached in steps that binary fractions can't represent. A picometre
+// of tolerance keeps a carriage exactly on the switch from being a rounding error short of it.
 constexpr double kRounding = 1e-9;
 
 }  // namespace

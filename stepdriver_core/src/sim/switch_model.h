@@ -10,26 +10,27 @@ namespace stepdriver::sim {
 
 enum class Side { kMin, kMax };
 
-/// A switch: pressed or not by where the carriage is, bouncing for a while after each change.
+/// A switch: the position of the carriage presses it or not, and it bounces for a while after each
+/// change.
 class SwitchModel {
  public:
   SwitchModel(const SwitchSpec& spec, Side side, double carriage);
 
   const SwitchSpec& spec() const { return spec_; }
 
-  /// The carriage stands here from this time on.
+  /// The carriage is at this position from this time on.
   void follow(double carriage, std::int64_t time_ns);
 
-  /// Reads active (true) or inactive from now on, whatever the carriage does; none: works again.
+  /// Reads active (true) or inactive from now on, whatever the carriage does; empty: works again.
   void stick(std::optional<bool> active) { stuck_ = active; }
 
-  /// As its line reads.
+  /// The reading of its line.
   bool active(std::int64_t time_ns) const;
 
-  /// As its line reads when the contact has bounced out.
+  /// The reading of its line after the bounces.
   bool settled() const { return stuck_.value_or(pressed_); }
 
-  /// The level that it gives its line.
+  /// The level of its line.
   bool level(std::int64_t time_ns) const { return active(time_ns) == spec_.active_level; }
 
   /// @return when the contact bounces next, after this time; kNever when it has settled.

@@ -12,8 +12,8 @@
 
 namespace stepdriver::sim {
 
-/// Brings the edges of pins and the bounces of switches, which no one calls in at their time, to a
-/// trace in the order of time. Does nothing without a trace.
+/// Writes the edges of pins and the bounces of switches, for which there are no calls at their
+/// time, to a trace in the order of time. Does nothing without a trace.
 class TraceFeed {
  public:
   explicit TraceFeed(std::shared_ptr<PinTrace> trace) : trace_(std::move(trace)) {}
@@ -24,20 +24,20 @@ class TraceFeed {
   /// @param contact outlives the feed.
   void addSwitch(const TracePin& pin, const SwitchModel* contact);
 
-  /// The pin has this level, by a request. Lines are requested one by one, but at one time: the
-  /// trace begins with all of them in place.
+  /// A request gave the pin this level. Lines are requested one by one, but at the same time: the
+  /// trace begins with the levels of all of them.
   void settle(int pin, bool level, std::int64_t time_ns);
   void edge(int pin, bool level, std::int64_t time_ns);
 
-  /// Brings in the bounces up to this time.
+  /// Writes the bounces up to this time.
   void advance(std::int64_t time_ns);
 
-  /// Brings in what switches did just now.
+  /// Writes the latest changes of switches.
   void switchesMoved(std::int64_t time_ns);
 
   void flush();
 
-  /// Brings in the bounces that are still to come. No edge may follow.
+  /// Writes all remaining bounces. No edge may follow.
   void finish();
 
  private:

@@ -11,16 +11,16 @@ namespace stepdriver::sim {
 
 /// Writes the edges to a VCD file (IEEE 1364-2005, clause 18; timescale 1 ns, time 0 at begin()),
 /// which GTKWave, PulseView and sigrok-cli open. A last time stamp, 1 us after the last edge,
-/// closes the file: without it viewers leave the last levels out.
+/// closes the file: without it viewers don't show the last levels.
 ///
-/// Each axis is a scope, and its pins are named as TracePin says. sigrok up to 0.5 drops the
-/// scopes: of several axes it shows pins of one name.
+/// Each axis is a scope, and its pins have the names of TracePin. sigrok up to 0.5 drops the
+/// scopes: with several axes it shows pins of the same name.
 ///
-/// The same edges make the same file: there is no date in it. Edges are buffered; the file is
-/// complete up to the last edge after flush() and after destruction.
+/// The same edges make the same file: it contains no date. Edges are buffered; the file is complete
+/// up to the last edge after flush() and after destruction.
 class VcdTrace : public PinTrace {
  public:
-  /// @throw Error where the file can't be written; an existing one is replaced.
+  /// @throw Error if the file can't be written; an existing one is replaced.
   explicit VcdTrace(const std::string& path);
   ~VcdTrace() override;
 
@@ -28,7 +28,7 @@ class VcdTrace : public PinTrace {
              std::int64_t time_ns) override;
   void edge(int pin, bool level, std::int64_t time_ns) override;
 
-  /// @throw Error where the file couldn't be written, now or earlier.
+  /// @throw Error if the file couldn't be written, now or earlier.
   void flush() override;
 
  private:

@@ -19,7 +19,7 @@ namespace {
 
 using config::ConfigValue;
 
-// Deeper than any configuration; an alias may name what it is in.
+// Deeper than any configuration; an alias may refer to a node that contains it.
 constexpr int kDeepest = 50;
 
 class Converter {
@@ -65,7 +65,7 @@ class Converter {
     fail(node.Mark(), "the tag " + tag + " can't be a ROS parameter");
   }
 
-  // A plain `on` or 7 is no word to PyYAML, and then rosparam can't load the file.
+  // A plain `on` or 7 isn't a string for PyYAML, so rosparam couldn't load the file.
   std::string keyOf(const YAML::Node& node) const {
     const ConfigValue key = scalar(node);
     if (const auto* word = key.as<std::string>()) return *word;

@@ -92,7 +92,7 @@ std::optional<double> realOf(const std::string& text) {
   return sign * (sixties ? sexagesimal(digits) : std::strtod(digits.c_str(), nullptr));
 }
 
-/// Whatever strtod() takes, and nothing behind it.
+/// Everything that strtod() accepts, with nothing after it.
 std::optional<double> anyNumber(const std::string& text) {
   char* end = nullptr;
   const double number = std::strtod(text.c_str(), &end);

@@ -14,7 +14,7 @@ namespace {
 
 using config::ConfigValue;
 
-/// Whether a plain scalar of this text is this text: `on` and 017 aren't.
+/// Whether a plain scalar with this text is a string with this text: `on` and 017 aren't.
 bool isPlain(const std::string& text) {
   try {
     const ConfigValue value = resolveScalar(text);
@@ -25,8 +25,8 @@ bool isPlain(const std::string& text) {
   }
 }
 
-/// As short as it can be read back as the same, and always with a point: without it YAML 1.1 has no
-/// doubles.
+/// The shortest text that is read back as the same number, always with a decimal point: YAML 1.1
+/// requires one in a double.
 std::string doubleText(double number) {
   constexpr int kFewest = 6;
   constexpr int kMost = 17;

@@ -6,10 +6,10 @@
 
 #include "gpiod_calls.h"
 
-// libgpiod 1.4 to 1.6. Flags hold for a whole request, and so inputs of one bias make one; a line
-// with edges always makes one of its own. gpiod_line_set_value() and gpiod_line_get_value() on one
-// line of many zero the others and read the first: it is always the whole request that is set and
-// read.
+// libgpiod 1.4 to 1.6. Flags apply to a whole request, so all inputs with the same bias share one;
+// a line with edges always has its own. In a request with several lines, gpiod_line_set_value()
+// zeroes the other lines and gpiod_line_get_value() reads the first one. The whole request is
+// therefore always set and read.
 
 namespace stepdriver::gpio::gpiod {
 namespace {
@@ -80,7 +80,7 @@ class Bulk {
     return levels[static_cast<std::size_t>(index)];
   }
 
-  /// Of a request of one line with edges.
+  /// For a request of one line with edges.
   int edgeFd() { return gpiod_line_event_get_fd(gpiod_line_bulk_get_line(&lines_, 0)); }
 
  private:
@@ -155,7 +155,7 @@ class Inputs1 : public Inputs {
   std::vector<std::unique_ptr<Bulk>> bulks_;
   std::vector<Place> lines_;
   std::vector<int> edge_fds_;
-  std::vector<int> edge_lines_;  // which line each of the fds is
+  std::vector<int> edge_lines_;  // the line of each fd
 };
 
 std::string textOf(const char* text) { return text == nullptr ? "" : text; }

@@ -6,14 +6,14 @@
 
 #include "gpiod_calls.h"
 
-// libgpiod 2. It aborts where it is given a null object: whatever is made is looked at first.
+// libgpiod 2. It aborts if it is given a null object, so every new object is checked first.
 
 namespace stepdriver::gpio::gpiod {
 namespace {
 
 constexpr std::size_t kEdgesAtOnce = 16;
 
-/// Frees an object of libgpiod by the function for it.
+/// Frees an object of libgpiod with its function.
 template <auto function>
 struct Free {
   template <typename Object>
@@ -63,7 +63,7 @@ gpiod_line_bias biasOf(Bias bias) {
   return GPIOD_LINE_BIAS_AS_IS;
 }
 
-/// A request in the making.
+/// A request under construction.
 class Wanted {
  public:
   explicit Wanted(gpiod_line_direction direction)
@@ -73,7 +73,7 @@ class Wanted {
           "gpiod_line_settings_set_direction");
   }
 
-  /// As they are for the lines that are added next.
+  /// The settings for the lines that are added next.
   gpiod_line_settings* settings() { return settings_.get(); }
 
   void add(unsigned offset) {

@@ -9,16 +9,17 @@
 #include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/gpio/lines.h"
 
-/// What the backend needs of libgpiod, in the words of neither of its versions. gpiod1.cpp and
-/// gpiod2.cpp are two forms of it, of which one is compiled; they call, and decide nothing.
+/// The functions of libgpiod that the backend needs, independent of its version. gpiod1.cpp and
+/// gpiod2.cpp implement them; one of the two is compiled. They only make the calls and decide
+/// nothing.
 ///
-/// What is called when lines are requested throws std::system_error with the errno; the rest is
-/// noexcept, doesn't allocate, and isn't safe to call on one object from two threads at a time.
+/// Functions that request lines throw std::system_error with the errno. The others are noexcept and
+/// don't allocate; only one thread at a time may call them on one object.
 namespace stepdriver::gpio::gpiod {
 
 constexpr const char* kConsumer = "stepdriver";
 
-/// What both versions of the kernel's interface take in one request.
+/// The limit of one request in both versions of the kernel's interface.
 constexpr std::size_t kMostLines = 64;
 
 /// A bit for each line of a request, by its index.
@@ -37,7 +38,8 @@ struct InputLine {
   bool edges;
 };
 
-/// The outputs of one chip. Lines go by their index in the request. Released on destruction.
+/// The outputs of one chip. Lines are identified by their index in the request. Released on
+/// destruction.
 class Outputs {
  public:
   Outputs() = default;
@@ -45,15 +47,16 @@ class Outputs {
   Outputs& operator=(const Outputs&) = delete;
   virtual ~Outputs() = default;
 
-  /// Drives lines, in one call of the kernel.
+  /// Drives lines, in one kernel call.
   ///
   /// @param lines a bit for each line that changes.
-  /// @param levels a bit for each line of all, since version 1 can only set all of a request.
+  /// @param levels a bit for each line of the request, because version 1 can only set all of them.
   /// @return 0 or the errno.
   virtual int set(LineBits lines, LineBits levels) noexcept = 0;
 };
 
-/// The inputs of one chip. Lines go by their index in the request. Released on destruction.
+/// The inputs of one chip. Lines are identified by their index in the request. Released on
+/// destruction.
 class Inputs {
  public:
   Inputs() = default;
@@ -61,16 +64,16 @@ class Inputs {
   Inputs& operator=(const Inputs&) = delete;
   virtual ~Inputs() = default;
 
-  /// @return 0 or 1, or -errno; one call of the kernel.
+  /// @return 0 or 1, or -errno; makes one kernel call.
   virtual int get(int line) noexcept = 0;
 
-  /// Readable when there are edges.
+  /// The file descriptors that become readable when there are edges.
   virtual const std::vector<int>& edgeFds() const = 0;
 
-  /// Reads from the fd of this index, which must be readable, at least one edge.
+  /// Reads at least one edge from the fd of this index, which must be readable.
   ///
   /// @param edges their `input` is the index of the line here.
-  /// @return how many, or -errno.
+  /// @return the number of edges, or -errno.
   virtual int takeEdges(std::size_t fd, EdgeEvent* edges, std::size_t capacity) noexcept = 0;
 };
 
@@ -81,17 +84,17 @@ class Chip {
   Chip& operator=(const Chip&) = delete;
   virtual ~Chip() = default;
 
-  /// The chip and its lines as they are now.
+  /// The current state of the chip and its lines.
   virtual ChipInfo info() = 0;
 
-  /// At most kMostLines. The chip must outlive them.
+  /// Requests at most kMostLines lines. The chip must outlive them.
   virtual std::unique_ptr<Outputs> requestOutputs(const std::vector<OutputLine>& lines) = 0;
   virtual std::unique_ptr<Inputs> requestInputs(const std::vector<InputLine>& lines) = 0;
 };
 
 std::unique_ptr<Chip> openChip(const std::string& path);
 
-/// Whether an input's bias can be set: from version 1.5 on.
+/// Whether an input's bias can be set: since version 1.5.
 bool canBias();
 
 /// `1.6.3`.

@@ -30,8 +30,8 @@ bool has(const Items& items, int index) {
 int setLevels(OutputGroup& group, LineBits lines, LineBits levels) noexcept {
   const std::lock_guard<PriorityMutex> lock(group.mutex);
   const LineBits all = (group.levels & ~lines) | (levels & lines);
-  // A write that fails leaves the levels as they were: a later one must not make an edge that
-  // someone was told has failed.
+  // A failed write doesn't change the stored levels: a later write must not make an edge that was
+  // reported as failed.
   const int error = group.request->set(lines, all);
   if (error == 0) group.levels = all;
   return error;
@@ -53,7 +53,7 @@ HeldLines::HeldLines(Parts&& parts)
 }
 
 HeldLines::~HeldLines() {
-  // One by one, in the order of the request; a chip that is gone has no lines to make safe.
+  // One by one, in the order of the request; a chip that was removed has no lines to make safe.
   for (const OutputSeat& output : parts_.outputs) {
     if (output.keep_on_release) continue;
     const LineBits line = bitOf(output.seat.index);
@@ -121,9 +121,9 @@ int HeldLines::waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
   for (std::size_t i = 0; i < sources_.size() && count < capacity; ++i) {
     const short seen = polled_[i + 1].revents;
     if (seen == 0) continue;
-    // Without POLLIN it is the chip that has gone.
+    // Without POLLIN, the chip was removed.
     const bool gone = (seen & POLLIN) == 0;
-    if (gone && count == 0) polled_[i + 1].fd = -1;  // told once: it would come again for ever
+    if (gone && count == 0) polled_[i + 1].fd = -1;  // reported once: it would come again for ever
     const int taken = gone ? -ENODEV : takeEdges(sources_[i], events + count, capacity - count);
     if (taken < 0) return count > 0 ? static_cast<int>(count) : taken;
     count += static_cast<std::size_t>(taken);
@@ -137,7 +137,7 @@ int HeldLines::takeEdges(const EdgeSource& source, EdgeEvent* events,
   const std::lock_guard<PriorityMutex> lock(group.mutex);
   const int count = group.request->takeEdges(source.fd, events, capacity);
   if (count <= 0) return count;
-  // Kernels before 5.7 stamp with CLOCK_REALTIME: far in the future, as it were.
+  // Kernels before 5.7 stamp with CLOCK_REALTIME, which is far in the future here.
   const std::int64_t now = monotonicNow();
   for (int i = 0; i < count; ++i) {
     events[i].input = group.inputs[static_cast<std::size_t>(events[i].input)];

@@ -14,21 +14,21 @@ struct pollfd;
 
 namespace stepdriver::gpio::gpiod {
 
-/// The outputs that are on one chip, in one request of the kernel.
+/// The outputs on one chip, in one kernel request.
 struct OutputGroup {
   std::unique_ptr<Outputs> request;
-  LineBits levels = 0;    // as they were last set
+  LineBits levels = 0;    // their last levels
   PriorityMutex mutex{};  // of both
 };
 
-/// The inputs that are on one chip.
+/// The inputs on one chip.
 struct InputGroup {
   std::unique_ptr<Inputs> request;
-  std::vector<int> inputs;  // index in the whole request by the one in this
+  std::vector<int> inputs;  // maps indices in this group to indices in the whole request
   PriorityMutex mutex{};    // of the request
 };
 
-/// Where a line of the whole request is.
+/// The place of a line of the whole request.
 struct Seat {
   std::size_t group;
   std::size_t index;
@@ -40,10 +40,10 @@ struct OutputSeat {
   bool keep_on_release;
 };
 
-/// Lines that were requested, whatever the version of libgpiod.
+/// Requested lines, for any version of libgpiod.
 class HeldLines : public Lines {
  public:
-  /// What it is made of. In the order in which it must not go: lines before their chips.
+  /// The parts, in the reverse order of destruction: lines must be released before their chips.
   struct Parts {
     std::vector<std::unique_ptr<Chip>> chips;
     std::vector<std::unique_ptr<InputGroup>> input_groups;
@@ -54,7 +54,7 @@ class HeldLines : public Lines {
     std::vector<std::string> input_names;
   };
 
-  /// @throw std::system_error where the kernel has no eventfd left.
+  /// @throw std::system_error if the kernel has no eventfd left.
   explicit HeldLines(Parts&& parts);
   ~HeldLines() override;
 
@@ -70,17 +70,17 @@ class HeldLines : public Lines {
  private:
   struct EdgeSource {
     InputGroup* group;
-    std::size_t fd;  // index among the group's
+    std::size_t fd;  // index among the group's file descriptors
   };
 
-  /// Sets those of the writes that are on the same chip as the first.
+  /// Sets the writes that are on the same chip as the first.
   int writeGroup(const LineWrite* writes, std::size_t count) noexcept;
   const Seat& seatOf(const LineWrite& write) const noexcept;
   static int takeEdges(const EdgeSource& source, EdgeEvent* events, std::size_t capacity) noexcept;
 
   Parts parts_;
   int interrupt_fd_;
-  std::vector<pollfd> polled_;  // the interrupt's, then one for each source
+  std::vector<pollfd> polled_;  // the interrupt, then one for each source
   std::vector<EdgeSource> sources_;
 };
 

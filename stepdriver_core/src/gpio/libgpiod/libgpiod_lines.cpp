@@ -34,7 +34,7 @@ class Requester {
   }
 
  private:
-  /// Indexes in the whole request of what is on one chip.
+  /// Indices in the whole request, by chip.
   using ByChip = std::map<std::size_t, std::vector<std::size_t>>;
 
   ByChip byChip(const char* kind, std::size_t first, std::size_t count) const {
@@ -112,8 +112,8 @@ class Requester {
     }
   }
 
-  /// Takes lines of one chip. Where that fails, it takes them one by one to find out which it is:
-  /// the kernel doesn't tell.
+  /// Requests lines of one chip. If that fails, it requests them one by one to find the one that
+  /// failed, because the kernel doesn't report it.
   template <typename Line, typename Take, typename Refusal>
   void request(std::size_t chip, const char* kind, const std::vector<Line>& lines, const Take& take,
                const Refusal& refusal) {
@@ -159,7 +159,7 @@ class Requester {
                       const std::string& reason) {
     const std::string described = "Line " + describe(open_.table, line, address);
     if (error == EBUSY) {
-      // Someone took it just now; the table doesn't know who.
+      // Another program requested it just now; the table doesn't know which.
       LineInfo holder;
       try {
         holder = open_.chips[address.chip]->info().lines[address.offset];
@@ -175,7 +175,7 @@ class Requester {
   const std::vector<InputRequest>& inputs_;
   gpiod::OpenChips open_;
   std::vector<LineAddress> addresses_;  // outputs first
-  HeldLines::Parts parts_;              // after the chips: its lines must go before them
+  HeldLines::Parts parts_;              // after the chips: its lines must be released before them
 };
 
 class LibgpiodBackend : public Backend {

@@ -8,11 +8,11 @@
 
 namespace stepdriver::gpio::gpiod {
 
-/// The machine's chips, by number. Symbolic links in /dev are left out: they are second names,
-/// which some systems have for a chip that has moved.
+/// The computer's chips, by number. Symbolic links in /dev are ignored: some systems have them as
+/// second names of a chip whose number has changed.
 struct OpenChips {
   std::vector<ChipInfo> table;
-  std::vector<std::unique_ptr<Chip>> chips;  // null where it couldn't be opened or read
+  std::vector<std::unique_ptr<Chip>> chips;  // null if it couldn't be opened or read
 };
 
 OpenChips openChips();
