@@ -43,11 +43,15 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   const auto end = draw();
   EXPECT_EQ(end.code, 0);
   // From (5, 0): 400 and 800, 1600, 1200, then back.
-  expectSays(end.output, "6800 pulses, at most ");
+  expectSays(end.output, "6800 pulses, off the lines at most by");
   expectSays(end.output, "line 4 of 4, 71 of 71 mm, 100 %");
-  const double off = std::stod(end.output.substr(end.output.find("at most ") + 8));
-  EXPECT_LE(off, 12.5) << "[um] no place is a microstep off the lines";
-  EXPECT_GT(off, 1.0) << "[um] a slope can't be drawn more exactly than its half steps";
+  for (const std::string axis : {"x", "y"}) {
+    const std::size_t place = end.output.find(" mm in " + axis + " (a microstep is 0.0125 mm)");
+    ASSERT_NE(place, std::string::npos) << end.output;
+    const double off = std::stod(end.output.substr(end.output.find_last_of(" \n", place - 1)));
+    EXPECT_LE(off, 0.0125) << axis << " [mm]: no place is a microstep off the lines";
+    EXPECT_GT(off, 0.001) << axis << " [mm]: no slope is more exact than its half steps";
+  }
   expectSays(picture.text(), "x [mm]");
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{2400, 2000}));
@@ -60,7 +64,7 @@ TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {
   write("10 10\n30 10\n");
   const auto end = draw();
   EXPECT_EQ(end.code, 0);
-  expectSays(end.output, "joint_states, at most ");
+  expectSays(end.output, "joint_states; what the axes did in between isn't known");
   EXPECT_TRUE(picture.exists());
 }
 
@@ -76,6 +80,12 @@ TEST_F(Draw, RefusesBeforeAnythingMoves) {
   expect_fails("10 10\nten 30\n", "line 2: ten 30");
   expect_fails("", "there is no line");
   EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 64);
+  write("10 10\n30 10\n");
+  std::vector<std::string> fast = arguments();
+  fast.insert(fast.end(), {"--speed", "5000"});
+  const auto refused = runProgram("draw", fast);
+  EXPECT_EQ(refused.code, 1);
+  expectSays(refused.output, "the speed 5000 mm/s is above the ");
   EXPECT_EQ(runProgram("draw", {"--help"}).code, 0);
   EXPECT_EQ(node.pulses(), 0);
   EXPECT_FALSE(picture.exists());

@@ -20,7 +20,7 @@ TEST(PlotMotion, DrawsWhatARunningNodeWouldDoAndMovesNothing) {
   EXPECT_EQ(end.code, 0);
   expectSays(end.output, "x: would move to 0.1 m in 1.2 s");
   expectSays(end.output, picture.path());
-  for (const char* words : {"speed [mm/s]", "step period [us]", "position [mm]", "jerk [mm/s"}) {
+  for (const char* words : {"velocity [mm/s]", "step period [us]", "position [mm]", "jerk [mm/s"}) {
     expectSays(picture.text(), words);
   }
   EXPECT_EQ(node.pulses(), 0);

@@ -4,9 +4,12 @@
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Endstops.h>
 
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <future>
 #include <string>
+#include <thread>
 
 #include "support/node_under_test.h"
 #include "support/recorder.h"
@@ -223,6 +226,21 @@ TEST(Fault, OfALineThatFailsEndsTheMoveAndIsShown) {
   const auto refused = node.moveTo(0.0, true);
   EXPECT_FALSE(refused.success);
   EXPECT_EQ(node.pulses(), pulses);
+}
+
+// The rig's clock shows it as real lines would: the next pulse is late.
+TEST(SuspendedNode, EndsItsMoveByAFault) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  auto waiting = longMove(node);
+  node.process().signal(SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  node.process().signal(SIGCONT);
+  const auto answer = waiting.get();
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "late");
+  EXPECT_EQ(node.pulses(), std::llround(answer.position / kMetresPerStep));
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ class BagTest(unittest.TestCase):
 
     def test_draws_joint_states_in_millimetres(self):
         self.assertEqual(self.draw("--steps-per-mm", "80"), (0, ""))
-        self.assertIn("speed [mm/s]", self.picture.read_text())
+        self.assertIn("velocity [mm/s]", self.picture.read_text())
         self.assertNotIn("needs the steps per unit", self.picture.read_text())
 
     def test_says_what_it_needs_for_the_step_period(self):
@@ -53,6 +53,10 @@ class BagTest(unittest.TestCase):
         code, error = self.draw()
         self.assertEqual(code, 1)
         self.assertIn("can't be read as a bag", error)
+        for noise in (bytes(range(255, -1, -1)) * 40, b"#ROSBAG V2.0\n" + bytes(range(256)) * 40):
+            self.bag.write_bytes(noise)
+            code, error = self.draw()
+            self.assertEqual((code, len(error.splitlines())), (1, 1), error)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import unittest
 
 import support  # noqa: F401: the path to the modules
 from stepdriver_plots import drawing
-from stepdriver_plots.errors import BadDrawing
+from stepdriver_plots.errors import BadDrawing, Undrawable
 
 PAPER = ((0.0, 200.0), (0.0, 150.0))
 
@@ -55,6 +55,28 @@ class DrawingTest(unittest.TestCase):
                 drawing.refuse_beyond([[place]], "xy", PAPER)
             self.assertIn(words, str(caught.exception))
         drawing.refuse_beyond([[(-1e9, 0.0)]], "xy", ((None, 0.0), PAPER[1]))
+
+    def test_refuses_a_speed_that_one_of_its_lines_is_too_slow_for(self):
+        lines = [((0.0, 0.0), (30.0, 40.0), True), ((30.0, 40.0), (60.0, 40.0), True)]
+        drawing.refuse_too_fast(lines, "xy", [100.0, 100.0], 100.0)
+        drawing.refuse_too_fast(lines[:1], "xy", [100.0, 100.0], 125.0)
+        with self.assertRaises(BadDrawing) as caught:
+            drawing.refuse_too_fast(lines, "xy", [100.0, 100.0], 125.0)
+        self.assertIn("the speed 125 mm/s is above the 100 mm/s that x and y allow from (30, 40) to",
+                      str(caught.exception))
+
+    def test_refuses_groups_that_are_nested_without_end(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "deep.svg"
+            file.write_text("<svg>" + "<g>" * 5000 + "</g>" * 5000 + "</svg>")
+            with self.assertRaises(BadDrawing) as caught:
+                drawing.read_drawing(file)
+            self.assertIn("nested too deeply", str(caught.exception))
+
+    def test_reads_no_device(self):
+        with self.assertRaises(Undrawable) as caught:
+            drawing.read_drawing(pathlib.Path("/dev/zero"))
+        self.assertIn("isn't a file", str(caught.exception))
 
     def test_goes_from_where_it_stands_through_all_strokes(self):
         lines = list(drawing.segments((0, 0), [[(0, 0), (1, 0)], [(2, 2), (3, 3)]]))

@@ -1,6 +1,9 @@
+import pathlib
+import tempfile
 import unittest
 
 import support  # noqa: F401: the path to the modules
+from stepdriver_plots.figure import draw_motion
 from stepdriver_plots.plan_curve import Piece, PlanCurve
 
 # 1 mm/ms^2 up, cruise, down; in m and s: 0.1 m/s after 0.1 s.
@@ -32,6 +35,14 @@ class PlanCurveTest(unittest.TestCase):
         s_curve = PlanCurve([Piece(0.1, 0.0, 0.0, 0.0, 10.0), Piece(0.1, 0.1, 0.05, 1.0, -10.0)])
         self.assertEqual(s_curve.acceleration()[1], [0.0, 1.0, 1.0, 0.0])
         self.assertEqual(s_curve.jerk()[1], [10.0, 10.0, -10.0, -10.0])
+
+    def test_has_no_jerk_without_a_jerk_limit(self):
+        self.assertFalse(self.curve.has_jerk_limit)
+        self.assertEqual(self.curve.jerk(), ([], []))
+        with tempfile.TemporaryDirectory() as folder:
+            picture = pathlib.Path(folder) / "plan.svg"
+            draw_motion([self.curve], picture)
+            self.assertIn("no jerk limit", picture.read_text())
 
     def test_scales_all_of_it(self):
         scaled = self.curve.scaled(1000.0, "mm")

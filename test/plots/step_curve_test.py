@@ -27,6 +27,17 @@ class StepCurveTest(unittest.TestCase):
         periods = curve.period_over_position()[1]
         self.assertNotEqual(periods[1], periods[1], "the line breaks off")
 
+    def test_has_no_acceleration_and_no_jerk_over_a_standstill(self):
+        times = ramp(100, 2000.0)
+        times += [times[-1] + 1.0 + time for time in times]
+        curve = StepCurve.of_counts(times, list(range(1, 201)))
+        for at, values in (curve.acceleration(), curve.jerk()):
+            self.assertFalse([time for time, value in zip(at, values)
+                              if times[99] < time < times[100] and value == value])
+            self.assertEqual(len([value for value in values if value != value]), 1, "one gap")
+        for acceleration in [value for value in curve.acceleration()[1] if value == value]:
+            self.assertAlmostEqual(acceleration, 2000.0, delta=200.0)
+
     def test_turns_where_the_count_does(self):
         speeds = StepCurve.of_counts([0.0, 0.01, 0.02, 0.03], [1, 2, 1, 0]).speed()[1]
         self.assertGreater(speeds[0], 0.0)

@@ -40,13 +40,17 @@ class PinTraceTest(unittest.TestCase):
     def test_says_where_it_cannot_read_a_file(self):
         for text, words in (("", "isn't a VCD file"),
                             (vcd((0, 1), [(10, "z", 1)]), "line 14: can't be read: 1z"),
-                            (vcd((0, 1), []) + "#ten\n", "line 13: can't be read: #ten")):
+                            (vcd((0, 1), []) + "#ten\n", "line 13: can't be read: #ten"),
+                            (vcd((0, 1), []) + "#9" + "0" * 30, "line 13: can't be read: #9")):
             with self.assertRaises(BadTrace) as caught:
                 self.trace(text)
             self.assertIn(words, str(caught.exception))
         with self.assertRaises(BadTrace) as caught:
             PinTrace(self.file.parent / "none.vcd")
         self.assertIn("none.vcd", str(caught.exception))
+
+    def test_has_no_axis_without_a_level(self):
+        self.assertEqual(self.trace(vcd((0, 1), []).replace("0a\n", "").replace("1a\n", "")).axes(), [])
 
 
 if __name__ == "__main__":

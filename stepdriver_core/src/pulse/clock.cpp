@@ -103,8 +103,19 @@ void VirtualClock::waitUntil(Nanoseconds time) {
     }
   }
   if (woken_) now_ = current();
+  if (speed_ > 0.0) takeStall();
   woken_ = false;
   waiting_ = false;
+}
+
+// A thread that is only slow falls behind by little from wait to wait, and nothing is late.
+void VirtualClock::takeStall() {
+  const Nanoseconds lag = paced() - now_;
+  if (static_cast<double>(lag - lag_) <= static_cast<double>(kStall) * speed_) {
+    lag_ = lag;
+  } else if (!woken_) {
+    now_ += lag - lag_;
+  }
 }
 
 void VirtualClock::wake() {

@@ -2,7 +2,7 @@
 
 import math
 
-from .errors import BadDrawing
+from .errors import BadDrawing, refuse_endless
 from .svg_path import read_svg
 
 MARGIN = 0.05  # of the smaller side, where a drawing is fitted into the axes' limits
@@ -10,6 +10,7 @@ MARGIN = 0.05  # of the smaller side, where a drawing is fitted into the axes' l
 
 def read_drawing(path):
     """Strokes of a file, and whether they are places in mm; those of an SVG have to be placed."""
+    refuse_endless(path)
     if path.suffix.lower() == ".svg":
         strokes, in_place = read_svg(path), False
         # Its y goes down, the axes' goes up.
@@ -88,6 +89,20 @@ def refuse_beyond(strokes, axes, limits):
                         (high is not None and value > high + 1e-9):
                     raise BadDrawing(f"the point ({place[0]:.6g}, {place[1]:.6g}) mm is beyond the "
                                      f"soft limits of {axis}, which are {low} and {high} mm")
+
+
+def refuse_too_fast(lines, axes, speeds, speed):
+    """speeds: of each axis alone [mm/s]. The node refuses a line that is too fast; the drawing is
+    refused before its first one."""
+    for begin, end, _ in lines:
+        ways = [abs(there - here) for here, there in zip(begin, end)]
+        time = max(way / most for way, most in zip(ways, speeds))
+        allowed = math.dist(begin, end) / time
+        if speed > allowed * (1 + 1e-9):
+            raise BadDrawing(
+                f"the speed {speed:.6g} mm/s is above the {allowed:.6g} mm/s that {axes[0]} and "
+                f"{axes[1]} allow from ({begin[0]:.6g}, {begin[1]:.6g}) to "
+                f"({end[0]:.6g}, {end[1]:.6g}) mm")
 
 
 def segments(start, strokes):

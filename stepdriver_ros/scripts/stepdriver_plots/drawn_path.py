@@ -1,7 +1,5 @@
 """Where the two axes of a drawing have really been, and how far that is from its lines."""
 
-import math
-
 
 def path_of_pulses(start, steps, unit_steps):
     """Places after each pulse of either axis.
@@ -28,16 +26,17 @@ def cut_to_lines(path, pulses):
     return parts
 
 
-def distance(place, begin, end):
-    """From a place to a line between two points."""
+def offset(place, begin, end):
+    """(x, y) from the nearest point of a line between two points to a place."""
     way = (end[0] - begin[0], end[1] - begin[1])
     off = (place[0] - begin[0], place[1] - begin[1])
     square = way[0] ** 2 + way[1] ** 2
     along = 0.0 if square == 0.0 else (off[0] * way[0] + off[1] * way[1]) / square
     along = min(1.0, max(0.0, along))
-    return math.hypot(off[0] - along * way[0], off[1] - along * way[1])
+    return off[0] - along * way[0], off[1] - along * way[1]
 
 
-def farthest(path, lines):
-    """The greatest distance of a place from the nearest of the lines."""
-    return max(min(distance(place, begin, end) for begin, end in lines) for place in path)
+def deviations(parts, lines):
+    """(x, y): how far in each axis the places of a part are off its line at most."""
+    offsets = [offset(place, *line) for part, line in zip(parts, lines) for place in part]
+    return tuple(max(abs(value) for value in values) for values in zip(*offsets))

@@ -4,6 +4,7 @@ import matplotlib
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
+from matplotlib.ticker import MaxNLocator, MultipleLocator  # noqa: E402
 
 # The same motion makes the same file.
 matplotlib.rcParams.update({
@@ -31,8 +32,8 @@ def save(figure, path):
 
 
 def draw_motion(curves, path, title=""):
-    """The graphs of one or more axes of one unit: speed and step period over position; position,
-    speed, acceleration and jerk over time."""
+    """The graphs of one or more axes of one unit: velocity and step period over position; position,
+    velocity, acceleration and jerk over time."""
     unit = curves[0].unit
     figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2))
     for curve, colour in zip(curves, COLOURS * len(curves)):
@@ -46,13 +47,14 @@ def draw_motion(curves, path, title=""):
                 (panels[2, 1], coarse.jerk())):
             panel.plot(xs, ys, color=colour, label=curve.label)
     if not any(curve.step for curve in curves):
-        panels[1, 0].text(0.5, 0.5, "needs the steps per unit", ha="center", va="center",
-                          transform=panels[1, 0].transAxes, color="#777777")
+        say_in(panels[1, 0], "needs the steps per unit")
+    if not any(curve.has_jerk_limit for curve in curves):
+        say_in(panels[2, 1], "no jerk limit")
     place, time = f"position [{unit}]", "time [s]"
-    for panel, x, y in ((panels[0, 0], place, f"speed [{unit}/s]"),
+    for panel, x, y in ((panels[0, 0], place, f"velocity [{unit}/s]"),
                         (panels[1, 0], place, "step period [us]"),
                         (panels[2, 0], time, place),
-                        (panels[0, 1], time, f"speed [{unit}/s]"),
+                        (panels[0, 1], time, f"velocity [{unit}/s]"),
                         (panels[1, 1], time, f"acceleration [{unit}/s$^2$]"),
                         (panels[2, 1], time, f"jerk [{unit}/s$^3$]")):
         panel.set_xlabel(x)
@@ -64,23 +66,42 @@ def draw_motion(curves, path, title=""):
     save(figure, path)
 
 
-def draw_drawing(lines, parts, limits, path, title):
+def say_in(panel, text):
+    """In place of a graph that there is none of."""
+    panel.text(0.5, 0.5, text, ha="center", va="center", transform=panel.transAxes,
+               color="#777777")
+
+
+def same_ticks(panel):
+    """On equal scales a tick is as long on both axes."""
+    spans = [high - low for low, high in (panel.get_xlim(), panel.get_ylim())]
+    step = MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, max(spans))[1]
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
+
+
+def draw_drawing(lines, parts, limits, path, title, axes=("x", "y")):
     """What was to be drawn, and over it what was: parts are (places, whether it is of the
     drawing). Of the limits those that there are make a frame."""
     figure, panel = plt.subplots(figsize=(6.4, 5.6))
+    labels = {}
     (left, right), (low, high) = limits
     if None not in (left, right, low, high):
         panel.plot([left, right, right, left, left], [low, low, high, high, low],
-                   color="#bbbbbb", linewidth=0.8)
+                   color="#bbbbbb", linewidth=0.8, label="soft limits")
     for begin, end in (line[:2] for line in lines if line[2]):
-        panel.plot(*zip(begin, end), color=COLOURS[1], linewidth=3.0, alpha=0.25,
-                   solid_capstyle="round")
+        labels["lines of the drawing"], = panel.plot(
+            *zip(begin, end), color=COLOURS[1], linewidth=3.0, alpha=0.25, solid_capstyle="round")
     for places, drawn in parts:
         if len(places) > 1:
-            panel.plot(*zip(*places), color=COLOURS[0] if drawn else "#999999",
-                       linewidth=1.0 if drawn else 0.5)
+            name = "where the axes were" if drawn else "way between strokes"
+            labels[name], = panel.plot(*zip(*places), color=COLOURS[0] if drawn else "#999999",
+                                       linewidth=1.0 if drawn else 0.5)
     panel.set_aspect("equal")
-    panel.set_xlabel("x [mm]")
-    panel.set_ylabel("y [mm]")
+    same_ticks(panel)
+    panel.set_xlabel(f"{axes[0]} [mm]")
+    panel.set_ylabel(f"{axes[1]} [mm]")
+    panel.legend(labels.values(), labels.keys(), loc="upper center",
+                 bbox_to_anchor=(0.5, -0.12), ncol=len(labels), frameon=False)
     panel.set_title(title)
     save(figure, path)

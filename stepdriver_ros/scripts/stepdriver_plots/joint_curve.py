@@ -15,6 +15,8 @@ class JointCurve:
         self.unit = unit
         self.step = step
 
+    has_jerk_limit = True  # as far as states tell
+
     def coarse(self, _samples):
         return self
 

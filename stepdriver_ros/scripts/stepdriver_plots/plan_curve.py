@@ -27,6 +27,11 @@ class PlanCurve:
         step = None if self.step is None else self.step * factor
         return PlanCurve(pieces, self.label, unit, step)
 
+    @property
+    def has_jerk_limit(self):
+        """Else the acceleration jumps from one piece to the next."""
+        return any(piece.jerk != 0.0 for piece in self.pieces)
+
     def coarse(self, _samples):
         return self
 
@@ -49,6 +54,8 @@ class PlanCurve:
         return self._over_time(lambda piece, t: piece.acceleration + piece.jerk * t, 1)
 
     def jerk(self):
+        if not self.has_jerk_limit:
+            return [], []
         return self._over_time(lambda piece, _: piece.jerk, 1)
 
     def speed_over_position(self):

@@ -5,6 +5,7 @@ line over the time, the acceleration the change from one speed to the next, and 
 """
 
 REST = 0.1  # [s] without a step: it stands
+GAP = float("nan")  # breaks off the line of a graph
 
 
 def differences(times, values):
@@ -30,6 +31,8 @@ class StepCurve:
         """From the count after each edge; before the first one it was 0."""
         places = [(before + count) / 2 * step for before, count in zip([0] + counts, counts)]
         return cls(times, places, label, unit, step)
+
+    has_jerk_limit = True  # as far as edges tell
 
     def coarse(self, samples):
         """The same from fewer of the edges, about so many: what is noise from one nanosecond to
@@ -78,10 +81,24 @@ class StepCurve:
         return at, speeds
 
     def acceleration(self):
-        return differences(*self.speed())
+        return self._of_each_motion(lambda times, places: differences(*differences(times, places)))
 
     def jerk(self):
-        return differences(*self.acceleration())
+        return self._of_each_motion(
+            lambda times, places: differences(*differences(*differences(times, places))))
+
+    def _of_each_motion(self, derivative):
+        """Of each motion between two rests for itself: there is none over a standstill."""
+        at, values = [], []
+        for stretch in self._stretches():
+            own_at, own_values = derivative([self.times[i] for i in stretch],
+                                            [self.places[i] for i in stretch])
+            if at and own_at:
+                at.append(own_at[0])
+                values.append(GAP)
+            at += own_at
+            values += own_values
+        return at, values
 
     def speed_over_position(self):
         return self._over_position(lambda way, gap: way / gap)
@@ -99,5 +116,5 @@ class StepCurve:
                 values.append(value(place - here, time - before))
             else:  # it stands: the line of the graph breaks off
                 at.append(place)
-                values.append(float("nan"))
+                values.append(GAP)
         return at, values

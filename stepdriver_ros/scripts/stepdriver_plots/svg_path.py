@@ -27,6 +27,8 @@ def read_svg(path):
         collect(root, strokes)
     except BadDrawing as error:
         raise BadDrawing(f"{path}: {error}") from error
+    except RecursionError as error:
+        raise BadDrawing(f"{path}: its groups are nested too deeply to be read") from error
     return strokes
 
 

@@ -1,7 +1,6 @@
 """Reads the pin trace that the simulated rig writes, and others of its kind."""
 
-
-from .errors import BadTrace
+from .errors import BadTrace, refuse_endless
 
 
 class PinTrace:
@@ -13,6 +12,7 @@ class PinTrace:
         self._names = {}
         self._scale = None
         try:
+            refuse_endless(path)
             with open(path, encoding="ascii") as file:
                 self._read(path, file)
         except (OSError, UnicodeDecodeError) as error:
@@ -21,8 +21,9 @@ class PinTrace:
             raise BadTrace(f"{path} isn't a VCD file: it has no $timescale, or no $var")
 
     def axes(self):
-        """Names of those that have a STEP and a DIR line."""
-        return [axis for axis, pin in self.edges if pin == "step" and (axis, "dir") in self.edges]
+        """Names of those that have a STEP and a DIR line with a level."""
+        return [axis for axis, pin in self.levels
+                if pin == "step" and (axis, "dir") in self.levels]
 
     def counts(self, axis, invert_step=None, invert_dir=None):
         """Times [s] of the steps and the count after each. Where it isn't said how the pins are
@@ -63,6 +64,8 @@ class PinTrace:
                     self.edges[key] = []
                 elif words[0].startswith("#"):
                     time = int(words[0][1:]) * self._scale
+                    if not 0 <= time < 2**63:
+                        raise ValueError("a time of 64 bits")
                 elif words[0][0] in "01":
                     self._change(self._names[words[0][1:]], words[0][0] == "1", time)
             except (IndexError, KeyError, TypeError, ValueError) as error:

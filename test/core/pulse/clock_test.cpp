@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <thread>
 
 namespace stepdriver::pulse {
@@ -42,6 +43,40 @@ TEST(VirtualClock, StandsStillAfterAWake) {
   EXPECT_EQ(clock.now(), 0);
   clock.waitUntil(1'000'000);
   EXPECT_EQ(clock.now(), 1'000'000);
+}
+
+/// Holds a paced clock for some real time in the middle of a wait.
+/// @return by how much the wait ended late.
+Nanoseconds latenessAfter(std::chrono::nanoseconds pause, double speed) {
+  VirtualClock clock(speed);
+  const Nanoseconds due = 1'000'000;
+  clock.hold();
+  std::thread waiter([&] { clock.waitUntil(due); });
+  std::this_thread::sleep_for(pause);
+  clock.release();
+  waiter.join();
+  return clock.now() - due;
+}
+
+TEST(VirtualClock, IsLateAfterAStallAsRealLinesWouldBe) {
+  const std::chrono::nanoseconds pause(VirtualClock::kStall + 200'000'000);
+  for (const double speed : {0.5, 1.0, 20.0}) {
+    const auto expected = static_cast<double>(pause.count()) * speed;
+    EXPECT_GT(static_cast<double>(latenessAfter(pause, speed)), 0.9 * expected) << speed;
+  }
+}
+
+TEST(VirtualClock, IsNeverLateBecauseItsThreadIsSlow) {
+  VirtualClock clock(1e6);  // a pace that nothing keeps
+  const auto begin = std::chrono::steady_clock::now();
+  auto last = begin;
+  for (Nanoseconds time = 1'000; last - begin < std::chrono::milliseconds(1200); time += 1'000) {
+    clock.waitUntil(time);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - last > std::chrono::milliseconds(900)) return;  // this computer stalled itself
+    last = now;
+    ASSERT_EQ(clock.now(), time);
+  }
 }
 
 TEST(VirtualClock, StandsStillWhileItIsHeld) {

@@ -86,12 +86,17 @@ class SteadyClock : public Clock {
 };
 
 /// Virtual time: it jumps from event to event, each at its exact nanosecond, however late the
-/// thread that serves them is.
+/// thread that serves them is. Only if a paced clock stands still for more than kStall of real
+/// time between two waits, for example in a process that was suspended, does the next wait end as
+/// late as it would on real lines.
 class VirtualClock : public Clock {
  public:
   /// @param speed virtual seconds per second of CLOCK_MONOTONIC; 0: a wait ends at once, and the
   ///   clock stands still while there is nothing to wait for.
   explicit VirtualClock(double speed = 0.0);
+
+  /// [ns] of CLOCK_MONOTONIC
+  static constexpr Nanoseconds kStall = 1'000'000'000;
 
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
@@ -102,6 +107,7 @@ class VirtualClock : public Clock {
  private:
   Nanoseconds current() const;
   Nanoseconds paced() const;
+  void takeStall();
 
   const double speed_;
   const Nanoseconds started_;
@@ -109,6 +115,7 @@ class VirtualClock : public Clock {
   std::condition_variable changed_;
   Nanoseconds now_ = 0;
   Nanoseconds awaited_ = 0;
+  Nanoseconds lag_ = 0;  // behind its pace, at the end of the last wait
   bool waiting_ = false;
   bool woken_ = false;
   int holds_ = 0;
