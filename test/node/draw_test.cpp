@@ -46,7 +46,7 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   expectSays(end.output, "6800 pulses, off the lines at most by");
   expectSays(end.output, "line 4 of 4, 71 of 71 mm, 100 %");
   for (const std::string axis : {"x", "y"}) {
-    const std::size_t place = end.output.find(" mm in " + axis + " (a microstep is 0.0125 mm)");
+    const std::size_t place = end.output.find(" mm in " + axis + " (microstep 0.0125 mm)");
     ASSERT_NE(place, std::string::npos) << end.output;
     const double off = std::stod(end.output.substr(end.output.find_last_of(" \n", place - 1)));
     EXPECT_LE(off, 0.0125) << axis << " [mm]: no place is a microstep off the lines";

@@ -87,8 +87,9 @@ def draw_drawing(lines, parts, limits, path, title, axes=("x", "y")):
     labels = {}
     (left, right), (low, high) = limits
     if None not in (left, right, low, high):
-        panel.plot([left, right, right, left, left], [low, low, high, high, low],
-                   color="#bbbbbb", linewidth=0.8, label="soft limits")
+        labels["soft limits"], = panel.plot([left, right, right, left, left],
+                                            [low, low, high, high, low],
+                                            color="#bbbbbb", linewidth=0.8)
     for begin, end in (line[:2] for line in lines if line[2]):
         labels["lines of the drawing"], = panel.plot(
             *zip(begin, end), color=COLOURS[1], linewidth=3.0, alpha=0.25, solid_capstyle="round")
