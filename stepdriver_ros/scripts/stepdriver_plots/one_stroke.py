@@ -1,0 +1,152 @@
+"""Makes one stroke of a drawing, for a pen that can't be lifted."""
+
+import heapq
+import math
+from collections import defaultdict, namedtuple
+
+OneStroke = namedtuple("OneStroke", "stroke length twice added")
+OneStroke.__doc__ = """Points, and [the drawing's unit] the length of the stroke, how much of that is
+drawn twice, and how much joins parts of the drawing that don't touch."""
+
+SAME = 1e-6  # of the drawing's size: points that are closer are one
+
+
+def one_stroke(strokes, start):
+    """Goes along every line once, and along some a second time where no other way leads on. Parts
+    that don't touch are joined by the shortest lines between their points. What is drawn twice is
+    kept short, but need not be the least that is possible.
+
+    start: where the pen stands; the stroke begins as near to it as it can.
+    """
+    graph = Graph(strokes)
+    added = graph.join_parts()
+    whole = graph.length()
+    twice = graph.double_between_odd(start)
+    stroke = graph.walk(start)
+    return OneStroke(stroke, whole + twice, twice, added)
+
+
+class Graph:
+    """Points, and lines between them, each as often as it is to be drawn."""
+
+    def __init__(self, strokes):
+        points = [point for stroke in strokes for point in stroke]
+        size = max(max(values) - min(values) for values in zip(*points))
+        self._grid = SAME * size
+        self._places = {}  # of each point of the grid
+        self._lines = defaultdict(lambda: defaultdict(int))  # [from][to]: how often
+        for stroke in strokes:
+            nodes = [self._node(point) for point in stroke]
+            for here, there in zip(nodes, nodes[1:]):
+                if here != there and there not in self._lines[here]:
+                    self._add(here, there)
+
+    def _node(self, point):
+        node = tuple(round(value / self._grid) for value in point)
+        self._places.setdefault(node, point)
+        return node
+
+    def _add(self, here, there):
+        self._lines[here][there] += 1
+        self._lines[there][here] += 1
+
+    def _distance(self, here, there):
+        return math.dist(self._places[here], self._places[there])
+
+    def length(self):
+        return sum(count * self._distance(here, there) for here, ends in self._lines.items()
+                   for there, count in ends.items()) / 2
+
+    def _parts(self):
+        """The nodes of each part that hangs together."""
+        parts, seen = [], set()
+        for first in self._lines:
+            if first in seen:
+                continue
+            part, left = [], [first]
+            seen.add(first)
+            while left:
+                node = left.pop()
+                part.append(node)
+                for other in self._lines[node]:
+                    if other not in seen:
+                        seen.add(other)
+                        left.append(other)
+            parts.append(part)
+        return parts
+
+    def join_parts(self):
+        """Returns the length of the lines that join them."""
+        parts, added = self._parts(), 0.0
+        joined = parts.pop(0)
+        while parts:
+            distance, here, there, nearest = min(
+                (self._distance(a, b), a, b, i) for i, part in enumerate(parts)
+                for a in joined for b in part)
+            self._add(here, there)
+            added += distance
+            joined += parts.pop(nearest)
+        return added
+
+    def _odd(self):
+        return [node for node, ends in self._lines.items() if sum(ends.values()) % 2]
+
+    def double_between_odd(self, start):
+        """At a point with an odd number of lines a stroke begins or ends: all but two of them are
+        paired by lines that are drawn twice. Returns the length of these."""
+        odd = self._odd()
+        if len(odd) <= 2:
+            return 0.0
+        odd.remove(self._nearest(odd, start))
+        ways = sorted((length, odd[i], other, route) for i in range(len(odd))
+                      for other, length, route in self._shortest(odd[i], set(odd[i + 1:])))
+        free, twice = set(odd), 0.0
+        for length, here, there, route in ways:
+            if len(free) < 3:
+                break
+            if here in free and there in free:
+                free -= {here, there}
+                twice += length
+                for a, b in zip(route, route[1:]):
+                    self._add(a, b)
+        return twice
+
+    def _nearest(self, nodes, place):
+        return min(nodes, key=lambda node: math.dist(self._places[node], place))
+
+    def _shortest(self, begin, wanted):
+        """(node, length, the nodes on the way) of each that is wanted."""
+        lengths, before, left = {begin: 0.0}, {}, [(0.0, begin)]
+        while left and wanted:
+            length, node = heapq.heappop(left)
+            if length > lengths[node]:
+                continue
+            if node in wanted:
+                wanted.remove(node)
+                route = [node]
+                while route[-1] != begin:
+                    route.append(before[route[-1]])
+                yield node, length, route
+            for other in self._lines[node]:
+                further = length + self._distance(node, other)
+                if further < lengths.get(other, math.inf):
+                    lengths[other], before[other] = further, node
+                    heapq.heappush(left, (further, other))
+
+    def walk(self, start):
+        """All lines in one go, by Hierholzer's algorithm."""
+        odd = self._odd()
+        node = self._nearest(odd or list(self._lines), start)
+        path, stroke = [node], []
+        while path:
+            ends = self._lines[path[-1]]
+            if ends:
+                there = next(iter(ends))
+                for a, b in ((path[-1], there), (there, path[-1])):
+                    self._lines[a][b] -= 1
+                    if self._lines[a][b] == 0:
+                        del self._lines[a][b]
+                path.append(there)
+            else:
+                stroke.append(self._places[path.pop()])
+        return stroke[::-1]

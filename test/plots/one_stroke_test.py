@@ -1,0 +1,70 @@
+import math
+import random
+import unittest
+from collections import Counter
+
+import support  # noqa: F401: the path to the modules
+from stepdriver_plots.one_stroke import one_stroke
+
+
+def lines_of(strokes):
+    return Counter(frozenset(line) for stroke in strokes for line in zip(stroke, stroke[1:]))
+
+
+class OneStrokeTest(unittest.TestCase):
+    def check(self, strokes, start=(0.0, 0.0)):
+        """Every line is drawn; what it says of lengths is so."""
+        found = one_stroke(strokes, start)
+        drawn, wanted = lines_of([found.stroke]), lines_of(strokes)
+        for line in wanted:
+            self.assertGreaterEqual(drawn[line], 1, line)
+        length = sum(math.dist(a, b) for a, b in zip(found.stroke, found.stroke[1:]))
+        added = sum(math.dist(*line) for line in drawn if line not in wanted)
+        once = sum(math.dist(*line) for line in drawn)
+        self.assertAlmostEqual(found.length, length)
+        self.assertAlmostEqual(found.added, added)
+        self.assertAlmostEqual(found.twice, length - once)
+        return found
+
+    def test_draws_a_house_of_eight_lines_without_drawing_one_twice(self):
+        a, b, c, d, roof = (0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (1.0, 3.0)
+        found = self.check([[a, b], [b, c], [c, d], [d, a], [a, c], [b, d], [d, roof], [roof, c]])
+        self.assertEqual(found.twice, 0.0)
+        self.assertEqual(found.added, 0.0)
+        self.assertEqual(len(found.stroke), 9)
+
+    def test_goes_back_along_a_line_that_leads_nowhere(self):
+        # A star of three rays: two are the beginning and the end, the third is drawn twice.
+        middle = (0.0, 0.0)
+        found = self.check([[middle, (1.0, 0.0)], [middle, (0.0, 2.0)], [middle, (-3.0, 0.0)]],
+                           (-3.0, 0.0))
+        self.assertEqual(found.stroke[0], (-3.0, 0.0))
+        self.assertEqual(found.twice, 1.0)
+
+    def test_joins_parts_that_do_not_touch_by_the_shortest_line(self):
+        found = self.check([[(0.0, 0.0), (1.0, 0.0)], [(3.0, 0.0), (5.0, 0.0)]])
+        self.assertEqual(found.added, 2.0)
+        self.assertEqual(found.twice, 0.0)
+
+    def test_draws_a_line_that_comes_twice_only_once(self):
+        found = self.check([[(0.0, 0.0), (1.0, 0.0), (0.0, 0.0)]])
+        self.assertEqual(found.length, 1.0)
+
+    def test_begins_near_the_pen_if_it_may_begin_anywhere(self):
+        square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
+        self.assertEqual(self.check([square], (2.0, 2.0)).stroke[0], (1.0, 1.0))
+
+    def test_draws_any_drawing(self):
+        for seed in range(60):
+            chance = random.Random(seed)
+            points = [(chance.uniform(0, 9), chance.uniform(0, 9)) for _ in range(12)]
+            strokes = [[chance.choice(points) for _ in range(chance.randint(2, 6))]
+                       for _ in range(chance.randint(1, 7))]
+            strokes = [[p for p, q in zip(s, s[1:] + [None]) if p != q] for s in strokes]
+            strokes = [stroke for stroke in strokes if len(stroke) > 1]
+            if strokes:
+                self.check(strokes, (chance.uniform(0, 9), 0.0))
+
+
+if __name__ == "__main__":
+    unittest.main()
