@@ -80,14 +80,14 @@ TEST(Examples, ArduinoCarriageMovesBetweenItsSwitches) {
   EXPECT_NEAR(plan.pieces[0].acceleration, 0.5, 1e-9);
   EXPECT_NEAR(plan.pieces[1].velocity, 0.1, 1e-9);
   EXPECT_TRUE(moveBy(x, 0.05).success);
-  EXPECT_EQ(rigOf(node).pulses_forward, Counts{4000});
+  EXPECT_EQ(rigOf(node).pulses_forward, Counts{8000});
   EXPECT_TRUE(turn(x, -0.5).success);
-  EXPECT_EQ(rigOf(node).pulses_backward, Counts{1600});
+  EXPECT_EQ(rigOf(node).pulses_backward, Counts{3200});
 
   const auto met = moveBy(x, 0.1);
   EXPECT_FALSE(met.success);
   expectSays(met.message, "max endstop");
-  EXPECT_NEAR(met.position, 0.06, 1.5 / 80000.0) << "not one step more";
+  EXPECT_NEAR(met.position, 0.06, 1.5 / 160000.0) << "not one step more";
   const auto blocked = moveBy(x, 0.001);
   EXPECT_FALSE(blocked.success);
   expectSays(blocked.message, "only towards min");
