@@ -105,12 +105,12 @@ def _of_sentences(text):
 
 
 def commands(text):
-    """All commands of a page, in its order: the lines of blocks that aren't of text, YAML or CMake, and
-    whole commands in sentences."""
+    """All commands of a page, in its order: the lines of blocks that aren't of text, YAML, CMake or
+    C++, and whole commands in sentences."""
     for language, lines in _blocks(text):
         if language is None:
             yield from _of_sentences("\n".join(lines))
-        elif language not in ("text", "yaml", "cmake"):
+        elif language not in ("text", "yaml", "cmake", "cpp"):
             yield from _of_block(lines)
 
 
