@@ -52,8 +52,8 @@ void Activities::takeOver(std::unique_ptr<Activity> activity) {
   Activity& begun = *activity;
   all_.push_back(std::move(activity));
   begun.begin(std::move(predecessors));
-  // An axis that was given another goal has left the others of its course, and they can't go on
-  // without it.
+  // An axis that was given another goal has left its path, and the others can't continue without
+  // it.
   const std::string left_by = begun.axes().front()->name();
   for (Predecessor& companion : companions) {
     all_.push_back(std::make_unique<ComeToRest>(
@@ -74,7 +74,7 @@ void Activities::endAll(const Why& why, const Ack& call) {
 }
 
 void Activities::look() {
-  // What begins in it looks too.
+  // Activities that begin during the loop are included.
   for (std::size_t i = 0; i < all_.size(); ++i) all_[i]->look();
   while (sweep()) {
   }

@@ -10,34 +10,34 @@
 
 namespace stepdriver::activity {
 
-/// Who owns which axis, and who is to own it next: the one place in which that changes.
+/// The owner and the heir of each axis. Ownership changes only here.
 ///
-/// An axis has one owner at most, and one heir at most: the heir has been accepted, and begins when
-/// the owners of all its axes have finished. Until then they only come to rest, or complete what
-/// they write to their pins. What ends an owner ends its heir too.
+/// An axis has at most one owner and at most one heir: the heir has been accepted, and begins when
+/// the owners of all its axes have finished. Until then they only come to rest, or complete their
+/// writes of pins. Ending an owner also ends its heir.
 class Activities {
  public:
   explicit Activities(Context& context) : context_(context) {}
 
   Activity* owner(const axis::AxisModel& axis) const { return find(axis, true); }
   Activity* heir(const axis::AxisModel& axis) const { return find(axis, false); }
-  /// Nobody owns it, or is to.
+  /// It has no owner and no heir.
   bool isFree(const axis::AxisModel& axis) const {
     return owner(axis) == nullptr && heir(axis) == nullptr;
   }
 
-  /// Gives an activity its axes: at once, from motions that it takes over, or as the heir of those
-  /// who own them now. Who is replaced is told why.
+  /// Gives an activity its axes: at once, from motions that it takes over, or as the heir of their
+  /// present owners. Replaced activities are told why.
   ///
-  /// @param why what those hear whom it doesn't take over from.
+  /// @param why the reason given to activities that it ends instead of taking over.
   /// @throw Refused if it can't take over; then nothing has changed.
   void begin(std::unique_ptr<Activity> activity, const Why& why);
 
-  /// Ends what an axis does, and what it was to do next.
+  /// Ends the owner and the heir of an axis.
   void end(const axis::AxisModel& axis, const Why& why, const Ack& call = {});
   void endAll(const Why& why, const Ack& call = {});
 
-  /// Each owner looks at what has happened; who has finished leaves its axes, and heirs begin.
+  /// Each owner handles what has happened; finished activities leave their axes, and heirs begin.
   void look();
 
   void forEach(const std::function<void(Activity&)>& action) const;

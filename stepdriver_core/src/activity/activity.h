@@ -13,23 +13,23 @@ namespace stepdriver::activity {
 
 class Manoeuvre;
 
-/// Something that takes time. It owns its axes from the moment at which it is accepted until it has
-/// finished: nobody else orders a motion of them or writes their pins.
+/// Something that takes time. It owns its axes from its acceptance until it has finished: nothing
+/// else orders a motion of them or writes their pins.
 ///
 /// Its calls come one at a time, from the controller's turns. None of them blocks.
 class Activity {
  public:
-  /// When it may begin on axes that do something else.
+  /// When it may begin on busy axes.
   enum class Handover {
-    kAtSpeed,    ///< it takes a motion over
-    kAfterRest,  ///< it waits until what its axes do has come to rest
+    kAtSpeed,    ///< it takes over a motion
+    kAfterRest,  ///< it waits until its axes are at rest
   };
 
-  /// What it does to its axes: that decides what a command that needs them is told.
+  /// Its effect on the axes, which decides the answer to other commands that need them.
   enum class Work {
     kMoves,
     kWritesPins,
-    kDisables,           ///< writes pins, and the motor has no current afterwards
+    kDisables,           ///< writes pins, and the motor is without current afterwards
     kChangesMicrosteps,  ///< may move before it writes pins
   };
 
@@ -44,24 +44,25 @@ class Activity {
   bool isFinished() const { return finished_; }
   bool hasBegun() const { return begun_; }
 
-  /// It is about to take its axes over at speed: it plans that. @throw Refused; then nothing
+  /// Called before it takes over its axes at speed, to plan that. @throw Refused; then nothing
   /// happens.
   virtual void prepare() {}
-  /// It owns its axes. @param predecessors what it takes over from.
+  /// It owns its axes now. @param predecessors the goals that it takes over.
   void begin(std::vector<Predecessor> predecessors);
-  /// Something may have happened: the engine has said something, a pin was written, an input has
-  /// another level, time has passed.
+  /// Something may have happened: there is news from the engine, a pin was written, an input has
+  /// changed, or time has passed.
   void look();
-  /// Ends it before its time: it comes to rest, tells whoever waits for it why, and finishes. Of a
-  /// sequence of pins it completes what it has begun.
+  /// Ends it early: it comes to rest, tells its waiting callers why, and finishes. It completes a
+  /// sequence of pins that it has begun.
   /// @param call is answered when the axes decelerate.
   void end(const Why& why, const Ack& call = {});
 
-  /// A motion that another one can take over now.
+  /// Whether it is a motion that another one can take over now.
   virtual bool canHandOver() const { return false; }
-  /// Leaves its axes. @param by who takes over, in words. @pre canHandOver()
+  /// Leaves its axes. @param by the successor, in words. @pre canHandOver()
   virtual std::vector<Predecessor> handOver(const std::string& /*by*/) { return {}; }
-  /// Others wait for it instead of being refused: it does something that nobody has asked for.
+  /// Whether other commands wait for it instead of being refused, because no client has requested
+  /// it.
   virtual bool isInBackground() const { return false; }
 
   virtual void hold(const Ack& /*call*/) {}
@@ -69,21 +70,21 @@ class Activity {
   virtual void resume(const Ack& /*call*/) {}
   /// The speed override or the limits have changed.
   virtual void speedChanged(const Ack& /*call*/) {}
-  /// The caller of these homings doesn't wait any more.
+  /// The caller of these homings no longer waits.
   virtual void cancelHomings(const std::vector<std::uint64_t>& /*ids*/) {}
-  /// @return false if it does not disable its axis; else this call waits for that too.
+  /// @return false if it does not disable its axis; otherwise this call waits for that too.
   virtual bool joinDisable(const Ack& /*call*/) { return false; }
 
-  /// Clock time at which look() has something to do at the latest.
+  /// Clock time by which look() must be called.
   virtual pulse::Nanoseconds due() const { return pulse::kNever; }
-  /// It looks at the levels of inputs.
+  /// Whether it uses the levels of inputs.
   virtual bool watchesInputs() const { return false; }
 
-  /// @name What a reader of the state is shown
+  /// @name For readers of the state
   /// @{
   virtual Work work() const { return Work::kMoves; }
   virtual axis::HomingPhase homingPhase() const { return axis::HomingPhase::kNone; }
-  /// The motion that it makes, or that is held; nullptr if it makes none now.
+  /// Its current or held motion; nullptr if there is none.
   virtual const Manoeuvre* motion() const { return nullptr; }
   /// @}
 
@@ -93,7 +94,7 @@ class Activity {
   virtual void onEnd(const Why& why, const Ack& call) = 0;
   /// It was ended before it began.
   virtual void onAbandon(const Why& why) = 0;
-  /// Else it is done whatever comes.
+  /// If false, it is carried out in any case.
   virtual bool endsBeforeItBegins() const { return true; }
 
   void finish() { finished_ = true; }

@@ -11,42 +11,42 @@
 
 namespace stepdriver::activity {
 
-/// A call of a client, by the number that the shell has given it.
+/// A client's call, by the number that the shell has assigned.
 using CallId = std::uint64_t;
 
-/// Why a call had no success. It becomes an exception in the thread of its caller.
+/// Why a call failed. It becomes an exception in the thread of its caller.
 struct Failure {
   enum class Kind {
     kRefused,
     kGpio,
-    kOutdated,  ///< what it was prepared from has changed meanwhile: it may be prepared again
+    kOutdated,  ///< the facts that it was prepared from have changed: it may be prepared again
     kOther,
   };
   Kind kind = Kind::kRefused;
   std::string text;
 };
 
-/// A homing that was accepted, and where its result appears.
+/// An accepted homing, and the outcome that receives its result.
 struct AcceptedHoming {
   std::vector<std::uint64_t> ids;
   std::vector<std::shared_ptr<const axis::Outcome<axis::HomingResult>>> outcomes;
 };
 
-/// What a call is answered with.
+/// The answer to a call.
 struct Reply {
   std::optional<Failure> failure;
   std::variant<std::monostate, std::vector<axis::Move>, axis::MovePlan, AcceptedHoming> value;
 };
 
-/// Where answers go.
+/// Receives answers.
 class AnswerSink {
  public:
   virtual ~AnswerSink() = default;
   virtual void answer(CallId call, Reply reply) = 0;
 };
 
-/// A call that is not yet answered. It is answered when the last who holds it lets go of it: each
-/// call gets exactly one answer, whatever becomes of those who work on it.
+/// A call that is not yet answered. It is answered when its last holder releases it, so that each
+/// call gets exactly one answer in any case.
 class PendingCall {
  public:
   PendingCall(AnswerSink& sink, CallId id) : sink_(sink), id_(id) {}
@@ -54,7 +54,7 @@ class PendingCall {
   PendingCall(const PendingCall&) = delete;
   PendingCall& operator=(const PendingCall&) = delete;
 
-  /// Several failures are told in one sentence each.
+  /// Several failures are reported in one sentence each.
   void fail(Failure failure) {
     if (!reply_.failure) {
       reply_.failure = std::move(failure);
@@ -74,7 +74,7 @@ class PendingCall {
   Reply reply_;
 };
 
-/// Shared by all who have a part in the answer; may be empty if nobody waits for it.
+/// Shared by everything that contributes to the answer; may be empty if nobody waits for it.
 using Ack = std::shared_ptr<PendingCall>;
 
 }  // namespace stepdriver::activity

@@ -9,7 +9,7 @@
 
 namespace stepdriver::activity {
 
-/// One axis comes to rest from a motion that somebody else has begun and left.
+/// Brings one axis to rest from a motion that another activity has begun and left.
 class ComeToRest : public Activity {
  public:
   ComeToRest(Context& context, Predecessor left, Why why)
@@ -36,7 +36,7 @@ class ComeToRest : public Activity {
   void onAbandon(const Why& /*why*/) override {}
 
  private:
-  // It leaves the course that it was on.
+  // The axis leaves its path.
   static Goal goalOf(Goal goal) {
     goal.kind = Goal::Kind::kMove;
     return goal;

@@ -15,30 +15,30 @@
 
 namespace stepdriver::activity {
 
-/// A write of a line that isn't STEP or DIR, for whoever writes the slow lines.
+/// A write of a line other than STEP or DIR, for the line writers.
 struct PinJob {
   std::uint64_t id = 0;
   int output = -1;
   bool level = false;
 };
 
-/// What has become of it.
+/// Its result.
 struct PinDone {
   std::uint64_t id = 0;
   int error = 0;  ///< errno; 0: the line was written
 };
 
-/// What a turn of the controller wants done, in this order: first what is shown, then the answers,
+/// The outputs of a turn of the controller, in this order: first the snapshot, then the answers,
 /// then the orders.
 struct Outputs {
   std::vector<pulse::Command> commands;
   std::vector<PinJob> pin_jobs;
   std::vector<std::pair<CallId, Reply>> answers;
-  std::uint64_t clear_stops = 0;  ///< emergency stops up to this count are over
+  std::uint64_t clear_stops = 0;  ///< emergency stops up to this count are cleared
 };
 
-/// What activities work with: the axes, the state of the machine, the time of this turn, and where
-/// their orders go.
+/// The environment of activities: the axes, the state of the machine, the time of this turn, and
+/// the outputs.
 class Context : public AnswerSink {
  public:
   explicit Context(std::size_t inputs) : levels(inputs) {}
@@ -51,7 +51,7 @@ class Context : public AnswerSink {
   /// @name Of this turn
   /// @{
   pulse::Nanoseconds now = 0;      ///< clock time
-  pulse::Nanoseconds slipped = 0;  ///< motion time is clock time less this
+  pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
   std::uint64_t stops_asked = 0;   ///< emergency stops
   std::optional<PinDone> pin_done;
   Outputs* out = nullptr;
@@ -75,7 +75,7 @@ class Context : public AnswerSink {
   std::uint64_t jobs_ = 0;
 };
 
-/// Why something is ended before its time.
+/// Why something ends early.
 struct Why {
   axis::MoveEnd end = axis::MoveEnd::kStopped;
   std::string text;

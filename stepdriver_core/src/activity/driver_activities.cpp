@@ -10,7 +10,7 @@
 namespace stepdriver::activity {
 namespace {
 
-// A level that has changed is told in this time, even if its edge was lost.
+// A changed level is reported within this time, even if its edge was lost.
 constexpr pulse::Nanoseconds kLevelIsTold = 250'000'000;
 
 std::unique_ptr<Step> resetStep(Context& context, axis::AxisModel& axis) {
@@ -120,7 +120,7 @@ Steps Recover::plan() {
     add(steps, pinsStep(context(), axis,
                         pins.restore(power.isEnabled() || axis.motor.enableIsHeldByOthers(),
                                      power.isAsleep())));
-    // Each pin on the way back that the failed change did not reach is where it should be already.
+    // Each pin on the way back that the failed change did not reach is already right.
     if (const int failed = axis.motor.failedMode(); failed != 0) {
       add(steps, pinsStep(context(), axis, pins.mode(failed, axis.motor.microsteps())));
     }
@@ -140,12 +140,12 @@ bool Recover::isFaulty() {
 Steps Recover::resetIfFaulty() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
-  // Asleep a chip says nothing of the fault that it may have kept.
+  // A sleeping chip doesn't report a fault that it may have kept.
   const bool unknown = axis.config.fault && axis.motor.power().isAsleep();
   if (!(isFaulty() || unknown) || !axis.motor.pins().hasReset()) return steps;
   add(steps, resetStep(context(), axis));
   add(steps, std::make_unique<WaitStep>(context(), [&axis] { return axis.motor.state().ready; }));
-  // The line has another level by then, which may be told a little later.
+  // The line has another level by then, which may be reported a little later.
   add(steps, std::make_unique<WaitStep>(
                  context(), [&axis] { return axis.motor.state().ready + kLevelIsTold; },
                  [this] { return !isFaulty(); }));
@@ -205,8 +205,8 @@ PinsStep::Writes ChangeMicrosteps::writes() {
   const double scale = static_cast<double>(wanted_) / axis.motor.microsteps();
   const std::int64_t slack =
       std::min<std::int64_t>(std::llround(static_cast<double>(state.slack) * scale), play);
-  // If Home has no count in the new mode, the counting starts anew from it, at the same position;
-  // and what is taken up of the backlash need not be whole microsteps of it.
+  // If Home has no count in the new mode, the counting restarts from Home, at the same position;
+  // and the part of the backlash that is taken up need not be whole microsteps of the new mode.
   const bool rescales = !change.home_stays || state.slack != 0;
   const double origin = rescales ? kept - static_cast<double>(change.count - slack) / per_unit
                                  : axis.position.origin();

@@ -7,10 +7,10 @@
 #include "script.h"
 #include "steps.h"
 
-/// What is done with the pins of a driver chip.
+/// Activities on the pins of a driver chip.
 namespace stepdriver::activity {
 
-/// A sequence of pins, which is completed whatever comes.
+/// A sequence of pins, which is always completed.
 class PinScript : public Script {
  public:
   PinScript(Context& context, axis::AxisModel& axis, Ack call)
@@ -40,7 +40,7 @@ class Enable : public PinScript {
   Steps plan() override;
 };
 
-/// Takes the motor's current away when the axis has come to rest.
+/// Switches the motor's current off when the axis has come to rest.
 class Disable : public PinScript {
  public:
   using PinScript::PinScript;
@@ -79,7 +79,7 @@ class Reset : public PinScript {
   Steps plan() override;
 };
 
-/// Takes the current of a motor away that has stood for its idle timeout.
+/// Switches off the current of a motor that has been at rest for its idle timeout.
 class GoIdle : public PinScript {
  public:
   GoIdle(Context& context, axis::AxisModel& axis) : PinScript(context, axis, nullptr) {}
@@ -120,7 +120,7 @@ class ChangeMicrosteps : public Script {
   const int wanted_;
 };
 
-/// Takes the position of an earlier run.
+/// Restores the position of an earlier run.
 class RestorePosition : public PinScript {
  public:
   RestorePosition(Context& context, axis::AxisModel& axis, const axis::AxisMemory& kept, bool clean,

@@ -27,7 +27,7 @@ std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes,
 
 namespace {
 
-// While pins are written nobody would slow down what the others do: they come to rest before that.
+// While pins are written, nothing could slow down the others: they come to rest before that.
 Activity::Handover handoverOf(const std::vector<Order>& orders) {
   const bool wakes = std::any_of(orders.begin(), orders.end(), [](const Order& order) {
     return order.axis->motor.power().isIdle();
@@ -97,7 +97,7 @@ std::shared_ptr<const axis::LinePath> FollowLine::linePath() const {
 
 Steps FollowLine::plan() {
   check();
-  linePath();  // what it refuses is refused before the backlash is taken up
+  linePath();  // a refusal must come before the backlash is taken up
   Steps steps;
   for (const Order& order : orders_) {
     append(steps, wakeSteps(context(), *order.axis));
@@ -109,7 +109,7 @@ Steps FollowLine::plan() {
   return steps;
 }
 
-// Brings the motor to where the joint moves with its first step of the line.
+// Brings the motor to the position from which the joint moves with the first step of the line.
 Steps FollowLine::takeUp(const Order& order) {
   axis::AxisModel& axis = *order.axis;
   const std::int64_t way = *order.goal.target - axis.jointCount();

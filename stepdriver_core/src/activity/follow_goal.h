@@ -12,11 +12,11 @@
 
 namespace stepdriver::activity {
 
-/// A move or a jog of one axis, or a path of several, from whatever they do. If one of them is
-/// idle, all come to rest first, and it is woken.
+/// A move or a jog of one axis, or a path of several, from any motion. If one of them is idle, all
+/// come to rest first, and it is woken up.
 class FollowGoal : public Script {
  public:
-  /// @param join empty for one axis alone.
+  /// @param join empty for a single axis.
   FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call);
 
   void prepare() override;
@@ -37,7 +37,7 @@ class FollowGoal : public Script {
 class FollowLine : public Script {
  public:
   /// @param targets [microsteps] of the joints.
-  /// @param velocity, duration as machine::LineRequest has them.
+  /// @param velocity, duration see machine::LineRequest.
   FollowLine(Context& context, std::vector<Order> orders, double velocity, double duration,
              Ack call);
 
@@ -57,7 +57,7 @@ class FollowLine : public Script {
   const double duration_;
 };
 
-/// Where axes will be at a motion time.
+/// The states of axes at a motion time.
 std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes, std::int64_t at);
 
 /// The axes of orders.

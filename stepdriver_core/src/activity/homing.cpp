@@ -43,7 +43,7 @@ using axis::HomingPhase;
 
 // A switch that has not come to rest after so many debounce times is broken.
 constexpr int kMostDebounces = 50;
-// While a switch settles it is looked at so often.
+// The polling period while a switch settles.
 constexpr pulse::Nanoseconds kSamplePeriod = 1'000'000;
 
 }  // namespace
@@ -260,7 +260,7 @@ void Homing::sample() {
   }
 }
 
-// What did not last is a glitch: the phase continues.
+// A level that did not last is a glitch: the phase continues.
 void Homing::settled() {
   settling_ = false;
   switch (phase_) {
@@ -306,7 +306,7 @@ double Homing::triggerCount() const {
   if (!edge || !latch_profile_) return towards_ * count - slack;
   double at = towards_ * latch_profile_->stateAt(*edge - slipped_).position.value();
   at = std::min(at, count + 0.5);
-  // When in the latch the timeline slid isn't known; by how many steps it could matter is.
+  // It isn't known when in the latch the timeline slid, but the number of steps bounds the effect.
   if (slipped_ != slipped_before_) at = std::max(at, count - 0.5);
   return towards_ * at - slack;
 }

@@ -14,8 +14,8 @@
 
 namespace stepdriver::activity {
 
-/// A homing: a row of strokes, each an ordinary move of the axis, and what to do at the end of
-/// each. It is a state machine that is driven by what the engine says, the switch and the time.
+/// A homing: a sequence of strokes, each an ordinary move of the axis, and the actions at the end
+/// of each. It is a state machine driven by the engine's news, the switch and the time.
 class Homing : public Activity {
  public:
   using Result = axis::Outcome<axis::HomingResult>;
@@ -86,9 +86,8 @@ class Homing : public Activity {
 
   Steps waking_;
   std::unique_ptr<Manoeuvre> stroke_;  // under way
-  std::int64_t bound_ =
-      0;                  // the joint's count at which the strokes of this phase end at the latest
-  bool slowing_ = false;  // the switch has opened
+  std::int64_t bound_ = 0;  // the joint's count at which the strokes of this phase must end
+  bool slowing_ = false;    // the switch has opened
   pulse::Nanoseconds phase_began_ = 0;
 
   // While the switch settles.
@@ -97,7 +96,7 @@ class Homing : public Activity {
   pulse::Nanoseconds settle_began_ = 0;
   pulse::Nanoseconds steady_since_ = 0;
 
-  // Of the latch: what the axis followed, and how that ended.
+  // The profile of the latch, and how it ended.
   std::shared_ptr<const motion::Profile> latch_profile_;
   pulse::ChannelState latched_;
   pulse::Nanoseconds slipped_before_ = 0;

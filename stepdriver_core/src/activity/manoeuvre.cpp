@@ -16,13 +16,13 @@ namespace {
 
 constexpr pulse::Nanoseconds kLongestLead = 2'000'000'000;
 
-/// [s] From the beginning of a goal to a motion time, as a clock on the wall measures it.
+/// [s] Wall-clock time from the beginning of a goal to a motion time.
 double durationOf(const Context& context, const Goal& goal, std::int64_t end_ns) {
   const std::int64_t slid = context.slipped - goal.slipped_ns;
   return std::max(0.0, static_cast<double>(end_ns - goal.began_ns + slid) * 1e-9);
 }
 
-/// How the engine ended an axis's motion, and in words.
+/// How the engine ended an axis's motion, also in words.
 std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis) {
   switch (axis.motor.state().end) {
     case pulse::EndReason::kDone:
@@ -65,7 +65,7 @@ void tell(const Goal& goal, axis::MoveResult result) {
   if (goal.outcome) goal.outcome->set(std::move(result));
 }
 
-/// Of a goal that nothing has taken over from: the axis stands.
+/// For a goal that no other goal has replaced: the axis is at rest.
 void conclude(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
   const bool reached = result.end == axis::MoveEnd::kReached;
   axis.position.reached(reached ? goal.remainder / axis.stepsPerUnit() : 0.0);
@@ -123,7 +123,7 @@ std::shared_ptr<const motion::Profile> Manoeuvre::planPath(std::int64_t at) {
 
 Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
   Plans plans;
-  // What was never joined to a path comes to rest axis by axis.
+  // Axes that never joined a path come to rest one by one.
   const bool alone = !join_ || (slowsDown() && path_ == nullptr);
   for (const Order& order : orders_) {
     if (alone && slowsDown() && !order.axis->moving()) continue;
@@ -248,10 +248,10 @@ void Manoeuvre::stop(const Why& why, const Ack& call) {
   }
   why_ = why;
   if (anyMoves()) return change(Mode::kStop, call);
-  if (held_) drop();  // else it has come to rest by itself
+  if (held_) drop();  // otherwise it has come to rest by itself
 }
 
-// What it kept at rest is given up.
+// Gives up the goals that it held at rest.
 void Manoeuvre::drop() {
   for (const Order& order : orders_) {
     activity::conclude(*order.axis, order.goal, droppedResult(order, &order == &orders_.front()));
@@ -301,7 +301,7 @@ bool Manoeuvre::look() {
   if (over_) return true;
   if (isOpen()) return false;
   if (!open_.empty()) {
-    // What was ordered after a refused order is refused too.
+    // Orders after a refused order are refused too.
     const std::vector<OpenOrder> orders = std::exchange(open_, {});
     for (const OpenOrder& order : orders) {
       if (wasAccepted(order)) accept(order);
@@ -316,7 +316,7 @@ bool Manoeuvre::look() {
   return over_;
 }
 
-// The engine takes an order for all of its axes or for none.
+// The engine accepts an order for all of its axes or for no axis.
 bool Manoeuvre::wasAccepted(const OpenOrder& order) const {
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const std::uint64_t serial = order.serials[i];
@@ -346,7 +346,7 @@ void Manoeuvre::accept(const OpenOrder& order) {
 void Manoeuvre::refused() {
   path_ = accepted_path_;
   for (auto before = predecessors_.begin(); before != predecessors_.end();) {
-    // This was planned from what the other had ordered: if that was refused, it was never begun.
+    // This was planned from the other's order: if that was refused, this one never began.
     if (before->call && before->axis->motor.state().accepted < before->serial) {
       before->call->fail(neverBegun(*before));
       before->call.reset();
@@ -355,14 +355,14 @@ void Manoeuvre::refused() {
     if (ended) conclude(context_, *before);
     before = ended ? predecessors_.erase(before) : before + 1;
   }
-  // What was to change has ended by itself.
+  // The motion to change has ended by itself.
   if (started_ && !anyMoves()) {
     if (!from_rest_) return calls_.clear();
     if (mode_ == Mode::kHold) held_ = true;
     if (mode_ == Mode::kStop) drop();
     if (slowsDown()) return calls_.clear();
   }
-  // An emergency stop that has come is told soon, and ends this.
+  // An emergency stop has come; its news will arrive soon, and end this.
   if (context_.stops_asked != context_.stops_handled) return;
   tryAgain();
 }
@@ -394,7 +394,7 @@ void Manoeuvre::tryAgain() {
   }
 }
 
-// It can't go on as it was to. What moves still comes to rest.
+// It can't continue as planned. Axes that still move come to rest.
 void Manoeuvre::fail(Failure failure) {
   if (call_) call_->fail(failure);
   call_.reset();
@@ -410,7 +410,7 @@ void Manoeuvre::fail(Failure failure) {
   try {
     order(plan(lead_));
   } catch (const std::exception&) {
-    // What the engine follows comes to rest by itself.
+    // The motion that the engine follows comes to rest by itself.
     mode_ = Mode::kRun;
   }
 }
@@ -477,7 +477,7 @@ const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
 // ---- how it ended, in words ----
 
 void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
-  // Neither it nor what took over from it was begun.
+  // Neither it nor its successor has begun.
   if (ended.call) ended.call->fail(neverBegun(ended));
   auto [end, why] = endOf(*ended.axis);
   if (end == axis::MoveEnd::kReached && ended.slowed_down) {
@@ -510,7 +510,7 @@ std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
   return "an axis that it moved together with was stopped";
 }
 
-// Of what was held at rest.
+// For a goal that was held at rest.
 axis::MoveResult Manoeuvre::droppedResult(const Order& order, bool by_it) const {
   if (by_it || orders_.size() == 1) {
     return resultWith(context_, *order.axis, order.goal, why_.end, why_.text);

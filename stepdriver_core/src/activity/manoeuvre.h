@@ -12,11 +12,12 @@
 namespace stepdriver::activity {
 
 /// A motion of one axis, or of several along one path, from the first order to the engine to the
-/// rest at its end: it plans, orders, plans again what the engine refuses, slows down and resumes,
-/// and tells how each axis's goal ended.
+/// standstill at its end. It plans and orders, plans again if the engine refuses an order, slows
+/// down and resumes, and reports how each axis's goal ended.
 ///
-/// An order can be refused: it came too late, or what it was planned from has ended meanwhile. It
-/// is then planned again from what the axes do now, as long as it makes sense.
+/// The engine may refuse an order because it came too late, or because the motion that it continues
+/// has ended. The order is then planned again from the current motion of the axes, as long as it
+/// makes sense.
 class Manoeuvre {
  public:
   /// @param join of orders that are kTogether; empty for one order alone.
@@ -24,21 +25,21 @@ class Manoeuvre {
 
   /// Plans the first order; nothing is ordered yet.
   ///
-  /// @return what each axis is to do. @throw Refused, GpioError
+  /// @return the move of each axis. @throw Refused, GpioError
   std::vector<axis::Move> prepare();
   /// Orders what was prepared.
-  /// @param predecessors what the axes did until now.
-  /// @param call is answered when the engine has taken the order.
+  /// @param predecessors the goals of the axes until now.
+  /// @param call is answered when the engine has accepted the order.
   void begin(std::vector<Predecessor> predecessors, Ack call);
-  /// Comes to rest from what another manoeuvre has begun.
+  /// Comes to rest from the motion of another manoeuvre.
   void beginStop(const Why& why);
 
-  /// The engine has said something, or time has passed. @return whether all is over.
+  /// There is news from the engine, or time has passed. @return whether the manoeuvre has ended.
   bool look();
   bool isOver() const { return over_; }
   /// How the first axis's goal ended. @pre isOver()
   const axis::MoveResult& result() const { return result_; }
-  /// Why it was not begun after all; none if it was.
+  /// Why it did not begin; empty if it did.
   const std::optional<Failure>& failure() const { return failure_; }
 
   /// Slows down to rest, along the path of axes that move together.
@@ -52,12 +53,12 @@ class Manoeuvre {
   /// The override or the limits have changed.
   void replan(const Ack& call);
 
-  /// Leaves the axes to another one, which takes over in the midst of the motion.
+  /// Leaves the axes to another manoeuvre, which takes over during the motion.
   std::vector<Predecessor> handOver();
 
-  /// What an axis was asked to do; nullptr if it has no part in it.
+  /// The goal of an axis; nullptr if the axis has no part in it.
   const Goal* goalOf(const axis::AxisModel& axis) const;
-  /// Tells how a goal ended that nobody has taken over from.
+  /// Reports how a goal ended that no other goal has replaced.
   static void conclude(const Context& context, const Predecessor& ended);
   bool slowsDown() const { return mode_ != Mode::kRun; }
 
@@ -65,16 +66,17 @@ class Manoeuvre {
   enum class Mode { kRun, kStop, kHold };
 
   struct Planned {
-    std::shared_ptr<const motion::Profile> profile;  // none if the axis stands while others stop
+    // null if the axis is at rest while others stop
+    std::shared_ptr<const motion::Profile> profile;
     double overshoot = 0.0;
   };
   struct Plans {
     std::int64_t at = 0;
     std::vector<Planned> planned;
-    std::shared_ptr<const motion::Profile> path;  // how the shared path is run through
+    std::shared_ptr<const motion::Profile> path;  // the motion along the shared path
   };
 
-  /// What the engine has not yet dealt with.
+  /// An order that the engine has not yet handled.
   struct OpenOrder {
     std::vector<std::uint64_t> serials;  // by axis; 0: it has no part in it
     Mode mode = Mode::kRun;
@@ -113,25 +115,26 @@ class Manoeuvre {
 
   Mode mode_ = Mode::kRun;
   Why why_;                          // of a stop
-  Mode accepted_mode_ = Mode::kRun;  // of what the engine follows
+  Mode accepted_mode_ = Mode::kRun;  // of the motion that the engine follows
   std::vector<OpenOrder> open_;
-  bool from_rest_ = true;  // the last order begins at rest: the first one, or that of a resume
-  bool started_ = false;   // the engine has taken one
+  // the last order begins at rest: it is the first one, or that of a resume
+  bool from_rest_ = true;
+  bool started_ = false;  // the engine has accepted an order
   bool held_ = false;
   bool over_ = false;
   axis::MoveResult result_;
   std::optional<Failure> failure_;
   pulse::Nanoseconds lead_;
   std::shared_ptr<const motion::Profile> path_;           // of the last order
-  std::shared_ptr<const motion::Profile> accepted_path_;  // of what the engine follows
+  std::shared_ptr<const motion::Profile> accepted_path_;  // of the motion that the engine follows
   Ack call_;                                              // of the beginning
-  std::vector<Ack> calls_;                                // of what is open
+  std::vector<Ack> calls_;                                // of the open orders
 };
 
 /// "x stands at 0.01 m, not at 0.02 m: it was stopped"
 std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why);
 
-/// An error as a call is told it.
+/// An error, for the answer to a call.
 Failure failureOf(const std::exception& error);
 
 }  // namespace stepdriver::activity

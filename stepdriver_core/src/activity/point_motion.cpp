@@ -7,8 +7,8 @@
 namespace stepdriver::activity {
 namespace {
 
-// A joint that is to come to its target upwards has all of the backlash taken up there, downwards
-// none of it. At rest on its target it stays, and a moving one comes to it from where it would
+// If the joint reaches its target upwards, all of the backlash is taken up there; if it reaches it
+// downwards, nothing is. At rest on its target it stays; a moving joint counts from where it would
 // stop.
 std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
                          const motion::MotionState& from, const motion::MotionLimits& within) {
@@ -45,7 +45,7 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   const motion::MotionState from = before.profile->stateAt(at);
   const motion::MotionLimits stopping = axis.stopLimits();
   const motion::DoubleDouble end = before.profile->endPosition();
-  // What hasn't begun to move has nothing ahead.
+  // A motion that hasn't begun has nothing ahead of it.
   const bool ends_ahead = (end - from.position).value() * from.velocity > 0.0;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
   return motion::planStop(at, from, stopping, std::llround(end.value()));
@@ -57,7 +57,7 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
   if (const motor::Motion* before = axis.motor.motions().latest()) {
     return std::max(now + lead, before->profile->startNs());
   }
-  // DIR is set when the profile is taken, and the chip may still be waking.
+  // DIR is set when the profile is accepted, and the chip may still be waking up.
   const pulse::Nanoseconds dir = axis.config.timing.dir_hold_ns + axis.config.timing.dir_setup_ns;
   return std::max(now + lead + dir, now + (axis.motor.state().ready - context.now) + dir);
 }
@@ -70,7 +70,8 @@ std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
 axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::Profile& profile,
                   double overshoot) {
   axis::Move move;
-  // A path may turn, which takes the backlash up anew: the motor's end doesn't tell the joint's.
+  // A path may reverse, which takes up the backlash again: the motor's end doesn't determine the
+  // joint's.
   const double rest = goal.kind == Goal::Kind::kTogether
                           ? static_cast<double>(*goal.target)
                           : axis.jointAt(profile.endPosition().value());

@@ -12,8 +12,8 @@
 
 namespace stepdriver::activity {
 
-/// A part of a script. It is begun once, and looks until it is done. Either may throw an Error,
-/// with which the script fails.
+/// A part of a script. It begins once, and look() is called until it is done. Both may throw an
+/// Error, which makes the script fail.
 class Step {
  public:
   Step() = default;
@@ -24,18 +24,17 @@ class Step {
   virtual void begin() {}
   /// @return whether it is done.
   virtual bool look() = 0;
-  /// The script is ended: a motion comes to rest, anything else is completed.
+  /// The script has been ended: a motion comes to rest, anything else is completed.
   virtual void end(const Why& /*why*/, const Ack& /*call*/) {}
   virtual pulse::Nanoseconds due() const { return pulse::kNever; }
-  /// The motion that it makes; nullptr if it makes none. Such a step waits while the machine is
-  /// held.
+  /// Its motion; nullptr if it makes none. A step with a motion waits while the machine is on hold.
   virtual Manoeuvre* manoeuvre() { return nullptr; }
 };
 
 using Steps = std::vector<std::unique_ptr<Step>>;
 
-/// An activity that is a list of steps, one after the other. What ends it lets the step of now come
-/// to its end, and leaves out those after it.
+/// An activity that is a list of steps, one after the other. If it is ended, the current step
+/// finishes and the others are left out.
 class Script : public Activity {
  public:
   Script(Context& context, std::vector<axis::AxisModel*> axes, Handover handover, Ack call)
@@ -55,17 +54,17 @@ class Script : public Activity {
   void onEnd(const Why& why, const Ack& call) override;
   void onAbandon(const Why& why) override;
 
-  /// Its steps, when it begins. May throw an Error.
+  /// Makes its steps when it begins. May throw an Error.
   virtual Steps plan() = 0;
-  /// What its call is told if it ends before it has done what was asked for. @param why in words
+  /// The failure for its call if it ends before it has carried out the request. @param why in words
   virtual Failure notDone(const std::string& why) const;
-  /// Steps that come before those that are left.
+  /// Inserts steps before the remaining ones.
   void insert(Steps steps);
   void add(Steps& steps, std::unique_ptr<Step> step) { steps.push_back(std::move(step)); }
-  /// Of who waits for it to be done, or, if it moves, to begin that.
+  /// The call of the client that waits until it is done or, for a motion, until it begins.
   const Ack& call() const { return call_; }
   Ack takeCall() { return std::exchange(call_, nullptr); }
-  /// Of the motion that it takes over from.
+  /// The goals that it takes over.
   std::vector<Predecessor> takePredecessors() { return std::exchange(predecessors_, {}); }
   Step* current() { return current_.get(); }
   const Step* current() const { return current_.get(); }

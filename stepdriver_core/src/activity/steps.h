@@ -28,7 +28,7 @@ class RunStep : public Step {
 /// Waits for a clock time.
 class WaitStep : public Step {
  public:
-  /// @param until asked when the step begins. @param earlier if it says so, the wait is over.
+  /// @param until called when the step begins. @param earlier ends the wait when it returns true.
   WaitStep(const Context& context, std::function<pulse::Nanoseconds()> until,
            std::function<bool()> earlier = {})
       : context_(context), until_(std::move(until)), earlier_(std::move(earlier)) {}
@@ -47,14 +47,15 @@ class WaitStep : public Step {
 /// needs after it. The engine has the channel reserved meanwhile.
 class PinsStep : public Step {
  public:
-  /// What is to be written.
+  /// The writes.
   struct Writes {
     motor::PinSequence sequence;
-    std::optional<pulse::Command::Scale> scale;  ///< where the motor stands then, in a new mode
-    std::function<void()> then;                  ///< when all is done
-    std::function<void()> failed;                ///< a line could not be written
+    /// The position of the motor afterwards, in a new mode.
+    std::optional<pulse::Command::Scale> scale;
+    std::function<void()> then;    ///< called when everything is written
+    std::function<void()> failed;  ///< called if a line could not be written
   };
-  /// @param writes asked when the step begins.
+  /// @param writes called when the step begins.
   PinsStep(Context& context, axis::AxisModel& axis, std::function<Writes()> writes)
       : context_(context), axis_(axis), build_(std::move(writes)) {}
 
@@ -92,7 +93,7 @@ class FollowStep : public Step {
         predecessors_(std::move(predecessors)),
         call_(std::move(call)) {}
 
-  /// Plans it beforehand. @throw Refused
+  /// Plans it in advance. @throw Refused
   void prepare() { moves_ = manoeuvre_.prepare(); }
 
   void begin() override;
@@ -107,16 +108,16 @@ class FollowStep : public Step {
   std::function<Ack()> call_;
 };
 
-/// @name Pins that more than one script writes
+/// @name Pins that several scripts write
 /// @{
 
-/// Energizes the motor, or takes its current away. A line that another axis wants stays as it is.
+/// Energizes the motor, or switches its current off. A line that another axis needs stays asserted.
 std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool on,
                                  std::function<void()> then);
 /// Writes a fixed sequence.
 std::unique_ptr<Step> pinsStep(Context& context, axis::AxisModel& axis,
                                const motor::PinSequence& sequence, std::function<void()> then = {});
-/// Gives an idle motor its current back; does nothing if it isn't idle.
+/// Switches an idle motor's current on; does nothing if the motor isn't idle.
 Steps wakeSteps(Context& context, axis::AxisModel& axis);
 /// @}
 

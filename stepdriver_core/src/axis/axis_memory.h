@@ -4,15 +4,15 @@
 
 namespace stepdriver::axis {
 
-/// What of an axis outlasts the program; see machine::StateFile.
+/// The part of an axis's state that outlives the program; see machine::StateFile.
 struct AxisMemory {
   config::Kind kind = config::Kind::kLinear;
   double steps_per_unit = 0.0;  ///< [steps/unit] as configured
   double position = 0.0;        ///< [unit] at rest
-  double slack = 0.0;           ///< [unit] what is taken up of the backlash
+  double slack = 0.0;           ///< [unit] the part of the backlash that is taken up
   bool valid = false;           ///< the position could be trusted
   bool homed = false;
-  bool at_home = false;  ///< the chip's translator was where it begins after a reset
+  bool at_home = false;  ///< the chip's translator was in its state after a reset
 
   bool operator==(const AxisMemory& other) const {
     return kind == other.kind && steps_per_unit == other.steps_per_unit &&

@@ -101,7 +101,7 @@ double AxisModel::checkedLimit(const char* what, double wanted, double configure
     refuse(
         fmt::format("the {} must be a finite number, above 0 or 0 for what is configured", what));
   }
-  // The bound as the configuration rounds it is not below itself.
+  // The bound must not be below itself after the configuration's rounding.
   const double bound = lowest / config.steps_per_unit;
   if (wanted > 0.0 && wanted * (1.0 + 1e-9) < bound) {
     refuse(fmt::format("the {0} {1} is below the lowest, {2} {3}{4}, which is {5} steps{4}", what,
@@ -109,7 +109,7 @@ double AxisModel::checkedLimit(const char* what, double wanted, double configure
                        config.kind == config::Kind::kLinear ? "m" : "rad", per,
                        numberText(lowest)));
   }
-  // Without a jerk limit in the configuration any is within it.
+  // If no jerk limit is configured, any jerk is allowed.
   if (configured > 0.0 && wanted > configured * (1.0 + 1e-12)) {
     refuse(fmt::format("the {} {} is above the configured {}", what, show(wanted, per),
                        show(configured, per)));

@@ -20,11 +20,11 @@
 
 namespace stepdriver::axis {
 
-/// An axis as the controller knows it: a motor, what its counts mean in the axis's unit, what its
-/// motions keep to, and its fault. It has no lock, no clock and no line.
+/// An axis as the controller knows it: a motor, the scale of its counts, the limits of its motions,
+/// and its fault. It has no lock, no clock and no line.
 ///
-/// Counts are the joint's unless they are said to be the motor's: the motor's are off by what is
-/// taken up of the backlash.
+/// Counts are the joint's unless stated otherwise: the motor's differ by the part of the backlash
+/// that is taken up.
 class AxisModel {
  public:
   /// @param machine_mode, input_levels, line_names outlive the axis.
@@ -43,7 +43,7 @@ class AxisModel {
   const std::string& name() const { return config.name; }
   bool moving() const { return motor.moving(); }
 
-  /// @name Scales, in the microstep mode of now
+  /// @name Scales, in the current microstep mode
   /// @{
   double stepsPerUnit() const { return stepsPerUnit(motor.microsteps()); }  ///< [microsteps/unit]
   double stepsPerUnit(int microsteps) const;  ///< [microsteps/unit] in that mode
@@ -51,18 +51,17 @@ class AxisModel {
   double countOf(double at) const { return (at - position.origin()) * stepsPerUnit(); }
   std::int64_t backlash() const;  ///< [microsteps]
   std::int64_t jointCount() const { return motor.state().count - motor.state().slack; }
-  /// [microsteps] Where the joint is once the motor has come to a count, straight on from where it
-  /// is.
+  /// [microsteps] The position of the joint when the motor has moved to a count without a reversal.
   double jointAt(double motor_count) const;
   double positionNow() const { return positionOf(static_cast<double>(jointCount())); }
-  /// A value with its unit, as messages show it.
+  /// A value with its unit, for messages.
   std::string show(double value, const char* per = "") const { return pathAxis().show(value, per); }
   /// @}
 
   /// @name For paths of several axes
   /// @{
   PathAxis pathAxis() const;
-  /// Where it will be at a motion time.
+  /// Its state at a motion time.
   PathStart pathStart(std::int64_t at) const;
   /// @}
 
@@ -71,14 +70,14 @@ class AxisModel {
   double maxSpeed() const;  ///< [unit/s]
   /// [microsteps] @param velocity [unit/s] the highest speed.
   motion::MotionLimits limits(double velocity) const;
-  /// What every stop keeps to, whatever setLimits() has done: the configured deceleration and jerk.
+  /// The limits of every stop, regardless of setLimits(): the configured deceleration and jerk.
   motion::MotionLimits stopLimits() const;
   double stopDeceleration() const;  ///< [microsteps/s^2]
   /// Steps closer than this are at a speed that the motor can't start from without a ramp.
   pulse::Nanoseconds restartInterval() const;
   const AxisLimits& limitsOfNextMotion() const { return limits_next_; }
   void changeLimits(const AxisLimits& wanted);
-  /// A motion has ended: the limits of the next one hold.
+  /// A motion has ended: the limits of the next one apply.
   void atRest() { limits_now_ = limits_next_; }
   /// @}
 
@@ -94,15 +93,15 @@ class AxisModel {
   void refuseBeyondLimits(double at, const std::string& what) const {
     pathAxis().refuseBeyondLimits(at, what);
   }
-  /// @param steps that it is to make; none is refused for 0.
+  /// @param steps to make; 0 is never refused.
   void refuseIntoEndstop(std::int64_t steps) const;
   void refuseMicrosteps(int wanted) const;
-  /// [unit/s] What is asked for, or the maximum if that is 0.
+  /// [unit/s] The requested velocity, or the maximum if that is 0.
   double checkedVelocity(double velocity) const;
   AxisLimits checkedLimits(const AxisLimits& wanted) const;
   /// @}
 
-  /// What the levels of the endstops say. @throw GpioError if a line can't be read.
+  /// Whether an endstop is active. @throw GpioError if a line can't be read.
   std::optional<bool> endstopActive(int line, const std::optional<config::Endstop>& endstop) const;
   /// @throw GpioError
   int readInput(int line) const;
@@ -112,8 +111,7 @@ class AxisModel {
   }
 
   /// @name The driver chip
-  /// @{
-  /// The motor had no current for a while.
+  /// @{ The motor was without current for a while.
   void noteUnpowered();
   /// The translator has gone Home: from another phase the motor turns when it has current again.
   void noteHome();
@@ -125,23 +123,23 @@ class AxisModel {
   std::string whyUnverified(const AxisMemory& kept, bool clean) const;
   /// @}
 
-  /// Something stopped it, moving or not: what it was commanded to do is over.
+  /// Something stopped it, moving or not: its command has ended.
   void noteStop() {
     ++stops;
     position.dropRemainder();
   }
 
-  /// Clock time of the last thing that it did.
+  /// Clock time at which its last activity ended.
   pulse::Nanoseconds rest_since = 0;
-  /// Times that something stopped it, other than the end of its motion.
+  /// How often something stopped it, other than the end of its motion.
   std::uint64_t stops = 0;
 
  private:
   double checkedLimit(const char* what, double wanted, double configured, double lowest,
                       const char* per) const;
 
-  AxisLimits limits_now_;   // of the motion under way
-  AxisLimits limits_next_;  // of those that begin at rest; the speed is that of now
+  AxisLimits limits_now_;   // of the current motion
+  AxisLimits limits_next_;  // of motions that begin at rest; the speed also applies now
 };
 
 }  // namespace stepdriver::axis

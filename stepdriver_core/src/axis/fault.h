@@ -5,8 +5,8 @@
 
 namespace stepdriver::axis {
 
-/// The fault of an axis, which stays until it is cleared. An emergency stop by the input is known
-/// to be the input's, whatever comes after it.
+/// The fault of an axis, which stays until it is cleared. An emergency stop by the input stays
+/// marked as such, whatever comes after it.
 class Fault {
  public:
   static constexpr const char* kEmergencyStop = "emergency stop";

@@ -22,7 +22,7 @@ LinePath::LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& sta
     : axes_(std::move(axes)) {
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     origins_.push_back(starts[i].motor.position);
-    // The backlash is taken up, so that the motor makes the way of the joint.
+    // The backlash is taken up, so the motor moves the same distance as the joint.
     const std::int64_t slack = std::llround(starts[i].slack);
     ways_.push_back(motion::fromInteger(targets[i] + slack) - origins_[i]);
     length_ = std::max(length_, static_cast<std::int64_t>(std::ceil(std::abs(ways_[i].value()))));
@@ -36,7 +36,7 @@ double LinePath::scale(std::size_t member) const {
   return std::abs(ways_[member].value()) / static_cast<double>(length_);
 }
 
-// Each axis does its scale of what the path does.
+// Each axis moves in proportion to the path.
 void LinePath::takeLimits() {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   limits_ = {kNone, kNone, kNone, kNone, 0.0};
@@ -62,7 +62,7 @@ void LinePath::takeLimits() {
   if (stop_jerk < kNone) stop_limits_.jerk = stop_jerk;
 }
 
-// Of the linear axes if one of them moves, else of the rotary ones.
+// The speed of the linear axes if one of them moves, otherwise of the rotary ones.
 double LinePath::pathSpeed(double velocity) const {
   double linear = 0.0;
   double rotary = 0.0;

@@ -9,18 +9,18 @@
 
 namespace stepdriver::axis {
 
-/// A straight line from where the axes rest. The path's unit is about a microstep of the axis that
-/// makes the most of them.
+/// A straight line from the positions of the axes at rest. The path's unit is about a microstep of
+/// the axis that makes the most of them.
 class LinePath : public SharedPath {
  public:
   /// @param starts at rest; the backlash is taken up. @param targets [microsteps] of each joint.
-  /// @param velocity along the path, as machine::LineRequest has it; 0: as the limits allow.
-  /// @param duration [s] that the line takes; 0: as short as the velocity makes it.
+  /// @param velocity along the path, see machine::LineRequest; 0: as fast as the limits allow.
+  /// @param duration [s] of the line; 0: determined by the velocity.
   /// @throw Refused if the limits of the axes don't allow that velocity, or that duration.
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
            const std::vector<std::int64_t>& targets, double velocity, double duration);
 
-  /// @throw Refused if an axis isn't where the line begins, at rest.
+  /// @throw Refused if an axis isn't at rest at the beginning of the line.
   void requireStart(const std::vector<PathStart>& starts) const;
 
   motion::MotionState begin() const override { return {}; }
@@ -40,10 +40,10 @@ class LinePath : public SharedPath {
   std::vector<PathAxis> axes_;
   std::vector<motion::DoubleDouble> origins_;  // microsteps of the motor
   std::vector<motion::DoubleDouble> ways_;
-  std::int64_t length_ = 0;           // of the path: the longest way, and up to a microstep more
-  motion::MotionLimits limits_;       // as the axes allow
+  std::int64_t length_ = 0;           // of the path: the longest distance, plus up to a microstep
+  motion::MotionLimits limits_;       // that the axes allow
   motion::MotionLimits stop_limits_;  // the same, for stops
-  double speed_ = 0.0;                // wanted, at a speed override of 1
+  double speed_ = 0.0;                // requested speed, at a speed override of 1
 };
 
 }  // namespace stepdriver::axis

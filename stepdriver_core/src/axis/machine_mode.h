@@ -4,7 +4,7 @@
 
 namespace stepdriver::axis {
 
-/// The state of the whole machine, whatever its axes do.
+/// The state of the whole machine, independent of its axes.
 struct MachineMode {
   bool held = false;            ///< by a feed hold, moving or not, until resume or stop
   double speed_override = 1.0;  ///< of all velocities

@@ -11,7 +11,7 @@
 namespace stepdriver::axis {
 namespace {
 
-// Longest way of one move: every count on it is exact in a double with a half.
+// Longest distance of one move: doubles represent every count and half count on it exactly.
 constexpr double kFarthest = 1099511627776.0;  // 2^40
 
 auto tied(const motion::MotionLimits& limits) {
@@ -42,7 +42,7 @@ std::string PathAxis::show(double value, const char* per) const {
 void PathAxis::refuse(const std::string& why) const { throw Refused(name + ": " + why); }
 
 void PathAxis::refuseBeyondLimits(double position, const std::string& what) const {
-  // Half a step of tolerance: what rounds to the limit is at the limit.
+  // Half a step of tolerance: a position that rounds to the limit is at the limit.
   const double tolerance = 0.5 / steps_per_unit;
   if (min_position && position < *min_position - tolerance) {
     refuse(fmt::format("{} {} is below the soft limit min_position {}", what, show(position),

@@ -10,8 +10,8 @@
 
 namespace stepdriver::axis {
 
-/// All that a path of several axes needs to know of one of them. A copy: a path may be planned from
-/// it in any thread, and compared later with what is true by then.
+/// Everything that a path of several axes needs to know about one of them. It is a copy: any thread
+/// may plan a path from it, and compare it later with the state at that time.
 struct PathAxis {
   std::string name;  ///< refusals begin with it
   config::Kind kind = config::Kind::kLinear;
@@ -23,10 +23,10 @@ struct PathAxis {
   std::optional<double> max_position;
   double configured_backlash = 0.0;  ///< [unit]
   std::int64_t backlash = 0;         ///< [microsteps]
-  /// [microsteps] Of motions that begin now; the maximum speed without any override.
+  /// [microsteps] For motions that begin now; the maximum speed is without the override.
   motion::MotionLimits limits;
   double stop_deceleration = 0.0;  ///< [microsteps/s^2]
-  double stop_jerk = 0.0;  ///< [microsteps/s^3] as configured, whatever `limits` has; 0: none
+  double stop_jerk = 0.0;  ///< [microsteps/s^3] as configured, regardless of `limits`; 0: no limit
 
   bool operator==(const PathAxis& other) const;
   bool operator!=(const PathAxis& other) const { return !(*this == other); }
@@ -45,11 +45,11 @@ struct PathAxis {
   void refuseBeyondLimits(double position, const std::string& what) const;
 };
 
-/// Where an axis is at the time at which a path begins.
+/// The state of an axis at the beginning of a path.
 struct PathStart {
   motion::MotionState motor;  ///< [microsteps]
-  double slack = 0.0;         ///< [microsteps] of the backlash, what is taken up
-  bool moves = false;         ///< else it is at rest
+  double slack = 0.0;         ///< [microsteps] the part of the backlash that is taken up
+  bool moves = false;         ///< false: it is at rest
 };
 
 }  // namespace stepdriver::axis

@@ -6,8 +6,8 @@
 
 namespace stepdriver::axis {
 
-/// Where an axis says that it stands: the position at count 0, whether it can be trusted, and what
-/// its last move left to the microstep that it rests on. It alone changes these.
+/// The position of an axis: the position at count 0, whether it can be trusted, and the remainder
+/// of its last move beyond a whole microstep. Only this class changes them.
 class Position {
  public:
   /// [unit] The position at count 0.
@@ -19,22 +19,22 @@ class Position {
   /// is none.
   const std::string& note() const { return valid_ ? kNothing : note_; }
 
-  /// [unit] The commanded position less the one that the axis rests on: up to half a microstep
-  /// after a move that reached its target, else 0. A relative move counts from the commanded
-  /// position, so that roundings don't add up.
+  /// [unit] The commanded position minus the position of the axis at rest: up to half a microstep
+  /// after a move that reached its target, otherwise 0. A relative move counts from the commanded
+  /// position, so that rounding errors don't accumulate.
   double remainder() const { return remainder_; }
-  /// A motion has reached its target but for this [unit].
+  /// A motion has reached its target except for this [unit].
   void reached(double remainder) { remainder_ = remainder; }
-  /// From now on the commanded position is where the axis stands.
+  /// From now on the commanded position is the position of the axis.
   void dropRemainder() { remainder_ = 0.0; }
 
-  /// Something has happened after which nobody knows where the axis stands.
+  /// Something has happened that makes the position of the axis uncertain.
   void distrust() {
     valid_ = homed_ = false;
     dropRemainder();
   }
 
-  /// Somebody who knows says where the axis stands.
+  /// A caller declares the position of the axis.
   void declare(double origin) {
     origin_ = origin;
     valid_ = true;
@@ -46,11 +46,11 @@ class Position {
   }
   void beginHoming() { homed_ = false; }
 
-  /// Counts mean something else from now on; the axis stands where it stood.
+  /// The scale of counts has changed; the position is the same.
   void rescale(double origin) { origin_ = origin; }
 
-  /// Takes the position of an earlier run.
-  /// @param doubt why it can't be trusted; empty: it can.
+  /// Restores the position of an earlier run.
+  /// @param doubt why it can't be trusted; empty: it can be trusted.
   void restore(double origin, std::string doubt, bool homed) {
     origin_ = origin;
     note_ = std::move(doubt);

@@ -22,9 +22,9 @@ using motion::Peak;
 using motion::Profile;
 using motion::ProfilePeaks;
 
-// What it has itself it may have again.
+// The slowed trajectory may use the limits that the trajectory itself reaches.
 constexpr double kMore = 1.0 + kTrajectoryTolerance;
-// So many are planned anew when a motion joins, if what was prepared is of no use.
+// How many pieces may be planned again on joining if the prepared ones can't be used.
 constexpr std::size_t kFewPieces = 5000;
 
 std::string at(double seconds) { return roughText(seconds) + " s after its start"; }
@@ -79,7 +79,7 @@ void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin
                   at(time_s), axis.show(axis.configured_backlash)));
 }
 
-// At rest a first point at time 0 says where the trajectory believes the axis to be.
+// At rest, a first point at time 0 gives the position that the trajectory assumes for the axis.
 void requireStart(const PathAxis& axis, const motion::Waypoint& first, const PathStart& start) {
   const double count = std::round(start.motor.position.value()) - start.slack;
   if (std::abs(first.position - count) <= axis.microsteps) return;
@@ -123,7 +123,7 @@ motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t 
                                                 const TrajectoryPoint& point,
                                                 const std::vector<motion::Waypoint>& before) const {
   const PathAxis& axis = axes_[member];
-  // Made for a refusal only: there are many points.
+  // Called only for a refusal, because there are many points.
   const auto name = [&] { return fmt::format("point {} of the trajectory", index); };
   const auto check = [&](const std::vector<double>& numbers, const char* what, bool optional) {
     if (optional && numbers.empty()) return;
@@ -178,7 +178,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(
     waypoints.push_back(waypointOf(member, i, points[i], waypoints));
   }
   if (lone_position_) {
-    // From a motion it comes to rest there as smoothly as the axis's limits ask for.
+    // If the axis moves, it comes to rest there as smoothly as its limits require.
     waypoints.front().velocity = 0.0;
     if (axis.limits.jerk > 0.0) waypoints.front().acceleration = 0.0;
   }
@@ -273,7 +273,7 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
   for (const auto& stretch : fresh) {
     const Profile planned = motion::part(*motor, stretch.from, stretch.to);
     if (planned.pieceCount() == 0) continue;
-    // The backlash doesn't make the speed jump: where the tail begins it is the joint that does.
+    // The backlash doesn't make the speed jump: at the beginning of the tail, only the joint does.
     const double seam = first && tail != nullptr ? tail->piece(0).v0 - endVelocity(head) : 0.0;
     const bool to_rest = first && tail == nullptr;
     const ProfilePeaks own_peaks =
@@ -300,7 +300,7 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::lineTo(
     const std::int64_t slack = std::llround(starts[i].slack);
     const std::int64_t way =
         joint + slack - std::llround(std::nearbyint(starts[i].motor.position.value()));
-    // The backlash is taken up on the way.
+    // The backlash is taken up during the motion.
     targets.push_back(joint + (way > 0 ? axes_[i].backlash : way < 0 ? 0 : slack) - slack);
   }
   const double duration = static_cast<double>(parts_.front().ends.back().time_ns) / 1e9;

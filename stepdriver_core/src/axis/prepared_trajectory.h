@@ -16,13 +16,13 @@
 
 namespace stepdriver::axis {
 
-/// A trajectory that is planned and checked but for its first segment, which depends on where the
-/// axes are when it begins. It takes as long as it has points, in whatever thread wants it; joining
-/// it to the motions of the axes then takes a bounded time.
+/// A trajectory that is planned and checked except for its first segment, which depends on the
+/// positions of the axes when it begins. Preparing it takes time in proportion to its points, in
+/// any thread; joining it to the motions of the axes then takes a bounded time.
 ///
-/// It is made from a copy of what it needs to know of the axes. Whoever joins it compares that with
-/// what is true by then: if axes() differs (other limits, another scale or origin), it has to be
-/// prepared again.
+/// It is made from a copy of the facts about the axes. Before joining it, the caller compares that
+/// copy with the present facts: if axes() differs (other limits, another scale or origin), it must
+/// be prepared again.
 class PreparedTrajectory {
  public:
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
@@ -32,31 +32,31 @@ class PreparedTrajectory {
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
   const std::vector<PathAxis>& axes() const { return axes_; }
-  /// [microsteps] Where each axis is to come to rest.
+  /// [microsteps] The position at which each axis will come to rest.
   double target(std::size_t member) const { return parts_[member].ends.back().position; }
 
-  /// The path from where the axes are. With a backlash also what takes it up until that is what was
-  /// prepared, which is mostly at the first turn.
+  /// The path from the current positions of the axes. If there is a backlash, it is taken up until
+  /// the result matches what was prepared, mostly at the first reversal.
   ///
   /// @param prepared is shared by the path, and by all profiles along it.
   /// @param starts one for each axis, at the time at which the path begins.
   ///
-  /// One point alone without velocities is a straight line to rest, in its time.
+  /// A single point without velocities is a straight line to rest, in its time.
   ///
-  /// @throw Refused if an axis can't do its part from there; or if the backlash is taken up anew at
-  ///   turn after turn and never at rest in between, so that it would take unbounded time to say.
+  /// @throw Refused if an axis can't do its part from there; or if reversals follow each other so
+  ///   closely that the backlash is never at rest, so that checking would take unbounded time.
   static std::shared_ptr<const SharedPath> join(
       const std::shared_ptr<const PreparedTrajectory>& prepared,
       const std::vector<PathStart>& starts);
 
  private:
-  // All that is known of one axis beforehand. What has a motor tail points into its spline tail.
+  // Everything that is known about one axis in advance. A motor tail points into the spline tail.
   struct Part {
     std::vector<motion::Waypoint> ends;  // the first waypoint, and the last
-    bool begins_at_start = false;        // the first is at time 0, one of several
+    bool begins_at_start = false;        // the first of several points is at time 0
     std::unique_ptr<const motion::SplineTail> spline;
-    std::unique_ptr<const motion::MotorTail> motor;  // with a backlash only
-    motion::MotorBounds bounds;                      // that the tail comes to
+    std::unique_ptr<const motion::MotorTail> motor;  // only with a backlash
+    motion::MotorBounds bounds;                      // reached by the tail
   };
 
   std::shared_ptr<const SharedPath> lineTo(const std::vector<PathStart>& starts) const;
@@ -70,7 +70,7 @@ class PreparedTrajectory {
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
-  bool lone_position_ = false;  // its only point has nothing but positions
+  bool lone_position_ = false;  // its only point gives only positions
 };
 
 }  // namespace stepdriver::axis

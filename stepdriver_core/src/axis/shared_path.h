@@ -7,13 +7,13 @@
 
 namespace stepdriver::axis {
 
-/// Where each of several axes is at each place of a path. How the path is run through is one
-/// profile for all of them, so that they stay on it whatever happens: another speed, a stop, a
-/// hold.
+/// A path of several axes: the position of each axis for each position along the path. One profile
+/// describes the motion along the path for all of them, so that they stay on it at any speed and
+/// during a stop or a hold.
 ///
-/// Never changed once made, and without an axis, an engine or a clock: any thread may plan on it.
-/// Every function takes a bounded time, however long the path is. None throws but std::range_error,
-/// if a motion would take longer than motion::Profile::kLongest.
+/// It is immutable, and uses no axis, engine or clock: any thread may plan on it. Every function
+/// takes a bounded time, however long the path is. The only exception is std::range_error, if a
+/// motion would take longer than motion::Profile::kLongest.
 class SharedPath {
  public:
   SharedPath() = default;
@@ -21,14 +21,14 @@ class SharedPath {
   SharedPath(const SharedPath&) = delete;
   SharedPath& operator=(const SharedPath&) = delete;
 
-  /// Where the path begins, and at which rate.
+  /// The position and the rate at the beginning of the path.
   virtual motion::MotionState begin() const = 0;
-  /// Along the path to its end, from a place on it.
+  /// The motion along the path to its end, from a position on it.
   virtual motion::Profile plan(std::int64_t at, const motion::MotionState& from,
                                double speed_override) const = 0;
-  /// Along the path to rest.
+  /// The motion along the path to rest.
   virtual motion::Profile planStop(std::int64_t at, const motion::MotionState& from) const = 0;
-  /// What the motor of one of the axes does while the path is run through [microsteps].
+  /// The motion of one axis's motor along the path [microsteps].
   virtual motion::Profile profileOf(std::size_t member, const motion::Profile& path) const = 0;
 };
 

@@ -13,13 +13,13 @@ namespace {
 
 using motion::DoubleDouble;
 
-constexpr double kSteepest = 1000.0;  // 1/s: from full rate to none in a millisecond
+constexpr double kSteepest = 1000.0;  // 1/s: from full rate to 0 in a millisecond
 constexpr double kSteepestJerk = kSteepest * kSteepest;  // 1/s^2
 constexpr double kGentler = 0.8;
 constexpr int kTries = 60;             // down to a millionth of the steepest
 constexpr double kFirstDelay = 0.010;  // s
 
-// When a path that planRate() has made comes to the rate, or to its end [s].
+// When a path from planRate() reaches the rate, or its end [s].
 double timeToRate(const motion::Profile& path, double rate) {
   const double duration = path.duration().value();
   if (path.pieceCount() == 0) return duration;
@@ -34,7 +34,7 @@ TrajectoryPath::TrajectoryPath(std::vector<Member> members) : members_(std::move
   endTogether();
 }
 
-// What takes up a backlash at the end may last longer than the trajectory.
+// Taking up a backlash at the end may last longer than the trajectory.
 void TrajectoryPath::endTogether() {
   DoubleDouble longest;
   for (const Member& member : members_) longest = std::max(longest, member.curve->duration());
@@ -59,8 +59,8 @@ motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
 }
 
 // As fast as the limits of all axes allow: now, or, if one of them is at its limit already, as soon
-// as it leaves some room. If it never does, the trajectory continues
-// nearly as it is: it ends at rest too.
+// as it leaves some room. If that never happens, the trajectory continues almost unchanged: it also
+// ends at rest.
 motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::MotionState& from,
                                            double rate, Bounds bounds) const {
   const DoubleDouble end = members_.front().curve->duration();

@@ -10,14 +10,13 @@
 
 namespace stepdriver::axis {
 
-/// A trajectory. The path's unit is a second of it; to run through it more slowly is to stay on its
-/// curve.
+/// A trajectory. The path's unit is a second of it; at a lower rate the axes stay on its curve.
 class TrajectoryPath : public SharedPath {
  public:
-  /// What one axis does.
+  /// The motion of one axis.
   struct Member {
     std::shared_ptr<const motion::Profile> curve;  ///< of the motor, from time 0 on
-    motion::MotorBounds bounds;                    ///< that its motor may come to
+    motion::MotorBounds bounds;                    ///< of its motor
     motion::MotorBounds stop_bounds;               ///< the same, for stops
   };
 

@@ -35,7 +35,7 @@ constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check tells what it holds), call "
     "recover, and home it or set its position";
 
-/// Of a line that may still have to wait for its axes to rest, whatever its direction.
+/// For a line whose axes may still have to come to rest, for any direction.
 void refuseTooFast(const std::vector<const axis::AxisModel*>& axes, double velocity) {
   double linear = 0.0;
   double rotary = 0.0;
@@ -142,7 +142,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
   if (!was_faulty && axis.fault) axis.noteStop();
 }
 
-// What falls due by the state of things alone.
+// Starts what the current state requires without a request.
 void Controller::supervise() {
   for (const auto& axis : context_.axes) {
     if (axis->fault && !activities_.isFree(*axis)) {
@@ -191,7 +191,7 @@ void Controller::refuseUnlessFree(const axis::AxisModel& axis, const std::string
     if (busy == nullptr || busy->isInBackground()) continue;
     const bool pins =
         busy->work() == Activity::Work::kWritesPins || busy->work() == Activity::Work::kDisables;
-    if (!pins) axis.refuseWhileHeld();  // what is held is to go on from here
+    if (!pins) axis.refuseWhileHeld();  // held motions must continue from here
     axis.refuse(pins ? "busy: its driver's pins are being written; " + what + " when that is done"
                      : "busy: it is about to move; " + what + " at rest");
   }
@@ -225,7 +225,7 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
     return static_cast<double>(axis.jointCount()) + axis.position.remainder() * axis.stepsPerUnit();
   }
   const Goal* goal = motion->goalOf(axis);
-  // What slows down, and what takes up backlash, ends where its motor does.
+  // A motion that slows down or takes up backlash ends at the end of its motor's motion.
   if (latest->slows_down || (goal != nullptr && goal->of_motor)) {
     return axis.jointAt(latest->profile->endPosition().value());
   }
@@ -323,7 +323,7 @@ void Controller::serve(const Jog& wanted, const Ack& call) {
     }
     moved.refuseIntoEndstop(sign);
   } else if (jogs && !motion->slowsDown() && current->velocity == wanted.velocity) {
-    return;  // it does so already
+    return;  // it does that already
   }
   activities_.begin(std::make_unique<activity::FollowGoal>(
                         context_, std::vector<Order>{{&moved, goalWithOutcome(goal)}},
@@ -440,7 +440,7 @@ void Controller::serve(const SetLimits& wanted, const Ack& call) {
   changed.refuseUnlessOpen();
   changed.changeLimits(changed.checkedLimits(wanted.limits));
   Activity* owner = activities_.owner(changed);
-  // Axes that move together keep what they began with.
+  // Axes that move together keep their limits.
   if (owner != nullptr && owner->axes().size() == 1) owner->speedChanged(call);
 }
 

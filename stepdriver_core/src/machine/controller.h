@@ -13,9 +13,8 @@
 
 namespace stepdriver::machine {
 
-/// Owns all state of a machine and decides everything that it does. It has no thread, no lock, no
-/// clock, no line and no file: what it wants done is a function of what it is told, and of the
-/// order in which it is told that.
+/// Owns all state of a machine and makes all decisions. It has no thread, lock, clock, line or
+/// file: its outputs are a function of its inputs and their order.
 class Controller {
  public:
   Controller(const std::vector<config::AxisConfig>& axes,
@@ -25,18 +24,18 @@ class Controller {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// A turn: takes in what has happened, and says what is to be done.
+  /// A turn: handles an input, and returns what must be done.
   void handle(const Input& input, activity::Outputs& out);
 
-  /// Clock time at which it wants a TimerDue at the latest.
+  /// Clock time by which it needs a TimerDue.
   pulse::Nanoseconds due() const;
-  /// It acts on the levels of inputs; else they are looked at when a request comes.
+  /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
   bool watchesInputs() const { return activities_.watchInputs(); }
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
 
  private:
-  // What comes from outside.
+  // Inputs from outside.
   void on(const Requested& requested);
   void on(const EngineNews& news);
   void on(const InputRead& read) { context_.levels.take(read.input, read.level); }
@@ -44,7 +43,7 @@ class Controller {
   void on(const activity::PinDone& done) { context_.pin_done = done; }
   void on(const TimerDue& /*due*/) {}
 
-  // Requests. Each throws Refused or GpioError, or takes the call.
+  // Requests. Each throws Refused or GpioError, or accepts the call.
   using Ack = activity::Ack;
   void serve(const MoveTo& wanted, const Ack& call);
   void serve(const MoveRounds& wanted, const Ack& call);
@@ -77,11 +76,11 @@ class Controller {
   axis::AxisModel& axis(AxisId id) { return *context_.axes.at(id); }
   activity::Goal goalOf(const MoveTo& wanted);
   void setTarget(activity::Goal& goal, axis::AxisModel& axis, double position, bool relative);
-  /// [microsteps] Of the joint, where a relative move counts from.
+  /// [microsteps] The position of the joint from which a relative move counts.
   double relativeOrigin(const axis::AxisModel& axis) const;
   activity::Goal newGoal() { return goalWithOutcome({}); }
   activity::Goal goalWithOutcome(activity::Goal goal);
-  /// It neither moves nor changes its pins. @param what is refused, in words.
+  /// Requires that the axis neither moves nor changes its pins. @param what is refused, in words.
   void refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const;
   void refuseUnlessReadyToMove(const axis::AxisModel& axis) const;
   void refuseWhileEmergencyStopInput() const;
@@ -101,7 +100,7 @@ class Controller {
   std::uint64_t input_stops_seen_ = 0;
   std::uint64_t homings_ = 0;
   std::vector<Ack> awaiting_rest_;
-  activity::Outputs last_;  // where calls that are never served are answered at the end
+  activity::Outputs last_;  // receives the answers to unserved calls at the end
 };
 
 }  // namespace stepdriver::machine

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kNiceness = 10;
 
-// Whatever the thread has that made it.
+// Regardless of the thread that created this one.
 void lowerPriority() {
   const sched_param none{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &none);
@@ -26,7 +26,7 @@ void lowerPriority() {
 
 }  // namespace
 
-// Outlives the disposer as long as something that it keeps is in use.
+// Outlives the disposer as long as one of its objects is in use.
 class Disposer::Queue {
  public:
   struct Entry {
@@ -42,7 +42,7 @@ class Disposer::Queue {
   Queue(const Queue&) = delete;
   Queue& operator=(const Queue&) = delete;
 
-  /// The thread is there from the first time on.
+  /// The first call starts the thread.
   void start() {
     if (!open_.load(std::memory_order_acquire)) return;
     std::call_once(started_, [this] { thread_ = std::thread([this] { run(); }); });

@@ -5,21 +5,21 @@
 
 namespace stepdriver::axis {
 
-/// Frees what is long to free, a plan of hundreds of thousands of points, say, in a thread of its
-/// own with a low priority: never in the thread that happens to be the last to use it.
+/// Frees large objects, such as a plan of hundreds of thousands of points, in a thread of its own
+/// with a low priority, and never in the thread that happens to use them last.
 ///
-/// The thread starts with the first object that is kept. Handing over is lock-free and doesn't
-/// allocate. All calls are safe from any thread.
+/// The thread starts with the first object. Handing over is lock-free and doesn't allocate. All
+/// calls are safe from any thread.
 class Disposer {
  public:
-  /// @param threaded else everything is freed at once.
+  /// @param threaded false: everything is freed at once.
   explicit Disposer(bool threaded);
-  /// Frees what is left. What is still in use is freed by its last user from then on.
+  /// Frees the remaining objects. Objects still in use are then freed by their last users.
   ~Disposer();
   Disposer(const Disposer&) = delete;
   Disposer& operator=(const Disposer&) = delete;
 
-  /// @return the same object; when the last user of it is done, it is handed over.
+  /// @return the same object; it is handed over when its last user releases it.
   /// @param owned has no other users.
   template <typename T>
   std::shared_ptr<const T> keep(std::shared_ptr<const T> owned) {

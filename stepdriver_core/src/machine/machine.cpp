@@ -168,7 +168,7 @@ class Machine::Impl {
       if (!own) return std::nullopt;
       result.positions.push_back(own->position);
       result.duration = std::max(result.duration, own->duration);
-      // What ended the first of them says more than that it took the others along.
+      // The reason for the first of them says more than that it ended the others too.
       const int weight = own->end == axis::MoveEnd::kReached     ? 0
                          : own->end == axis::MoveEnd::kCompanion ? 1
                                                                  : 2;
@@ -216,7 +216,7 @@ class Machine::Impl {
     keeper_->start([this] { return memories(); }, threaded);
   }
 
-  // In the order in which they must go: axes, shell, controller, engine, lines.
+  // Destroyed in this order: axes, shell, controller, engine, lines.
   axis::Disposer disposer_;
   std::shared_ptr<gpio::Lines> lines_;
   axis::LineNames names_;

@@ -146,7 +146,7 @@ std::vector<axis::HomingResult> homeInOrder(Shell& shell, const std::vector<Mach
     } else if (all.empty()) {
       results = homeTogether(shell, group, cancelled);
     } else {
-      // Others have moved by now: what has come in between is how this one ended.
+      // Others have moved by now: if this one can't begin anymore, that is its result.
       try {
         results = homeTogether(shell, group, cancelled);
       } catch (const Refused& refused) {

@@ -13,8 +13,8 @@
 
 namespace stepdriver::machine {
 
-/// An axis as its clients see it: each command is a request to the controller, what is read is its
-/// last snapshot and the engine's count.
+/// An axis as its clients see it: each command is a request to the controller; readers use the last
+/// snapshot and the engine's count.
 class MachineAxis : public axis::Axis {
  public:
   /// @param shell, lines, names outlive the axis.
@@ -56,13 +56,13 @@ class MachineAxis : public axis::Axis {
   const axis::LineNames& names_;
 };
 
-/// An answer that is a success. @throw Refused, GpioError, Error
+/// Returns a successful answer. @throw Refused, GpioError, Error
 activity::Reply valueOf(activity::Reply reply);
 
 /// Has a request carried out. @return its answer. @throw as valueOf()
 activity::Reply ask(Shell& shell, Request request);
 
-/// Homes axes at once, and returns when all are over.
+/// Homes axes simultaneously, and returns when all have ended.
 std::vector<axis::HomingResult> homeTogether(Shell& shell, const std::vector<AxisId>& axes,
                                              const std::function<bool()>& cancelled);
 

@@ -21,7 +21,7 @@ namespace stepdriver::machine {
 /// An axis by its number in the configuration.
 using AxisId = std::size_t;
 
-/// @name What a client may ask for. As the calls of Axis and Machine of these names.
+/// @name Requests of clients, see the functions of Axis and Machine with these names.
 /// @{
 struct MoveTo {
   AxisId axis = 0;
@@ -52,7 +52,8 @@ struct MoveLine {
 struct FollowTrajectory {
   std::vector<AxisId> axes;
   std::shared_ptr<const axis::PreparedTrajectory> prepared;
-  /// AxisState::stops of each axis when it was asked for: what was stopped meanwhile isn't begun.
+  /// AxisState::stops of each axis at the time of the request: if one was stopped since, it isn't
+  /// begun.
   std::vector<std::uint64_t> stops;
 };
 struct StopAxis {
@@ -102,7 +103,7 @@ struct SetPosition {
 struct Recover {};
 /// @}
 
-/// @name What the machine itself asks for
+/// @name Requests of the machine itself
 /// @{
 struct BringUp {};
 struct RestorePosition {
@@ -118,7 +119,7 @@ struct NotePosition {
 struct Close {
   std::string reason;
 };
-/// Answered when every axis rests.
+/// Answered when every axis is at rest.
 struct AwaitRest {};
 /// Disables the axes that are configured so.
 struct PowerDown {};
@@ -130,13 +131,13 @@ using Request =
                  Sleep, Reset, SetMicrosteps, SetPosition, Recover, BringUp, RestorePosition,
                  NotePosition, Close, AwaitRest, PowerDown>;
 
-/// @name What the controller is told
+/// @name Inputs of the controller
 /// @{
 struct Requested {
   activity::CallId call = 0;
   Request request;
 };
-/// What the pulse engine has done: its emergency stops, and then all its channels.
+/// The state of the pulse engine: its emergency stops, and then all its channels.
 struct EngineNews {
   std::uint64_t stops_served = 0;
   std::uint64_t input_stops = 0;
@@ -155,8 +156,8 @@ struct TimerDue {};
 
 struct Input {
   pulse::Nanoseconds now = 0;      ///< clock time
-  pulse::Nanoseconds slipped = 0;  ///< motion time is clock time less this
-  std::uint64_t stops_asked = 0;   ///< emergency stops that were asked for
+  pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
+  std::uint64_t stops_asked = 0;   ///< emergency stops that were requested
   std::variant<Requested, EngineNews, InputRead, InputEdge, activity::PinDone, TimerDue> what;
 };
 

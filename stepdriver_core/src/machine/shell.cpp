@@ -19,7 +19,7 @@ constexpr pulse::Nanoseconds kVirtualInputPeriod = 1'000'000;
 constexpr std::size_t kMostRequests = 256;
 
 /// Requests that may be refused because of the level of a switch. Their callers read the inputs
-/// again, so that what was pressed just now counts.
+/// again, so that a switch that was just pressed counts.
 bool asksForLevels(const Request& request) {
   return std::holds_alternative<MoveTo>(request) || std::holds_alternative<MoveRounds>(request) ||
          std::holds_alternative<PlanMove>(request) || std::holds_alternative<Jog>(request) ||
@@ -130,7 +130,7 @@ void Shell::wait(const std::function<bool()>& ready, bool often) {
     settle();
     const std::uint64_t turns = turns_;
     if (ready()) return;
-    if (turns != turns_) continue;  // it has asked for something itself
+    if (turns != turns_) continue;  // it has made a request itself
     const pulse::Nanoseconds due = std::min(engine_due_, controller_.due());
     if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
     clock_.waitUntil(often ? std::min(due, clock_.now() + kOften) : due);
@@ -138,7 +138,7 @@ void Shell::wait(const std::function<bool()>& ready, bool often) {
 }
 
 void Shell::advance(pulse::Nanoseconds time) {
-  engine_.inputsChanged();  // nobody watches them
+  engine_.inputsChanged();  // nothing watches them
   feedInputs();
   const pulse::Nanoseconds end = clock_.now() + time;
   for (;;) {
@@ -176,7 +176,7 @@ void Shell::answer(activity::CallId call, activity::Reply reply) {
 
 // ---- what happens ----
 
-// A virtual clock stands still until the news were taken.
+// A virtual clock stands still until the news has been handled.
 void Shell::onNews() noexcept {
   news_.store(true, std::memory_order_release);
   if (!threaded_) return;
@@ -199,8 +199,8 @@ std::vector<InputRead> Shell::readInputs() const {
   return reads;
 }
 
-// An edge is only a wake-up: levels are read. One that was lost, or a chip that was waking when it
-// came, is made good by reading again after a while.
+// An edge is only a wake-up: the levels are read. Periodic reading makes up for a lost edge, or one
+// that came while a chip was waking up.
 void Shell::watchInputs() {
   pthread_setname_np(pthread_self(), "inputs");
   std::vector<InputRead> known;
@@ -220,7 +220,7 @@ void Shell::watchInputs() {
       if (changed) reads_.insert(reads_.end(), reads.begin(), reads.end());
     }
     if (changed || count > 0) wakeUp();
-    // If waiting fails, reading will fail too, and say so.
+    // If waiting fails, reading will fail too, and report it.
     if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
   }
 }
@@ -251,7 +251,7 @@ void Shell::run() {
     while (turn()) {
     }
     if (!clock_.realtime()) pulse_thread_->setAlarm(alarm());
-    // Until the engine has taken what was ordered, and the lines are written.
+    // Until the engine has accepted the orders, and the lines are written.
     if (!ordersAreOpen() && writers_.idle()) {
       clock_.release();
       holding = false;
@@ -261,8 +261,8 @@ void Shell::run() {
   if (news_hold_.exchange(false)) clock_.release();
 }
 
-// When virtual time has to stand still until the controller has looked at it. The thread that
-// watches the inputs takes real time, in which virtual time could pass by far what a switch says.
+// When virtual time must stand still for the controller. The thread that watches the inputs takes
+// real time, in which virtual time could run far past the change of a switch.
 pulse::Nanoseconds Shell::alarm() const {
   const pulse::Nanoseconds due = controller_.due();
   return controller_.watchesInputs() ? std::min(due, clock_.now() + kVirtualInputPeriod) : due;

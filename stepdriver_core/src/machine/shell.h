@@ -24,45 +24,45 @@
 
 namespace stepdriver::machine {
 
-/// Runs a controller: brings it what happens, in order, and does what it says. In threads of its
-/// own, or without any, as a pump that whoever waits works.
+/// Runs a controller: passes all events to it in order, and carries out its outputs. It has threads
+/// of its own or, without threads, is a pump that the waiting caller drives.
 ///
-/// The calls of clients are safe from any thread. What they hand over and what they read is behind
-/// mutexes that nobody holds for longer than a copy takes.
+/// The calls of clients are safe from any thread. Mutexes protect what they write and read, and are
+/// never held for longer than a copy takes.
 class Shell : public pulse::NewsListener {
  public:
   struct Options {
     bool threaded = true;
     std::int64_t write_timeout_ns =
-        0;  ///< of one write of a line that the pulse thread doesn't time
+        0;  ///< for one write of a line that the pulse thread doesn't time
     std::string latency_device;
   };
 
   /// @param controller, engine, clock outlive the shell.
   Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
         std::shared_ptr<gpio::Lines> lines, std::size_t inputs, const Options& options);
-  /// stop(), if that wasn't called.
+  /// Calls stop() if that wasn't called.
   ~Shell() override;
 
-  /// Hands a request over and waits for its answer.
+  /// Hands over a request and waits for its answer.
   activity::Reply call(Request request);
 
-  /// Returns when `ready` says so. It is asked after whatever happens, from the calling thread.
-  /// @param often it is also asked each millisecond.
-  /// @throw Error without threads, if nothing is under way that could change its answer.
+  /// Returns when `ready` returns true. It is called after each event, in the calling thread.
+  /// @param often `ready` is also called each millisecond.
+  /// @throw Error without threads, if nothing is in progress that could change its answer.
   void wait(const std::function<bool()>& ready, bool often = false);
 
-  /// Only without threads: lets the clock go on for a while.
+  /// Only without threads: lets the clock run for a while.
   void advance(pulse::Nanoseconds time);
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
   axis::AxisState state(AxisId axis) const;
   double peakRate(AxisId axis) const;
 
-  /// How the pulse thread runs.
+  /// The permissions of the pulse thread.
   pulse::RealtimeRights rights() const;
 
-  /// Ends all threads; no pulse goes out from then on. Who still waits is refused.
+  /// Ends all threads; no pulse goes out from then on. Waiting calls are refused.
   void stop();
 
   void onNews() noexcept override;
@@ -120,10 +120,10 @@ class Shell : public pulse::NewsListener {
 
   // From the pulse thread.
   std::atomic<bool> news_{true};
-  std::atomic<bool> news_hold_{false};  // the clock is held for news that nobody has taken yet
+  std::atomic<bool> news_hold_{false};  // the clock is held for news that hasn't been handled yet
 
   // Of the thread that runs the controller.
-  std::vector<int> levels_;  // of the inputs, as the controller was told them
+  std::vector<int> levels_;  // of the inputs, as reported to the controller
   std::deque<pulse::Command> outbox_;
   std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
   EngineNews news_seen_;

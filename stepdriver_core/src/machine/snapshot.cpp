@@ -17,7 +17,7 @@ const AxisSnapshot::Motion* followed(const AxisSnapshot& axis, const pulse::Chan
 
 axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& live,
                         pulse::Nanoseconds before, pulse::Nanoseconds after) {
-  // A count of another microstep mode than the scale's means nothing.
+  // A count in another microstep mode than the scale's is meaningless.
   const pulse::ChannelState& channel = live.epoch == axis.channel.epoch ? live : axis.channel;
   const auto position_of = [&axis](double count) {
     return axis.origin + count / axis.steps_per_unit;
@@ -34,7 +34,7 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
       std::minmax({motion->profile->stateAt(before).position.value(), now.position.value()});
   const double planned = std::clamp(static_cast<double>(channel.count), low, high);
   state.planned = position_of(planned - static_cast<double>(channel.slack));
-  // While the backlash is taken up, the joint stands.
+  // While the backlash is taken up, the joint stands still.
   const bool joint_moves = channel.slack == (now.velocity > 0.0 ? axis.backlash : 0);
   state.velocity = joint_moves ? now.velocity / axis.steps_per_unit : 0.0;
   if (motion->slows_down) {

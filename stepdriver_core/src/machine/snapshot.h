@@ -15,9 +15,9 @@
 
 namespace stepdriver::machine {
 
-/// What the controller knows of an axis, for readers in any thread. Never changed once made.
+/// The controller's state of an axis, for readers in any thread. Immutable.
 struct AxisSnapshot {
-  /// A profile that the engine follows, or is to follow.
+  /// A profile that the engine follows, or will follow.
   struct Motion {
     std::uint64_t serial = 0;
     std::shared_ptr<const motion::Profile> profile;
@@ -25,7 +25,7 @@ struct AxisSnapshot {
     bool slows_down = false;
   };
 
-  axis::AxisState state;        ///< but for what changes with every step
+  axis::AxisState state;        ///< without the parts that change with every step
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] position at count 0
   std::int64_t backlash = 0;    ///< [microsteps]
@@ -33,7 +33,7 @@ struct AxisSnapshot {
   std::optional<double> held_target;  ///< [unit]
   std::vector<Motion> motions;
   axis::PathAxis path_axis;
-  pulse::ChannelState channel;             ///< as the engine has told it last
+  pulse::ChannelState channel;             ///< from the engine's last news
   std::optional<axis::AxisMemory> memory;  ///< at rest
 };
 
@@ -43,14 +43,14 @@ struct MachineSnapshot {
   std::uint64_t stops_handled = 0;  ///< emergency stops
 };
 
-/// An axis as it is at one instant.
+/// The state of an axis at one instant.
 ///
-/// @param live what the engine's channel does now.
-/// @param before, after motion times around the moment at which `live` was read.
+/// @param live the current state of the engine's channel.
+/// @param before, after motion times before and after `live` was read.
 axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& live,
                         pulse::Nanoseconds before, pulse::Nanoseconds after);
 
-/// [microsteps/s] The highest rate of the motion under way, as planned; 0 at rest.
+/// [microsteps/s] The highest planned rate of the current motion; 0 at rest.
 double peakRateOf(const AxisSnapshot& axis, const pulse::ChannelState& live);
 
 }  // namespace stepdriver::machine

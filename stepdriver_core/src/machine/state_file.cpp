@@ -39,7 +39,7 @@ std::string textOf(const KeptState& state) {
   return text;
 }
 
-// A file that has what is to be on the disk, before it takes the place of the one that is there.
+// The new file, written to the disk before it replaces the old one.
 class NewFile {
  public:
   explicit NewFile(const std::string& path)
@@ -70,7 +70,7 @@ void syncDirectory(const std::string& path) {
   if (file < 0) failed("written", path);
   const int result = fsync(file);
   close(file);
-  // Some file systems have no such thing.
+  // Some file systems don't support this.
   if (result != 0 && errno != EINVAL) failed("written", path);
 }
 

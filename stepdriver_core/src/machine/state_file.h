@@ -8,31 +8,32 @@
 
 namespace stepdriver::machine {
 
-/// What a state file keeps.
+/// The contents of a state file.
 struct KeptState {
-  bool clean = false;  ///< the machine was shut down at rest; else it runs, or has crashed
+  /// True: the machine was shut down at rest; false: it is running, or has crashed.
+  bool clean = false;
   std::map<std::string, axis::AxisMemory> axes;  ///< by their names
 };
 
-/// A file in which the positions of axes outlast the program: a line of text for each axis.
+/// A file that keeps the positions of axes beyond the program's end: a line of text for each axis.
 ///
-/// It is replaced as a whole: whoever reads it, be it after a loss of power, finds what was saved
-/// last or what was saved before that. For one thread at a time.
+/// It is replaced as a whole: a reader finds the latest or the previous contents, even after a loss
+/// of power. For one thread at a time.
 class StateFile {
  public:
-  /// Takes the file for this program, by a lock on `path`.lock, which remains.
+  /// Reserves the file for this program with a lock on `path`.lock, which remains.
   ///
-  /// @param path absolute; its directory is there.
-  /// @throw Error where another program has it, or the directory can't be written.
+  /// @param path absolute; its directory exists.
+  /// @throw Error if another program has reserved it, or the directory can't be written.
   explicit StateFile(std::string path);
   ~StateFile();
   StateFile(const StateFile&) = delete;
   StateFile& operator=(const StateFile&) = delete;
 
-  /// @return none where there is no file. @throw Error where it isn't one of these.
+  /// @return empty if there is no file. @throw Error if it isn't a state file.
   std::optional<KeptState> load() const;
 
-  /// Returns when the disk has it. @throw Error
+  /// Returns when it is on the disk. @throw Error
   void save(const KeptState& state) const;
 
   /// Of the file itself, not of its lock.

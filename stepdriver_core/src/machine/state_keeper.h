@@ -11,21 +11,22 @@
 
 namespace stepdriver::machine {
 
-/// Keeps the positions of a machine's axes in a file: gives them back at the start, and writes them
-/// when they have changed and the axes rest. While it keeps them the file says that the machine
-/// runs: what a crash leaves is known for that. Disks are slow, so it has a thread of its own.
+/// Keeps the positions of a machine's axes in a file: restores them at the start, and writes them
+/// when they have changed and the axes are at rest. Meanwhile the file says that the machine is
+/// running, which identifies the file of a crashed one. Disks are slow, so it has a thread of its
+/// own.
 class StateKeeper {
  public:
   /// Of the axes at rest, by name.
   using Memories = std::map<std::string, axis::AxisMemory>;
 
-  /// What an earlier run has kept.
+  /// The state of an earlier run.
   struct Loaded {
     KeptState state;       ///< empty if there is none
-    std::string why_none;  ///< why an axis has no position in it
+    std::string why_none;  ///< why it has no position for an axis
   };
 
-  /// @throw Error if the file can't be had.
+  /// @throw Error if the file can't be reserved.
   explicit StateKeeper(const std::string& path) : file_(path) {}
   ~StateKeeper();
   StateKeeper(const StateKeeper&) = delete;
@@ -33,18 +34,18 @@ class StateKeeper {
 
   Loaded load();
 
-  /// Takes the file as one of a machine that runs.
-  /// @param read what there is to keep; called from any thread.
-  /// @param threaded else keep() is for whoever has the machine. @throw Error
+  /// Marks the file as that of a running machine.
+  /// @param read returns the state to keep; called from any thread.
+  /// @param threaded false: the owner of the machine calls keep(). @throw Error
   void start(std::function<Memories()> read, bool threaded);
 
-  /// Writes what has changed, of axes at rest.
+  /// Writes changes of axes at rest.
   void keep();
 
   /// The machine is at rest, and stays so.
   void close(const Memories& last);
 
-  /// Why the last writing failed; empty: it didn't.
+  /// Why the last write failed; empty: it succeeded.
   std::string error() const;
 
  private:

@@ -17,12 +17,12 @@ enum class RateLimit { kLateness, kPulse, kSpinning };
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
-/// What a step of an axis takes of the pulse thread's time, in nanoseconds.
+/// The time of the pulse thread that a step of an axis takes, in nanoseconds.
 struct Load {
   double rise;      // the calls for the rising edge: the read of an endstop and a write
   double calls;     // those for both edges
   double chip;      // high and low time
-  double spinning;  // spinning before both edges, where nothing shortens it
+  double spinning;  // spinning before both edges, if nothing shortens it
   double alone;     // the shortest interval that doesn't spin too much, with no other axis moving
   double interval;  // of the steps at top speed
 };
@@ -49,7 +49,7 @@ Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
   return load;
 }
 
-/// What the other axes take meanwhile, at their top speeds.
+/// The time that the other axes take meanwhile, at their top speeds.
 struct Others {
   double rise = 0.0;
   double calls = 0.0;
@@ -62,22 +62,22 @@ struct Others {
   }
 };
 
-/// The shortest interval that holds, and why none shorter does.
+/// The shortest interval that can be sustained, and why a shorter one can't.
 struct Interval {
   double ns;
   RateLimit limit;
   double lateness;
 };
 
-/// The shortest interval of an axis beside others with which the thread spins for no longer than it
-/// may: the edges of the axes come at random to each other.
+/// The shortest interval of an axis, together with the others, at which the thread stays within its
+/// spinning limit: the edges of different axes are independent.
 double shortestSpinning(const Load& load, const Others& others) {
   if (others.not_spinning == 1.0) return load.alone;
   const double room = 1.0 - (1.0 - pulse::HybridWait::kMostSpinning) / others.not_spinning;
   return room > 0.0 ? std::max(load.alone, load.spinning / room) : kEndless;
 }
 
-/// @param spinning the shortest interval as far as spinning goes.
+/// @param spinning the shortest interval with regard to spinning.
 Interval shortest(const Load& load, const Others& others, pulse::Nanoseconds late,
                   double spinning) {
   const auto lateness = static_cast<double>(late);

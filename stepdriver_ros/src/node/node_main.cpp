@@ -37,10 +37,10 @@ constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
 
 constexpr std::chrono::milliseconds kPoll{1000};
-// For the calls that came in while the axes came to rest.
+// Time for the calls that arrived while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
 
-// Where memory is locked, each thread's stack is in memory as a whole, by default 8 MB.
+// If memory is locked, each thread's whole stack is in memory, 8 MB by default.
 constexpr std::size_t kThreadStack = std::size_t{1} << 20;
 
 constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value ...]
@@ -66,7 +66,7 @@ written, 3 the computer is too slow for its axes and ~realtime is enforce, 64 wr
 Start it with: roslaunch stepdriver axis.launch
 )";
 
-/// Refuses new commands, decelerates, disables, and lets every client have its answer.
+/// Refuses new commands, decelerates, disables the axes, and lets every client get its answer.
 ///
 /// @return the exit code.
 int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
@@ -113,7 +113,7 @@ void warnOfPositions(const machine::Machine& machine) {
   }
 }
 
-/// The node's life, once there is a master.
+/// Runs the node, once there is a master.
 ///
 /// @return the exit code.
 int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_requests) {
@@ -130,7 +130,7 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
   CallQueues queues(machine.axes().size());
-  // Subscribers to latched topics are served by a queue too.
+  // Subscribers to latched topics need a queue too.
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
@@ -178,8 +178,8 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
 }
 
 int runOrExplain(EndRequests& end_requests) {
-  // With the last of its handles roscpp shuts down, and takes the console with it: these live on
-  // until everything has been said.
+  // With its last handle roscpp shuts down, and so does the log: these handles live until
+  // everything has been logged.
   const ros::NodeHandle node;
   const ros::NodeHandle private_node("~");
   end_requests.takeOverShutdownCall();

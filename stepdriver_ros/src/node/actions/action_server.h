@@ -14,7 +14,8 @@
 
 namespace stepdriver::ros_node {
 
-/// An action's topics: actionlib::ActionServer, but its status comes at the beat of all actions.
+/// An action's topics, like actionlib::ActionServer, but one timer publishes the statuses of all
+/// actions.
 template <typename Action>
 class ActionServer : public actionlib::ActionServerBase<Action> {
   using Base = actionlib::ActionServerBase<Action>;
@@ -34,7 +35,7 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   using Lock = boost::recursive_mutex::scoped_lock;
 
   static constexpr int kQueueSize = 50;
-  static constexpr double kKeptInStatus = 5.0;  // [s] that a goal is, after its end
+  static constexpr double kKeptInStatus = 5.0;  // [s] how long a goal stays after its end
 
   void initialize() override {
     this->status_list_timeout_ = ros::Duration(kKeptInStatus);
@@ -48,7 +49,7 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   }
   Base* asBase() { return this; }
 
-  // Without goals and subscribers nobody hears it: whoever comes later gets the last one.
+  // Without goals or subscribers nothing is published: later subscribers get the last status.
   void beat() {
     const Lock lock(this->lock_);
     if (!this->status_list_.empty() || status_publisher_.getNumSubscribers() > 0) publishStatus();

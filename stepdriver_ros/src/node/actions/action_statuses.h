@@ -9,17 +9,17 @@
 
 namespace stepdriver::ros_node {
 
-/// Publishes the statuses of all actions at one beat: with a timer for each of them, as actionlib's
-/// servers have it, a node with many axes would never sleep.
+/// Publishes the statuses of all actions together: with a timer for each action, as in actionlib's
+/// servers, a node with many axes would never sleep.
 class ActionStatuses {
  public:
-  /// @param node a handle with the queue that they are published by; above the actions' names
-  ///   `actionlib_status_frequency` says how often, 5 Hz where it is missing.
+  /// @param node a handle with the queue that publishes them. The parameter
+  ///   `actionlib_status_frequency` above the actions' names sets the rate; the default is 5 Hz.
   explicit ActionStatuses(const ros::NodeHandle& node);
   ActionStatuses(const ActionStatuses&) = delete;
   ActionStatuses& operator=(const ActionStatuses&) = delete;
 
-  /// @param publish an action's status; is called for as long as the queue is served.
+  /// @param publish publishes an action's status; called as long as the queue is served.
   void add(std::function<void()> publish);
 
  private:

@@ -8,8 +8,8 @@
 
 namespace stepdriver::ros_node {
 
-/// The action of trajectories: control_msgs' where that was found, else this package's with the
-/// same fields. A connection is made by the md5sums, and these are the same.
+/// The action of trajectories: that of control_msgs if it was found, otherwise this package's with
+/// the same fields. Connections are matched by md5sums, which are the same.
 #ifdef STEPDRIVER_HAS_CONTROL_MSGS
 namespace action_msgs = control_msgs;
 #else

@@ -14,9 +14,9 @@
 
 namespace stepdriver::ros_node {
 
-/// The action `homing` of one axis, below its name. Its goals come one after the other: a newer one
-/// cancels the one under way, and those that haven't begun. While there are goals it has a thread,
-/// in which it waits for them.
+/// The action `homing` of one axis, below its name. Its goals run one after the other: a newer one
+/// cancels the current one, and those that haven't begun. While there are goals it has a thread
+/// that waits for them.
 class HomingAction {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
@@ -33,7 +33,7 @@ class HomingAction {
   void take(const GoalHandle& goal);
   void cancel(const GoalHandle& goal);
   void homeForAll();
-  /// Takes the next goal under way. @return whether there is one.
+  /// Begins the next goal. @return whether there is one.
   bool beginNext();
   bool isCancelled();
   void home();
@@ -41,7 +41,7 @@ class HomingAction {
 
   axis::Axis& axis_;
   Server server_;
-  // Of the thread alone.
+  // For the thread only.
   axis::HomingPhase told_ = axis::HomingPhase::kNone;
   Clock::time_point told_at_;
 

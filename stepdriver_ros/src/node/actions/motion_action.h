@@ -16,14 +16,14 @@
 
 namespace stepdriver::ros_node {
 
-/// How often an action asks how its goals are, while it has any.
+/// How often an action polls its goals, while it has any.
 inline const ros::WallDuration kPollPeriod(0.01);
 
-/// An action whose goals are motions. It asks each kPollPeriod how these are: no thread waits for a
-/// motion, and what other commands make of it is seen like anything else that ends it.
+/// An action whose goals are motions. It polls them each kPollPeriod: no thread waits for a motion,
+/// and it makes no difference which command ends it.
 ///
 /// @tparam Action the type of the action.
-/// @tparam Following a goal under way; has `GoalHandle handle` and `std::string preempted_by`, a
+/// @tparam Following a current goal; has `GoalHandle handle` and `std::string preempted_by`, a
 ///   cancel or a newer goal in words.
 template <typename Action, typename Following>
 class MotionAction {
@@ -32,13 +32,12 @@ class MotionAction {
   MotionAction& operator=(const MotionAction&) = delete;
   virtual ~MotionAction() = default;
 
-  /// Tells the clients what has become of their goals; to be called each kPollPeriod, from a goal
-  /// that has begun on.
+  /// Reports results to the clients. Call it each kPollPeriod as soon as a goal has begun.
   ///
-  /// @return whether there may be goals under way.
+  /// @return whether there may be current goals.
   bool poll() {
-    // A goal that begins may wait for a chip to wake, or be long to plan; this thread has others to
-    // look at.
+    // A new goal may wait for a chip to wake up, or take long to plan; this thread must poll others
+    // too.
     const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
     if (!lock.owns_lock()) return true;
     concludeEnded();
@@ -47,7 +46,8 @@ class MotionAction {
     return !under_way_.empty();
   }
 
-  /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
+  /// Reports ended goals to their clients; after the machine has been shut down, these are all
+  /// goals.
   void tellEnded() {
     const std::lock_guard<std::mutex> lock(mutex_);
     concludeEnded();
@@ -66,22 +66,22 @@ class MotionAction {
             node, name, statuses, [this](const GoalHandle& handle) { take(handle); },
             [this](const GoalHandle& handle) { cancel(handle); }) {}
 
-  /// To be called when the action is whole.
+  /// Call it when the action is fully constructed.
   void start() { server_.start(); }
 
  private:
   static constexpr int kPollsPerFeedback = 5;
 
-  /// Begins its motion. @throw Error where that is refused.
+  /// Begins its motion. @throw Error if it is refused.
   virtual Following begin(const GoalHandle& handle) = 0;
   virtual void reject(GoalHandle& handle, const Error& error) = 0;
   /// A newer goal has begun.
   virtual void takeOver(const Following& newer, Following& older) = 0;
-  /// Decelerates what is still of this goal.
+  /// Decelerates the axes that still follow this goal.
   virtual void stop(const Following& following) = 0;
-  /// Tells the client where the motion has ended. @return whether it has.
+  /// Reports the end of the motion to the client. @return whether it has ended.
   virtual bool conclude(Following& following) = 0;
-  /// Looks at a motion under way, and tells how it is.
+  /// Checks a current motion, and reports on it.
   virtual void watch(Following& following, bool tell) = 0;
 
   void take(GoalHandle handle) {

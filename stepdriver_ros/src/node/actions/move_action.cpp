@@ -24,7 +24,7 @@ int endOf(axis::MoveEnd end) {
     case axis::MoveEnd::kEmergencyStop:
       return MoveResult::EMERGENCY_STOP;
     case axis::MoveEnd::kFault:
-    case axis::MoveEnd::kCompanion:  // which the motion of one axis has none of
+    case axis::MoveEnd::kCompanion:  // the motion of one axis has no companions
       break;
   }
   return MoveResult::FAULT;

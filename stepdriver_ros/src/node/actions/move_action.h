@@ -12,21 +12,21 @@
 
 namespace stepdriver::ros_node {
 
-/// A goal of an axis's action `move` under way.
+/// A current goal of an axis's action `move`.
 struct FollowingMove {
   actionlib::ServerGoalHandle<MoveAction> handle;
   axis::Move move;
   double began_at = 0.0;     // [unit]
-  std::string preempted_by;  // a cancel, in words; empty: none
+  std::string preempted_by;  // a cancel, in words; empty: no cancel
 };
 
-/// The action `move` of one axis, below its name: the service `move_to` as an action. What else
-/// moves the axis, and who else waits for it, makes no difference to it.
+/// The action `move` of one axis, below its name: the service `move_to` as an action. It is
+/// independent of other commands to the axis and of other waiting clients.
 class AxisMoveAction : public MotionAction<MoveAction, FollowingMove> {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
   /// @param axis, statuses outlive the action.
-  /// @param begun is called when a goal has begun: from then on poll() is to be called.
+  /// @param begun is called when a goal has begun: from then on poll() must be called.
   AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses,
                  std::function<void()> begun);
 

@@ -12,7 +12,7 @@
 
 namespace stepdriver::ros_node {
 
-/// The actions `move` of all axes. Their goals are taken by the axes' queues.
+/// The actions `move` of all axes. The axes' queues handle their goals.
 class MoveActions {
  public:
   /// @param node the node's private handle.
@@ -29,7 +29,8 @@ class MoveActions {
   MoveActions(const MoveActions&) = delete;
   MoveActions& operator=(const MoveActions&) = delete;
 
-  /// Tells the clients of goals that have ended; after the machine has been shut down that is all.
+  /// Reports ended goals to their clients; after the machine has been shut down, these are all
+  /// goals.
   void tellEnded() {
     for (AxisMoveAction& action : actions_) action.tellEnded();
   }

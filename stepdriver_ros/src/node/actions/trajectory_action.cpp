@@ -114,10 +114,10 @@ bool TrajectoryAction::conclude(Following& following) {
 
 std::string TrajectoryAction::shortOfGoal(const Following& following,
                                           const machine::CoordinatedResult& result) const {
-  // What a stop, a switch or a fault ended stayed on its path, was no bad goal, and isn't
-  // SUCCESSFUL: of the codes that there are, 0 to -5, the goal that it missed says most.
+  // A motion that a stop, a switch or a fault ended stayed on its path, had a valid goal, and isn't
+  // SUCCESSFUL: of the available codes, 0 to -5, the missed goal fits best.
   if (result.end != axis::MoveEnd::kReached) return result.message;
-  // A motion's duration is its own time, which slips aren't in.
+  // A motion's duration doesn't include slips.
   const double late = result.duration + machine_.figures().slipped - following.slipped_before -
                       following.move.duration;
   if (late > following.tolerances.goal_time) {
@@ -155,7 +155,7 @@ void TrajectoryAction::publishFeedback(Following& following, const Places& place
   }
   feedback.desired.positions = places.planned;
   feedback.actual.positions = places.actual;
-  // An axis has no velocity but that of its plan.
+  // The only velocity of an axis is that of its plan.
   feedback.desired.velocities = feedback.actual.velocities = places.velocities;
   feedback.error.velocities.resize(places.velocities.size());
   for (std::size_t i = 0; i < places.planned.size(); ++i) {

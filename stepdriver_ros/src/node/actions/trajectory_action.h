@@ -16,7 +16,7 @@
 
 namespace stepdriver::ros_node {
 
-/// A goal of ~follow_joint_trajectory under way.
+/// A current goal of ~follow_joint_trajectory.
 struct FollowingTrajectory {
   actionlib::ServerGoalHandle<action_msgs::FollowJointTrajectoryAction> handle;
   machine::CoordinatedMove move;
@@ -24,13 +24,13 @@ struct FollowingTrajectory {
   TrajectoryTolerances tolerances;
   std::vector<double> goal;  // [unit] the last point
   ros::Time began;
-  double slipped_before = 0.0;  // [s] by the machine's timeline
-  std::string preempted_by;     // a cancel or a newer goal, in words; empty: neither
-  std::string violated;         // a path tolerance, in words; empty: none
+  double slipped_before = 0.0;  // [s] slip of the machine's timeline
+  std::string preempted_by;     // a cancel or a newer goal, in words; otherwise empty
+  std::string violated;         // a path tolerance, in words; empty: not violated
 };
 
-/// The action ~follow_joint_trajectory. A goal is judged before it is accepted; one that shares a
-/// joint with a goal under way takes over from it without a stop, others run side by side.
+/// The action ~follow_joint_trajectory. A goal is checked before it is accepted. A goal that shares
+/// a joint with a current one takes over without a stop; others run side by side.
 class TrajectoryAction
     : public MotionAction<action_msgs::FollowJointTrajectoryAction, FollowingTrajectory> {
  public:
@@ -42,7 +42,7 @@ class TrajectoryAction
  private:
   using Following = FollowingTrajectory;
 
-  /// Where the joints of a goal are, in their order.
+  /// The states of a goal's joints, in their order.
   struct Places {
     std::vector<double> planned;
     std::vector<double> actual;

@@ -18,7 +18,7 @@ constexpr double kNoLimit = std::numeric_limits<double>::infinity();
   throw BadTrajectory(BadTrajectory::Kind::kInvalid, why);
 }
 
-// 0 is the default and a negative number lifts it; the default is no limit.
+// 0 means the default, which is no limit; a negative number removes the limit too.
 double limitOf(double tolerance) { return tolerance > 0.0 ? tolerance : kNoLimit; }
 
 template <typename Tolerances>

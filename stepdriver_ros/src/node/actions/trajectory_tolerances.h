@@ -7,19 +7,19 @@
 
 namespace stepdriver::ros_node {
 
-/// How far the joints of a trajectory may be from where it wants them. Numbers are of the joints in
-/// the order of the goal, in their units; infinite where there is no limit.
+/// How far the joints may deviate from a trajectory. The numbers are in the units of the joints and
+/// in the order of the goal; infinite if there is no limit.
 struct TrajectoryTolerances {
   std::vector<double> path;
   std::vector<double> goal;
   double goal_time = 0.0;  ///< [s]
 };
 
-/// @throw BadTrajectory for a joint that isn't the trajectory's, and for what isn't a number.
+/// @throw BadTrajectory for a joint that isn't part of the trajectory, and for NaN.
 TrajectoryTolerances readTolerances(const action_msgs::FollowJointTrajectoryGoal& goal);
 
 /// @param limits, wanted, actual of each joint.
-/// @return the first joint that is too far off, in a sentence; empty: none.
+/// @return a sentence about the first joint that is too far off; empty: there is none.
 std::string violation(const std::vector<std::string>& joints, const std::vector<double>& limits,
                       const std::vector<double>& wanted, const std::vector<double>& actual);
 

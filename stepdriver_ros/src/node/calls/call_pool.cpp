@@ -52,7 +52,7 @@ void CallPool::makeReady(PooledQueue& queue) {
 void CallPool::startThread() {
   threads_.emplace_back([this] {
     pthread_setname_np(pthread_self(), "calls");
-    // Calls wait for the pulse thread in naps that are shorter than the default slack, 50 us.
+    // Calls wait for the pulse thread in naps shorter than the default slack, 50 us.
     prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
     serve();
   });
@@ -72,7 +72,7 @@ void CallPool::serve() {
     lock.lock();
     ++free_;
     --queue.under_way_;
-    // A subscriber's next message can't be taken while the last one is: it is in the queue again.
+    // A subscriber's next message can't be handled during the last one: it goes back to the queue.
     if (result == ros::CallbackQueue::TryAgain) ++queue.waiting_;
     if (queue.waiting_ == 0) continue;
     --queue.waiting_;

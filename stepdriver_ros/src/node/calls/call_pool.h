@@ -14,10 +14,10 @@ namespace stepdriver::ros_node {
 
 class PooledQueue;
 
-/// Threads that several queues of calls share. They sleep until there is a call, without a
-/// time-out; one more is started when a call finds them all busy, and stays.
+/// Threads shared by several queues of calls. They sleep until there is a call, without a timeout;
+/// another one starts when a call finds all of them busy, and stays.
 ///
-/// Made, started and stopped by one thread.
+/// Created, started and stopped by one thread.
 class CallPool {
  public:
   CallPool() = default;
@@ -25,13 +25,12 @@ class CallPool {
   CallPool(const CallPool&) = delete;
   CallPool& operator=(const CallPool&) = delete;
 
-  /// Serves the calls that there are by now, and those to come.
+  /// Serves the present and all later calls.
   ///
-  /// @param threads that are there from the beginning.
+  /// @param threads that exist from the beginning.
   void start(std::size_t threads);
 
-  /// Waits for the calls that are under way, and ends the threads. Calls that come later wait for
-  /// ever.
+  /// Waits for the calls in progress, and ends the threads. Later calls wait for ever.
   void stop();
 
  private:
@@ -45,18 +44,18 @@ class CallPool {
 
   std::mutex mutex_;
   std::condition_variable call_ready_;
-  std::deque<PooledQueue*> ready_;  // each as often as one of its calls may begin
+  std::deque<PooledQueue*> ready_;  // one entry for each call that may begin
   std::vector<std::thread> threads_;
-  std::size_t free_ = 0;  // threads that are in no call
+  std::size_t free_ = 0;  // idle threads
   bool serving_ = false;
 };
 
-/// A queue whose calls take threads of a pool, but never more than its share: so calls of one queue
-/// that wait don't hold up those of another. They begin in their order.
+/// A queue whose calls use threads of a pool, but never more than its share, so that waiting calls
+/// of one queue don't delay those of another. They begin in their order.
 class PooledQueue : public ros::CallbackQueue {
  public:
   /// @param pool outlives the queue's last call.
-  /// @param most how many of its calls are under way at once.
+  /// @param most its share: how many calls run at once.
   PooledQueue(CallPool& pool, int most) : pool_(pool), most_(most) {}
 
   /// Safe from any thread.
@@ -69,7 +68,7 @@ class PooledQueue : public ros::CallbackQueue {
   const int most_;
   // Both under the pool's mutex.
   int under_way_ = 0;
-  std::size_t waiting_ = 0;  // calls that found all of its share taken
+  std::size_t waiting_ = 0;  // calls that wait because the share is used up
 };
 
 }  // namespace stepdriver::ros_node

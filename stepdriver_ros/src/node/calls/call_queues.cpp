@@ -6,12 +6,12 @@ namespace stepdriver::ros_node {
 namespace {
 
 constexpr int kControlThreads = 2;
-// One, so that a hold and a stop are taken in their order.
+// One, so that holds and stops keep their order.
 constexpr int kStopThreads = 1;
 constexpr int kEmergencyThreads = 1;
 constexpr int kTrajectoryThreads = 2;
 constexpr int kSpareLineThreads = 3;
-// Those that are there before anything waits.
+// Those that exist before anything waits.
 constexpr int kFirstThreads = 2;
 constexpr std::chrono::milliseconds kPoll{5};
 
@@ -52,7 +52,7 @@ void CallQueues::stop() {
 }
 
 bool CallQueues::allAnswered() {
-  // A queue is empty when nothing is in it and nothing from it is being called.
+  // A queue is empty when it contains no call and none of its calls is running.
   bool empty = control_.isEmpty() && stops_.isEmpty() && emergency_.isEmpty() && lines_.isEmpty();
   for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
   for (ros::CallbackQueue& queue : power_) empty = empty && queue.isEmpty();

@@ -11,25 +11,25 @@
 
 namespace stepdriver::ros_node {
 
-/// The queues of service calls and their threads, made so that a call that waits holds up no other.
+/// The queues of service calls and their threads. A waiting call never delays another.
 ///
-/// Each axis has a queue of its own. Of its share of threads a waiting move takes one, as an axis
-/// moves once at a time, and a disable or a microstep change that waits for rest another; calls
-/// that find the rest taken wait no longer than a chip takes to wake or to be reset. Lines of
-/// several axes have a thread for each axis, as each moves in one line at a time, and some for
-/// lines that wait for their axes to rest. Threads are started when so many calls are under way at
-/// once, and then shared by all axes. At rest no thread wakes.
+/// Each axis has its own queue. A waiting move uses one thread of its share, because an axis makes
+/// one move at a time, and a disable or a microstep change that waits for standstill uses another.
+/// Calls that find the other threads busy wait no longer than a chip takes to wake up or to be
+/// reset. Lines of several axes have a thread for each axis, because each moves in one line at a
+/// time, and some more for lines that wait for their axes to come to rest. Threads start when that
+/// many calls run at once, and are then shared by all axes. At rest no thread wakes up.
 ///
-/// Nothing that stops a motion waits behind anything else. Stops and holds have a thread of their
-/// own from the start, which takes them in the order in which they come, and so has the emergency
-/// stop. Enabling and disabling has a share of its own for each axis, as a disable waits for rest.
+/// Nothing that stops a motion waits behind another call. Stops and holds have a thread of their
+/// own from the start, which serves them in order, and so does the emergency stop. Enabling and
+/// disabling has its own share for each axis, because a disable waits for standstill.
 ///
-/// Made and used by one thread; the queues themselves may be used by any.
+/// Created and used by one thread; any thread may use the queues themselves.
 class CallQueues {
  public:
-  /// How many calls of an axis are under way at once, at most.
+  /// How many calls of an axis run at once, at most.
   static constexpr int kThreadsPerAxis = 4;
-  /// How many of the calls that enable or disable an axis are, besides.
+  /// In addition, how many calls that enable or disable an axis run at once.
   static constexpr int kPowerThreadsPerAxis = 2;
 
   explicit CallQueues(std::size_t axes);
@@ -41,21 +41,21 @@ class CallQueues {
   ros::CallbackQueue& ofAxis(std::size_t axis) { return axes_.at(axis); }
   /// Calls that may take as long as a motion of several axes.
   ros::CallbackQueue& lines() { return lines_; }
-  /// Trajectories: goals, messages, cancels and what becomes of them. To plan one takes a while.
+  /// Trajectories: goals, messages, cancels and results. Planning one takes a while.
   ros::CallbackQueue& trajectories() { return trajectories_; }
   /// Calls that enable or disable this axis.
   ros::CallbackQueue& power(std::size_t axis) { return power_.at(axis); }
-  /// Recover, resume, and all that answers at once.
+  /// Recover, resume, and everything that answers at once.
   ros::CallbackQueue& control() { return control_; }
   /// Stops and holds, which answer at once.
   ros::CallbackQueue& stops() { return stops_; }
   ros::CallbackQueue& emergency() { return emergency_; }
 
-  /// Starts the threads; to be called when everything has been advertised.
+  /// Starts the threads. Call it when everything has been advertised.
   void start();
 
-  /// Waits until every call has its answer, but not longer than the bound for calls that only
-  /// begin; then ends the threads.
+  /// Waits until every call is answered, but no longer than the bound for calls that only begin;
+  /// then ends the threads.
   void finish(std::chrono::milliseconds bound);
 
  private:
@@ -75,7 +75,7 @@ class CallQueues {
   PooledQueue emergency_;
 };
 
-/// A handle for what is to be served by a queue.
+/// A handle whose callbacks a queue serves.
 inline ros::NodeHandle onQueue(ros::CallbackQueue& queue, ros::NodeHandle node) {
   node.setCallbackQueue(&queue);
   return node;

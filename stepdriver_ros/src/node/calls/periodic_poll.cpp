@@ -23,7 +23,7 @@ void PeriodicPoll::call() {
   }
   const bool more = poll_();
   const std::lock_guard<std::mutex> lock(mutex_);
-  // What began during the call may be something that it didn't see.
+  // Something may have begun during the call that it didn't see.
   if (!more && !begun_) timer_.stop();
 }
 

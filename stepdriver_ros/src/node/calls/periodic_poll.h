@@ -8,16 +8,16 @@
 
 namespace stepdriver::ros_node {
 
-/// Calls a function each period while there is something to look at; else nothing wakes.
+/// Calls a function each period while there is something to poll; otherwise nothing wakes up.
 class PeriodicPoll {
  public:
-  /// @param node a handle with the queue that the function is called by.
-  /// @param poll returns whether it is to be called again.
+  /// @param node a handle with the queue that calls the function.
+  /// @param poll returns whether it must be called again.
   PeriodicPoll(const ros::NodeHandle& node, ros::WallDuration period, std::function<bool()> poll);
   PeriodicPoll(const PeriodicPoll&) = delete;
   PeriodicPoll& operator=(const PeriodicPoll&) = delete;
 
-  /// There is something to look at: the first call comes after a period. Safe from any thread, and
+  /// There is something to poll: the first call comes after a period. Safe from any thread, and
   /// from the function itself.
   void begin();
 

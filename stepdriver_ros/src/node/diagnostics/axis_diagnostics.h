@@ -7,20 +7,20 @@
 
 namespace stepdriver::ros_node {
 
-/// What diagnostics say of an axis.
+/// The facts about an axis for diagnostics.
 struct AxisReading {
   axis::AxisState state;
   axis::AxisLimits limits;
   axis::EndstopState endstops;
-  std::string endstop_error;  ///< why they couldn't be read; empty: they could
+  std::string endstop_error;  ///< why they couldn't be read; empty: they were read
 };
 
-/// Near a soft limit is what is within this part of the way between the two; where there is one
-/// alone, what is at it.
+/// Near a soft limit means within this part of the distance between the two; if there is only one,
+/// at the limit.
 constexpr double kNearLimit = 0.01;
 
-/// ERROR: a fault, with what ends it, or an endstop that can't be read. WARN: the position is
-/// unverified, an endstop is active, or it stands or moves near a soft limit.
+/// ERROR: a fault, with its remedy, or an endstop that can't be read. WARN: the position is
+/// unverified, an endstop is active, or the axis is near a soft limit.
 void reportAxis(const config::AxisConfig& config, const AxisReading& reading,
                 diagnostic_updater::DiagnosticStatusWrapper& status);
 

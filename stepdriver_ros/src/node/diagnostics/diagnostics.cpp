@@ -17,7 +17,7 @@ namespace {
 const ros::WallDuration kPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 
-/// Against the limits that hold now, and against the motions under way.
+/// For the current limits, and for the current motions.
 void readRates(const machine::Machine& machine, EngineReading& reading) {
   if (!machine.capability()) return;
   std::vector<config::AxisConfig> axes;

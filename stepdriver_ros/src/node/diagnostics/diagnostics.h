@@ -19,7 +19,7 @@ class Diagnostics {
  public:
   /// @param node, private_node handles of the node, and of its private names.
   /// @param machine, queues outlive the diagnostics.
-  /// @param hardware_id says which hardware it is.
+  /// @param hardware_id name of the hardware.
   /// @param max_lateness [s] MachineOptions::max_lateness
   Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
               const machine::Machine& machine, CallQueues& queues, const std::string& hardware_id,
@@ -35,7 +35,7 @@ class Diagnostics {
 
   const machine::Machine& machine_;
   const double max_lateness_;
-  std::uint64_t slips_before_ = 0;  // of the timer alone
+  std::uint64_t slips_before_ = 0;  // for the timer only
   diagnostic_updater::Updater updater_;
   ros::SteadyTimer timer_;
 };

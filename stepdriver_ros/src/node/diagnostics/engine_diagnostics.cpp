@@ -51,7 +51,7 @@ void judgeMargins(const EngineReading& reading, DiagnosticStatusWrapper& status)
   }
 }
 
-/// The first one of an axis; nullptr: there is none.
+/// The first rate of an axis; nullptr: there is none.
 const machine::StepRate* find(const std::vector<machine::StepRate>& rates,
                               const std::string& axis) {
   const auto found =

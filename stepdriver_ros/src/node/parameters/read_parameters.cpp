@@ -42,7 +42,7 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
   const std::string& name = private_node.getNamespace();
   const config::ConfigValue tree = privateParameters(private_node);
   NodeConfig config = readNodeConfig(tree, name, issues);
-  // What depends on the axes can only be judged where they are right.
+  // Values that depend on the axes can be checked only if the axes are right.
   if (!issues.empty()) throw ConfigError(issues);
   const auto sources = applyDescriptionParameter(node, config.axes, issues);
   if (issues.empty() && config.backend == setup::GpioBackend::kSimulated) {

@@ -6,10 +6,10 @@
 
 namespace stepdriver::ros_node {
 
-/// Reads and checks everything that the node is told by parameters: its own and the robot
-/// description, whose limits are applied. Prints the limits that hold.
+/// Reads and checks all parameters of the node: its own and the robot description, whose limits it
+/// applies. Logs the resulting limits.
 ///
-/// @throw ConfigError with everything that is wrong. No line has been touched by then.
+/// @throw ConfigError listing every mistake. No line has been touched by then.
 NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
 
 }  // namespace stepdriver::ros_node

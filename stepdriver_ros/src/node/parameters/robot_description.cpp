@@ -55,7 +55,7 @@ class JointFitter {
  private:
   void issue(const std::string& message) { issues_.push_back({name_, message}); }
 
-  /// @param message what is wrong with the joint, after its name.
+  /// @param message the mistake, to follow the joint's name.
   void issueOfJoint(const std::string& message) {
     issue(fmt::format("is wrong: joint \"{}\" of axis {} {}", axis_.joint, axis_.name, message));
   }

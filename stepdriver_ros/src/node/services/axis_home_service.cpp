@@ -9,7 +9,7 @@
 
 namespace stepdriver::ros_node {
 
-// A homing takes a thread of the axis's queue while its call waits, as a move does.
+// Like a move, a homing occupies a thread of the axis's queue while its call waits.
 AxisHomeService::AxisHomeService(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
                                  CallQueues& queues)
     : axis_(axis),

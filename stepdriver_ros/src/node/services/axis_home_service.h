@@ -14,7 +14,7 @@ namespace stepdriver::ros_node {
 class AxisHomeService {
  public:
   /// @param node the node's private handle.
-  /// @param index of the axis, which says its queue.
+  /// @param index of the axis, which determines its queue.
   /// @param axis, queues outlive the service; before its end the machine has been shut down.
   AxisHomeService(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
                   CallQueues& queues);

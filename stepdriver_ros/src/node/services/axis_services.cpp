@@ -8,7 +8,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-/// What differs, in words: "max_speed 0.05 m/s instead of 0.1 m/s".
+/// The differences, in words: "max_speed 0.05 m/s instead of 0.1 m/s".
 std::string changesText(const axis::AxisLimits& before, const axis::AxisLimits& now,
                         const std::string& unit) {
   std::string text;

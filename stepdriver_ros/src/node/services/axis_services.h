@@ -19,11 +19,11 @@
 
 namespace stepdriver::ros_node {
 
-/// The services of one axis, below its name. They are called from any thread of their queues.
+/// The services of one axis, below its name. Any thread of their queues calls them.
 class AxisServices {
  public:
   /// @param node the node's private handle.
-  /// @param index of the axis, which says its queue.
+  /// @param index of the axis, which determines its queue.
   /// @param axis, queues outlive the services.
   AxisServices(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
                CallQueues& queues);

@@ -36,7 +36,7 @@ void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names
 
 }  // namespace
 
-// As lines, homings wait in a queue that has a thread for each axis.
+// Like lines, homings wait in a queue that has a thread for each axis.
 MachineHomeService::MachineHomeService(ros::NodeHandle node, machine::Machine& machine,
                                        CallQueues& queues)
     : machine_(machine) {

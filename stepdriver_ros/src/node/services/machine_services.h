@@ -14,7 +14,7 @@
 
 namespace stepdriver::ros_node {
 
-/// The services of the whole machine. They are called from any thread of their queues.
+/// The services of the whole machine. Any thread of their queues calls them.
 class MachineServices {
  public:
   /// @param node the node's private handle.

@@ -6,10 +6,10 @@
 
 namespace stepdriver::ros_node {
 
-/// Answers a service call: whatever the core throws becomes `success: false` and a message.
+/// Answers a service call: exceptions of the core become `success: false` and a message.
 ///
-/// @param action sets what else is in the response, and success where it isn't simply true.
-/// @return true: the call is answered; roscpp would tell the client nothing more of a false.
+/// @param action sets the other fields of the response, and success if it isn't simply true.
+/// @return true: the call is answered; with false, roscpp would tell the client nothing else.
 template <typename Response, typename Action>
 bool respond(Response& response, const Action& action) {
   try {

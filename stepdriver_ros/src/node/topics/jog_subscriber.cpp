@@ -12,9 +12,9 @@
 namespace stepdriver::ros_node {
 namespace {
 
-// A stream of messages: one that is late is of no use when the next has come.
+// A stream of messages: an old one is useless when the next has arrived.
 constexpr std::uint32_t kQueued = 1;
-// The time-out is kept to this part of itself.
+// The accuracy of the timeout, as a part of it.
 constexpr double kTimeoutPart = 0.05;
 
 }  // namespace
@@ -81,7 +81,7 @@ void JogSubscriber::jog(std::size_t axis, double velocity) {
   } catch (const Error& error) {
     ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
   }
-  // When it was dealt with: a call that had to wait is no pause of the stream.
+  // The time after handling it: a call that had to wait is no pause of the stream.
   stream.last = ros::SteadyTime::now();
 }
 

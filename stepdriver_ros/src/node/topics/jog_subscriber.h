@@ -17,10 +17,10 @@
 
 namespace stepdriver::ros_node {
 
-/// The topic ~jog. A message that can't be understood moves nothing; an axis that refuses its
-/// velocity doesn't keep the others from theirs. Both are logged, at most once a second. A stream
-/// of messages does not run on through a stop of the axis: what follows is refused until the stream
-/// has paused for the timeout or sent 0.
+/// The topic ~jog. A message that can't be understood moves nothing; if one axis refuses its
+/// velocity, the others still move. Both are logged, at most once a second. A stream of messages
+/// does not continue after a stop of the axis: messages are refused until the stream has paused for
+/// the timeout or sent 0.
 class JogSubscriber {
  public:
   /// @param node the node's private handle.
@@ -32,14 +32,14 @@ class JogSubscriber {
   JogSubscriber& operator=(const JogSubscriber&) = delete;
 
  private:
-  /// Messages for one axis that follow one another within the timeout.
+  /// Consecutive messages for one axis within the timeout.
   struct Stream {
-    ros::SteadyTime last;     // its last message, refused or not; zero: there is no stream
+    ros::SteadyTime last;     // time of its last message, refused or not; zero: there is no stream
     std::uint64_t stops = 0;  // AxisState::stops when it began
   };
 
   void take(const Jog::ConstPtr& message);
-  /// @return the axes that the message names, by their index. @throw Refused
+  /// @return the indices of the axes that the message names. @throw Refused
   std::vector<std::size_t> axesOf(const Jog& message) const;
   void jog(std::size_t axis, double velocity);
   void end(std::size_t axis);
@@ -50,7 +50,7 @@ class JogSubscriber {
   const ros::WallDuration timeout_;
   std::mutex mutex_;
   std::vector<Stream> streams_;  // of each axis
-  // The last message of each axis that was taken; zero: none, or it is over.
+  // Time of each axis's last accepted message; zero: there is no jog.
   std::vector<ros::SteadyTime> heard_;
   PeriodicPoll poll_;
   ros::Subscriber subscriber_;

@@ -8,11 +8,11 @@
 
 namespace stepdriver::ros_node {
 
-/// Warns of what a topic's messages were refused for, as a topic has no answer: each reason at most
-/// once a second, whatever numbers are in it. Safe from any thread.
+/// Logs why a topic's messages were refused, because a topic has no answer: each reason at most
+/// once a second, regardless of the numbers in it. Safe from any thread.
 class RefusalLog {
  public:
-  /// @param source what the message came by; it stands before the reason.
+  /// @param source of the messages; logged before the reason.
   explicit RefusalLog(std::string source) : source_(std::move(source)) {}
 
   void warn(const std::string& reason);

@@ -12,21 +12,21 @@
 namespace stepdriver::ros_node {
 namespace {
 
-// Of the looks for what has changed.
+// The polling periods for changes.
 constexpr std::chrono::milliseconds kMovingPeriod{10};
 constexpr std::chrono::milliseconds kRestPeriod{20};
 constexpr std::chrono::milliseconds kAxisStatePeriod{100};
 constexpr int kQueueSize = 10;
 
-/// The next of the times that a period gives; those that have gone by are left out, so that a late
-/// thread publishes less and not in bursts.
+/// The next time of a periodic sequence; past ones are skipped, so that a late thread publishes
+/// less often and not in bursts.
 template <typename Time, typename Duration>
 Time nextTime(Time last, Duration period, Time now) {
   last += period;
   return last > now ? last : now + period;
 }
 
-/// Whether anything but the progress of a motion differs.
+/// Whether anything except the progress of a motion differs.
 bool differ(const axis::AxisState& one, const axis::AxisState& other) {
   return one.enabled != other.enabled || one.asleep != other.asleep || one.idle != other.idle ||
          one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
@@ -91,7 +91,7 @@ void StatePublisher::run() {
       const bool moving = std::any_of(states_.begin(), states_.end(),
                                       [](const axis::AxisState& state) { return state.moving; });
       const bool due = now >= axis_states_due;
-      // At rest nobody is told the same again, but whoever listens gets his beat.
+      // At rest nothing is repeated, except the periodic message for subscribers.
       publishAxisStates(!due || (!moving && axis_state_publisher_.getNumSubscribers() == 0));
       if (due)
         axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
@@ -135,7 +135,7 @@ void StatePublisher::publishEndstopsOnChange() {
       endstops_.max[i] = max;
       endstops_unreadable_[i] = false;
     } catch (const GpioError& error) {
-      // What was read last stands; the other axes' switches are read all the same.
+      // The last reading stays; the other axes' switches are still read.
       if (!endstops_unreadable_[i]) ROS_ERROR_NAMED("endstops", "%s", error.what());
       endstops_unreadable_[i] = true;
     }

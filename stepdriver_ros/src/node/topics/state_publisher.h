@@ -16,8 +16,8 @@
 
 namespace stepdriver::ros_node {
 
-/// Publishes joint_states, ~endstops and ~axis_states, from a thread of its own: nothing that
-/// waits elsewhere slows it down. start() and stop() are called from one thread.
+/// Publishes joint_states, ~endstops and ~axis_states from a thread of its own, so that waiting
+/// calls don't slow it down. One thread calls start() and stop().
 class StatePublisher {
  public:
   /// @param node, private_node handles of the node, and of its private names.
@@ -31,7 +31,7 @@ class StatePublisher {
 
   void start();
 
-  /// Publishes everything a last time, and ends the thread.
+  /// Publishes everything once more, and ends the thread.
   void stop();
 
  private:
@@ -50,7 +50,7 @@ class StatePublisher {
   ros::Publisher endstop_publisher_;
   ros::Publisher axis_state_publisher_;
 
-  // Of the thread alone.
+  // For the thread only.
   sensor_msgs::JointState joint_states_;
   Endstops endstops_;
   std::vector<axis::AxisState> states_;

@@ -7,7 +7,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-// A trajectory that comes after another replaces it: only those of several clients can queue up.
+// A newer trajectory replaces an older one: only those of several clients can queue up.
 constexpr std::uint32_t kQueued = 10;
 
 }  // namespace

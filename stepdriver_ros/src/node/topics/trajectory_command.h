@@ -11,8 +11,8 @@
 
 namespace stepdriver::ros_node {
 
-/// The topic ~command: a trajectory replaces what its joints do; one without points stops them, or
-/// all axes where it names no joint. What is refused moves nothing and is logged.
+/// The topic ~command: a trajectory replaces the motions of its joints. Without points it stops
+/// them, or all axes if it names no joint. A refused message moves nothing and is logged.
 class TrajectoryCommand {
  public:
   /// @param node the node's private handle.

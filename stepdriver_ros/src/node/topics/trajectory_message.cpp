@@ -11,7 +11,7 @@ namespace {
 
 using Kind = BadTrajectory::Kind;
 
-// [s] What is nearer starts at once: a plan is made for a moment as far ahead as this.
+// [s] A shorter delay starts at once: plans begin this far in the future anyway.
 constexpr double kShortestDelay = 0.001;
 
 std::string namesOf(const AxisOfJoint& axes) {

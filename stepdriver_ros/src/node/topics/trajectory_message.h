@@ -12,13 +12,13 @@
 
 namespace stepdriver::ros_node {
 
-/// A trajectory's message that can't be followed, for what is in it.
+/// A trajectory's message whose contents can't be followed.
 class BadTrajectory : public Refused {
  public:
   enum class Kind {
     kInvalid,
-    kJoints,    ///< a joint that isn't there, none, or one twice
-    kOldStamp,  ///< a point of it is in the past
+    kJoints,    ///< an unknown joint, no joint, or a joint twice
+    kOldStamp,  ///< a point is in the past
   };
 
   BadTrajectory(Kind kind, const std::string& message) : Refused(message), kind_(kind) {}
@@ -29,40 +29,42 @@ class BadTrajectory : public Refused {
   Kind kind_;
 };
 
-/// Names of axes by those of their joints.
+/// Names of axes by the names of their joints.
 using AxisOfJoint = std::map<std::string, std::string>;
 
 AxisOfJoint axisOfJoint(const machine::Machine& machine);
 
 /// @return the axes of these joints, in their order.
-/// @throw BadTrajectory where a joint isn't there or is named twice, or none is named.
+/// @throw BadTrajectory if a joint is unknown or named twice, or none is named.
 std::vector<std::string> axesOf(const std::vector<std::string>& joints, const AxisOfJoint& axes);
 
-/// What a trajectory's message asks of the axes.
+/// A trajectory's message, translated for the axes.
 struct TimedTrajectory {
   machine::TrajectoryRequest request;
-  double delay = 0.0;  ///< [s] until it starts; the request's times count from then on
+  double delay = 0.0;  ///< [s] until it starts; the request's times count from the start
 };
 
-/// Reads a message. Its header's stamp says when the trajectory starts: 0 at once. Where that has
-/// gone by, the points come so much sooner; a first one at time 0 only says where it begins, and is
-/// never too late where others follow. Numbers and their count are left for the machine to judge.
+/// Reads a message. The header's stamp gives the start of the trajectory; 0 means at once. A stamp
+/// in the past shortens the time to the points. A first point at time 0 only gives the start
+/// position, and is never too late if others follow. The machine checks the numbers and their
+/// count.
 ///
 /// @throw BadTrajectory
 TimedTrajectory timedTrajectory(const trajectory_msgs::JointTrajectory& message,
                                 const AxisOfJoint& axes, ros::Time now);
 
-/// Adds the rest until a trajectory starts; a first point at time 0 goes on to say where it begins.
+/// Adds the rest before the start of a trajectory; a first point at time 0 still gives the start
+/// position.
 ///
-/// @param positions [unit] where its axes stand.
+/// @param positions [unit] of its axes.
 machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
                                      const std::vector<double>& positions);
 
-/// Has the machine follow a message. One that starts later keeps its axes at rest until then: stops
-/// and later commands end that as they end a motion.
+/// Makes the machine follow a message. A delayed trajectory keeps its axes at rest until its start;
+/// stops and later commands end that like a motion.
 ///
-/// @throw BadTrajectory; Refused as Machine::followTrajectory(), and where the trajectory starts
-///   later and an axis of it moves.
+/// @throw BadTrajectory; Refused as Machine::followTrajectory(), and if the trajectory is delayed
+///   and one of its axes moves.
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,
                                        const AxisOfJoint& axes);
