@@ -17,7 +17,7 @@
 //   node_listener SECONDS TOPIC...
 //
 // Says "listening"; then, when it has heard each for SECONDS, a line for each: the topic, the time
-// of the first message, ns since 1970, and the rate, Hz. Exit code 1 where one isn't heard.
+// of the first message, ns since 1970, and the rate, Hz. Exit code 1 if one isn't heard.
 
 namespace {
 

@@ -94,7 +94,7 @@ double residentMemory(pid_t process) {
   return kilobytes / 1024.0;
 }
 
-/// [us] Negative where there was no answer.
+/// [us] Negative if there was no answer.
 double callTime(ros::ServiceClient& client, double position) {
   stepdriver::MoveTo call;
   call.request.position = position;

@@ -102,7 +102,7 @@ Plan planned(Nanoseconds begin, int axes, double rate, double seconds) {
   return plan;
 }
 
-// Where the machine stalls for so long that the engine has the order too late, it is made again.
+// If the machine stalls for so long that the engine has the order too late, it is made again.
 Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rate, double seconds) {
   Nanoseconds ahead = kBegin;
   for (std::uint64_t serial = 1;; ++serial, ahead *= 2) {

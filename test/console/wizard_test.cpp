@@ -90,7 +90,7 @@ class Machine : public MachineAtHand {
   std::vector<double> speeds;
   std::function<void()> on_wait;
   std::string refusal;
-  bool endless = false;  ///< moves go on until they are stopped
+  bool endless = false;  ///< moves continue until they are stopped
   bool gone = false;
   int stops = 0;
 

@@ -160,7 +160,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   return all;
 }
 
-/// What an issue with this key says; none where there is none.
+/// What an issue with this key says; none if there is none.
 std::optional<std::string> issueWith(const Reading& reading, const std::string& key) {
   for (const ConfigIssue& issue : reading.issues) {
     if (issue.key == "/" + key) return issue.message;
@@ -221,7 +221,7 @@ bool isRequired(const Parameter& parameter) {
   return words.count(parameter.fallback) > 0;
 }
 
-/// The default as a value; none where the page has it in words.
+/// The default as a value; none if the page has it in words.
 std::optional<ConfigValue> literal(const Parameter& parameter) {
   static const std::set<std::string> words = {"none", "as configured", "host, chips, lines",
                                               "the axis's name"};

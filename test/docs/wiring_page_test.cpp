@@ -60,7 +60,7 @@ TEST(WiringPage, HasTheLinesOfTheShippedConfigurations) {
   EXPECT_GE(compared, 25);
 }
 
-/// The first time in a cell [ns]; 0 where it has none.
+/// The first time in a cell [ns]; 0 if it has none.
 std::int64_t firstTime(const std::string& cell) {
   char* unit = nullptr;
   const double number = std::strtod(cell.c_str(), &unit);

@@ -34,17 +34,17 @@ class KernelTrace {
   /// `mono`), and where the kernel says that it dropped events.
   explicit KernelTrace(std::istream& text, const std::string& name = "the trace");
 
-  /// @throw Error as above, and where the file can't be read.
+  /// @throw Error as above, and if the file can't be read.
   static KernelTrace fromFile(const std::string& path);
 
   const std::vector<LineEvent>& events() const { return events_; }
 
   /// @param name a number, or chip:offset with the label of a chip.
-  /// @throw Error where it is neither, or there is no such chip or line.
+  /// @throw Error if it is neither, or there is no such chip or line.
   unsigned line(const std::string& name) const;
 
   /// @return the level in the line's first event: for an output the one that it was requested with.
-  /// None where the line has no event.
+  ///   None if the line has no event.
   std::optional<bool> firstLevel(unsigned line) const;
 
   /// Changes of the line's level; its first event isn't one.

@@ -14,7 +14,7 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "waveform.h"
 
-/// What the kernel's lines did while whole machines moved, held against the plan and the chips.
+/// What the kernel's lines did while whole machines moved, compared with the plan and the chips.
 ///
 /// On a machine that stalls pulses come late: then later ones do, too, but they come never closer
 /// than three quarters of their planned interval, and none is left out.

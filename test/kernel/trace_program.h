@@ -19,7 +19,7 @@ struct TraceProgram {
   std::function<bool(const std::vector<std::string>& arguments, const KernelTrace& trace)> act;
 };
 
-/// Its main(). @return 0 where all was right, 1 where not, 2 where it couldn't be done.
+/// Its main(). @return 0 if all was right, 1 if not, 2 if it couldn't be done.
 inline int runTraceProgram(const TraceProgram& program, int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   if (arguments.size() == 1 && (arguments[0] == "--help" || arguments[0] == "-h")) {

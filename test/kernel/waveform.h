@@ -11,7 +11,8 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/driver/driver_chip.h"
 
-/// The waveform of an axis as the kernel put it out, held against what the driver chip needs.
+/// The waveform of an axis as the kernel put it out, compared with the requirements of the driver
+/// chip.
 ///
 /// The chip needs its times from the end of one write to the beginning of the next. The kernel
 /// stamps a write within it, so what lies between two stamps is never shorter than what was kept:
@@ -40,7 +41,7 @@ struct WiredAxis {
 };
 
 /// The wiring that an axis is configured with.
-/// @throw Error where the trace doesn't know a line's chip: its pins must be named label:offset.
+/// @throw Error if the trace doesn't know a line's chip: its pins must be named label:offset.
 WiredAxis wiredAxis(const config::AxisConfig& config, const KernelTrace& trace);
 
 enum class Rule {
@@ -62,7 +63,7 @@ struct Violation {
   Rule rule;
   std::int64_t time_ns;  ///< of the edge that broke it
   std::int64_t seen_ns;
-  std::int64_t least_ns;  ///< what would have been right; 0 where the rule has no time
+  std::int64_t least_ns;  ///< what would have been right; 0 if the rule has no time
 };
 
 /// An active STEP edge.
@@ -71,7 +72,7 @@ struct Pulse {
   bool forward;
 };
 
-/// The shortest times that occurred; none where there weren't two such edges.
+/// The shortest times that occurred; none if there weren't two such edges.
 struct ShortestTimes {
   std::optional<std::int64_t> high;
   std::optional<std::int64_t> low;
@@ -94,7 +95,7 @@ struct Waveform {
   std::map<Rule, std::size_t> violationsByRule() const;
 };
 
-/// @throw Error where one of the lines has no event: it is a wrong number, or nothing drove it.
+/// @throw Error if one of the lines has no event: it is a wrong number, or nothing drove it.
 Waveform waveformOf(const KernelTrace& trace, const WiredAxis& axis);
 
 /// The figures of a waveform in a few lines, each indented, and each rule that was broken with the

@@ -21,8 +21,8 @@ struct ProfilePeaks {
                        ///< between two pieces or at the end
 };
 
-/// In closed form for each piece; rounding makes jumps of about 2^-50 of the velocity where there
-/// should be none.
+/// In closed form for each piece; rounding makes jumps of about 2^-50 of the velocity at continuous
+/// points.
 ///
 /// @param velocity_before the velocity before the profile [microsteps/s].
 /// @param velocity_after the velocity after it [microsteps/s].

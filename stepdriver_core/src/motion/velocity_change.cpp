@@ -37,7 +37,8 @@ void rise(Mirrored m, DoubleDouble v_end, DoubleDouble a_end, double limit, doub
   const DoubleDouble j(jerk);
   const DoubleDouble a = m.a();
   const DoubleDouble top = std::max(DoubleDouble(limit), a_end);
-  // Where the line that rises from (v, a^2/2) meets the one that falls to (v_end, a_end^2/2).
+  // The point at which the line that rises from (v, a^2/2) meets the one that falls to (v_end,
+  // a_end^2/2).
   const DoubleDouble corner = (square(a) + square(a_end)) * kHalf + j * change;
   if (!(square(top) < corner)) {
     const DoubleDouble peak = sqrt(corner);

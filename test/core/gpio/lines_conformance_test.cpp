@@ -67,7 +67,7 @@ class LinesConformance : public testing::TestWithParam<TestBoardKind> {
     return text;
   }
 
-  // @return false where the board can't tell.
+  // @return false if the board can't tell.
   bool takeDriven(std::vector<Driven>& driven) {
     auto taken = board->takeDriven();
     if (!taken) return false;

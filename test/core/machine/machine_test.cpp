@@ -27,7 +27,7 @@ TEST(Machine, TakesAllLinesOrNone) {
   pulse::VirtualClock clock;
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
   EXPECT_THROW(machine::Machine(configs, backend, clock, {false}), GpioError);
-  // Nothing is held: the same lines can be had.
+  // Nothing is held: the same lines can be requested.
   machine::Machine machine({configs[0]}, backend, clock, {false});
   EXPECT_EQ(machine.axes().size(), 1U);
 }

@@ -11,7 +11,7 @@
 #include "support/bench.h"
 #include "support/motion_trace.h"
 
-// The motions of docs/motion.md: what it says of them is held against the edges here, and
+// The motions of docs/motion.md: its statements are compared with the edges here, and
 // scripts/motion_pictures.sh draws its pictures from the same edges. 1000 steps/m.
 
 namespace stepdriver {

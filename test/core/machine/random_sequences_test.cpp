@@ -13,7 +13,7 @@
 #include "support/differences.h"
 #include "support/random_motion.h"
 
-// A hundred thousand sequences of random commands on two axes, held against what must always be
+// A hundred thousand sequences of random commands on two axes, compared with what must always be
 // true: the position is the count of the edges, the limits hold by differentiating the trace, the
 // rig sees no violation, and the same seed gives the same trace.
 

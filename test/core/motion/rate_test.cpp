@@ -84,7 +84,7 @@ TEST(Rate, NeverRunsBackwardsNorFasterWhateverComesInBetween) {
     const double wanted = unit(random) < 0.5 ? 1.0 : unit(random);
     const double after = unit(random) < 0.5 ? 0.0 : unit(random);
     const Profile path = planRate(0, from, wanted, second, after, 1000.0);
-    // What a slope of now takes to end may be as much as it took to begin.
+    // What the current slope takes to end may be as much as it took to begin.
     expectSound(path, second, std::max(first.jerk, second.jerk) * (1.0 + 1e-6));
     EXPECT_NEAR(path.endPosition().value(), 1000.0, 1e-9) << i;
     if (testing::Test::HasFailure()) return;

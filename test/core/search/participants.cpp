@@ -525,7 +525,7 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   if (now.memory) return now.memory->position;
   const machine::AxisSnapshot::Motion& last = now.motions.back();
   if (!last.target && !last.slows_down) return std::nullopt;
-  // Each turn on the way takes the backlash up anew.
+  // Each turn on the way takes up the backlash again.
   double motor = static_cast<double>(now.channel.count);
   double slack = static_cast<double>(now.channel.slack);
   const auto move_to = [&](double position) {

@@ -128,7 +128,7 @@ class ProfileCheck {
 
   void expectContinuous(const MotionState& end, const MotionState& begin) const {
     EXPECT_LE(std::abs((end.position - begin.position).hi), positionDoubt()) << "a jump";
-    // Up to the start speed it may rest and start anew, and whatever acceleration there was is
+    // Up to the start speed it may rest and start again, and whatever acceleration there was is
     // over.
     const double slow = start_ + speedDoubt();
     const bool at_start_speed = std::abs(end.velocity) <= slow && std::abs(begin.velocity) <= slow;

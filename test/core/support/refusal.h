@@ -8,7 +8,7 @@
 
 namespace stepdriver::test {
 
-// The message of the refusal; empty where the action was accepted.
+// The message of the refusal; empty if the action was accepted.
 template <typename Action>
 std::string refusal(Action action) {
   try {

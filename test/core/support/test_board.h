@@ -41,14 +41,14 @@ class TestBoard {
   virtual std::int64_t now() const = 0;
 
   /// The levels that outputs were driven to since the last call, with those of their request, and
-  /// without repetitions. None where the board can't tell.
+  /// without repetitions. None if the board can't tell.
   virtual std::optional<std::vector<Driven>> takeDriven() = 0;
 };
 
 /// A kind of board.
 struct TestBoardKind {
   const char* name;
-  std::string (*missing)();  ///< why there can't be one here; empty where there can
+  std::string (*missing)();  ///< why there can't be one here; empty if there can
   std::unique_ptr<TestBoard> (*make)();
 };
 

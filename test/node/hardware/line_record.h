@@ -11,7 +11,7 @@ namespace stepdriver::node_test {
 /// What the kernel does to its GPIO lines from its making on, in a buffer of its own.
 class LineRecord {
  public:
-  /// @throw std::runtime_error where the kernel has no gpio tracepoints.
+  /// @throw std::runtime_error if the kernel has no gpio tracepoints.
   LineRecord();
   ~LineRecord();
   LineRecord(const LineRecord&) = delete;
@@ -41,7 +41,7 @@ std::int64_t pulsesIn(const kernel::KernelTrace& trace, const StepAndDir& lines)
 /// Times at which the line was set to this level, whatever it had before.
 std::vector<std::int64_t> timesSet(const kernel::KernelTrace& trace, unsigned line, bool level);
 
-/// The level that the line was set to last. @throw std::runtime_error where it never was.
+/// The level that the line was set to last. @throw std::runtime_error if it never was.
 bool lastSet(const kernel::KernelTrace& trace, unsigned line);
 
 /// How often both lines changed in one write. Only where each write names all lines of its chip, as

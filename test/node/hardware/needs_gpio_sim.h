@@ -7,7 +7,7 @@
 
 namespace stepdriver::node_test {
 
-/// Skipped where there is no gpio-sim.
+/// Skipped if there is no gpio-sim.
 class NeedsGpioSim : public testing::Test {
  protected:
   void SetUp() override {

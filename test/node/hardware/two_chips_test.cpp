@@ -47,7 +47,7 @@ class TwoChips : public BoardAndExpander {
     })) << "it doesn't move";
   }
 
-  /// Sends SIGTERM. @return the exit code; none where it still runs.
+  /// Sends SIGTERM. @return the exit code; none if it still runs.
   std::optional<int> end() const {
     node->process().signal(SIGTERM);
     return node->process().waitForExit(kBound);

@@ -14,7 +14,7 @@ namespace stepdriver::storm {
 
 /// What the clients of a storm do now.
 enum class Weather {
-  kStorm,  ///< they send whatever comes to their mind
+  kStorm,  ///< they send random requests
   kCalm,   ///< they send nothing that could begin a motion, and wait for their answers
   kOver,   ///< they end
 };

@@ -206,7 +206,7 @@ void Storm::calm() {
   endMotions();
   double longest = 0.0;
   for (const AxisFacts& axis : seen_.axes) longest = std::max(longest, axis.longest_stop);
-  // Longer than a stop may take, and than a forgotten stream of jogs that begins anew.
+  // Longer than a stop may take, and than a forgotten stream of jogs that begins again.
   sleepFor(2.0 * longest + 0.5);
   if (!isAlive()) return;
   stopAll();

@@ -6,8 +6,8 @@
 
 namespace stepdriver::node_test {
 
-/// Calls a method of a node's own interface, beside its services: `getPid`, `shutdown`. The test
-/// fails where no answer comes.
+/// Calls a method of a node's own interface, in addition to its services: `getPid`, `shutdown`. The
+/// test fails if no answer comes.
 ///
 /// @param why what `shutdown` is told; others take no notice of it.
 /// @return the answer's value.

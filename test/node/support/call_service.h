@@ -14,13 +14,13 @@ namespace stepdriver::node_test {
 /// kind is closed by the server right after the answer, and now and then the client takes that for
 /// a failed call before it reads the answer (ros_comm issue 1976).
 ///
-/// @return false where no answer came.
+/// @return false if no answer came.
 template <typename Service>
 bool callService(const std::string& name, Service& call) {
   return ros::NodeHandle().serviceClient<Service>(name, true).call(call);
 }
 
-/// Calls a service of a node that may still be starting; the test fails where no answer comes.
+/// Calls a service of a node that may still be starting; the test fails if no answer comes.
 template <typename Service>
 typename Service::Response callWhenThere(const std::string& name,
                                          const typename Service::Request& request = {}) {

@@ -17,7 +17,7 @@ namespace stepdriver::node_test {
 extern const char* const kStepdriverNode;
 extern const char* const kStepdriverJoystick;
 
-/// A running node, and all that it prints. Killed at the end where it still runs.
+/// A running node, and all that it prints. Killed at the end if it still runs.
 class NodeProcess {
  public:
   explicit NodeProcess(const std::vector<std::string>& arguments,
@@ -28,11 +28,11 @@ class NodeProcess {
 
   void signal(int number) const;
 
-  /// @return the exit code, 128 + the signal's number where a signal ended it; none where it still
+  /// @return the exit code, 128 + the signal's number where a signal ended it; none if it still
   ///   runs after this time.
   std::optional<int> waitForExit(std::chrono::duration<double> bound);
 
-  /// A size in its /proc/PID/status, as `VmRSS` [kB]. @throw std::runtime_error where it has none.
+  /// A size in its /proc/PID/status, as `VmRSS` [kB]. @throw std::runtime_error if it has none.
   std::size_t kilobytes(const std::string& field) const;
 
   /// Both of its streams; complete after waitForExit().

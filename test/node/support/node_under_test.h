@@ -49,7 +49,7 @@ class NodeUnderTest {
   NodeProcess& start();
   NodeProcess& process() { return *process_; }
 
-  /// Calls a service below the node's name; the test fails where no answer comes.
+  /// Calls a service below the node's name; the test fails if no answer comes.
   template <typename Service>
   typename Service::Response call(const std::string& service,
                                   const typename Service::Request& request = {}) {

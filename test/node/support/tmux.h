@@ -26,7 +26,7 @@ class Tmux {
   std::string screen() const;
 
   bool shows(const std::string& words) const { return screen().find(words) != std::string::npos; }
-  /// Waits until it shows these words; where it doesn't, the test fails with what it shows.
+  /// Waits until it shows these words; if it doesn't, the test fails with what it shows.
   bool waitFor(const std::string& words) const;
   bool waitUntilGone(const std::string& words) const;
 

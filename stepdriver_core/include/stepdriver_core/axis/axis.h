@@ -103,7 +103,7 @@ class Axis {
   /// holds a motor without current: disabling invalidates the position, unless
   /// AxisConfig::holds_position_unpowered is set.
   ///
-  /// @throw Refused if enable isn't wired, or if a faulty axis is to be enabled.
+  /// @throw Refused if enable isn't wired, or if the call enables a faulty axis.
   virtual void enable(bool on) = 0;
 
   /// Puts the chip to sleep, or wakes it. A chip wakes at its Home position, so the axis's position
