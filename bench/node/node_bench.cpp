@@ -128,7 +128,7 @@ struct CallTimes {
 };
 
 /// Calls take turns, so that noise meets both. The target is a new one each time, so that each call
-/// plans a motion, from the midst of the last one.
+/// plans a motion, from the middle of the last one.
 CallTimes measureCalls(ros::NodeHandle& handle, bool persistent, double way) {
   constexpr int kCalls = 800;
   auto node = handle.serviceClient<stepdriver::MoveTo>("/stepdriver/a0/move_to", persistent);

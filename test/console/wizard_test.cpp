@@ -14,7 +14,7 @@
 namespace stepdriver::console {
 namespace {
 
-/// A person who answers each question in turn, and does something where nothing is asked.
+/// A person who answers each question in turn, and acts when nothing is asked.
 class Person : public Dialogue {
  public:
   explicit Person(std::deque<std::string> answers) : answers_(std::move(answers)) {}
@@ -43,7 +43,7 @@ class Person : public Dialogue {
 
   std::string heard;
   std::function<void(const std::string&)> on_say;
-  int patience = 1000;  ///< how often it looks before it presses Enter where it may press a switch
+  int patience = 1000;  ///< how often it looks before it presses Enter if it may press a switch
   bool stops_moves = false;
 
  private:

@@ -242,7 +242,7 @@ TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
   const std::vector<Parameter> parameters = parametersOf(GetParam());
   for (auto& [map, on_page] : mapsOf(parameters)) {
     std::set<std::string> expected = on_page;
-    if (map == "axes/x") {  // it can be of either kind, and says so where it is given keys of both
+    if (map == "axes/x") {  // it can be of either kind, and says so if it is given keys of both
       for (const std::string& key : on_page) expected.insert(rotaryKey(key));
       for (const Cells& row : tableRows("docs/parameters.md", "An axis")) {
         if (!GetParam().rotary) break;

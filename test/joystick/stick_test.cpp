@@ -24,7 +24,7 @@ TEST(Stick, GivesNothingInTheDeadBand) {
   }
   for (const float dead_band : {0.05F, 0.1F, 0.15F, 0.2F, 0.3F}) {
     Stick shape = stick();
-    shape.dead_band = std::stod(std::to_string(dead_band));  // as a file has it
+    shape.dead_band = std::stod(std::to_string(dead_band));  // as in a file
     EXPECT_EQ(velocityOf(shape, dead_band), 0.0) << dead_band << ", as a joystick says it";
   }
 }

@@ -1,11 +1,10 @@
 // The first process of the test kernel; run.sh boots it. It mounts what programs expect to find,
 // runs the three steps that run.sh left in a folder, and turns the machine off:
 //
-//   before       bash script: makes the chips. Where it fails, nothing else runs
-//   command      the arguments of the command, each ended by a zero byte
-//   after        bash script: runs after the command, whatever became of it
-//   environment  variables for all three, each ended by a zero byte
-//   directory    the working directory for all three
+//   before bash script: makes the chips. If it fails, nothing else runs command the arguments of
+//   the command, each ended by a zero byte after bash script: runs after the command, whatever
+//   became of it environment variables for all three, each ended by a zero byte directory the
+//   working directory for all three
 //
 // The verdict goes to the file `status` there: "exit N", as a shell counts, or "error TEXT".
 #include <fcntl.h>
@@ -166,8 +165,8 @@ class Steps {
         output_(output),
         errors_(errors) {}
 
-  /// @return the exit status, 128 more than the signal that ended it, 126 or 127 where the program
-  /// can't be run or isn't there.
+  /// @return the exit status, 128 more than the signal that ended it, 126 or 127 if the program
+  ///   can't be run or doesn't exist.
   int run(std::vector<std::string> words) {
     const std::vector<char*> arguments = pointersTo(words);
     const std::vector<char*> variables = pointersTo(environment_);

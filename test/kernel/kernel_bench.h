@@ -27,7 +27,7 @@ class Recording {
  public:
   Recording();
 
-  /// Ends it. Where the environment names a folder in STEPDRIVER_TRACES, it is kept there.
+  /// Ends it. If the environment names a folder in STEPDRIVER_TRACES, it is kept there.
   /// @param name of its file there.
   KernelTrace stop(const std::string& name);
 };
@@ -52,7 +52,7 @@ class KernelBench {
   axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
   test::GpioSimChip& chip(std::size_t index) { return chips_.at(index); }
 
-  /// Where the axis says that it stands [microsteps].
+  /// The position that the axis reports [microsteps].
   std::int64_t count(const std::string& name);
 
   /// Starts a move by a number of microsteps.

@@ -20,7 +20,7 @@
 namespace stepdriver::kernel {
 
 struct WiredPin {
-  unsigned line = 0;      ///< as KernelTrace::line() has it
+  unsigned line = 0;      ///< as from KernelTrace::line()
   bool inverted = false;  ///< the wiring inverts the level on its way to the chip
 };
 

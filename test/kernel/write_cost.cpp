@@ -13,7 +13,7 @@
 #include "stepdriver_core/pulse/clock.h"
 #include "support/gpio_sim.h"
 
-// What one write of lines costs on the test kernel, beside a system call that does nothing.
+// What one write of lines costs on the test kernel, compared with a system call that does nothing.
 
 namespace {
 

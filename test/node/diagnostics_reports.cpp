@@ -6,7 +6,7 @@
 #include "node/diagnostics/engine_diagnostics.h"
 #include "support/says.h"
 
-// Each level is reached by one thing alone, and left where that is over.
+// Each level is reached by one thing alone, and left when that is over.
 
 namespace stepdriver::ros_node {
 namespace {

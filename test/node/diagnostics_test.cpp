@@ -23,7 +23,7 @@ using diagnostic_msgs::DiagnosticStatus;
 
 class DiagnosticsTest : public testing::Test {
  protected:
-  /// The node's name without its slash, as diagnostics have it.
+  /// The node's name without its slash, as in diagnostics.
   std::string nameOf(const std::string& what) const { return node.name().substr(1) + ": " + what; }
 
   /// Waits until the newest status of this name has that level and begins with that.

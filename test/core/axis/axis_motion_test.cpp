@@ -13,7 +13,7 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// Motions that take over from others. In steps, if it says nothing else: 1000 steps/m.
+// Motions that take over from others. In steps, unless stated otherwise: 1000 steps/m.
 
 namespace stepdriver {
 namespace {

@@ -198,7 +198,7 @@ TEST_F(MotionPictures, LineWithHold) {
   EXPECT_EQ(bench->pulses("y"), 400);
   EXPECT_NEAR(trace->speedAt("x", 0.65), 1000.0, 1e-2);
   EXPECT_NEAR(trace->speedAt("y", 0.65), 400.0, 1e-2);
-  // Where y steps, x is at 2.5 times as much, but for the half step that each may be off.
+  // When y steps, x is at 2.5 times as much, but for the half step that each may be off.
   const std::vector<MotionTrace::Step> of_x = trace->steps("x");
   for (const MotionTrace::Step& step : trace->steps("y")) {
     std::int64_t count = 0;

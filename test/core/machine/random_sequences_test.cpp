@@ -102,7 +102,7 @@ class Batch {
     bench_.machine->setSpeedOverride(1.0);
     if (random_.chance(0.5)) bench_.machine->stop();
     rest();
-    bench_.machine->stop();  // a jog that goes on for ever, and what is held
+    bench_.machine->stop();  // a jog that continues for ever, and what is held
     rest();
     checkPositions();
     // A switch ends a motion in one step.

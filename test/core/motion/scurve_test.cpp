@@ -62,8 +62,8 @@ class DoubleS {
     long double duration;
   };
 
-  // Time of a ramp that raises the speed by v: v/a + a/j where it reaches the acceleration a, else
-  // twice sqrt(v/j).
+  // Time of a ramp that raises the speed by v: v/a + a/j if it reaches the acceleration a,
+  // otherwise twice sqrt(v/j).
   long double rampTime(long double v, long double a) const {
     return v * jerk_ >= a * a ? v / a + a / jerk_ : 2.0L * std::sqrt(v / jerk_);
   }

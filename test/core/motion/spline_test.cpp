@@ -164,8 +164,8 @@ TEST(Spline, StepsOfAQuinticComeWhereThePolynomialIsWithinAHundredthOfAStep) {
   EXPECT_FALSE(finder.next(step));
 }
 
-// Where both segments at a waypoint have a velocity for it, they join without a jump; so do the
-// cubics that a quintic is made of.
+// If both segments at a waypoint have a velocity for it, they join without a jump; so do the cubics
+// that a quintic is made of.
 TEST(Spline, JoinsWithoutAJumpOfVelocity) {
   std::mt19937_64 random(20261122);
   for (int round = 0; round < 1000; ++round) {

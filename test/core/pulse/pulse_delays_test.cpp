@@ -77,13 +77,13 @@ class PulseDelays : public DelayedLine, public testing::WithParamInterface<Delay
 
 TEST_P(PulseDelays, BunchNothingKeepTheAxesOnTheirLineAndFaultWhereTheyMust) {
   startLine(GetParam().speed);
-  constexpr Nanoseconds kDelayedAt = 500 * kMillisecond;  // in the midst of the cruise
+  constexpr Nanoseconds kDelayedAt = 500 * kMillisecond;  // in the middle of the cruise
   runUntil(kDelayedAt);
   clock.waitUntil(clock.now() + GetParam().length);
   runOut();
   for (std::size_t i = 0; i < kAxes; ++i) expectNothingBunched(i);
   if (GetParam().faults) {
-    // The fastest axis can't go on; all end in the same instant, with nothing sent after it.
+    // The fastest axis can't continue; all end in the same instant, with nothing sent after it.
     EXPECT_EQ(engine->channel(0).end, EndReason::kTooLate);
     EXPECT_GT(engine->channel(0).end_lateness, kMaxLateness);
     EXPECT_EQ(engine->channel(0).end_abrupt, true);

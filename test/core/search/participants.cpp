@@ -910,7 +910,7 @@ std::vector<std::string> Participants::run() {
   const auto played = [this] {
     return next_item_ == schedule_.items.size() && clients_[0].idle() && clients_[1].idle();
   };
-  // What is held is answered when it goes on, or is stopped.
+  // What is held is answered when it continues, or is stopped.
   const auto held = [this] {
     return !clients_[0].waits_for_stops && !clients_[1].waits_for_stops &&
            controller_->snapshot()->axes.front().state.held;

@@ -13,7 +13,7 @@ using driver::Model;
 using test::HandRig;
 using test::plainAxis;
 
-constexpr double kTravel = 0.2;  // [mm] a full step, as plainAxis() has it
+constexpr double kTravel = 0.2;  // [mm] a full step, as in plainAxis()
 
 /// A max switch at 1 mm and a min switch at -1 mm: 5 full steps either way.
 RigAxisSpec axisWithSwitches() {

@@ -17,7 +17,7 @@ using driver::Model;
 using test::HandRig;
 using test::plainAxis;
 
-constexpr double kTravel = 0.2;  // [mm] a full step, as plainAxis() has it
+constexpr double kTravel = 0.2;  // [mm] a full step, as in plainAxis()
 
 TEST(Rig, CarriageFollowsTheStepsThatGoOut) {
   HandRig bench(Model::kA4988);

@@ -20,7 +20,7 @@ namespace {
 constexpr const char* kTracing = "/sys/kernel/tracing";
 
 /// Every level that the kernel sets an output to, from its own tracepoint; in a buffer of its own,
-/// so that another trace goes on undisturbed.
+/// so that another trace continues undisturbed.
 class OutputTrace {
  public:
   OutputTrace() {

@@ -33,7 +33,7 @@ class TestBoard {
   /// The level of an output that is held.
   virtual bool level(const std::string& line) = 0;
 
-  /// Drives an input. Edges may merge where they are closer than pace().
+  /// Drives an input. Edges may merge if they are closer than pace().
   virtual void drive(const std::string& line, bool level) = 0;
   virtual std::int64_t pace() const = 0;
 

@@ -25,7 +25,7 @@
 #include "support/wait.h"
 
 // The shipped launch file with the shipped configuration, on a chip with the line names of a
-// Raspberry Pi. The tests go on from one another, as a user's first hour does.
+// Raspberry Pi. The tests continue one another, as a user's first hour does.
 
 namespace stepdriver::node_test {
 namespace {

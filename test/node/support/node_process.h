@@ -28,8 +28,8 @@ class NodeProcess {
 
   void signal(int number) const;
 
-  /// @return the exit code, 128 + the signal's number where a signal ended it; none if it still
-  ///   runs after this time.
+  /// @return the exit code, 128 + the signal's number if a signal ended it; none if it still runs
+  ///   after this time.
   std::optional<int> waitForExit(std::chrono::duration<double> bound);
 
   /// A size in its /proc/PID/status, as `VmRSS` [kB]. @throw std::runtime_error if it has none.
