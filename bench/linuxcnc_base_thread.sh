@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# How late the base thread of LinuxCNC comes on this machine, where linuxcnc-uspace is installed: for
-# the rates of bench/paced.cpp, the furthest that one period was off, as its component timedelta
-# measures it. Prints one line for each rate; without LinuxCNC it says so, and is 0.
+# Measures how late the base thread of LinuxCNC is on this computer, if linuxcnc-uspace is installed:
+# for each rate of bench/paced.cpp, the largest error of one period according to its component
+# timedelta. Prints one line for each rate; without LinuxCNC it says so, and exits with 0.
 set -euo pipefail
 
 usage() {

@@ -39,7 +39,7 @@ build_bench() {
     -DSTEPDRIVER_BENCH=ON -DSTEPDRIVER_TESTS=OFF &&
     cmake --build "$bench/core" -j "$jobs"
 }
-# The repetitions of all benchmarks of a program take turns, so that noise meets all of them.
+# The repetitions of all benchmarks of a program take turns, so that noise affects all of them.
 run_bench() {
   "$1" --benchmark_repetitions="$repetitions" --benchmark_min_time="$seconds" \
     --benchmark_enable_random_interleaving=true --benchmark_out_format=json \
@@ -56,7 +56,7 @@ done
 say "Running stop_latency"
 quietly stop_latency "$bench/core/bench/stop_latency" "${latency[@]}" --json "$bench/stop_latency_bench.json"
 
-# Only where it is on this machine: the core's figures need no ROS.
+# Only if ROS is installed: the core's figures don't need it.
 if [[ -x /usr/bin/roscore || -x /usr/bin/catkin_make ]]; then
   say "Running node_bench"
   bash "$root/scripts/node_bench.sh"

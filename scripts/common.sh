@@ -1,6 +1,6 @@
 # shellcheck shell=bash
-# What demo.sh, test.sh and test_in_root.sh share: where things are, the Debian packages, the
-# builds, ROS and the end of it all. Sourced, never run; needs `set -euo pipefail`.
+# Shared by demo.sh, test.sh and test_in_root.sh: paths, Debian packages, builds, ROS and cleanup.
+# Sourced, never run; needs `set -euo pipefail`.
 
 # Debian's own tools and Python first, whatever else is on PATH, and numbers with a point.
 export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH"
@@ -52,7 +52,7 @@ end_group() {
 
 # Runs a command, or a function under `set -e`, and waits for it. It has a process group of its
 # own, which ends with this script: an interrupt leaves nothing behind. Sets run_status, and always
-# returns 0: called in a condition, the function would run on after a failing command.
+# returns 0: in a condition, the function would continue after a failing command.
 run() {
   run_status=0
   if [[ -n ${in_group:-} ]]; then
@@ -79,10 +79,10 @@ at_exit end_run
 safe_path() { [[ $1 =~ ^[A-Za-z0-9_./+-]+$ ]]; }
 
 # Creates the build folder and sets
-#   build   the folder for everything that is made: a path that catkin can live with
-#   src     the checkout as CMake and ROS see it: a path that catkin can live with
-# catkin's tests break where a path has a space. There, and where the checkout can't be written
-# to, the build goes to a cache folder, which reaches the checkout by a symbolic link.
+#   build   the folder for all build products: a path that works with catkin
+#   src     the checkout as CMake and ROS see it: a path that works with catkin
+# catkin's tests fail if a path contains a space. In that case, and if the checkout isn't writable, the
+# build goes to a cache folder, which refers to the checkout through a symbolic link.
 # STEPDRIVER_BUILD names another folder.
 choose_build_folder() {
   local key place
@@ -114,8 +114,8 @@ choose_build_folder() {
   export ROS_HOME=$build/ros ROS_IP=127.0.0.1
 }
 
-# Runs a command with its output in a file; shows the end of it only where the command fails.
-# A function given to it joins its commands by &&.
+# Runs a command with its output in a file; shows the end of it only if the command fails.
+# A function as the command must join its own commands with &&.
 quietly() {
   local log=$build/log/$1.log
   shift
@@ -136,7 +136,7 @@ list_packages() {
     NF && wanted { print $1 }' "$root/scripts/packages.txt"
 }
 
-# Installs what is missing of the named groups. Asks apt, and for root, only where anything is.
+# Installs the missing packages of the named groups. Asks apt, and for root, only if some are missing.
 install_packages() {
   local wanted present missing as_root=()
   mapfile -t wanted <<<"$(list_packages "$@")"
@@ -166,7 +166,7 @@ install_packages() {
 
 # ---- builds ----
 
-# Configures a build folder; a cache that was made for another place is thrown away.
+# Configures a build folder; discards a cache that was made for another path.
 configure() {
   local from=$1 into=$2
   shift 2

@@ -25,7 +25,7 @@ case ${1:-} in
   *) usage >&2 && exit 2 ;;
 esac
 
-# What config/a4988.yaml makes of it: 80 steps/mm.
+# From config/a4988.yaml: 80 steps/mm.
 distance=0.0125
 steps=1000
 
@@ -40,12 +40,12 @@ field() { sed -n "s/^$2: *//p" <<<"$1" | head -n 1 | tr -d '[]'; }
 
 same_place() { awk -v a="$1" -v b="$2" 'BEGIN { exit !(a != "" && (a - b) ^ 2 < 1e-6 ^ 2) }'; }
 
-# Runs a ROS command, with a bound, and leaves what it printed in $answer.
+# Runs a ROS command, with a time limit, and stores its output in $answer.
 ask() {
   answer=$(timeout --foreground 60 "$@" </dev/null 2>&1) || die "$* failed: $answer"
 }
 
-# Shows a service call as a person would type it, and what it answers.
+# Shows a service call as a person would type it, and its answer.
 call() {
   say "\$ rosservice call $1 \"$2\""
   ask rosservice call "$1" "$2"
@@ -53,7 +53,7 @@ call() {
   [[ $(field "$answer" success) == True ]] || problem "refused"
 }
 
-# Moves by a distance [m] and looks whether service, pins and joint_states agree.
+# Moves by a distance [m] and checks that service, pins and joint_states agree.
 move() {
   local by=$1 goal=$2 goal_forward=$3 goal_backward=$4 forward backward violations place
   say "" "Commanded: move by $by m, which is $steps steps, to $goal m"
@@ -123,13 +123,13 @@ if grep -E 'process has died|escalating to SIGTERM' "$log" >&2; then
 fi
 
 say "" "The pin trace: $trace"
-# compress: pauses longer than 1000 ns are shortened, else sigrok reads each nanosecond of them.
+# compress: shortens pauses of more than 1000 ns; otherwise sigrok reads each nanosecond of them.
 look=(sigrok-cli -i "$trace" -I vcd:compress=1000 -P stepper_motor:step=step:dir=dir
   -A stepper_motor=position)
 if [[ ! -s $trace ]]; then
   problem "there is no trace"
 else
-  # It prints a position when the next step comes: so the farthest one while the axis stood there.
+  # It prints a position when the next step comes: the farthest one while the axis was at rest there.
   decoded=$("${look[@]}" </dev/null 2>"$build/log/sigrok.log" |
     sed -n 's/^stepper_motor-1: \(-\?[0-9]*\) steps$/\1/p') || true
   far=$(sort -n <<<"$decoded" | tail -n 1)

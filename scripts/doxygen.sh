@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pages of the core's public headers, and says what is wrong with their comments.
+# Makes the manual of the core's public headers, and reports mistakes in their comments.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -30,7 +30,7 @@ doxygen_warnings() {
   SRC=$src doxygen "$build/doxygen/Doxyfile" 2>&1 || true
 }
 
-# The names in comments, as Machine::stop(), that nothing has.
+# The names in comments, such as Machine::stop(), that don't exist.
 dead_names() {
   local include=$root/stepdriver_core/include
   grep -rhoE '///.*' "$include" | grep -oE '\b[A-Z][A-Za-z]*::[A-Za-z_]+' | sort -u |

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Has libgpiod 2 beside the system's libgpiod 1, for builds and tests with both.
+# Provides libgpiod 2 in addition to the system's libgpiod 1, for builds and tests with both.
 set -euo pipefail
 
 usage() {
@@ -71,7 +71,7 @@ echo "deb [signed-by=$keys] ${mirror%/} $suite-backports main" >"$work/sources.l
 apt=(-o Dir::State="$work" -o Dir::State::lists="$work/lists" -o Dir::State::status="$work/status"
   -o Dir::Cache="$work/cache" -o Dir::Etc::sourcelist="$work/sources.list"
   -o Dir::Etc::sourceparts="$work/none" -o APT::Update::Error-Mode=any)
-# apt's own user couldn't read the folder of whoever calls.
+# apt's own user couldn't read the caller's folder.
 (($(id -u) != 0)) || apt+=(-o APT::Sandbox::User=root)
 
 apt-get "${apt[@]}" -q update >"$work/log" 2>&1 ||
@@ -84,6 +84,6 @@ for package in "$work"/debs/*.deb; do dpkg-deb -x "$package" "$work/root"; done
 grep -qs gpiod_api_version "$work/root/usr/include/gpiod.h" ||
   missing "the package libgpiod-dev $version has no gpiod.h of version 2"
 
-# Another run may have been first: then its folder stays.
+# Another run may have been faster: then keep its folder.
 mv -T "$work/root" "$cache/$version" 2>/dev/null || true
 newest

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Calls everything at once against a running node, and judges what came of it.
+# Sends all kinds of requests at once to a running node, and judges the results.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -38,9 +38,9 @@ say "Building"
 quietly storm-build build_storm
 use_ros "$build/catkin/devel"
 say "Seed $seed, for $minutes minutes"
-# The end is judged after the storm: the trace of an hour takes a while to read.
+# The judgement comes after the storm: reading the trace of an hour takes a while.
 # Another node has a sanitizer, whose own memory grows.
 rostest --text "$src/test/node/storm/storm.test" "seconds:=$((minutes * 60))" "seed:=$seed" \
   "limit:=$((minutes * 90 + 300))" ${STEPDRIVER_NODE:+most_growth:=300} | tee "$build/log/storm.log"
-# With --text the exit code of rostest doesn't tell.
+# With --text the exit code of rostest is meaningless.
 grep -qF '[  PASSED  ] 1 test.' "$build/log/storm.log"

@@ -44,7 +44,7 @@ wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 
 passed=0 failed=0 skipped=0 summary=''
 declare -A outcome
-# A stage that can't run here ends with this status, and its reason in log/skipped.
+# A stage that can't run here ends with this status, and writes its reason to log/skipped.
 skip_status=77
 skip() {
   say "$*" >"$build/log/skipped"
@@ -56,7 +56,7 @@ conclude() {
   summary+=$(printf '%-12s %-8s %s' "$1" "$2" "$3")$'\n'
 }
 
-# stage NAME FUNCTION [NEEDED...]: runs a function; not where a stage that it needs didn't pass.
+# stage NAME FUNCTION [NEEDED...]: runs a function, unless a stage that it needs didn't pass.
 stage() {
   local name=$1 function=$2 needed start=$SECONDS
   for needed in "${@:3}"; do
@@ -110,8 +110,8 @@ check_prose() {
 }
 check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 
-# Each file with the compile commands of the build that compiles it. Of the adapters to libgpiod that
-# is the one to the version that is installed.
+# Each file with the compile commands of the build that compiles it. Of the two adapters to libgpiod,
+# that is the one for the installed version.
 tidy_all() {
   local status=0
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | tidy core || status=1
@@ -143,8 +143,8 @@ tidy() {
       --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
 
-# clang-tidy takes the longest of all. It begins before the kernel's stages, which use one processor, and
-# has what these and others leave; the stage `tidy` waits for its end.
+# clang-tidy takes longest. It begins before the kernel's stages, which use one processor, and runs in
+# the background with low priority; the stage `tidy` waits for its end.
 tidy_group=
 begin_tidy() {
   rm -f "$build/log/tidy-status"
@@ -192,7 +192,7 @@ test_kernel() {
   bash "$src/test/kernel/rig_test.sh" "$build/core/test/kernel/trace_to_vcd"
   STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --chip rig:rig:8 -- \
     bash "$src/test/operations/udev_test.sh"
-  # Where memory may be locked.
+  # Here memory may be locked.
   in_kernel -- "$build/core/test/core/pulse_thread_calls_test" --gtest_filter='*NoMemoryThatIsMissing'
   test_lines_in_kernel "$build/core"
   test_waveform_in_kernel "$build/core"
@@ -202,7 +202,7 @@ test_lines_in_kernel() {
     --gtest_filter='*LinesConformance.*:Libgpiod*'
 }
 
-# Whole machines there, held against what the kernel's own trace says of their pulses.
+# Whole machines there; compares their pulses with the kernel's own trace.
 test_waveform_in_kernel() {
   local tests=$1/test/kernel traces=$1/traces run
   rm -rf "$traces"
@@ -220,7 +220,7 @@ in_kernel() {
   ! grep -qF '[  SKIPPED ]' "$build/log/in-kernel.log" || die "what must run there was skipped"
 }
 
-# The same with libgpiod 2 where the system's is 1.
+# The same with libgpiod 2 if the system's version is 1.
 test_kernel_gpiod2() {
   local unpacked status=0
   unpacked=$(bash "$src/scripts/libgpiod2.sh" 2>"$build/log/libgpiod2.log") || status=$?
@@ -246,10 +246,10 @@ test_node() {
   (cd "$build/catkin" && ctest -j "$jobs" --timeout 600 --no-tests=error --output-on-failure)
 }
 
-# The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and
-# nodes of the tests' own on chips of their own. The kernel's trace of it all stays with the logs; what
-# the launched node did in it is held against its chip. It goes at 1600 steps/s at most, and a late
-# step takes up to a quarter of the interval after it.
+# The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and other
+# nodes of the tests on chips of their own. The kernel's trace stays with the logs; the part of the
+# launched node is compared with its chip's times. It runs at 1600 steps/s at most, and a late step takes
+# up to a quarter of the interval after it.
 test_node_in_kernel() {
   local offset lines='' trace=$build/log/kernel-node.trace header=pinctrl-bcm2711
   for offset in {2..27}; do lines+=",$offset=GPIO$offset"; done

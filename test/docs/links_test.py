@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Looks whether what the pages link to and name is there: files, messages, launch arguments.
+"""Checks that everything exists that the pages link to or name: files, messages, launch arguments.
 
 usage: test/docs/links_test.py
 

@@ -1,4 +1,4 @@
-"""The project's pages, and what they say that can be tried: commands, links, tables."""
+"""The project's pages and their testable parts: commands, links, tables; comments of sources."""
 
 import pathlib
 import re
@@ -6,7 +6,7 @@ import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
-# What a command in the midst of a sentence begins with.
+# The first words of commands within sentences.
 _PROGRAMS = (
     "apt|apt-get|bash|cmake|ctest|gpioinfo|gtkwave|journalctl|pkill|pulseview|python3|ros[a-z]+|"
     r"scripts/\w+\.sh|setup_system|sigrok-cli|source|stepdriver_\w+|sudo|systemctl"
