@@ -107,7 +107,7 @@ class UnderWay {
   std::shared_ptr<const TrajectoryPath> join() const {
     return PreparedTrajectory::join(trajectory_, starts_);
   }
-  /// All three axes along a path that goes on at rate 1 from somewhere.
+  /// All three axes along a path that continues at rate 1 from somewhere.
   template <typename Plan>
   void plan(benchmark::State& state, double rate, const Plan& plan) const {
     constexpr double kPlaces[] = {1234.5671, 1235.1113, 1236.0071, 1500.9};

@@ -17,7 +17,7 @@ struct PacedFigures {
   std::size_t too_short = 0;                 ///< pulses and pauses shorter than the chip's time
   std::size_t too_close = 0;  ///< steps closer than pulse::PulseEngine::kClosest of their interval
   double cpu = 0.0;           ///< of one core, of the whole process
-  int scheduler_error = -1;   ///< as pulse::RealtimeRights has it
+  int scheduler_error = -1;   ///< from pulse::RealtimeRights
 
   pulse::Nanoseconds percentile(double part) const;
 };

@@ -31,7 +31,7 @@ class KernelTrace {
  public:
   /// @param name of the source, for messages.
   /// @throw Error for a line that can't be read, for times that go back (another clock than
-  /// `mono`), and where the kernel says that it dropped events.
+  ///   `mono`), and if the kernel says that it dropped events.
   explicit KernelTrace(std::istream& text, const std::string& name = "the trace");
 
   /// @throw Error as above, and if the file can't be read.

@@ -70,7 +70,7 @@ double worstOf(const Waveform& seen, const Moves& moves, const Speed& speed) {
   for (const std::int64_t move : moves) {
     const std::int64_t n = std::abs(move);
     if (seen.pulses.size() < first + static_cast<std::size_t>(n)) break;
-    // The start can't be seen from outside: it is where no step comes before its time.
+    // The start can't be seen from outside: it is the one with which no step comes before its time.
     double earliest = 1e18;
     double latest = 0.0;
     for (std::int64_t k = 1; k <= n; ++k) {

@@ -9,10 +9,10 @@ namespace stepdriver::check {
 
 using setup::BackendChoice;
 
-/// Reads a file as the node reads its parameters. A file that names no backend, as the launch files
-/// have it, is taken to mean libgpiod.
+/// Reads a file like the node reads its parameters. If the file names no backend, which the launch
+/// files set, libgpiod is assumed.
 ///
-/// @throw Error where it isn't YAML. @throw ConfigError with everything that is wrong.
+/// @throw Error if it isn't YAML. @throw ConfigError listing every mistake.
 ros_node::NodeConfig readConfiguration(const std::string& path, BackendChoice choice);
 
 /// The axes with their top speeds.

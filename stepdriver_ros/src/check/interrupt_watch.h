@@ -7,17 +7,17 @@
 
 namespace stepdriver::check {
 
-/// Waits in a thread for what asks a program to end, for as long as it lives: the signals of
+/// During its lifetime, waits in a thread for a request to end the program: the signals of
 /// ros_node::endSignals().
 class InterruptWatch {
  public:
-  /// Blocks these signals in this thread and in those that it starts from now on.
+  /// Blocks these signals in this thread and in all threads that it starts from now on.
   static void block();
 
-  /// @return whether one of them comes in this time; they are blocked.
+  /// @return whether one of them arrives in this time; they must be blocked.
   static bool comesWithin(std::chrono::nanoseconds time);
 
-  /// @param act called once, at the first of them, from the thread that waits.
+  /// @param act called once, at the first signal, from the waiting thread.
   explicit InterruptWatch(std::function<void()> act);
   ~InterruptWatch();
   InterruptWatch(const InterruptWatch&) = delete;

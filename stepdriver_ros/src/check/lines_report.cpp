@@ -12,10 +12,10 @@
 namespace stepdriver::check {
 namespace {
 
-/// Reasons, and the lines that share them, in the order of the first.
+/// Reasons, and the lines that share them, in the order of their first lines.
 class Reasons {
  public:
-  /// @param message as findLine() throws it: with the line's name first.
+  /// @param message as thrown by findLine(): the line's name comes first.
   void add(const std::string& line, const std::string& message) {
     const std::string prefix = "Line " + line + ": ";
     const bool named = message.rfind(prefix, 0) == 0;
@@ -60,7 +60,7 @@ std::string holderOf(const gpio::LineInfo& info) {
 std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
                                const std::optional<config::InputSwitch>& emergency_stop) {
   std::vector<NamedLine> lines;
-  std::vector<std::size_t> enables;  // those of `lines` that axes may share
+  std::vector<std::size_t> enables;  // the lines that axes may share
   for (const config::AxisConfig& axis : axes) {
     const auto add = [&](const char* pin, const std::string& line) {
       if (!line.empty()) lines.push_back({axis.name + "/" + pin, line});

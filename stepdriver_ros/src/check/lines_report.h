@@ -9,25 +9,25 @@
 
 namespace stepdriver::check {
 
-/// A line that an axis or the emergency stop is wired to.
+/// A line of an axis or of the emergency stop.
 struct NamedLine {
   std::string pin;   ///< x/step, emergency_stop
-  std::string line;  ///< as the file names it
+  std::string line;  ///< its name in the file
 };
 
 std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
                                const std::optional<config::InputSwitch>& emergency_stop = {});
 
-/// What there is, and what of it the file asks for.
+/// The existing chips, and the lines that the file names.
 struct LinesReport {
   std::string text;
-  std::size_t missing = 0;  ///< lines that can't be had
+  std::size_t missing = 0;  ///< lines that aren't available
 };
 
 LinesReport linesReport(const std::vector<gpio::ChipInfo>& chips,
                         const std::vector<NamedLine>& lines);
 
-/// The chips alone.
+/// Only the chips.
 std::string chipsText(const std::vector<gpio::ChipInfo>& chips);
 
 }  // namespace stepdriver::check

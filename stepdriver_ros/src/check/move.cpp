@@ -38,7 +38,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   const axis::MoveResult forth = axis.wait(axis.moveTo(stroke, true));
   say(fmt::format("  {}: forth: {}", config.name, forth.message));
   bool reached = forth.end == axis::MoveEnd::kReached;
-  // Away from an endstop that it met is where it came from; anything else isn't to be trusted.
+  // Away from an endstop that it met is the way back; after any other end it must not move.
   if (reached || forth.end == axis::MoveEnd::kEndstopMin ||
       forth.end == axis::MoveEnd::kEndstopMax) {
     const axis::MoveResult back = axis.wait(axis.moveTo(start));

@@ -11,9 +11,9 @@
 
 namespace stepdriver::check {
 
-/// What is to be moved.
+/// What to move.
 struct MoveOrder {
-  std::vector<config::AxisConfig> axes;  ///< all of them: their lines are held
+  std::vector<config::AxisConfig> axes;  ///< all axes: their lines are held
   std::string only;                      ///< name of an axis; empty: all, one after the other
   std::optional<double> distance;        ///< [mm|deg] 1 mm or 10 degrees by default
   double max_lateness = 0.005;           ///< [s] see machine::MachineOptions
@@ -21,16 +21,16 @@ struct MoveOrder {
   std::string latency_device{};  ///< the same
 };
 
-/// Where an axis is declared to stand before a stroke of this length, both in its unit, so that the
-/// stroke is within the soft limits; 0 where that is.
+/// The position to declare for an axis before a stroke of this length, both in its unit, so that
+/// the stroke stays within the soft limits; 0 if that is possible.
 double startFor(const config::AxisConfig& axis, double stroke);
 
-/// Drives axes forth and back at their top speeds; each is disabled again when it is done.
+/// Drives axes forth and back at their top speeds; each is disabled again afterwards.
 ///
-/// @param say is told each line of text as it comes.
+/// @param say receives each line of text immediately.
 /// @return whether each is back where it was. An interrupt (see InterruptWatch, whose signals
 ///   are blocked in this thread) decelerates, disables, and makes it false.
-/// @throw GpioError where a line can't be had.
+/// @throw GpioError if a line can't be requested.
 bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clock& clock,
                       const std::function<void(const std::string&)>& say);
 

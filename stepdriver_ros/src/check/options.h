@@ -13,14 +13,14 @@ struct Options {
   std::string config;
   BackendChoice backend = BackendChoice::kAsInTheFile;
   bool move = false;
-  std::string axis;                ///< the only one to move; empty: all, one after the other
+  std::string axis;                ///< the only axis to move; empty: all, one after the other
   std::optional<double> distance;  ///< [mm|deg]
 };
 
-/// How the program is used and how it ends.
+/// The usage and the exit codes of the program.
 extern const char* const kUsage;
 
-/// @throw Error where they can't be understood.
+/// @throw Error if they can't be understood.
 Options parseOptions(const std::vector<std::string>& arguments);
 
 }  // namespace stepdriver::check

@@ -26,7 +26,7 @@ std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spr
           std::to_string(spread.count)};
 }
 
-/// Downwards: whoever writes what is named here must not be told that it is too much.
+/// Rounded down: a user who enters this value must not be told that it is too high.
 std::string rateText(double rate) { return roundedText(std::floor(rate)); }
 
 }  // namespace

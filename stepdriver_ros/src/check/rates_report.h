@@ -9,14 +9,14 @@
 
 namespace stepdriver::check {
 
-/// The times that were measured; without channels, those of the wake-ups alone.
+/// The measured times; without channels, only those of the wake-ups.
 std::string measurementsText(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability);
 
-/// Asked and held step rates, axis by axis.
+/// The needed and the sustainable step rates, axis by axis.
 std::string ratesText(const machine::StepRates& rates);
 
-/// The axes that ask for more than can be held: `x, y`.
+/// The axes that need more than the computer can sustain: `x, y`.
 std::string tooFast(const machine::StepRates& rates);
 
 }  // namespace stepdriver::check

@@ -80,7 +80,7 @@ SystemFacts systemFacts() {
   facts.rt_period_us = firstLine("/proc/sys/kernel/sched_rt_period_us");
   utsname name{};
   if (uname(&name) == 0) facts.kernel = std::string(name.release) + " " + name.version;
-  // Kernels say it in one place or the other, by version.
+  // The place depends on the version of the kernel.
   facts.preempt_rt = firstLine("/sys/kernel/realtime") == "1" ||
                      facts.kernel.find("PREEMPT_RT") != std::string::npos ||
                      facts.kernel.find("PREEMPT RT") != std::string::npos;

@@ -24,7 +24,7 @@ bool isNumber(const std::string& text) {
 
 std::string orUnknown(const std::string& text) { return text.empty() ? "unknown" : text; }
 
-/// As the kernel has it: microseconds of each period, or -1 for all of it.
+/// In the kernel's format: microseconds of each period, or -1 for the whole period.
 std::string throttleText(const SystemFacts& facts) {
   if (facts.rt_runtime_us.empty()) return "unknown";
   if (facts.rt_runtime_us == "-1") return "none (sched_rt_runtime_us -1)";

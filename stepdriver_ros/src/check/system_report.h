@@ -16,7 +16,7 @@ struct DeviceNode {
   bool usable = false;
 };
 
-/// What the system allows this process. A text is empty where the system doesn't tell.
+/// What the system allows this process. A text is empty if the system doesn't provide it.
 struct SystemFacts {
   std::string user;
   std::vector<std::string> groups;
@@ -24,7 +24,7 @@ struct SystemFacts {
   bool udev_rule = false;     ///< /etc/udev/rules.d has stepdriver's
   std::string rtprio;         ///< RLIMIT_RTPRIO
   std::string memlock;        ///< RLIMIT_MEMLOCK
-  std::string rt_runtime_us;  ///< of each rt_period_us real-time threads may run so long
+  std::string rt_runtime_us;  ///< how long real-time threads may run in each rt_period_us
   std::string rt_period_us;
   std::string kernel;  ///< release and version
   bool preempt_rt = false;
@@ -36,7 +36,7 @@ SystemFacts systemFacts();
 /// Who may use the GPIO chips.
 std::string permissionsText(const SystemFacts& facts);
 
-/// @param rights as they were granted when they were asked for.
+/// @param rights as granted on request.
 std::string limitsText(const SystemFacts& facts, const pulse::RealtimeRights& rights);
 
 }  // namespace stepdriver::check

@@ -11,7 +11,7 @@ namespace stepdriver::client {
 
 constexpr const char* kNobodyAnswers = "nobody answers";
 
-/// @param client persistent: of the other kind roscpp may report a call as failed that was carried
+/// @param client persistent: otherwise roscpp may report a failure although the call was carried
 ///   out.
 template <typename Service>
 Answer ask(ros::ServiceClient& client, const typename Service::Request& request = {}) {
@@ -21,7 +21,7 @@ Answer ask(ros::ServiceClient& client, const typename Service::Request& request 
   return {call.response.success != 0, call.response.message};
 }
 
-/// The same by a connection for this one call.
+/// The same, with a connection for this one call.
 ///
 /// @param service its full name.
 template <typename Service>

@@ -9,17 +9,17 @@
 
 namespace stepdriver::client {
 
-/// What a service of the driver answered.
+/// The answer of a driver's service.
 struct Answer {
   bool success = false;
   std::string message;
 };
 
-/// Makes one call at a time in a thread of its own, so that nobody waits for it: a disable answers
-/// when the axis rests, a homing when it is over.
+/// Makes one call at a time in a thread of its own, so that the caller needn't wait: a disable
+/// answers when the axis is at rest, a homing when it has ended.
 ///
-/// To be used by one thread. Its destructor waits for the call under way, which ends with an
-/// answer, or with ros::shutdown().
+/// For one thread. The destructor waits for the call in progress, which ends with an answer or with
+/// ros::shutdown().
 class BackgroundCall {
  public:
   using Ask = std::function<Answer()>;
@@ -29,11 +29,11 @@ class BackgroundCall {
   BackgroundCall(const BackgroundCall&) = delete;
   BackgroundCall& operator=(const BackgroundCall&) = delete;
 
-  /// Not to be called before the last call's answer was taken.
+  /// Must not be called before the last call's answer was taken.
   ///
   /// @param ask makes the call; it must not throw.
   void start(Ask ask);
-  /// The answer of the last call, once.
+  /// Returns the answer of the last call, once.
   std::optional<Answer> takeAnswer();
 
  private:

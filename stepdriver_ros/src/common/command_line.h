@@ -9,18 +9,18 @@
 
 namespace stepdriver {
 
-/// Reads the arguments of a program: long options by their whole names, short ones, and nothing
-/// else. Fills in what the descriptions point to.
+/// Reads the arguments of a program: long options with their full names, short options, and nothing
+/// else. Fills in the variables of the descriptions.
 ///
-/// @throw Error where they can't be understood.
+/// @throw Error if they can't be understood.
 boost::program_options::variables_map readCommandLine(
     const boost::program_options::options_description& known,
     const std::vector<std::string>& arguments);
 
-/// The value of an option that has a string's; none where it wasn't given.
+/// The value of an option that was read as a string; empty if it wasn't given.
 ///
-/// @param allowed says it of a number. @param wanted the same in words.
-/// @throw Error where it isn't an allowed number.
+/// @param allowed whether a number is allowed. @param wanted the same in words.
+/// @throw Error if it isn't an allowed number.
 std::optional<double> findNumber(const boost::program_options::variables_map& options,
                                  const std::string& name,
                                  const std::function<bool(double)>& allowed,

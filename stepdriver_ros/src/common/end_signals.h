@@ -13,8 +13,8 @@ struct EndSignal {
 constexpr std::array<EndSignal, 4> kEndSignals{
     {{SIGINT, "SIGINT"}, {SIGTERM, "SIGTERM"}, {SIGQUIT, "SIGQUIT"}, {SIGHUP, "SIGHUP"}}};
 
-/// The signals that ask a program to end: these, but SIGHUP, as of a terminal that is closed, only
-/// where nobody has it ignored (nohup).
+/// The signals that ask a program to end. SIGHUP, which a closed terminal sends, counts only if it
+/// isn't ignored (nohup).
 inline sigset_t endSignals() {
   sigset_t signals;
   sigemptyset(&signals);

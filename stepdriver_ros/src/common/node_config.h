@@ -12,8 +12,8 @@ namespace stepdriver::ros_node {
 /// All parameters of the node: those of its machine, and its own.
 struct NodeConfig : setup::MachineConfig {
   double joint_state_rate = 50.0;  ///< [Hz]
-  double jog_timeout = 0.5;        ///< [s] without a jog message; then the axis comes to rest
-  std::string hardware_id;         ///< of diagnostics; empty: made from the rest
+  double jog_timeout = 0.5;        ///< [s] without a jog message until the axis comes to rest
+  std::string hardware_id;         ///< for diagnostics; empty: made from the other facts
 };
 
 /// Reads the node's private parameters: in addition to those of setup::readMachineConfig()
@@ -26,7 +26,7 @@ struct NodeConfig : setup::MachineConfig {
 ///
 /// @param tree all of them, as one map.
 /// @param name the node's full name.
-/// @param issues everything that is wrong is added here.
+/// @param issues every mistake is added here.
 /// @return to be used only if no issue was added.
 NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& name,
                           std::vector<ConfigIssue>& issues);

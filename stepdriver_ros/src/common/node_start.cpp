@@ -19,7 +19,7 @@ constexpr std::chrono::milliseconds kMasterPoll{200};
 }  // namespace
 
 std::optional<int> handleArguments(int argc, char** argv, const char* usage) {
-  // Whoever reads the output by a pipe, as roslaunch does, is to see each line when it is written.
+  // A program that reads the output through a pipe, such as roslaunch, must see each line at once.
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   std::vector<std::string> arguments;
   ros::removeROSArgs(argc, argv, arguments);

@@ -8,8 +8,8 @@
 
 namespace stepdriver::ros_node {
 
-/// A number as messages show it: six digits, no trailing zeros; from 100000 on as a whole number,
-/// as nobody reads 1.23457e+06, up to what a double counts exactly.
+/// A number for messages: six digits, no trailing zeros. From 100000 on it is a whole number, which
+/// is easier to read than 1.23457e+06, as far as a double counts exactly.
 inline std::string roundedText(double number) {
   const double size = std::abs(number);
   char text[32];

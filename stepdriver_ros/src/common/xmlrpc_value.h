@@ -6,8 +6,8 @@
 
 namespace stepdriver::ros_node {
 
-/// What the parameter server holds, as the core's reader takes it. Nothing is converted or left
-/// out: what the reader has no type for (dates, binary data) becomes nothing, which it refuses.
+/// Converts parameters for the core's reader. No value is converted or left out: a type that the
+/// reader doesn't have (dates, binary data) becomes "nothing", which the reader refuses.
 config::ConfigValue configValue(XmlRpc::XmlRpcValue value);
 
 }  // namespace stepdriver::ros_node

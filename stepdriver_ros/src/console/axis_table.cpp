@@ -11,8 +11,8 @@ constexpr std::size_t kGap = 1;
 
 struct Column {
   std::string title;
-  int importance = 0;     ///< the highest goes first where there is no room
-  std::size_t width = 0;  ///< grows with what is in it
+  int importance = 0;     ///< the highest is dropped first if there is no room
+  std::size_t width = 0;  ///< grows with the contents
   bool right_aligned = false;
   std::vector<std::string> cells;
 };
@@ -75,7 +75,7 @@ std::size_t widthOf(const std::vector<Column>& columns) {
   return width;
 }
 
-/// Takes the least important column out. @return its title.
+/// Removes the least important column. @return its title.
 std::string dropOne(std::vector<Column>& columns) {
   const auto least = std::max_element(
       columns.begin(), columns.end(),

@@ -7,7 +7,7 @@
 
 namespace stepdriver::console {
 
-/// The axes, one in each row, below a row of titles.
+/// The axes, one per row, below a row of titles.
 struct AxisTable {
   Row titles;
   std::vector<Row> rows;

@@ -5,19 +5,19 @@
 
 namespace stepdriver::console {
 
-/// Catches what the process prints to standard output and error, from the making to the end of this
-/// object. What nobody takes in time is lost, and nobody who prints ever waits.
+/// Catches everything that the process prints to standard output and error during the lifetime of
+/// this object. Output that isn't read in time is lost, and printing never waits.
 class CaughtOutput {
  public:
-  /// @throw Error where there is no pipe to be had.
+  /// @throw Error if no pipe can be created.
   CaughtOutput();
   ~CaughtOutput();
   CaughtOutput(const CaughtOutput&) = delete;
   CaughtOutput& operator=(const CaughtOutput&) = delete;
 
-  /// What standard output was before; it stays this object's.
+  /// The previous standard output; this object keeps owning it.
   int realOutput() const { return output_; }
-  /// Whole lines since the last time, without colours.
+  /// Whole lines since the last call, without colours.
   std::vector<std::string> lines();
 
  private:

@@ -16,18 +16,18 @@ namespace stepdriver::console {
 namespace {
 
 constexpr int kPoll = 20;            // [ms] for a key
-constexpr double kDrawPeriod = 0.1;  // [s] where no key was pressed
-// For the last message, which roscpp sends in a thread of its own.
+constexpr double kDrawPeriod = 0.1;  // [s] if no key was pressed
+// Time for the last message, which roscpp sends in a thread of its own.
 constexpr std::chrono::milliseconds kLastWords{50};
 
-/// The terminal is given back before anything can keep the program from ending.
+/// The terminal is restored before anything can keep the program from ending.
 void runScreen(Session& session, DriverClient& client, ros_node::EndRequests& end_requests) {
   Terminal terminal;
   double drawn = 0.0;
   while (!session.ended() && end_requests.waitFor(std::chrono::milliseconds(0)).empty()) {
     const auto keys = terminal.keys(kPoll);
     if (!keys) return;
-    // First, so that no key is held against a state that is older than it need be.
+    // First, so that keys are checked against the latest state.
     ros::getGlobalCallbackQueue()->callAvailable();
     const double now = steadyNow();
     if (!keys->empty()) client.carryOut(session.press(*keys, now));
@@ -49,7 +49,7 @@ void runConsole(const ros::NodeHandle& node, const std::string& driver, const Op
   const auto end = [&] {
     client.carryOut(session.rest());
     std::this_thread::sleep_for(kLastWords);
-    ros::shutdown();  // also ends the calls that nobody answers
+    ros::shutdown();  // also ends unanswered calls
   };
   try {
     runScreen(session, client, end_requests);

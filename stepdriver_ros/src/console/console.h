@@ -9,11 +9,10 @@
 
 namespace stepdriver::console {
 
-/// The screen, from its first picture to the key that ends it, or to an end request.
+/// Runs the screen until a key or an end request ends it.
 ///
 /// @param driver full name of the node.
-/// @throw Error where there is no terminal for it, ConfigError where the driver's parameters are
-///   wrong.
+/// @throw Error if there is no suitable terminal, ConfigError if the driver's parameters are wrong.
 void runConsole(const ros::NodeHandle& node, const std::string& driver, const Options& options,
                 ros_node::EndRequests& end_requests);
 

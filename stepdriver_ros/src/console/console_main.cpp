@@ -27,7 +27,7 @@ constexpr int kExitNothingWritten = 2;
 
 void complain(const std::string& text) { std::fprintf(stderr, "console: %s\n", text.c_str()); }
 
-/// @throw Error where there is no such driver.
+/// @throw Error if there is no such driver.
 void findDriver(const std::string& driver) {
   const std::vector<std::string> running = runningDrivers();
   if (std::find(running.begin(), running.end(), driver) != running.end()) return;
@@ -79,7 +79,7 @@ int start(int argc, char** argv, EndRequests& end_requests) {
     std::fputs(kUsage, stdout);
     return ros_node::kExitOk;
   }
-  // Two consoles may look at one machine.
+  // Two consoles can show one machine.
   ros::init(argc, argv, "console",
             ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
   if (!ros::master::check()) {

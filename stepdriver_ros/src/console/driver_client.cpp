@@ -18,7 +18,7 @@ namespace stepdriver::console {
 namespace {
 
 constexpr std::uint32_t kQueued = 10;
-// So many messages come in the driver's jog_timeout: one that is late ends no jog.
+// How many messages arrive in the driver's jog_timeout, so that a late one ends no jog.
 constexpr double kMessagesInTimeout = 3.0;
 constexpr double kLongestJogPeriod = 0.04;  // [s]
 
@@ -121,7 +121,7 @@ void DriverClient::noticeTheDriver() {
     session_.messages().say("no state of " + driver_ + " comes any more");
     return;
   }
-  // It may be another one by now, or one that was started with other parameters.
+  // It may be another driver by now, or have been started with other parameters.
   parameters_ = std::async(std::launch::async, readDriverParameters, driver_);
 }
 
@@ -175,7 +175,7 @@ void DriverClient::take(const Endstops& endstops) {
   }
 }
 
-// Jogs have no answer: why one was refused is in the driver's log only.
+// Jogs have no answer: only the driver's log says why one was refused.
 void DriverClient::take(const rosgraph_msgs::Log& log) {
   if (log.name != driver_ || log.level < rosgraph_msgs::Log::WARN) return;
   session_.messages().say(log.msg);

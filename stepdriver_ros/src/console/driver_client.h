@@ -20,21 +20,21 @@
 
 namespace stepdriver::console {
 
-/// Tells a session what the driver publishes and answers, and the driver what the session orders.
+/// Passes the driver's messages and answers to a session, and the session's orders to the driver.
 /// None of its functions waits for the driver or the master.
 ///
-/// To be used by one thread, which also serves the global callback queue. Its destructor waits for
-/// the calls under way, which end with ros::shutdown().
+/// For one thread, which also serves the global callback queue. The destructor waits for the calls
+/// in progress, which end with ros::shutdown().
 class DriverClient {
  public:
-  /// @param parameters as readDriverParameters() has them now.
+  /// @param parameters the current result of readDriverParameters().
   /// @param session outlives this.
   DriverClient(ros::NodeHandle node, Session& session, const DriverParameters& parameters);
   DriverClient(const DriverClient&) = delete;
   DriverClient& operator=(const DriverClient&) = delete;
 
   void carryOut(const Orders& orders);
-  /// Hands over the answers that have come. To be called often.
+  /// Passes on the answers that have arrived. Call it often.
   void poll();
 
  private:
@@ -55,9 +55,9 @@ class DriverClient {
 
   Session& session_;
   const std::string driver_;
-  std::map<std::string, std::unique_ptr<Lane>> lanes_;  // one for each name of a call
+  std::map<std::string, std::unique_ptr<Lane>> lanes_;  // one for each call name
   EmergencyStopClient emergency_stop_;
-  std::future<DriverParameters> parameters_;  // while they are read again
+  std::future<DriverParameters> parameters_;  // while they are being read again
   bool was_live_ = false;
   ros::Publisher jog_;
   ros::Subscriber states_;

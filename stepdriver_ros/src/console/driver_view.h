@@ -8,7 +8,7 @@
 
 namespace stepdriver::console {
 
-/// What an axis of the driver is and does, in the units of configurations: mm or degrees.
+/// The state of an axis of the driver, in the units of configurations: mm or degrees.
 struct AxisView {
   std::string name;
   bool enabled = false;
@@ -23,38 +23,38 @@ struct AxisView {
   double velocity = 0.0;  ///< [mm/s|deg/s]
   std::string fault;      ///< empty: none
   std::string position_note;
-  bool switches_known = false;  ///< no: the two below say nothing
+  bool switches_known = false;  ///< false: the two below are meaningless
   bool min_active = false;
   bool max_active = false;
 };
 
-/// What the console knows of the driver: how its axes are configured, and what it said last. It
-/// knows no clock: times are seconds on any that never goes back.
+/// What the console knows about the driver: the configuration of its axes, and their last state. It
+/// has no clock: times are seconds on any clock that never goes back.
 class DriverView {
  public:
-  /// A state older than this is no news any more: the driver publishes it ten times a second.
+  /// A state older than this is stale: the driver publishes it ten times a second.
   static constexpr double kStaleAfter = 1.0;  // [s]
 
-  /// @param configs of all axes, as the driver reads them.
+  /// @param configs of all axes, read like the driver reads them.
   void configure(std::vector<config::AxisConfig> configs) { configs_ = std::move(configs); }
-  /// @param axes all that the driver has.
+  /// @param axes all axes of the driver.
   void update(std::vector<AxisView> axes, double now);
-  /// The switches of one axis, which come by themselves.
+  /// The switches of one axis, which come in a message of their own.
   void updateEndstops(const std::string& axis, bool min_active, bool max_active);
-  /// They come on their changes only, so that those of a driver that has gone say nothing.
+  /// They are published only when they change, so those of a driver that has gone are meaningless.
   void forgetEndstops();
 
   const std::vector<AxisView>& axes() const { return axes_; }
-  /// @return nullptr where there is no such axis.
+  /// @return nullptr if there is no such axis.
   const AxisView* axis(const std::string& name) const;
   const config::AxisConfig* config(const std::string& name) const;
   /// Whether each axis has a configuration, and each configuration its axis.
   bool configured() const;
 
-  /// [s] since the last state; none: there was none yet.
+  /// [s] since the last state; empty: there was no state yet.
   std::optional<double> age(double now) const;
   bool live(double now) const;
-  /// How many states there were so far.
+  /// The number of states so far.
   int updates() const { return updates_; }
   bool anyFault() const;
   bool anyMoving() const;
@@ -74,7 +74,7 @@ class DriverView {
   int updates_ = 0;
 };
 
-/// [mm|deg] that one step of the axis moves it, in the microstep mode of now.
+/// [mm|deg] Travel of one step of the axis in the current microstep mode.
 double stepOf(const config::AxisConfig& config, const AxisView& axis);
 
 /// `mm` or `deg`.

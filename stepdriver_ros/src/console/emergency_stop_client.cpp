@@ -12,7 +12,7 @@
 namespace stepdriver::console {
 namespace {
 
-// How soon a connection that broke is made again.
+// How soon a broken connection is made again.
 constexpr std::chrono::milliseconds kCheckPeriod{500};
 
 }  // namespace

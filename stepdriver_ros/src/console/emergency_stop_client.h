@@ -10,10 +10,10 @@
 
 namespace stepdriver::console {
 
-/// Calls the driver's emergency stop, in a thread of its own and over a connection that is made
-/// beforehand, so that nothing else that is under way keeps it.
+/// Calls the driver's emergency stop, in a thread of its own and over a connection that is made in
+/// advance, so that no other call delays it.
 ///
-/// To be used by one thread. Its destructor ends with an answer, or with ros::shutdown().
+/// For one thread. The destructor waits for an answer or for ros::shutdown().
 class EmergencyStopClient {
  public:
   /// @param service its full name.
@@ -22,7 +22,7 @@ class EmergencyStopClient {
   EmergencyStopClient(const EmergencyStopClient&) = delete;
   EmergencyStopClient& operator=(const EmergencyStopClient&) = delete;
 
-  /// May be called again before the answer has come: then there is one more stop.
+  /// May be called again before the answer has arrived: this makes one more stop.
   void press();
   /// The answer to the latest stop, once.
   std::optional<client::Answer> takeAnswer();

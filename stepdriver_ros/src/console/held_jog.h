@@ -5,15 +5,15 @@
 
 namespace stepdriver::console {
 
-/// The jog of one axis by a key that is held. A terminal tells of no key that is let go: it only
-/// repeats one that is held. So a key jogs for a short while, each repeat prolongs that, and the
-/// jog ends by itself when none comes. It knows no clock: times are seconds on any that never goes
-/// back.
+/// The jog of one axis while a key is held. A terminal does not report that a key was released; it
+/// only repeats a key that is held. A key therefore jogs for a short while, each repeat extends
+/// that, and the jog ends by itself without repeats. It has no clock: times are seconds on any
+/// clock that never goes back.
 class HeldJog {
  public:
-  /// [s] after a key, or its last repeat: longer than from one repeat to the next, and short
-  /// against a hand that lets go. A terminal's first repeat comes later: the axis comes to rest
-  /// once before it goes on.
+  /// [s] after a key or its last repeat: longer than the time between repeats, and short enough
+  /// after a key is released. A terminal's first repeat comes later: the axis comes to rest once
+  /// before it continues.
   static constexpr double kHold = 0.2;
 
   struct Order {
@@ -21,14 +21,14 @@ class HeldJog {
     double velocity = 0.0;  ///< [mm/s|deg/s] 0 ends the jog
   };
 
-  /// @param period [s] from one order to the next while the jog goes on.
+  /// @param period [s] from one order to the next during the jog.
   void setPeriod(double period) { period_ = period; }
 
-  /// A key, or one of its repeats. Another axis than the one before: end() comes first.
+  /// A key, or one of its repeats. Call end() before changing the axis.
   void press(const std::string& axis, double velocity, double now);
-  /// What the driver is to be told now. To be called often.
+  /// The order for the driver now. Call it often.
   std::optional<Order> due(double now);
-  /// Ends the jog. @return what the driver is to be told, where one was under way.
+  /// Ends the jog. @return the order for the driver, if there was a jog.
   std::optional<Order> end();
 
   bool active() const { return !axis_.empty(); }

@@ -4,7 +4,7 @@
 
 namespace stepdriver::console {
 
-/// A key as the terminal gives it: a character's code, or one of these.
+/// A key from the terminal: a character's code, or one of these.
 using Key = int;
 constexpr Key kKeyUp = 0x110001;  // beyond every character
 constexpr Key kKeyDown = 0x110002;
@@ -34,15 +34,15 @@ enum class Action {
 
 enum class JogSpeed { kSlow, kFast };
 
-/// What a key asks for.
+/// The command of a key.
 struct Command {
   Action action = Action::kHelp;
   int direction = 0;                 ///< of a jog or a step: -1 or 1
   JogSpeed speed = JogSpeed::kSlow;  ///< of a jog
-  int index = 0;                     ///< of the axis to choose, from 0
+  int index = 0;                     ///< index of the axis to choose, from 0
 };
 
-/// @return none: the key has no meaning.
+/// @return empty if the key has no meaning.
 std::optional<Command> commandOf(Key key);
 
 }  // namespace stepdriver::console

@@ -6,7 +6,7 @@
 
 namespace stepdriver::console {
 
-/// The last things that were said, the newest last. One that is said again and again is kept once.
+/// The latest messages, the newest last. A repeated message is kept once.
 class Messages {
  public:
   static constexpr std::size_t kKept = 100;

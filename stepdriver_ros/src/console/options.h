@@ -16,10 +16,10 @@ struct Options {
   WizardOptions wizard_options;
 };
 
-/// How the program is used and how it ends.
+/// The usage and the exit codes of the program.
 extern const char* const kUsage;
 
-/// @throw Error where they can't be understood.
+/// @throw Error if they can't be understood.
 Options parseOptions(const std::vector<std::string>& arguments);
 
 }  // namespace stepdriver::console

@@ -10,7 +10,7 @@
 namespace stepdriver::console {
 namespace {
 
-constexpr int kFewestMessages = 3;  // rows; before the help takes any
+constexpr int kFewestMessages = 3;  // rows; they come before the help
 
 std::string secondsText(double seconds) { return fmt::format("{:.1f} s", seconds); }
 
@@ -63,13 +63,13 @@ std::vector<Row> emergencyRows(const Session& session, int columns, double now) 
   return rows;
 }
 
-/// What is left of the window, given away in the order of importance.
+/// The remaining rows of the window, handed out in the order of importance.
 class Body {
  public:
   explicit Body(int room) : room_(std::max(room, 0)) {}
 
   int left() const { return room_; }
-  /// @return as many of the rows as there is room for.
+  /// @return the rows for which there is room.
   std::vector<Row> take(std::vector<Row> rows) {
     if (static_cast<int>(rows.size()) > room_) rows.resize(room_);
     room_ -= static_cast<int>(rows.size());
@@ -84,7 +84,7 @@ class Body {
   int room_;
 };
 
-/// The axes that fit, around the chosen one, and how many don't.
+/// The axes that fit, around the chosen one, and the number of those that don't.
 std::vector<Row> axisRows(const AxisTable& table, Body& body) {
   const int count = static_cast<int>(table.rows.size());
   if (count <= body.left() || body.left() < 1) return body.take(table.rows);
@@ -154,7 +154,7 @@ std::vector<Row> messageRows(const Session& session, int columns, int room) {
     const std::string times = message->times > 1 ? fmt::format(" ({} times)", message->times) : "";
     const std::vector<Row> lines = rowsOf(message->text + times, columns);
     if (static_cast<int>(rows.size() + lines.size()) > room) {
-      // The newest is worth its beginning at least.
+      // Of the newest message, show at least the beginning.
       if (rows.empty()) rows.assign(lines.begin(), lines.begin() + room);
       break;
     }
@@ -181,7 +181,7 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
     screen.resize(rows);
     return screen;
   }
-  Body body(rows - static_cast<int>(screen.size()) - 1);  // but for the row of keys
+  Body body(rows - static_cast<int>(screen.size()) - 1);  // except the row of keys
   append(screen, body.take({titleRow(session, columns, now)}));
   const AxisTable table = axisTable(session, columns, now);
   const std::vector<Row> axes = axisRows(table, body);
@@ -203,7 +203,7 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
   append(screen, faults);
   append(screen, messages);
   append(screen, pending);
-  // The keys stay at the bottom, whatever there is to say.
+  // The keys stay at the bottom, regardless of the messages.
   const int below = static_cast<int>(help.size()) + 1;
   screen.resize(std::max<int>(static_cast<int>(screen.size()), rows - below));
   append(screen, help);

@@ -7,15 +7,15 @@
 
 namespace stepdriver::console {
 
-/// A row of the screen. What is loud stands out where the terminal can do that; its text says all
-/// the same without.
+/// A row of the screen. A loud row stands out if the terminal supports that; its text is complete
+/// without it.
 struct Row {
   std::string text;
   bool loud = false;
 };
 
-/// What the screen shows: at most so many rows, each of at most so many ASCII characters. What
-/// doesn't fit is left out by its importance, and a row says so.
+/// The contents of the screen: at most this many rows, each of at most this many ASCII characters.
+/// If something doesn't fit, the least important parts are left out, and a row says so.
 ///
 /// @param rows, columns of the window; at least 1.
 std::vector<Row> draw(const Session& session, int rows, int columns, double now);

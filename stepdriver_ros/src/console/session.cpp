@@ -208,7 +208,7 @@ void Session::update(std::vector<AxisView> axes, double now) {
     chosen_ = driver_.axes().empty() ? std::string() : driver_.axes().front().name;
   }
   if (emergency_ != Emergency::kStopped) return;
-  // Ended by a recover(), of whomever.
+  // Ended by any client's recover().
   emergency_seen_ = emergency_seen_ || driver_.anyFault();
   if (emergency_seen_ && !driver_.anyFault()) emergency_ = Emergency::kNone;
 }

@@ -18,28 +18,28 @@ struct Call {
   std::string axis;       ///< empty: all
   double distance = 0.0;  ///< [m|rad] of a step
 
-  /// What it is, in words: `x: home`. There is one of a name under way at a time.
+  /// The call in words: `x: home`. Only one call of a name is in progress at a time.
   std::string name() const;
 };
 
-/// What is to be sent to the driver now.
+/// What to send to the driver now.
 struct Orders {
   bool emergency_stop = false;
   std::vector<Call> calls;
   std::vector<HeldJog::Order> jogs;
 };
 
-/// How fast a jog is, as a part of the axis's highest speed.
+/// Jog speeds, as fractions of the axis's highest speed.
 struct JogSpeeds {
   double slow = 0.05;
   double fast = 0.5;
 };
 
-/// What the person at the keys wants, and what came of it: everything of the console that is
-/// neither ROS nor a terminal. It knows no clock: times are seconds on any that never goes back.
+/// What the user wants, and the results: the part of the console that is neither ROS nor a
+/// terminal. It has no clock: times are seconds on any clock that never goes back.
 ///
-/// Nothing but a key moves an axis, and no key moves one that isn't enabled, or whose state isn't
-/// live. Stops and the emergency stop are sent whatever the state is.
+/// Only a key moves an axis, and no key moves an axis that isn't enabled, or whose state isn't
+/// live. Stops and the emergency stop are sent in any state.
 class Session {
  public:
   enum class Emergency { kNone, kSent, kStopped, kFailed };
@@ -52,17 +52,17 @@ class Session {
   /// @param driver full name of the node.
   Session(std::string driver, JogSpeeds speeds) : name_(std::move(driver)), speeds_(speeds) {}
 
-  /// All keys that have come since the last time. An emergency stop among them comes first, and
-  /// what else there is is dropped.
+  /// All keys since the last call. An emergency stop among them comes first, and the other keys are
+  /// dropped.
   Orders press(const std::vector<Key>& keys, double now);
-  /// What time alone brings. To be called often.
+  /// Handles the passing of time. Call it often.
   Orders tick(double now);
-  /// Ends the jog, where one is under way.
+  /// Ends the jog, if there is one.
   Orders rest();
 
   void answered(const Call& call, bool success, const std::string& message);
   void emergencyAnswered(bool success, const std::string& message);
-  /// The states of the axes, as of DriverView.
+  /// The states of the axes, see DriverView.
   void update(std::vector<AxisView> axes, double now);
 
   DriverView& driver() { return driver_; }
@@ -72,7 +72,7 @@ class Session {
   HeldJog& jog() { return jog_; }
 
   const std::string& driverName() const { return name_; }
-  /// The axis that the keys are for; empty where there is none.
+  /// The chosen axis, to which the keys apply; empty if there is none.
   const std::string& chosen() const { return chosen_; }
   const std::vector<PendingCall>& pending() const { return pending_; }
   Emergency emergency() const { return emergency_; }
@@ -86,7 +86,7 @@ class Session {
   void choose(int step);
   void jogBy(const Command& command, double now, Orders& orders);
   void stepBy(int direction, double now, Orders& orders);
-  /// Why the chosen axis must not be moved; empty: it may.
+  /// Why the chosen axis must not be moved; empty: it may be moved.
   std::string hindrance(double now) const;
   void endJog(Orders& orders);
   void call(Call call, double now, Orders& orders);

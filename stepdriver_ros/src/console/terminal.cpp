@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-// As macros, what curses calls its functions would change what others are called.
+// Without this, curses would define its functions as macros, which would rename the functions of
+// others.
 #define NCURSES_NOMACROS
 #include <curses.h>
 #include <poll.h>
@@ -16,7 +17,7 @@
 namespace stepdriver::console {
 namespace {
 
-// For the bytes of one key that come apart, as over a slow line.
+// For bytes of one key that arrive separately, for example over a slow line.
 constexpr int kEscapeDelay = 100;  // [ms]
 
 Key keyOf(int code) {
@@ -28,7 +29,7 @@ Key keyOf(int code) {
   return found == keys.end() ? code : found->second;
 }
 
-/// Of the terminal that curses has now.
+/// Whether the current terminal of curses can move its cursor.
 bool movesItsCursor() {
   char name[] = "cup";
   return tigetstr(name) != nullptr;
@@ -77,7 +78,7 @@ std::optional<std::vector<Key>> Terminal::keys(int milliseconds) {
   bool swallowed = false;
   for (int code = getch(); code != ERR; code = getch()) {
     if (!swallowed && code != KEY_RESIZE) keys.push_back(keyOf(code));
-    // What follows belongs to a key that isn't known here.
+    // The following bytes belong to an unknown key.
     swallowed = swallowed || code == kKeyEscape;
   }
   return keys;

@@ -5,7 +5,7 @@
 namespace stepdriver::console {
 namespace {
 
-// A window narrower than this has no room to give away.
+// A window narrower than this has no room for indentation.
 constexpr int kRoomToIndent = 20;
 
 }  // namespace

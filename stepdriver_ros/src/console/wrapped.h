@@ -5,8 +5,9 @@
 
 namespace stepdriver::console {
 
-/// Cuts a text into lines of at most so many characters, between words where it can; lines after
-/// the first are indented by two where there is room. What isn't printable ASCII becomes `?`.
+/// Splits a text into lines of at most this many characters, between words if possible; lines after
+/// the first are indented by two if there is room. Characters other than printable ASCII become
+/// `?`.
 std::vector<std::string> wrapped(const std::string& text, int columns);
 
 }  // namespace stepdriver::console

@@ -9,13 +9,14 @@
 
 namespace stepdriver::joystick {
 
-/// Holds the axes of a joystick against those of the driver: its names, units and highest speeds.
-/// What is wrong with the driver's own configuration is for the driver to say.
+/// Compares the axes of a joystick with those of the driver: names, units and highest speeds.
+/// Mistakes in the driver's own configuration are reported by the driver.
 ///
-/// @param joystick, name the joystick's parameters as readJoystickConfig() took them.
-/// @param driver_axes the driver's parameter `axes`; nothing: not known yet, all is right.
+/// @param joystick, name the joystick's parameters as read by readJoystickConfig().
+/// @param driver_axes the driver's parameter `axes`; nothing: not known yet, so everything is
+///   accepted.
 /// @param driver full name of the driver.
-/// @param issues everything that doesn't fit is added here.
+/// @param issues every mismatch is added here.
 void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
                      const config::ConfigValue& driver_axes, const std::string& driver,
                      std::vector<ConfigIssue>& issues);

@@ -48,7 +48,7 @@ JogOrders JogSequence::ordersWhileOn(double velocity, double now) {
 
 void JogSequence::answered(bool success, double now) {
   if (!success) not_before_ = now + kRetryAfter;
-  // An axis that couldn't be disabled is on, as one is that could be enabled.
+  // The axis is on if it could be enabled, and also if it couldn't be disabled.
   power_ = (power_ == Power::kEnabling) == success ? Power::kOn : Power::kOff;
   in_dead_band_since_ = now;
 }

@@ -14,7 +14,7 @@
 namespace stepdriver::joystick {
 namespace {
 
-// A stream of messages: one that is late is of no use when the next has come.
+// A stream of messages: an old one is useless when the next has arrived.
 constexpr std::uint32_t kQueued = 1;
 constexpr double kLogPeriod = 2.0;  // [s]
 

@@ -19,9 +19,9 @@ namespace stepdriver::joystick {
 
 /// From the topic `joy` to the driver's `jog`, and to the `enable` services of its axes.
 ///
-/// Sticks that are out are repeated at the configured rate; each message of the joystick takes
-/// effect at once. A message that can't be understood, and none for the configured time, end all
-/// jogs. Its callbacks run in one thread, which also makes it and calls rest().
+/// Repeats the velocities of deflected sticks at the configured rate; each message of the joystick
+/// takes effect at once. A message that can't be understood, or no message for the configured time,
+/// ends all jogs. Its callbacks run in one thread, which also creates it and calls rest().
 class Joystick {
  public:
   /// @param driver full name of the node that drives the axes.
@@ -38,11 +38,11 @@ class Joystick {
     std::string service;
     double velocity = 0.0;
     JogSequence sequence;
-    std::unique_ptr<client::BackgroundCall> enable;  ///< where it is disabled in the dead band
+    std::unique_ptr<client::BackgroundCall> enable;  ///< if the axis is disabled in the dead band
   };
 
   void take(const sensor_msgs::Joy& message);
-  /// @return what is wrong with a message; empty: nothing.
+  /// @return the mistake in a message; empty: no mistake.
   std::string mistakeIn(const sensor_msgs::Joy& message) const;
   bool deadmanHeld(const sensor_msgs::Joy& message) const;
   void endWithoutMessages();
@@ -52,7 +52,7 @@ class Joystick {
 
   const JoystickConfig config_;
   std::vector<Jogged> axes_;
-  ros::SteadyTime heard_;  // the last message; zero: none, or its time is over
+  ros::SteadyTime heard_;  // time of the last message; zero: there is none, or it has timed out
   ros::Publisher publisher_;
   ros::Subscriber subscriber_;
   ros::SteadyTimer timer_;

@@ -65,7 +65,7 @@ std::vector<JogAxis> readAxes(ConfigReader& reader, const ConfigValue& tree) {
   ConfigReader each = reader.map("axes");
   if (!each.isMap()) return axes;
   const auto& map =
-      *tree.as<ConfigValue::Map>()->at("axes").as<ConfigValue::Map>();  // both were looked at
+      *tree.as<ConfigValue::Map>()->at("axes").as<ConfigValue::Map>();  // both exist: checked above
   if (map.empty()) each.issue("", "is empty, but must be a map of at least one axis");
   for (const auto& entry : map) axes.push_back(readAxis(entry.first, each.map(entry.first)));
   return axes;

@@ -18,7 +18,7 @@ struct JogAxis {
   std::string name;
   int joystick_axis = 0;  ///< index in sensor_msgs/Joy's axes
   config::Kind kind = config::Kind::kLinear;
-  double max_speed = 0.0;  ///< [mm/s|deg/s] as it was given
+  double max_speed = 0.0;  ///< [mm/s|deg/s] as configured
   Stick stick;
   bool disable_in_dead_band = false;
   double disable_after = 1.0;  ///< [s] in the dead band
@@ -27,9 +27,9 @@ struct JogAxis {
 /// All parameters of the node.
 struct JoystickConfig {
   std::string driver = "stepdriver";  ///< the name of the node that drives the axes
-  double rate = 25.0;                 ///< [Hz] of the jog messages while a stick is out
-  double joy_timeout = 0.5;           ///< [s] without a message from the joystick; then all rest
-  int deadman_button = -1;            ///< index of the button to be held; -1: none
+  double rate = 25.0;                 ///< [Hz] of the jog messages while a stick is deflected
+  double joy_timeout = 0.5;  ///< [s] without a message from the joystick until all jogs end
+  int deadman_button = -1;   ///< index of the button that must be held; -1: no button
   std::vector<JogAxis> axes;
 };
 
@@ -53,8 +53,8 @@ struct JoystickConfig {
 ///
 /// @param tree all of them, as one map.
 /// @param name the node's full name.
-/// @param issues everything that is wrong is added here.
-/// @return to be used only where no issue was added.
+/// @param issues every mistake is added here.
+/// @return to be used only if no issue was added.
 JoystickConfig readJoystickConfig(const config::ConfigValue& tree, const std::string& name,
                                   std::vector<ConfigIssue>& issues);
 

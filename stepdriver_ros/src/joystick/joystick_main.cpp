@@ -25,9 +25,9 @@ namespace {
 using ros_node::EndRequests;
 
 constexpr double kPoll = 0.02;  // [s]
-// For the last message, which roscpp sends in a thread of its own.
+// Time for the last message, which roscpp sends in a thread of its own.
 constexpr std::chrono::milliseconds kLastWords{50};
-// So many messages should come in the driver's jog_timeout: one that is late ends no jog.
+// How many messages should arrive in the driver's jog_timeout, so that a late one ends no jog.
 constexpr double kMessagesInTimeout = 3.0;
 
 constexpr const char* kUsage = R"(usage: stepdriver_joystick [--help] [name:=value ...]
@@ -42,7 +42,7 @@ Exit codes: 0 ended as asked, 1 wrong configuration, 64 wrong usage.
 Start it with: roslaunch stepdriver joystick.launch
 )";
 
-/// @param driver is set to the driver's full name.
+/// @param driver receives the driver's full name.
 /// @throw ConfigError
 JoystickConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                               std::string& driver) {
@@ -95,7 +95,7 @@ int run(EndRequests& end_requests) {
     ROS_INFO_NAMED("joystick", "Ending on %s", who.c_str());
     joystick.rest();
     std::this_thread::sleep_for(kLastWords);
-    ros::shutdown();  // also ends the calls that nobody answers
+    ros::shutdown();  // also ends unanswered calls
     return ros_node::kExitOk;
   } catch (const ConfigError& error) {
     ros_node::explain(error, private_node.getNamespace(), "Not started");

@@ -6,7 +6,7 @@
 namespace stepdriver::joystick {
 
 double velocityOf(const Stick& stick, double deflection) {
-  // Deflections come as floats: one of 0.1 is beyond a dead band of 0.1 in doubles.
+  // Deflections are floats: 0.1 as a float is beyond a dead band of 0.1 as a double.
   const double dead_band = static_cast<float>(stick.dead_band);
   const double out = std::min(std::abs(deflection), 1.0) - dead_band;
   if (!(out > 0.0)) return 0.0;

@@ -192,7 +192,7 @@ TEST(AxisIdle, StaysThroughAWakeUpThatFails) {
   }
 }
 
-// What holds the position is the mechanics, and where the translator goes Home only a place of that
+// What holds the position is the mechanics, and if the translator goes Home only a place of that
 // phase: 64 microsteps at 1/16, 0.8 mm.
 TEST(AxisIdle, KeepsTheTrustOnlyWhereNothingCanHaveMoved) {
   struct Case {

@@ -12,8 +12,8 @@
 #include "stepdriver_core/gpio/lines.h"
 #include "support/test_board.h"
 
-// What holds for every backend. The simulated one is tried everywhere, libgpiod where the kernel
-// has simulated chips.
+// What holds for every backend. The simulated one is tried everywhere, libgpiod if the kernel has
+// simulated chips.
 
 namespace stepdriver::gpio {
 namespace {

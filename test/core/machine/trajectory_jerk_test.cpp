@@ -115,7 +115,7 @@ TEST_F(TrajectoryWithJerkLimit, StopsAndChangesItsSpeedWithinIt) {
 
 class TrajectoryAtItsLimits : public test::TrajectoryBench {};
 
-// Up to 1 m/s at 10 m/s^2, and down to 0.2 m/s at as much, where it goes on for seconds.
+// Up to 1 m/s at 10 m/s^2, and down to 0.2 m/s at as much, where it continues for seconds.
 std::vector<TrajectoryPoint> brakingHard() {
   const auto point = [](double time, double position, double velocity) {
     return TrajectoryPoint{time, {position, 0.0}, {velocity, 0.0}, {}};

@@ -20,7 +20,7 @@ class PulseGroups : public PulseEngineTest {
 TEST_F(PulseGroups, TakesAllProfilesOfAnOrderOrNone) {
   make({config(0), config(1)});
   order(cruise(1'000'000, 0, 100, 1000.0), 0);
-  order(cruise(1'000'000, 0, 100, 1000.0), 1, 99);  // goes on from a profile that isn't there
+  order(cruise(1'000'000, 0, 100, 1000.0), 1, 99);  // continues a profile that doesn't exist
   std::swap(follows[0], follows[1]);
   postFollows(2);
   runOut();

@@ -116,7 +116,7 @@ Schedule tripleOf(std::mt19937_64& random) {
 /// these are.
 class Interleavings : public testing::TestWithParam<std::size_t> {
  protected:
-  /// @return whether to go on.
+  /// @return whether to continue.
   bool expectGood(const Schedule& schedule, const std::string& seed) {
     ++played_;
     const std::vector<std::string> wrong = play(schedule);

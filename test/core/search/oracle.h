@@ -22,7 +22,7 @@ struct Meaning {
   enum class Quiet { kNone, kAtRest, kSlowsDown, kHeld, kEmergency };
   Quiet quiet = Quiet::kNone;  ///< that its answer promises
   bool moves = false;          ///< it may begin a motion
-  bool resumes = false;        ///< it may go on with what is held
+  bool resumes = false;        ///< it may continue with what is held
   bool recovers = false;
   bool ends_hold = false;   ///< whatever its answer, motions may begin after a hold before it
   std::uint64_t as_of = 0;  ///< nothing must have stopped it since this Oracle::moment(); 0: any

@@ -518,7 +518,7 @@ void Participants::noteServed(Ask& asked) {
   }
 }
 
-// Where the joint comes to rest as things are; none while that isn't known.
+// The position at which the joint comes to rest as things are; none while that isn't known.
 std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes.at(axis);

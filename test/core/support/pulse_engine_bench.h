@@ -38,7 +38,7 @@ class PulseEngineTest : public testing::Test {
     engine = std::make_unique<PulseEngine>(lines, clock, channels, max_lateness);
   }
 
-  /// @param continues serial of the profile that this one goes on from.
+  /// @param continues serial of the profile that this one continues.
   std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
     profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
     follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval, 0,

@@ -29,7 +29,7 @@ struct OfControlMsgs : Message {
   using ConstPtr = boost::shared_ptr<const OfControlMsgs>;
 };
 
-/// FollowJointTrajectory as MoveIt's clients have it.
+/// FollowJointTrajectory as in MoveIt's clients.
 struct ControlMsgsAction {
   using _action_goal_type = OfControlMsgs<action_msgs::FollowJointTrajectoryActionGoal>;
   using _action_result_type = OfControlMsgs<action_msgs::FollowJointTrajectoryActionResult>;

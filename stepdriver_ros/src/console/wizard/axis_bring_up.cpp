@@ -8,7 +8,7 @@
 namespace stepdriver::console {
 namespace {
 
-/// The motor's current for as long as this object lives.
+/// Keeps the motor enabled during its lifetime.
 class Current {
  public:
   Current(MachineAtHand& machine, std::string axis) : machine_(machine), axis_(std::move(axis)) {}
@@ -18,7 +18,7 @@ class Current {
   Current(const Current&) = delete;
   Current& operator=(const Current&) = delete;
 
-  /// @return whether it flows.
+  /// @return whether the motor is enabled.
   bool ask(Dialogue& dialogue) {
     if (machine_.state(axis_).enabled) return true;
     if (!askYesNo(dialogue, axis_ + " isn't enabled. Give its motor current?", false)) return false;
@@ -34,8 +34,8 @@ class Current {
   bool given_ = false;
 };
 
-/// Soft limits count from where the axis was switched on, until somebody knows better: it might
-/// move nowhere.
+/// Until the position is known, soft limits count from where the axis was switched on: it might be
+/// unable to move at all.
 void askPosition(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config) {
   if (machine.state(config.name).position_valid) return;
   const auto position = askNumber(

@@ -7,10 +7,10 @@
 
 namespace stepdriver::console {
 
-/// All checks of an axis. Its motor gets current only after a question, and where it had none
-/// before, it has none afterwards, however this ends.
+/// All checks of an axis. The motor is enabled only after a question, and if it was disabled
+/// before, it is disabled afterwards, however this ends.
 ///
-/// @throw Ended, and Error where the driver goes away.
+/// @throw Ended, and Error if the driver goes away.
 Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config);
 
 }  // namespace stepdriver::console

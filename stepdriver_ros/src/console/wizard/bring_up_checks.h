@@ -7,11 +7,11 @@
 
 namespace stepdriver::console {
 
-/// One after the other, for one axis; each adds what it has found out, and moves nothing without a
+/// The checks of one axis, one after the other. Each adds its findings, and moves nothing without a
 /// question.
 
-/// Do the switches read right? Each is pressed by hand; nothing moves. It comes first: nobody
-/// should move an axis whose switches may be dead.
+/// Do the switches read right? The user presses each by hand; nothing moves. This comes first,
+/// because no axis should move while its switches may be dead.
 void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings);
 
@@ -19,7 +19,7 @@ void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const config::Axi
 void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                     Findings& findings);
 
-/// Is the distance right? By the play's taking up, a move and a rule.
+/// Is the distance right? Takes up the play, makes a move, and asks for the measured distance.
 void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings);
 

@@ -13,12 +13,12 @@ namespace {
 
 using ros_node::roundedText;
 
-// Nearer than this a rule and an eye don't tell.
+// Reading a rule by eye is no more accurate than this.
 constexpr double kAsGoodAsRight = 0.002;
-// A factor that is as near as this to a power of two comes from the microsteps, not from a gear.
+// A factor this close to a power of two comes from the microsteps, not from a gear.
 constexpr double kNearPower = 0.05;
 
-/// What is usually behind such a factor; empty: nothing that is known.
+/// The usual cause of such a factor; empty: unknown.
 std::string usualCause(double factor) {
   const double power = std::log2(factor);
   const double whole = std::round(power);
@@ -34,7 +34,7 @@ struct Measured {
   double really = 0.0;     ///< [mm|deg]
 };
 
-/// @return none: a move wasn't made to its end, or its length isn't known.
+/// @return empty if a move wasn't completed, or its length isn't known.
 std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
                                 const config::AxisConfig& config) {
   const std::string unit = unitOf(config.kind);

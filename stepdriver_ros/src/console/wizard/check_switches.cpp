@@ -10,14 +10,14 @@ namespace {
 
 struct Press {
   bool max = false;       ///< the switch that is configured as max, not min
-  bool inverted = false;  ///< it read active while nobody pressed it
+  bool inverted = false;  ///< it read active while it wasn't pressed
 };
 
 std::string nameOf(bool max) { return max ? "max" : "min"; }
 
-/// Waits for a switch that is pressed and let go.
+/// Waits until a switch has been pressed and released.
 ///
-/// @return none: a line came instead.
+/// @return empty: a line was entered instead.
 std::optional<Press> awaitPress(Dialogue& dialogue, MachineAtHand& machine,
                                 const std::string& axis) {
   const AxisView rest = machine.state(axis);

@@ -49,7 +49,7 @@ void writeFile(const std::string& path, const std::string& text, bool replace) {
     throw error;
   }
   close(file);
-  // A link fails where another one has made the file meanwhile; a rename would replace it.
+  // A link fails if another program has made the file meanwhile; a rename would replace it.
   const bool named = replace ? std::rename(unfinished.c_str(), path.c_str()) == 0
                              : link(unfinished.c_str(), path.c_str()) == 0;
   const Error error = named ? Error("") : failure(path, "written");

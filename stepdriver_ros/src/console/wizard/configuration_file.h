@@ -7,19 +7,20 @@
 
 namespace stepdriver::console {
 
-/// A configuration as YAML, which `rosparam load` and stepdriver_check read as the same again.
+/// A configuration as YAML, which `rosparam load` and stepdriver_check read back as the same
+/// configuration.
 ///
 /// @param parameters a map.
-/// @param comment lines that stand before it.
+/// @param comment lines at the top.
 std::string configurationText(const config::ConfigValue& parameters,
                               const std::vector<std::string>& comment);
 
-/// @throw Error where a file is there and isn't to be replaced.
+/// @throw Error if the file exists and must not be replaced.
 void checkNewFile(const std::string& path, bool replace);
 
-/// Writes the file as a whole, or not at all.
+/// Writes the whole file, or nothing.
 ///
-/// @throw Error as checkNewFile(), and where it can't be written.
+/// @throw Error as checkNewFile(), and if it can't be written.
 void writeFile(const std::string& path, const std::string& text, bool replace);
 
 }  // namespace stepdriver::console

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPoll = 0.02;        // [s]
 constexpr double kFirstState = 10.0;  // [s]
-// Longer than the screen waits before it calls a state stale: here it ends everything.
+// Longer than the screen's limit for a stale state, because this ends the wizard.
 constexpr double kGone = 2.0;  // [s]
 
 }  // namespace

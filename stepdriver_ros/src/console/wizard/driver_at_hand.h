@@ -8,7 +8,7 @@
 
 namespace stepdriver::console {
 
-/// The driver that runs. To be used by one thread, which serves the global callback queue by it.
+/// The running driver. For one thread, which serves the global callback queue through it.
 class DriverAtHand : public MachineAtHand {
  public:
   DriverAtHand(const ros::NodeHandle& node, const std::string& driver,
@@ -23,9 +23,9 @@ class DriverAtHand : public MachineAtHand {
   client::Answer move(const std::string& axis, double distance, double speed) override;
   client::Answer stop(const std::string& axis) override;
 
-  /// Takes what the driver has said. @throw Error where it says nothing any more.
+  /// Handles the driver's messages. @throw Error if the driver has stopped sending them.
   void poll();
-  /// Waits for the first state of the axes and of their switches. @throw Error where none comes.
+  /// Waits for the first state of the axes and of their switches. @throw Error if there is none.
   void awaitState();
 
  private:

@@ -17,7 +17,7 @@ using config::Kind;
 using ros_node::roundedText;
 using Map = ConfigValue::Map;
 
-/// The map below a key, which is made where it isn't there.
+/// The map below a key, which is created if it is missing.
 Map& below(Map& map, const std::string& key) {
   ConfigValue& value = map[key];
   if (value.as<Map>() == nullptr) value = ConfigValue(Map{});
@@ -54,15 +54,14 @@ void swapSwitches(Map& endstops) {
   endstops = std::move(swapped);
 }
 
-/// To what a rule can tell, and a reader can read.
+/// Rounded to the accuracy of a rule, which is also easy to read.
 double rounded(double number) {
   char text[32];
   std::snprintf(text, sizeof text, "%.7g", number);
   return std::strtod(text, nullptr);
 }
 
-/// The scale is changed in the key that the axis is scaled by: a length for a round is the longer,
-/// the fewer steps there are for a mm.
+/// Changes the key that scales the axis: fewer steps per mm mean a longer travel per revolution.
 void scale(Map& axis, double factor) {
   for (const char* steps : {"steps_per_mm", "steps_per_degree"}) {
     if (const auto number = numberAt(axis, steps)) {

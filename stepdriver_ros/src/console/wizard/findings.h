@@ -9,26 +9,26 @@
 
 namespace stepdriver::console {
 
-/// What a bring-up has found out of an axis.
+/// The findings of a bring-up about one axis.
 struct Findings {
   std::string axis;
-  bool wrong_way = false;         ///< its plus isn't where plus is to be
+  bool wrong_way = false;         ///< its plus direction is the user's minus
   bool switches_swapped = false;  ///< min is at the plus end, max at the minus end
   bool min_inverted = false;      ///< the switch that is configured as min reads the wrong way
   bool max_inverted = false;
-  std::optional<double> scale;  ///< commanded distance by the measured one
+  std::optional<double> scale;  ///< commanded distance divided by the measured one
 
   bool changesAnything() const {
     return wrong_way || switches_swapped || min_inverted || max_inverted || scale;
   }
 };
 
-/// The driver's parameters with what they must be by these findings; nothing else is changed.
+/// The driver's parameters, corrected according to these findings; nothing else is changed.
 ///
-/// @param parameters all of the node's.
+/// @param parameters all parameters of the node.
 config::ConfigValue corrected(config::ConfigValue parameters, const Findings& findings);
 
-/// What corrected() changes, a sentence for each; none where nothing is.
+/// The changes of corrected(), a sentence for each; empty if there are none.
 std::vector<std::string> changesText(const Findings& findings, const config::AxisConfig& config);
 
 }  // namespace stepdriver::console

@@ -13,7 +13,7 @@ namespace {
 using config::Kind;
 using ros_node::roundedText;
 
-// One that was read before may be on its way when a call is answered; the one after it is new.
+// When a call is answered, an older state may still be on its way; the one after it is new.
 constexpr int kStatesUntilFresh = 2;
 
 SmallMove slowly(const config::AxisConfig& config, double distance, double speed) {

@@ -6,19 +6,19 @@
 
 namespace stepdriver::console {
 
-/// Small and slow, for a machine that nothing is known of yet.
+/// A small and slow move, for a machine about which nothing is known yet.
 struct SmallMove {
   double distance = 0.0;  ///< [mm|deg]
   double speed = 0.0;     ///< [mm/s|deg/s]
 };
 
-/// To see which way it goes.
+/// To see the direction.
 SmallMove visibleMove(const config::AxisConfig& config);
 /// To measure it.
 SmallMove measurableMove(const config::AxisConfig& config);
 
-/// Moves an axis after a question, and watches it: a line of the person, and any switch that
-/// changes, stop it, as nobody knows yet which switch is at which end.
+/// Moves an axis after a question, and watches it. A line from the user stops it, and so does any
+/// change of a switch, because it isn't known yet which switch is at which end.
 class HandMove {
  public:
   /// All outlive this object.
@@ -26,13 +26,13 @@ class HandMove {
       : dialogue_(dialogue), machine_(machine), config_(config) {}
 
   /// @param move its distance is negative towards minus.
-  /// @return [mm|deg] how far it went, as counted; 0: it didn't, or not to its end.
+  /// @return [mm|deg] the counted distance; 0: it didn't move, or the move wasn't completed.
   double ask(const SmallMove& move);
 
  private:
   double watch(double start);
   void rest();
-  /// The next state that the driver says, and not one that was under way.
+  /// The next state of the driver, not one that was already on its way.
   AxisView freshState();
 
   Dialogue& dialogue_;

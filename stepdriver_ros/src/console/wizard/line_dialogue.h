@@ -8,11 +8,11 @@
 
 namespace stepdriver::console {
 
-/// At standard input and output, a terminal or not. Signals that ask the program to end, the end
-/// of the input, and a line `q` end it.
+/// A dialogue on standard input and output, with or without a terminal. Signals that ask the
+/// program to end, the end of the input, and a line `q` end it.
 class LineDialogue : public Dialogue {
  public:
-  /// @param meanwhile called often while a line is waited for.
+  /// @param meanwhile called often while waiting for a line.
   LineDialogue(ros_node::EndRequests& end_requests, std::function<void()> meanwhile)
       : end_requests_(end_requests), meanwhile_(std::move(meanwhile)) {}
 

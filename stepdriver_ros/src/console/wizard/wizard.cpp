@@ -30,7 +30,7 @@ std::vector<config::AxisConfig> chosenAxes(const DriverParameters& parameters,
   return axes;
 }
 
-/// The driver must take what is written for it.
+/// The driver must accept the written parameters.
 ///
 /// @throw ConfigError
 void check(const config::ConfigValue& parameters, const std::string& driver) {

@@ -9,17 +9,17 @@
 namespace stepdriver::console {
 
 struct WizardOptions {
-  std::string axis;  ///< the only one to look at; empty: all, one after the other
+  std::string axis;  ///< the only axis to check; empty: all, one after the other
   std::string output = "stepdriver_wizard.yaml";
   bool overwrite = false;
 };
 
-/// A guided first bring-up at standard input and output: switches, direction and distance of each
-/// axis, and a configuration with what they must be.
+/// A guided first bring-up on standard input and output: checks switches, direction and distance of
+/// each axis, and writes a corrected configuration.
 ///
 /// @param driver full name of the node.
 /// @return whether the file was written.
-/// @throw Error where the driver goes away, or the file can't be written; ConfigError where its
+/// @throw Error if the driver goes away, or the file can't be written; ConfigError if its
 ///   parameters are wrong.
 bool runWizard(const ros::NodeHandle& node, const std::string& driver, const WizardOptions& options,
                ros_node::EndRequests& end_requests);
