@@ -18,7 +18,7 @@ namespace {
 using axis::PathAxis;
 using axis::PathStart;
 using axis::PreparedTrajectory;
-using axis::TrajectoryPath;
+using axis::SharedPath;
 using axis::TrajectoryPoint;
 
 constexpr double kPointEvery = 0.010;  // s
@@ -104,7 +104,7 @@ class UnderWay {
     return all;
   }
 
-  std::shared_ptr<const TrajectoryPath> join() const {
+  std::shared_ptr<const SharedPath> join() const {
     return PreparedTrajectory::join(trajectory_, starts_);
   }
   /// All three axes along a path that continues at rate 1 from somewhere.
@@ -127,7 +127,7 @@ class UnderWay {
 
   std::shared_ptr<const PreparedTrajectory> trajectory_;
   std::vector<PathStart> starts_;
-  std::shared_ptr<const TrajectoryPath> path_;
+  std::shared_ptr<const SharedPath> path_;
 };
 
 void join(benchmark::State& state, UnderWay& (*trajectory)()) {

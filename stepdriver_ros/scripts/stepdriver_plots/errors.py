@@ -1,5 +1,7 @@
 """Why something can't be drawn."""
 
+import pathlib
+
 
 class Undrawable(Exception):
     """Says what is wrong, and what was to be expected."""
@@ -7,6 +9,7 @@ class Undrawable(Exception):
 
 def refuse_endless(path):
     """Devices and pipes have no end that a reader could wait for."""
+    path = pathlib.Path(path)
     if path.exists() and not path.is_file():
         raise Undrawable(f"{path}: isn't a file")
 
