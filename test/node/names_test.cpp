@@ -2,6 +2,7 @@
 #include <ros/master.h>
 #include <ros/this_node.h>
 #include <sensor_msgs/JointState.h>
+#include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/RigReport.h>
@@ -73,7 +74,8 @@ TEST(Names, CanBeRemapped) {
   const auto process =
       startAs(like, "/remapped/stepdriver",
               {"__ns:=/remapped", "__name:=stepdriver", "joint_states:=/robot/arm_states",
-               "~axis_states:=axes", "~x/move_to:=/robot/go", "/diagnostics:=/robot/health"});
+               "~axis_states:=axes", "~x/move_to:=/robot/go", "~x/stop:=/robot/halt",
+               "~emergency_stop:=/robot/kill", "/diagnostics:=/robot/health"});
   const Recorder<sensor_msgs::JointState> states(std::string("/robot/arm_states"));
   const Recorder<AxisStates> axes(std::string("/remapped/axes"));
   MoveTo::Request request;
@@ -86,7 +88,13 @@ TEST(Names, CanBeRemapped) {
   EXPECT_TRUE(isPublished("/robot/health"));
   EXPECT_FALSE(isPublished("/remapped/joint_states"));
   EXPECT_FALSE(isPublished("/remapped/stepdriver/axis_states"));
-  EXPECT_FALSE(ros::service::exists("/remapped/stepdriver/x/move_to", false));
+  for (const char* service : {"/robot/halt", "/robot/kill"}) {
+    EXPECT_TRUE(callWhenThere<std_srvs::Trigger>(service).success) << service;
+  }
+  for (const char* service : {"x/move_to", "x/stop", "emergency_stop"}) {
+    const std::string name = std::string("/remapped/stepdriver/") + service;
+    EXPECT_FALSE(ros::service::exists(name, false)) << name;
+  }
   process->signal(SIGTERM);
   process->waitForExit(kBound);
   ros::param::del("/remapped");

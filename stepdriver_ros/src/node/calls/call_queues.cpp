@@ -6,9 +6,6 @@ namespace stepdriver::ros_node {
 namespace {
 
 constexpr int kControlThreads = 2;
-// One, so that holds and stops keep their order.
-constexpr int kStopThreads = 1;
-constexpr int kEmergencyThreads = 1;
 constexpr int kTrajectoryThreads = 2;
 constexpr int kSpareLineThreads = 3;
 // Those that exist before anything waits.
@@ -21,8 +18,8 @@ CallQueues::CallQueues(std::size_t axes)
     : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
       trajectories_(waiting_pool_, kTrajectoryThreads),
       control_(control_pool_, kControlThreads),
-      stops_(stop_pool_, kStopThreads),
-      emergency_(emergency_pool_, kEmergencyThreads) {
+      stops_("stops"),
+      emergency_("emergency stop") {
   for (std::size_t i = 0; i < axes; ++i) {
     axes_.emplace_back(waiting_pool_, kThreadsPerAxis);
     power_.emplace_back(waiting_pool_, kPowerThreadsPerAxis);
@@ -32,8 +29,8 @@ CallQueues::CallQueues(std::size_t axes)
 void CallQueues::start() {
   waiting_pool_.start(kFirstThreads);
   control_pool_.start(kControlThreads);
-  stop_pool_.start(kStopThreads);
-  emergency_pool_.start(kEmergencyThreads);
+  stops_.start();
+  emergency_.start();
 }
 
 void CallQueues::finish(std::chrono::milliseconds bound) {
@@ -42,18 +39,20 @@ void CallQueues::finish(std::chrono::milliseconds bound) {
     std::this_thread::sleep_for(kPoll);
   }
   stop();
+  for (TriggerServer* server : {&stops_, &emergency_}) {
+    const auto left = deadline - std::chrono::steady_clock::now();
+    server->finish(std::chrono::ceil<std::chrono::milliseconds>(left));
+  }
 }
 
 void CallQueues::stop() {
   waiting_pool_.stop();
   control_pool_.stop();
-  stop_pool_.stop();
-  emergency_pool_.stop();
 }
 
 bool CallQueues::allAnswered() {
   // A queue is empty when it contains no call and none of its calls is running.
-  bool empty = control_.isEmpty() && stops_.isEmpty() && emergency_.isEmpty() && lines_.isEmpty();
+  bool empty = control_.isEmpty() && lines_.isEmpty();
   for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
   for (ros::CallbackQueue& queue : power_) empty = empty && queue.isEmpty();
   return empty;

@@ -8,10 +8,12 @@
 #include <deque>
 
 #include "call_pool.h"
+#include "trigger_server.h"
 
 namespace stepdriver::ros_node {
 
-/// The queues of service calls and their threads. A waiting call never delays another.
+/// The queues of service calls, the servers of those that stop motions, and the threads of both. A
+/// waiting call never delays another.
 ///
 /// Each axis has its own queue. A waiting move uses one thread of its share, because an axis makes
 /// one move at a time, and a disable or a microstep change that waits for standstill uses another.
@@ -20,9 +22,10 @@ namespace stepdriver::ros_node {
 /// time, and some more for lines that wait for their axes to come to rest. Threads start when that
 /// many calls run at once, and are then shared by all axes. At rest no thread wakes up.
 ///
-/// Nothing that stops a motion waits behind another call. Stops and holds have a thread of their
-/// own from the start, which serves them in order, and so does the emergency stop. Enabling and
-/// disabling has its own share for each axis, because a disable waits for standstill.
+/// Nothing that stops a motion waits behind another call. Stops and holds have a socket and a
+/// thread of their own, which serves them one after another, and so does the emergency stop: they
+/// don't even wait while roscpp reads a long message. Enabling and disabling has its own share for
+/// each axis, because a disable waits for standstill.
 ///
 /// Created and used by one thread; any thread may use the queues themselves.
 class CallQueues {
@@ -48,8 +51,8 @@ class CallQueues {
   /// Recover, resume, and everything that answers at once.
   ros::CallbackQueue& control() { return control_; }
   /// Stops and holds, which answer at once.
-  ros::CallbackQueue& stops() { return stops_; }
-  ros::CallbackQueue& emergency() { return emergency_; }
+  TriggerServer& stops() { return stops_; }
+  TriggerServer& emergency() { return emergency_; }
 
   /// Starts the threads. Call it when everything has been advertised.
   void start();
@@ -64,15 +67,13 @@ class CallQueues {
 
   CallPool waiting_pool_;
   CallPool control_pool_;
-  CallPool stop_pool_;
-  CallPool emergency_pool_;
   std::deque<PooledQueue> axes_;
   std::deque<PooledQueue> power_;
   PooledQueue lines_;
   PooledQueue trajectories_;
   PooledQueue control_;
-  PooledQueue stops_;
-  PooledQueue emergency_;
+  TriggerServer stops_;
+  TriggerServer emergency_;
 };
 
 /// A handle whose callbacks a queue serves.

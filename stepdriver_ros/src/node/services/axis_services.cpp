@@ -49,7 +49,15 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
   advertise<std_srvs::SetBool>("enable", &AxisServices::enable, queues.power(index));
   advertise<std_srvs::SetBool>("sleep", &AxisServices::sleep, own);
   advertise<std_srvs::Trigger>("reset", &AxisServices::reset, own);
-  advertise<std_srvs::Trigger>("stop", &AxisServices::stop, queues.stops());
+  // The queues outlive this, and the axis outlives them.
+  queues.stops().advertise(
+      node_.resolveName("stop"),
+      [&axis](std_srvs::Trigger::Request& /*request*/, std_srvs::Trigger::Response& response) {
+        return respond(response, [&] {
+          axis.stop();
+          response.message = axis.config().name + ": stops";
+        });
+      });
 }
 
 bool AxisServices::moveTo(MoveTo::Request& request, MoveTo::Response& response) {
@@ -179,14 +187,6 @@ bool AxisServices::reset(std_srvs::Trigger::Request& /*request*/,
   return respond(response, [&] {
     axis_.reset();
     response.message = axis_.config().name + ": reset";
-  });
-}
-
-bool AxisServices::stop(std_srvs::Trigger::Request& /*request*/,
-                        std_srvs::Trigger::Response& response) {
-  return respond(response, [&] {
-    axis_.stop();
-    response.message = axis_.config().name + ": stops";
   });
 }
 

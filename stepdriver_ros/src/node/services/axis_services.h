@@ -24,7 +24,8 @@ class AxisServices {
  public:
   /// @param node the node's private handle.
   /// @param index of the axis, which determines its queue.
-  /// @param axis, queues outlive the services.
+  /// @param queues outlive the services.
+  /// @param axis outlives the queues.
   AxisServices(const ros::NodeHandle& node, std::size_t index, axis::Axis& axis,
                CallQueues& queues);
   AxisServices(const AxisServices&) = delete;
@@ -46,7 +47,6 @@ class AxisServices {
   bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool sleep(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool reset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
-  bool stop(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
 
   template <typename Response>
   void respondToMove(const axis::Move& move, bool wait, Response& response);

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 #include <ros/console.h>
 #include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <exception>
+#include <functional>
 #include <utility>
 
 #include "common/text.h"
@@ -76,21 +78,41 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
   return response;
 }
 
+using Trigger = std_srvs::Trigger;
+using TriggerFunction = boost::function<bool(Trigger::Request&, Trigger::Response&)>;
+
+/// @param done what the answer says then.
+TriggerFunction triggerHandler(const std::string& done, const std::function<void()>& action) {
+  return [done, action](Trigger::Request& /*request*/, Trigger::Response& response) {
+    return respond(response, [&] {
+      action();
+      response.message = done;
+    });
+  };
+}
+
 }  // namespace
 
 MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& machine,
                                  CallQueues& queues)
     : node_(node), queues_(queues) {
-  advertise("stop", queues.stops(), "all axes stop", [&machine] { machine.stop(); });
-  advertise("emergency_stop", queues.emergency(), "all axes are stopped; recover ends that",
-            [&machine] { machine.emergencyStop(); });
-  advertise("recover", queues.control(), "all faults are ended", [&machine] { machine.recover(); });
-  advertise("hold", queues.stops(),
-            "all axes are on hold until resume or stop; those that move come to rest and keep "
-            "their goals",
-            [&machine] { machine.hold(); });
-  advertise("resume", queues.control(), "the hold is over: held motions continue",
-            [&machine] { machine.resume(); });
+  TriggerServer& stops = queues.stops();
+  stops.advertise(node_.resolveName("stop"),
+                  triggerHandler("all axes stop", [&machine] { machine.stop(); }));
+  stops.advertise(
+      node_.resolveName("hold"),
+      triggerHandler("all axes are on hold until resume or stop; those that move come to rest and "
+                     "keep their goals",
+                     [&machine] { machine.hold(); }));
+  queues.emergency().advertise(node_.resolveName("emergency_stop"),
+                               triggerHandler("all axes are stopped; recover ends that",
+                                              [&machine] { machine.emergencyStop(); }));
+  node_.setCallbackQueue(&queues.control());
+  servers_.push_back(node_.advertiseService(
+      "recover", triggerHandler("all faults are ended", [&machine] { machine.recover(); })));
+  servers_.push_back(node_.advertiseService(
+      "resume",
+      triggerHandler("the hold is over: held motions continue", [&machine] { machine.resume(); })));
   advertiseSpeedOverride(machine);
   advertiseMoveLine(machine);
 }
@@ -116,20 +138,6 @@ void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
       };
   node_.setCallbackQueue(&queues_.control());
   servers_.push_back(node_.advertiseService("speed_override", handler));
-}
-
-void MachineServices::advertise(const std::string& name, ros::CallbackQueue& queue,
-                                const std::string& done, const std::function<void()>& action) {
-  using Service = std_srvs::Trigger;
-  const boost::function<bool(Service::Request&, Service::Response&)> handler =
-      [done, action](Service::Request& /*request*/, Service::Response& response) {
-        return respond(response, [&] {
-          action();
-          response.message = done;
-        });
-      };
-  node_.setCallbackQueue(&queue);
-  servers_.push_back(node_.advertiseService(name, handler));
 }
 
 void MachineServices::advertiseRig(setup::Simulation& simulation) {

@@ -2,9 +2,7 @@
 
 #include <ros/node_handle.h>
 #include <ros/service_server.h>
-#include <std_srvs/Trigger.h>
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -18,16 +16,14 @@ namespace stepdriver::ros_node {
 class MachineServices {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the services.
+  /// @param queues outlive the services.
+  /// @param machine outlives the queues.
   MachineServices(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues);
 
   /// Adds the services of the simulated rig. @param simulation outlives the services.
   void advertiseRig(setup::Simulation& simulation);
 
  private:
-  void advertise(const std::string& name, ros::CallbackQueue& queue, const std::string& done,
-                 const std::function<void()>& action);
-
   void advertiseEndstop(setup::Simulation& simulation, const std::string& axis,
                         setup::Simulation::End end);
   void advertiseSpeedOverride(machine::Machine& machine);

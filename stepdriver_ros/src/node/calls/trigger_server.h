@@ -1,0 +1,99 @@
+#pragma once
+
+#include <poll.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <list>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "descriptor.h"
+#include "trigger_session.h"
+
+namespace stepdriver::ros_node {
+
+/// Serves services of the type std_srvs/Trigger with a socket and a thread of its own. Clients see
+/// no difference, but no long message delays their calls: roscpp reads all connections of a node
+/// in one thread.
+///
+/// Calls are carried out one after another. A slow, silent or hostile client delays no other: a
+/// client never has more memory than a header takes, it must finish what it begins in time, and if
+/// there are too many clients, the one that has been silent for the longest time is disconnected.
+///
+/// To be used by one thread.
+class TriggerServer {
+ public:
+  /// How many clients can be connected at once.
+  static constexpr std::size_t kMostConnections = 256;
+  /// How long a client may take to send a header, to send the rest of a request, and to read an
+  /// answer.
+  static constexpr std::chrono::seconds kPatience{10};
+
+  /// @param name of the thread, up to 15 characters.
+  /// @throw std::system_error if there is no socket for it.
+  explicit TriggerServer(std::string name);
+  ~TriggerServer() { finish(std::chrono::milliseconds(0)); }
+  TriggerServer(const TriggerServer&) = delete;
+  TriggerServer& operator=(const TriggerServer&) = delete;
+
+  /// Tells the master of a service, before start(). Until then its calls wait.
+  ///
+  /// @param name the full name.
+  /// @param handler is called by the thread, until finish().
+  void advertise(const std::string& name, TriggerHandler handler);
+
+  void start();
+
+  /// Takes no new clients, answers the calls that have come, and ends the thread.
+  ///
+  /// @param bound for clients that don't read their answers or don't stop asking.
+  void finish(std::chrono::milliseconds bound);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct Connection {
+    Connection(Descriptor its_socket, const TriggerServices& services)
+        : socket(std::move(its_socket)), session(services) {}
+
+    /// Receives and sends what can be now. @return false: it is to be closed.
+    bool serve();
+    bool receive();
+    bool send();
+
+    Descriptor socket;
+    TriggerSession session;
+    Clock::time_point since = Clock::now();  ///< the client last began or concluded something
+  };
+
+  void serveAll();
+  /// Waits until there is something to do for one of polled_. @return for how many there is.
+  int poll(bool finishing, Clock::time_point until);
+  /// When something is due if nothing comes.
+  Clock::time_point nextDue() const;
+  bool anyUnderWay() const;
+  void serveConnections(Clock::time_point now);
+  void accept();
+  bool makeRoom();
+  void disconnectLongestSilent();
+
+  const std::string name_;
+  Descriptor reserve_;  ///< lets a client in when the process has no other descriptor left
+  Descriptor wake_;     ///< an eventfd
+  Descriptor listening_;
+  const std::string uri_;
+  TriggerServices services_;
+  std::atomic<Clock::time_point> finish_by_{Clock::time_point::max()};
+  std::thread thread_;
+
+  // Of the thread alone.
+  std::list<Connection> connections_;
+  std::vector<pollfd> polled_;
+  Clock::time_point accept_from_;
+};
+
+}  // namespace stepdriver::ros_node
