@@ -187,6 +187,8 @@ TEST(Examples, Stm32WheelRollsTwentyTurns) {
   EXPECT_EQ(rigOf(node).pulses_forward, Counts{32000});
   EXPECT_TRUE(moveBy(x, 0.00019635).success);
   EXPECT_EQ(rigOf(node).pulses_forward, Counts{32001}) << "a single step";
+  const auto again = moveBy(x, 20.0 * 0.1 * kPi);
+  EXPECT_TRUE(again.success) << "there is no end: " << again.message;
   EXPECT_TRUE(moveBy(x, -3.0, false).success);
   MoveTo::Request home;
   home.wait = true;

@@ -67,7 +67,8 @@ TEST(Limits, RefuseWhatIsBeyondTheConfiguredOnes) {
   node.start();
   const auto beyond = setLimits(node, 0.05, 0.6);
   EXPECT_FALSE(beyond.success);
-  EXPECT_EQ(beyond.message, "x: the acceleration 0.6 m/s^2 is above the configured 0.5 m/s^2");
+  EXPECT_EQ(beyond.message,
+            "x: the acceleration 0.6 m/s^2 is above 0.5 m/s^2, from the configuration");
   EXPECT_EQ(beyond.max_speed, 0.1) << "nothing is changed";
   for (const double bad :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -79,7 +80,7 @@ TEST(Limits, RefuseWhatIsBeyondTheConfiguredOnes) {
   EXPECT_TRUE(too_fast.success);
   const auto refused = node.moveTo(0.1, true, 0.06);
   EXPECT_FALSE(refused.success);
-  expectSays(refused.message, "above the maximum 0.05 m/s");
+  expectSays(refused.message, "above the maximum 0.05 m/s, from set_limits");
 }
 
 }  // namespace

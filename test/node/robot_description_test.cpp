@@ -47,12 +47,15 @@ TEST(RobotDescription, TightensTheLimitsAndSaysWhereTheyCameFrom) {
   NodeUnderTest node;
   node.describe(robot("prismatic", kTighter));
   node.start();
-  expectSays(node.process().output(), "min position 0.02 m (joint)");
-  expectSays(node.process().output(), "max position 0.05 m (joint)");
-  expectSays(node.process().output(), "speed 0.05 m/s (joint)");
-  EXPECT_FALSE(node.moveTo(0.06, true).success);
-  EXPECT_FALSE(node.moveTo(0.01, true).success);
-  EXPECT_FALSE(node.moveTo(0.05, true, 0.06).success);
+  expectSays(node.process().output(), "min position 0.02 m (from robot_description)");
+  expectSays(node.process().output(), "max position 0.05 m (from robot_description)");
+  expectSays(node.process().output(), "speed 0.05 m/s (from robot_description)");
+  expectSays(node.moveTo(0.06, true).message,
+             "above the soft limit max_position 0.05 m, from robot_description");
+  expectSays(node.moveTo(0.01, true).message,
+             "below the soft limit min_position 0.02 m, from robot_description");
+  expectSays(node.moveTo(0.05, true, 0.06).message,
+             "above the maximum 0.05 m/s, from robot_description");
   EXPECT_EQ(node.pulses(), 0);
   const auto answer = node.moveTo(0.05, true);
   EXPECT_TRUE(answer.success) << answer.message;
@@ -63,10 +66,19 @@ TEST(RobotDescription, ThatIsLooserLeavesTheLimitsOfTheAxis) {
   NodeUnderTest node;
   node.describe(robot("prismatic", kLooser));
   node.start();
-  expectSays(node.process().output(), "min position 0 m (axis)");
-  expectSays(node.process().output(), "max position 0.2 m (axis)");
-  expectSays(node.process().output(), "speed 0.1 m/s (axis)");
+  expectSays(node.process().output(), "min position 0 m (from the configuration)");
+  expectSays(node.process().output(), "max position 0.2 m (from the configuration)");
+  expectSays(node.process().output(), "speed 0.1 m/s (from the configuration)");
   EXPECT_FALSE(node.moveTo(0.3, true).success);
+}
+
+TEST(RobotDescription, IsNotReadIfItsLimitsAreNotWanted) {
+  NodeUnderTest node;
+  node.describe(robot("fixed", kTighter));
+  node.set("urdf_limits", false);
+  node.start();
+  expectSays(node.moveTo(0.3, true).message, "max_position 0.2 m, from the configuration");
+  EXPECT_TRUE(node.moveTo(0.06, true).success);
 }
 
 TEST(RobotDescription, LimitsARevoluteJoint) {
@@ -74,8 +86,8 @@ TEST(RobotDescription, LimitsARevoluteJoint) {
   makeRotary(node);
   node.describe(robot("revolute", R"(<limit lower="-1" upper="1" velocity="2" effort="1"/>)"));
   node.start();
-  expectSays(node.process().output(), "min position -1 rad (joint)");
-  expectSays(node.process().output(), "speed 2 rad/s (joint)");
+  expectSays(node.process().output(), "min position -1 rad (from robot_description)");
+  expectSays(node.process().output(), "speed 2 rad/s (from robot_description)");
   EXPECT_FALSE(node.moveTo(1.1, true).success);
   EXPECT_TRUE(node.moveTo(1.0, true).success);
 }
@@ -100,7 +112,7 @@ TEST(RobotDescription, WarnsOfAContinuousJointWhoseAxisHasSoftLimits) {
   expectSays(
       node.process().output(),
       "axis x has soft limits, but its joint x_joint is continuous in the robot description");
-  expectSays(node.process().output(), "speed 2 rad/s (joint)");
+  expectSays(node.process().output(), "speed 2 rad/s (from robot_description)");
   const auto beyond = node.moveTo(1.6, true);
   EXPECT_FALSE(beyond.success);
   expectSays(beyond.message, "above the soft limit max_position");

@@ -47,6 +47,11 @@ class Configuration : public TemporaryFile {
   std::string argument() const { return "config:=" + path(); }
 };
 
+/// Full path of a URDF of the package.
+std::string urdf(const std::string& name) {
+  return std::string(STEPDRIVER_SOURCES "/urdf/") + name;
+}
+
 MoveTo::Response moveTo(double position) {
   MoveTo::Request request;
   request.position = position;
@@ -79,6 +84,27 @@ TEST(RoslaunchAgain, TakesTheUsersFileAfterTheDefaultOne) {
   const Configuration file(axisX());  // its STEP is at the line of the other's endstop
   Roslaunch launch("axis.launch", {file.argument()});
   EXPECT_TRUE(launch.isReady());
+}
+
+TEST(RoslaunchModel, OfTheDemoDoesNotLimitAnotherConfiguration) {
+  {
+    Roslaunch demo("axis.launch", {});  // leaves its robot_description behind
+    ASSERT_TRUE(demo.isReady());
+  }
+  const Configuration file(axisX({"min_position_mm: 0.0", "max_position_mm: 500.0"}));
+  Roslaunch launch("axis.launch", {file.argument()});
+  ASSERT_TRUE(launch.isReady());
+  const auto answer = moveTo(0.3);
+  EXPECT_TRUE(answer.success) << answer.message;
+  expectSays(moveTo(0.6).message, "max_position 0.5 m, from the configuration");
+}
+
+TEST(RoslaunchModel, ThatIsGivenLimitsTheConfiguration) {
+  const Configuration file(axisX());
+  Roslaunch launch("axis.launch", {file.argument(), "model:=" + urdf("linear_axis.urdf")});
+  ASSERT_TRUE(launch.isReady());
+  expectSays(moveTo(0.3).message, "max_position 0.2 m, from robot_description");
+  EXPECT_TRUE(ros::param::has(Roslaunch::space() + "/robot_description"));
 }
 
 TEST(ParametersLoadedByHand, AreSaidToBeLeftOverIfTheyContradictEachOther) {

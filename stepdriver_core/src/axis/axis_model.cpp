@@ -49,9 +49,12 @@ PathAxis AxisModel::pathAxis() const {
   facts.origin = position.origin();
   facts.min_position = config.min_position;
   facts.max_position = config.max_position;
+  facts.min_position_source = config.min_position_source;
+  facts.max_position_source = config.max_position_source;
   facts.configured_backlash = config.backlash;
   facts.backlash = backlash();
   facts.limits = limits(maxSpeed());
+  facts.max_speed_source = maxSpeedSource();
   facts.stop_deceleration = stopDeceleration();
   facts.stop_jerk = config.jerk * stepsPerUnit();
   return facts;
@@ -75,6 +78,12 @@ double AxisModel::maxSpeed() const {
   return std::min(limits_now_.max_speed, 1.0 / (period * stepsPerUnit()));
 }
 
+config::LimitSource AxisModel::maxSpeedSource() const {
+  if (maxSpeed() < limits_now_.max_speed) return config::LimitSource::kChip;
+  if (limits_now_.max_speed < config.max_speed) return config::LimitSource::kSetLimits;
+  return config.max_speed_source;
+}
+
 motion::MotionLimits AxisModel::limits(double velocity) const {
   const double scale = stepsPerUnit();
   return {config.start_speed * scale, velocity * scale, limits_now_.acceleration * scale,
@@ -96,7 +105,7 @@ pulse::Nanoseconds AxisModel::restartInterval() const {
 }
 
 double AxisModel::checkedLimit(const char* what, double wanted, double configured, double lowest,
-                               const char* per) const {
+                               const char* per, config::LimitSource source) const {
   if (!std::isfinite(wanted) || wanted < 0.0) {
     refuse(
         fmt::format("the {} must be a finite number, above 0 or 0 for what is configured", what));
@@ -111,16 +120,16 @@ double AxisModel::checkedLimit(const char* what, double wanted, double configure
   }
   // If no jerk limit is configured, any jerk is allowed.
   if (configured > 0.0 && wanted > configured * (1.0 + 1e-12)) {
-    refuse(fmt::format("the {} {} is above the configured {}", what, show(wanted, per),
-                       show(configured, per)));
+    refuse(fmt::format("the {} {} is above {}", what, show(wanted, per),
+                       pathAxis().showLimit(configured, source, per)));
   }
   return wanted > 0.0 ? wanted : configured;
 }
 
 AxisLimits AxisModel::checkedLimits(const AxisLimits& wanted) const {
   AxisLimits next;
-  next.max_speed =
-      checkedLimit("max_speed", wanted.max_speed, config.max_speed, config::kLowestRate, "/s");
+  next.max_speed = checkedLimit("max_speed", wanted.max_speed, config.max_speed,
+                                config::kLowestRate, "/s", config.max_speed_source);
   next.acceleration = checkedLimit("acceleration", wanted.acceleration, config.acceleration,
                                    config::kLowestAcceleration, "/s^2");
   next.deceleration = checkedLimit("deceleration", wanted.deceleration, config.deceleration,
@@ -162,7 +171,7 @@ void AxisModel::refuseUnlessReady() const {
 void AxisModel::refuseTooFast(double speed) const {
   if (speed <= maxSpeed() * (1.0 + 1e-12)) return;
   refuse(fmt::format("the velocity {} is above the maximum {}", show(speed, "/s"),
-                     show(maxSpeed(), "/s")));
+                     pathAxis().showLimit(maxSpeed(), maxSpeedSource(), "/s")));
 }
 
 double AxisModel::checkedVelocity(double velocity) const {

@@ -68,6 +68,7 @@ class AxisModel {
   /// @name Limits
   /// @{
   double maxSpeed() const;  ///< [unit/s]
+  config::LimitSource maxSpeedSource() const;
   /// [microsteps] @param velocity [unit/s] the highest speed.
   motion::MotionLimits limits(double velocity) const;
   /// The limits of every stop, regardless of setLimits(): the configured deceleration and jerk.
@@ -136,7 +137,8 @@ class AxisModel {
 
  private:
   double checkedLimit(const char* what, double wanted, double configured, double lowest,
-                      const char* per) const;
+                      const char* per,
+                      config::LimitSource source = config::LimitSource::kConfiguration) const;
 
   AxisLimits limits_now_;   // of the current motion
   AxisLimits limits_next_;  // of motions that begin at rest; the speed also applies now

@@ -22,7 +22,8 @@ auto tied(const motion::MotionLimits& limits) {
 auto tied(const PathAxis& axis) {
   return std::tie(axis.name, axis.kind, axis.microsteps, axis.steps_per_unit, axis.origin,
                   axis.min_position, axis.max_position, axis.configured_backlash, axis.backlash,
-                  axis.stop_deceleration, axis.stop_jerk);
+                  axis.stop_deceleration, axis.stop_jerk, axis.max_speed_source,
+                  axis.min_position_source, axis.max_position_source);
 }
 
 }  // namespace
@@ -39,6 +40,10 @@ std::string PathAxis::show(double value, const char* per) const {
   return fmt::format("{:.9g} {}{}", value, kind == config::Kind::kLinear ? "m" : "rad", per);
 }
 
+std::string PathAxis::showLimit(double value, config::LimitSource source, const char* per) const {
+  return fmt::format("{}, from {}", show(value, per), config::sourceText(source));
+}
+
 void PathAxis::refuse(const std::string& why) const { throw Refused(name + ": " + why); }
 
 void PathAxis::refuseBeyondLimits(double position, const std::string& what) const {
@@ -46,11 +51,11 @@ void PathAxis::refuseBeyondLimits(double position, const std::string& what) cons
   const double tolerance = 0.5 / steps_per_unit;
   if (min_position && position < *min_position - tolerance) {
     refuse(fmt::format("{} {} is below the soft limit min_position {}", what, show(position),
-                       show(*min_position)));
+                       showLimit(*min_position, min_position_source)));
   }
   if (max_position && position > *max_position + tolerance) {
     refuse(fmt::format("{} {} is above the soft limit max_position {}", what, show(position),
-                       show(*max_position)));
+                       showLimit(*max_position, max_position_source)));
   }
   if (std::abs(countOf(position)) > kFarthest) {
     refuse(fmt::format("{} {} is more than 2^40 steps away", what, show(position)));

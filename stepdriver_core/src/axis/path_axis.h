@@ -21,10 +21,13 @@ struct PathAxis {
   /// [unit] Soft limits.
   std::optional<double> min_position;
   std::optional<double> max_position;
+  config::LimitSource min_position_source = config::LimitSource::kConfiguration;
+  config::LimitSource max_position_source = config::LimitSource::kConfiguration;
   double configured_backlash = 0.0;  ///< [unit]
   std::int64_t backlash = 0;         ///< [microsteps]
   /// [microsteps] For motions that begin now; the maximum speed is without the override.
   motion::MotionLimits limits;
+  config::LimitSource max_speed_source = config::LimitSource::kConfiguration;
   double stop_deceleration = 0.0;  ///< [microsteps/s^2]
   double stop_jerk = 0.0;  ///< [microsteps/s^3] as configured, regardless of `limits`; 0: no limit
 
@@ -38,6 +41,8 @@ struct PathAxis {
 
   /// "0.1 m", "0.1 rad/s"
   std::string show(double value, const char* per = "") const;
+  /// A limit with its source: "0.1 m, from robot_description".
+  std::string showLimit(double value, config::LimitSource source, const char* per = "") const;
   /// @throw Refused always: "x: why".
   [[noreturn]] void refuse(const std::string& why) const;
   /// @param position [unit] @param what "the position"

@@ -35,12 +35,13 @@ Peak later(Peak peak, double seconds) {
 }
 
 void requireWithin(const PathAxis& axis, const Peak& peak, double most, const char* what,
-                   const char* per) {
+                   const char* per, std::optional<config::LimitSource> source = {}) {
   if (std::abs(peak.value) <= most * kMore) return;
   const double scale = axis.steps_per_unit;
-  axis.refuse(fmt::format("the trajectory's {} is {} {}, but the axis has {}", what,
-                          axis.show(peak.value / scale, per), at(peak.time_s),
-                          axis.show(most / scale, per)));
+  axis.refuse(fmt::format(
+      "the trajectory's {} is {} {}, but the axis has {}", what, axis.show(peak.value / scale, per),
+      at(peak.time_s),
+      source ? axis.showLimit(most / scale, *source, per) : axis.show(most / scale, per)));
 }
 
 void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double begin) {
@@ -63,7 +64,8 @@ void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double 
 }
 
 void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin) {
-  requireWithin(axis, later(motor.velocity, begin), axis.limits.max_speed, "velocity", "/s");
+  requireWithin(axis, later(motor.velocity, begin), axis.limits.max_speed, "velocity", "/s",
+                axis.max_speed_source);
   requireWithin(axis, later(motor.acceleration, begin), axis.mostAcceleration(), "acceleration",
                 "/s^2");
   // A jump of less than a microstep/s is rounding.

@@ -313,13 +313,16 @@ void Controller::serve(const Jog& wanted, const Ack& call) {
   Goal goal;
   goal.kind = Goal::Kind::kJog;
   goal.velocity = wanted.velocity;
-  const auto& limit = wanted.velocity > 0.0 ? moved.config.max_position : moved.config.min_position;
+  const bool up = wanted.velocity > 0.0;
+  const auto& limit = up ? moved.config.max_position : moved.config.min_position;
   if (limit) goal.target = std::llround(moved.countOf(*limit));
   if (!moved.moving()) {
-    const std::int64_t sign = wanted.velocity > 0.0 ? 1 : -1;
+    const std::int64_t sign = up ? 1 : -1;
     if (goal.target && (*goal.target - moved.jointCount()) * sign <= 0) {
-      moved.refuse(fmt::format("it stands at the soft limit {}; it jogs only away from it",
-                               moved.show(*limit)));
+      moved.refuse(
+          fmt::format("it stands at the soft limit {}; it jogs only away from it",
+                      moved.pathAxis().showLimit(*limit, up ? moved.config.max_position_source
+                                                            : moved.config.min_position_source)));
     }
     moved.refuseIntoEndstop(sign);
   } else if (jogs && !motion->slowsDown() && current->velocity == wanted.velocity) {

@@ -23,7 +23,8 @@ constexpr double kLongestTimeoutMs = 60'000.0;
 const std::vector<std::string> kPolicies = {"warn", "enforce"};
 
 /// Keys of a configuration that only the ROS node uses.
-constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout", "hardware_id"};
+constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout", "urdf_limits",
+                                     "hardware_id"};
 
 void readGpio(ConfigReader gpio, MachineConfig& config) {
   const std::string backend = gpio.oneOf("backend", {"simulated", "libgpiod"});

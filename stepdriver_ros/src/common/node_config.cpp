@@ -18,6 +18,7 @@ NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& na
   config.joint_state_rate =
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
   config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
+  config.urdf_limits = reader.boolean("urdf_limits", config.urdf_limits);
   config.hardware_id = reader.text("hardware_id", config.hardware_id);
   reader.rejectUnknown();
   return config;

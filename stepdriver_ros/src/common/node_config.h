@@ -13,6 +13,7 @@ namespace stepdriver::ros_node {
 struct NodeConfig : setup::MachineConfig {
   double joint_state_rate = 50.0;  ///< [Hz]
   double jog_timeout = 0.5;        ///< [s] without a jog message until the axis comes to rest
+  bool urdf_limits = true;         ///< the limits of robot_description apply as well
   std::string hardware_id;         ///< for diagnostics; empty: made from the other facts
 };
 
@@ -21,6 +22,7 @@ struct NodeConfig : setup::MachineConfig {
 /// @code{.yaml}
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
 /// jog_timeout: 0.5               # [s] from 0.02 to 60
+/// urdf_limits: true              # those of robot_description hold too
 /// hardware_id: ""                # of diagnostics; empty: the host and the driver chips
 /// @endcode
 ///

@@ -59,7 +59,7 @@ the lines and ends.
   topics      joint_states  ~endstops  ~axis_states  /diagnostics  ~jog, ~command (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
-              ~state_file  ~hardware_id  ~simulation  robot_description
+              ~state_file  ~hardware_id  ~urdf_limits  ~simulation  robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
 written, 3 the computer is too slow for its axes and ~realtime is enforce, 64 wrong usage.

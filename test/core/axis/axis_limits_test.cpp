@@ -209,10 +209,11 @@ TEST_F(AxisLimitsTest, RefusesWhatIsBeyondTheConfiguredOnesAndChangesNothing) {
     const char* words;
   };
   for (const Bad& bad :
-       {Bad{{1.01, 0, 0, 0}, "the max_speed 1.01 m/s is above the configured 1 m/s"},
-        Bad{{0.5, 2.5, 0, 0}, "the acceleration 2.5 m/s^2 is above the configured 2 m/s^2"},
-        Bad{{0.5, 0, 3, 0}, "the deceleration 3 m/s^2 is above the configured 2 m/s^2"},
-        Bad{{0.5, 0, 0, 5}, "the jerk 5 m/s^3 is above the configured 4 m/s^3"},
+       {Bad{{1.01, 0, 0, 0}, "the max_speed 1.01 m/s is above 1 m/s, from the configuration"},
+        Bad{{0.5, 2.5, 0, 0},
+            "the acceleration 2.5 m/s^2 is above 2 m/s^2, from the configuration"},
+        Bad{{0.5, 0, 3, 0}, "the deceleration 3 m/s^2 is above 2 m/s^2, from the configuration"},
+        Bad{{0.5, 0, 0, 5}, "the jerk 5 m/s^3 is above 4 m/s^3, from the configuration"},
         Bad{{-1, 0, 0, 0}, "the max_speed must be a finite number"},
         Bad{{kNaN, 0, 0, 0}, "the max_speed must be a finite number"},
         Bad{{0.5, kInfinity, 0, 0}, "the acceleration must be a finite number"},
@@ -222,6 +223,24 @@ TEST_F(AxisLimitsTest, RefusesWhatIsBeyondTheConfiguredOnesAndChangesNothing) {
     EXPECT_EQ(x().limits().acceleration, 2.0);
     EXPECT_EQ(x().limits().jerk, 4.0);
   }
+}
+
+TEST_F(AxisLimitsTest, NamesWhoSetTheLimitThatRefuses) {
+  config::AxisConfig config = linearAxis("x");
+  config.max_position = 0.2;
+  config.max_position_source = config::LimitSource::kRobotDescription;
+  config.min_position = -0.1;
+  config.max_speed_source = config::LimitSource::kRobotDescription;
+  bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config});
+  EXPECT_REFUSED(x().moveTo(0.21),
+                 "0.21 m is above the soft limit max_position 0.2 m, from robot_description");
+  EXPECT_REFUSED(x().moveTo(-0.11),
+                 "-0.11 m is below the soft limit min_position -0.1 m, from the configuration");
+  const double top = config.max_speed;
+  EXPECT_REFUSED(x().moveTo(0.1, false, 2.0 * top), " m/s, from robot_description");
+  EXPECT_REFUSED(x().setLimits({2.0 * top, 0.0, 0.0, 0.0}), " m/s, from robot_description");
+  x().setLimits({0.5 * top, 0.0, 0.0, 0.0});
+  EXPECT_REFUSED(x().moveTo(0.1, false, top), " m/s, from set_limits");
 }
 
 TEST_F(AxisLimitsTest, AxesThatMoveTogetherKeepWhatTheyBeganWith) {

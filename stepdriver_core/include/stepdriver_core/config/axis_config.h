@@ -71,6 +71,17 @@ struct HomingConfig {
   int order = 0;  ///< axes with the lowest number go first; the same number: simultaneously
 };
 
+/// Who sets a limit of an axis. Of several the tightest counts.
+enum class LimitSource {
+  kConfiguration,     ///< the axis's own keys
+  kRobotDescription,  ///< its joint in the URDF
+  kSetLimits,         ///< a call that lowered it while the machine runs
+  kChip,              ///< the highest step rate of the driver chip
+};
+
+/// The source as messages name it: "the configuration".
+const char* sourceText(LimitSource source);
+
 /// The complete configuration of an axis, checked by readAxes(). A unit is m on a linear axis, rad
 /// on a rotary one; a step is a microstep of the configured mode.
 struct AxisConfig {
@@ -95,6 +106,9 @@ struct AxisConfig {
   double backlash = 0.0;  ///< [unit] travel that a reversal loses; the motor makes it up
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;
+  LimitSource max_speed_source = LimitSource::kConfiguration;
+  LimitSource min_position_source = LimitSource::kConfiguration;
+  LimitSource max_position_source = LimitSource::kConfiguration;
 
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;

@@ -15,15 +15,16 @@
 namespace stepdriver::ros_node {
 namespace {
 
-std::vector<LimitSources> applyDescriptionParameter(const ros::NodeHandle& node,
-                                                    std::vector<config::AxisConfig>& axes,
-                                                    std::vector<ConfigIssue>& issues) {
+/// @return warnings.
+std::vector<std::string> applyDescriptionParameter(const ros::NodeHandle& node,
+                                                   std::vector<config::AxisConfig>& axes,
+                                                   std::vector<ConfigIssue>& issues) {
   std::string name;
   XmlRpc::XmlRpcValue value;
   if (!node.searchParam("robot_description", name) || !ros::param::get(name, value)) {
     ROS_INFO_NAMED(
         "limits", "There is no robot_description: the limits are those of the axes' configuration");
-    return std::vector<LimitSources>(axes.size());
+    return {};
   }
   const config::ConfigValue description = configValue(value);
   const auto* urdf = description.as<std::string>();
@@ -44,17 +45,16 @@ NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& pr
   NodeConfig config = readNodeConfig(tree, name, issues);
   // Values that depend on the axes can be checked only if the axes are right.
   if (!issues.empty()) throw ConfigError(issues);
-  const auto sources = applyDescriptionParameter(node, config.axes, issues);
+  std::vector<std::string> warnings;
+  if (config.urdf_limits) warnings = applyDescriptionParameter(node, config.axes, issues);
   if (issues.empty() && config.backend == setup::GpioBackend::kSimulated) {
     setup::checkSimulation(config.axes, config.simulation, name + "/simulation", issues);
   }
   if (!issues.empty()) throw ConfigError(issues);
-  for (std::size_t i = 0; i < config.axes.size(); ++i) {
-    ROS_INFO_NAMED("limits", "%s", limitsText(config.axes[i], sources[i]).c_str());
-    if (sources[i].limited_though_continuous) {
-      ROS_WARN_NAMED("limits", "%s", continuousJointText(config.axes[i]).c_str());
-    }
+  for (const config::AxisConfig& axis : config.axes) {
+    ROS_INFO_NAMED("limits", "%s", limitsText(axis).c_str());
   }
+  for (const std::string& warning : warnings) ROS_WARN_NAMED("limits", "%s", warning.c_str());
   return config;
 }
 

@@ -16,6 +16,7 @@ constexpr double kRounding = 1e-5;
 
 using config::AxisConfig;
 using config::Kind;
+using config::LimitSource;
 
 const char* typeName(const urdf::Joint& joint) {
   switch (joint.type) {
@@ -42,14 +43,13 @@ class JointFitter {
   JointFitter(AxisConfig& axis, std::string name, std::vector<ConfigIssue>& issues)
       : axis_(axis), name_(std::move(name)), issues_(issues) {}
 
-  LimitSources fit(const urdf::Joint* joint) {
+  void fit(const urdf::Joint* joint) {
     if (joint == nullptr) {
       issue(fmt::format("has no joint \"{}\", which is the joint of axis {}", axis_.joint,
                         axis_.name));
     } else if (checkType(*joint) && checkLimits(*joint)) {
       tighten(*joint);
     }
-    return sources_;
   }
 
  private:
@@ -115,23 +115,21 @@ class JointFitter {
   }
 
   void tighten(const urdf::Joint& joint) {
-    const bool continuous = joint.type == urdf::Joint::CONTINUOUS;
-    sources_.limited_though_continuous = continuous && (axis_.min_position || axis_.max_position);
     if (!joint.limits) return;
     const urdf::JointLimits& limits = *joint.limits;
     if (limits.velocity < axis_.max_speed) {
       axis_.max_speed = limits.velocity;
       axis_.start_speed = std::min(axis_.start_speed, axis_.max_speed);
-      sources_.max_speed = "joint";
+      axis_.max_speed_source = LimitSource::kRobotDescription;
     }
-    if (continuous) return;
+    if (joint.type == urdf::Joint::CONTINUOUS) return;
     if (!axis_.min_position || limits.lower > *axis_.min_position) {
       axis_.min_position = limits.lower;
-      sources_.min_position = "joint";
+      axis_.min_position_source = LimitSource::kRobotDescription;
     }
     if (!axis_.max_position || limits.upper < *axis_.max_position) {
       axis_.max_position = limits.upper;
-      sources_.max_position = "joint";
+      axis_.max_position_source = LimitSource::kRobotDescription;
     }
     if (*axis_.min_position < *axis_.max_position) return;
     issueOfJoint(fmt::format("goes from {} to {} {}, which leaves nothing of the axis's own range",
@@ -142,34 +140,11 @@ class JointFitter {
   AxisConfig& axis_;
   std::string name_;
   std::vector<ConfigIssue>& issues_;
-  LimitSources sources_;
 };
 
-std::string positionText(const std::optional<double>& position, Kind kind, const char* source) {
+std::string positionText(const std::optional<double>& position, Kind kind, LimitSource source) {
   if (!position) return "without limit";
-  return fmt::format("{} {} ({})", roundedText(*position), unitOf(kind), source);
-}
-
-}  // namespace
-
-std::vector<LimitSources> applyRobotDescription(const std::string& urdf, const std::string& name,
-                                                std::vector<AxisConfig>& axes,
-                                                std::vector<ConfigIssue>& issues) {
-  std::vector<LimitSources> sources;
-  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(urdf);
-  if (!model) {
-    issues.push_back(
-        {name,
-         "can't be read as a URDF; what the parser says stands above. A common reason: a prismatic "
-         "or revolute joint without <limit effort=... velocity=...>"});
-    return sources;
-  }
-  sources.reserve(axes.size());
-  for (AxisConfig& axis : axes) {
-    const urdf::JointConstSharedPtr joint = model->getJoint(axis.joint);
-    sources.push_back(JointFitter(axis, name, issues).fit(joint.get()));
-  }
-  return sources;
+  return fmt::format("{} {} (from {})", roundedText(*position), unitOf(kind), sourceText(source));
 }
 
 std::string continuousJointText(const AxisConfig& axis) {
@@ -180,12 +155,37 @@ std::string continuousJointText(const AxisConfig& axis) {
       axis.name, axis.joint);
 }
 
-std::string limitsText(const AxisConfig& axis, const LimitSources& sources) {
+}  // namespace
+
+std::vector<std::string> applyRobotDescription(const std::string& urdf, const std::string& name,
+                                               std::vector<AxisConfig>& axes,
+                                               std::vector<ConfigIssue>& issues) {
+  std::vector<std::string> warnings;
+  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(urdf);
+  if (!model) {
+    issues.push_back(
+        {name,
+         "can't be read as a URDF; what the parser says stands above. A common reason: a prismatic "
+         "or revolute joint without <limit effort=... velocity=...>"});
+    return warnings;
+  }
+  for (AxisConfig& axis : axes) {
+    const urdf::JointConstSharedPtr joint = model->getJoint(axis.joint);
+    JointFitter(axis, name, issues).fit(joint.get());
+    if (joint && joint->type == urdf::Joint::CONTINUOUS &&
+        (axis.min_position || axis.max_position)) {
+      warnings.push_back(continuousJointText(axis));
+    }
+  }
+  return warnings;
+}
+
+std::string limitsText(const AxisConfig& axis) {
   return fmt::format(
-      "axis {} (joint {}) is limited: min position {}, max position {}, speed {} {}/s ({})",
-      axis.name, axis.joint, positionText(axis.min_position, axis.kind, sources.min_position),
-      positionText(axis.max_position, axis.kind, sources.max_position), roundedText(axis.max_speed),
-      unitOf(axis.kind), sources.max_speed);
+      "axis {} (joint {}) is limited: min position {}, max position {}, speed {} {}/s (from {})",
+      axis.name, axis.joint, positionText(axis.min_position, axis.kind, axis.min_position_source),
+      positionText(axis.max_position, axis.kind, axis.max_position_source),
+      roundedText(axis.max_speed), unitOf(axis.kind), sourceText(axis.max_speed_source));
 }
 
 }  // namespace stepdriver::ros_node
