@@ -107,6 +107,14 @@ TEST(RoslaunchModel, ThatIsGivenLimitsTheConfiguration) {
   EXPECT_TRUE(ros::param::has(Roslaunch::space() + "/robot_description"));
 }
 
+TEST(RoslaunchOfAWrongConfiguration, EndsByItself) {
+  const Configuration file(axisX({"max_sped_mm_s: 1.0"}));
+  Roslaunch launch("axis.launch", {file.argument()});
+  EXPECT_TRUE(launch.process().waitForExit(kBound)) << "it still runs";
+  expectSays(launch.process().output(), "did you mean max_speed_mm_s?");
+  expectSays(launch.process().output(), "REQUIRED process");
+}
+
 TEST(ParametersLoadedByHand, AreSaidToBeLeftOverIfTheyContradictEachOther) {
   NodeUnderTest node;
   node.set("axes/y/driver", "a4988");

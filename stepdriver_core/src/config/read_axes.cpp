@@ -71,8 +71,11 @@ std::optional<driver::Timing> readTiming(ConfigReader& axis, const driver::Timin
 }
 
 const driver::DriverChip* readDriver(ConfigReader& axis) {
-  const auto name = axis.findOneOf("driver", driver::driverChipNames(), Presence::kRequired);
-  return name ? driver::findDriverChip(*name) : nullptr;
+  const auto* name = axis.value("driver").as<std::string>();
+  const auto* chip = name != nullptr ? driver::findDriverChip(*name) : nullptr;
+  if (chip == nullptr) axis.findOneOf("driver", driver::driverChipNames(), Presence::kRequired);
+  axis.allow("driver");
+  return chip;
 }
 
 std::optional<int> readMicrosteps(ConfigReader& axis, const driver::DriverChip* chip) {

@@ -114,8 +114,10 @@ const DriverChip& driverChipOf(Model model) {
 }
 
 const DriverChip* findDriverChip(const std::string& name) {
+  const auto same = [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b - 'A' + 'a' : b); };
   for (const DriverChip& chip : chips()) {
-    if (chip.name == name) return &chip;
+    const std::string& own = chip.name;
+    if (std::equal(own.begin(), own.end(), name.begin(), name.end(), same)) return &chip;
   }
   return nullptr;
 }

@@ -166,6 +166,10 @@ TEST(ReadAxes, ChecksTheNamesOfAxes) {
   }
 }
 
+TEST(ReadAxes, TakesADriverInUpperAndLowerCase) {
+  expectIssues(linearAxis(), {{"driver", "A4988", ""}, {"driver", "Drv8825", ""}});
+}
+
 TEST(ReadAxes, ListsTheDriversAndNamesTheNearest) {
   expectIssues(linearAxis(),
                {{"driver", "a4899",

@@ -80,7 +80,10 @@ TEST(Chip, IsFoundByTheNameInConfigurations) {
     ASSERT_NE(findDriverChip(name), nullptr) << name;
     EXPECT_EQ(findDriverChip(name), &driverChipOf(findDriverChip(name)->model)) << name;
   }
-  EXPECT_EQ(findDriverChip("A4988"), nullptr);
+  EXPECT_EQ(findDriverChip("A4988"), findDriverChip("a4988"));
+  EXPECT_EQ(findDriverChip("Drv8825"), findDriverChip("drv8825"));
+  EXPECT_EQ(findDriverChip("a498"), nullptr);
+  EXPECT_EQ(findDriverChip("a49888"), nullptr);
   EXPECT_EQ(findDriverChip(""), nullptr);
 }
 

@@ -59,6 +59,7 @@ struct DriverChip {
 /// The data of a chip, which live as long as the program.
 const DriverChip& driverChipOf(Model model);
 
+/// @param name in upper or lower case.
 /// @return nullptr if there is no driver of that name.
 const DriverChip* findDriverChip(const std::string& name);
 
