@@ -126,6 +126,19 @@ TEST(EndingUnderNohup, TakesNoNoticeOfAClosedTerminal) {
   expectSays(node.process().output(), "Ending on SIGTERM");
 }
 
+TEST(EndingForAnother, IsNotAskedOfByOneWithAWrongConfiguration) {
+  NodeUnderTest node;
+  node.start();
+  node.set("axes/x/microsteps", 3);
+  const std::string space = node.name().substr(0, node.name().rfind('/'));
+  NodeProcess second({"__ns:=" + space, "__name:=stepdriver"});
+  ASSERT_EQ(second.waitForExit(kBound).value_or(-1), 1) << second.output();
+  expectSays(second.output(), "/axes/x/microsteps is 3, but must be");
+  const auto answer = node.moveTo(0.001, true);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_EQ(node.process().output().find("Ending"), std::string::npos);
+}
+
 TEST(EndingEnabled, LeavesTheMotorOnWhereConfiguredSo) {
   NodeUnderTest node;
   node.set("axes/x/disable_on_shutdown", false);

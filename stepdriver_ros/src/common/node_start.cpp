@@ -37,9 +37,9 @@ bool waitForMaster(EndRequests& end_requests) {
   return true;
 }
 
-config::ConfigValue privateParameters(const ros::NodeHandle& private_node) {
+config::ConfigValue privateParameters(const std::string& node_name) {
   XmlRpc::XmlRpcValue tree;
-  if (!ros::param::get(private_node.getNamespace(), tree)) return config::ConfigValue::Map{};
+  if (!ros::param::get(node_name, tree)) return config::ConfigValue::Map{};
   return configValue(tree);
 }
 

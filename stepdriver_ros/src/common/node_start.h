@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ros/node_handle.h>
-
 #include <optional>
 #include <string>
 
@@ -25,8 +23,9 @@ std::optional<int> handleArguments(int argc, char** argv, const char* usage);
 /// @return false: the node was asked to end before there was a master.
 bool waitForMaster(EndRequests& end_requests);
 
-/// @return the node's private parameters as one map; empty if there are none.
-config::ConfigValue privateParameters(const ros::NodeHandle& private_node);
+/// @param node_name full name of a node.
+/// @return its private parameters as one map, empty where there are none.
+config::ConfigValue privateParameters(const std::string& node_name);
 
 /// Logs all mistakes in the parameters. If some of them may be left over from an earlier launch, it
 /// says how to delete them.

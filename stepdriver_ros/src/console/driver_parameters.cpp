@@ -2,7 +2,7 @@
 
 #include <ros/master.h>
 #include <ros/message_traits.h>
-#include <ros/node_handle.h>
+#include <ros/names.h>
 #include <stepdriver/AxisStates.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace stepdriver::console {
 DriverParameters readDriverParameters(const std::string& driver) {
   std::vector<ConfigIssue> issues;
   ros_node::NodeConfig config = ros_node::readNodeConfig(
-      ros_node::privateParameters(ros::NodeHandle(driver)), driver, issues);
+      ros_node::privateParameters(ros::names::resolve(driver)), driver, issues);
   if (!issues.empty()) throw ConfigError(issues);
   return {std::move(config.axes), config.jog_timeout};
 }

@@ -5,9 +5,11 @@
 #include <ros/names.h>
 #include <ros/node_handle.h>
 #include <ros/param.h>
+#include <ros/this_node.h>
 
 #include <chrono>
 #include <exception>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -44,19 +46,17 @@ Start it with: roslaunch stepdriver joystick.launch
 
 /// @param driver receives the driver's full name.
 /// @throw ConfigError
-JoystickConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
-                              std::string& driver) {
+JoystickConfig readParameters(std::string& driver) {
   std::vector<ConfigIssue> issues;
-  const std::string& name = private_node.getNamespace();
-  JoystickConfig config =
-      readJoystickConfig(ros_node::privateParameters(private_node), name, issues);
+  const std::string& name = ros::this_node::getName();
+  JoystickConfig config = readJoystickConfig(ros_node::privateParameters(name), name, issues);
   std::string why;
   if (config.driver.empty() || !ros::names::validate(config.driver, why)) {
     issues.push_back({name + "/driver", fmt::format("is \"{}\", but must be the name of a node{}",
                                                     config.driver, why.empty() ? "" : ": " + why)});
   }
   if (!issues.empty()) throw ConfigError(issues);
-  driver = node.resolveName(config.driver);
+  driver = ros::names::resolve(config.driver);
   XmlRpc::XmlRpcValue axes;
   if (ros::param::get(driver + "/axes", axes)) {
     checkDriverAxes(config, name, ros_node::configValue(axes), driver, issues);
@@ -77,15 +77,16 @@ void warnOfTooLowRate(const std::string& driver, double rate) {
 }
 
 int run(EndRequests& end_requests) {
-  const ros::NodeHandle node;
-  const ros::NodeHandle private_node("~");
-  end_requests.takeOverShutdownCall();
+  std::optional<ros::NodeHandle> node;  // with it roscpp and its console end
   try {
+    // Before the handle registers this node, which ends a running one of its name.
     std::string driver;
-    const JoystickConfig config = readParameters(node, private_node, driver);
+    const JoystickConfig config = readParameters(driver);
+    node.emplace();
+    end_requests.takeOverShutdownCall();
     warnOfTooLowRate(driver, config.rate);
-    Joystick joystick(node, driver, config);
-    ROS_INFO_NAMED("joystick", "Ready: %s jogs %zu %s of %s", node.resolveName("joy").c_str(),
+    Joystick joystick(*node, driver, config);
+    ROS_INFO_NAMED("joystick", "Ready: %s jogs %zu %s of %s", node->resolveName("joy").c_str(),
                    config.axes.size(), config.axes.size() == 1 ? "axis" : "axes", driver.c_str());
     std::string who;
     while (who.empty()) {
@@ -98,7 +99,7 @@ int run(EndRequests& end_requests) {
     ros::shutdown();  // also ends unanswered calls
     return ros_node::kExitOk;
   } catch (const ConfigError& error) {
-    ros_node::explain(error, private_node.getNamespace(), "Not started");
+    ros_node::explain(error, ros::this_node::getName(), "Not started");
   } catch (const std::exception& error) {
     ROS_FATAL_NAMED("joystick", "Not started: %s", error.what());
   }

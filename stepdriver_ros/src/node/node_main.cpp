@@ -2,6 +2,7 @@
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
+#include <ros/this_node.h>
 
 #include <cstddef>
 #include <deque>
@@ -113,11 +114,14 @@ void warnOfPositions(const machine::Machine& machine) {
   }
 }
 
-/// Runs the node, once there is a master.
+/// Runs the node, once it is registered with the master.
 ///
 /// @return the exit code.
-int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_requests) {
-  const NodeConfig config = readParameters(node, private_node);
+int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle private_node,
+        EndRequests& end_requests) {
+  const NodeConfig& config = parameters.config;
+  for (const std::string& note : parameters.notes) ROS_INFO_NAMED("limits", "%s", note.c_str());
+  for (const std::string& text : parameters.warnings) ROS_WARN_NAMED("limits", "%s", text.c_str());
   setup::Hardware hardware(config, private_node.getNamespace());
   machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), config.options());
 
@@ -177,17 +181,23 @@ int run(ros::NodeHandle node, ros::NodeHandle private_node, EndRequests& end_req
   return shutDown(machine, queues, move_actions, trajectory_action, publisher);
 }
 
-int runOrExplain(EndRequests& end_requests) {
+/// @return the exit code.
+int explainConfig(const ConfigError& error) {
+  explain(error, ros::this_node::getName(), "Not started, no line was touched");
+  return kExitConfig;
+}
+
+/// Registers the node and runs it. @return the exit code.
+int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
   // With its last handle roscpp shuts down, and so does the log: these handles live until
   // everything has been logged.
   const ros::NodeHandle node;
   const ros::NodeHandle private_node("~");
   end_requests.takeOverShutdownCall();
   try {
-    return run(node, private_node, end_requests);
+    return run(parameters, node, private_node, end_requests);
   } catch (const ConfigError& error) {
-    explain(error, private_node.getNamespace(), "Not started, no line was touched");
-    return kExitConfig;
+    return explainConfig(error);
   } catch (const GpioError& error) {
     ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitGpio;
@@ -197,6 +207,15 @@ int runOrExplain(EndRequests& end_requests) {
   } catch (const std::exception& error) {
     ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitConfig;
+  }
+}
+
+/// Registers the node only if its parameters are right. @return the exit code.
+int start(EndRequests& end_requests) {
+  try {
+    return runOrExplain(readParameters(), end_requests);
+  } catch (const ConfigError& error) {
+    return explainConfig(error);
   }
 }
 
@@ -210,7 +229,7 @@ int main(int argc, char** argv) {
   if (const auto code = node::handleArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
   if (!node::waitForMaster(end_requests)) return node::kExitOk;
-  const int exit_code = node::runOrExplain(end_requests);
+  const int exit_code = node::start(end_requests);
   ros::shutdown();
   return exit_code;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <ros/init.h>
+#include <ros/names.h>
 
 #include <vector>
 
@@ -69,7 +70,7 @@ bool runWizard(const ros::NodeHandle& node, const std::string& driver, const Wiz
   checkNewFile(options.output, options.overwrite);
   const DriverParameters known = readDriverParameters(driver);
   const std::vector<config::AxisConfig> axes = chosenAxes(known, options.axis);
-  config::ConfigValue parameters = ros_node::privateParameters(ros::NodeHandle(driver));
+  config::ConfigValue parameters = ros_node::privateParameters(ros::names::resolve(driver));
   DriverAtHand machine(node, driver, known);
   LineDialogue dialogue(end_requests, [&machine] { machine.poll(); });
   try {

@@ -1,15 +1,24 @@
 #pragma once
 
-#include <ros/node_handle.h>
+#include <string>
+#include <vector>
 
 #include "common/node_config.h"
 
 namespace stepdriver::ros_node {
 
+struct Parameters {
+  NodeConfig config;
+  /// Sentences for the log: the limits of the axes and where they come from.
+  std::vector<std::string> notes;
+  std::vector<std::string> warnings;
+};
+
 /// Reads and checks all parameters of the node: its own and the robot description, whose limits it
-/// applies. Logs the resulting limits.
+/// applies. It needs a master and ros::init(), but not ros::start(): with that the master shuts
+/// down a running node of the same name, which a mistake in the parameters must not do.
 ///
-/// @throw ConfigError listing every mistake. No line has been touched by then.
-NodeConfig readParameters(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
+/// @throw ConfigError listing every mistake.
+Parameters readParameters();
 
 }  // namespace stepdriver::ros_node
