@@ -41,6 +41,10 @@ TEST(PlotMotion, SaysWhyItDrawsNothing) {
   expect_fails("x", "0.3", 1, "above the soft limit");
   expect_fails("x", "0", 1, "nothing would move");
   expect_fails("z", "0.1", 1, "has no axis z: its axes are x");
+  const auto none = runProgram("plot_motion", {"plan", "--node", "/nobody", "--axis", "x", "--to",
+                                               "0.1", "-o", picture.path()});
+  EXPECT_EQ(none.code, 1);
+  expectSays(none.output, "the parameter /nobody/axes has no axis; it must have x");
   expect_fails("x", "nan", 64, "must be a finite number");
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <regex>
 #include <utility>
 
 #include "message_text.h"
@@ -43,6 +44,19 @@ std::string shownWithType(const ConfigValue& value) {
   if (value.as<std::string>() != nullptr) return value.shown() + " (a string)";
   if (value.as<bool>() != nullptr) return value.shown() + " (a boolean)";
   return value.shown();
+}
+
+/// How to write a number with an exponent that YAML 1.1 takes for text: "1e6" as 1.0e+6. Empty if
+/// the value is none.
+std::string exponentHint(const ConfigValue& value) {
+  static const std::regex number("([-+]?[0-9]+)(\\.[0-9]*)?[eE]([-+]?)([0-9]+)");
+  const auto* text = value.as<std::string>();
+  std::smatch parts;
+  if (text == nullptr || !std::regex_match(*text, parts, number)) return "";
+  const std::string fraction = parts[2].length() > 1 ? parts[2].str() : ".0";
+  const std::string sign = parts[3].length() > 0 ? parts[3].str() : "+";
+  return fmt::format("; write {}{}e{}{}, as YAML takes {} for text", parts[1].str(), fraction, sign,
+                     parts[4].str(), *text);
 }
 
 const ConfigValue::Map* mapOrIssue(const ConfigValue& value, const std::string& name,
@@ -117,7 +131,7 @@ std::optional<double> ConfigReader::findNumber(const std::string& key, const Ran
   const int* integer = value->as<int>();
   const double* real = value->as<double>();
   if (integer == nullptr && real == nullptr) {
-    wrong(key, shownWithType(*value), wanted);
+    wrong(key, shownWithType(*value), wanted + exponentHint(*value));
     return {};
   }
   const double number = integer != nullptr ? *integer : *real;

@@ -89,9 +89,11 @@ std::string RealtimeRights::text() const {
                                "SCHED_FIFO refused ({}): `@realtime - rtprio 98` in "
                                "/etc/security/limits.d allows it to the group realtime",
                                std::strerror(scheduler_error));
-  text += memory_error == 0
-              ? "; memory locked"
-              : "; memory not locked: `@realtime - memlock unlimited` there allows it";
+  text += memory_error == 0 ? "; memory locked"
+                            : fmt::format(
+                                  "; memory not locked ({}): `@realtime - memlock unlimited` in "
+                                  "/etc/security/limits.d allows it to the group realtime",
+                                  std::strerror(memory_error));
   return text + latencyText(latency_error);
 }
 

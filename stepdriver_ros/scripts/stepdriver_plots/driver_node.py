@@ -47,8 +47,10 @@ class DriverNode:
             return 1000.0, "mm"
         if self.axis_param(axis, "max_speed_deg_s") is not None:
             return 180.0 / math.pi, "deg"
-        raise NodeError(f"{self.name} has no axis {axis}: its axes are "
-                        f"{', '.join(sorted(self.param('axes', {}))) or 'none'}")
+        axes = ", ".join(sorted(self.param("axes", {})))
+        raise NodeError(f"{self.name} has no axis {axis}: its axes are {axes}" if axes else
+                        f"the parameter {self.name}/axes has no axis; it must have {axis}. Is {self.name} the "
+                        "name of the node, and does it run?")
 
     def wiring(self, axis):
         """Whether STEP and DIR are inverted on their lines."""

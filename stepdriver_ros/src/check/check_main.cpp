@@ -124,7 +124,9 @@ class Check {
 
   void move() {
     if (!real_ || exit_code_ == kExitLines) {
-      note(kExitMove, "nothing was moved: there are no lines to move it by.");
+      note(kExitMove,
+           "no axis was moved: gpio/backend is \"simulated\", but --move needs \"libgpiod\", which "
+           "--backend libgpiod sets.");
       return;
     }
     print(

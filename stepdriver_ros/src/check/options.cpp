@@ -50,7 +50,7 @@ Options parseOptions(const std::vector<std::string>& arguments) {
   add("move", po::bool_switch(&options.move));
   add("axis", po::value(&options.axis));
   add("distance", po::value<std::string>());
-  const po::variables_map values = readCommandLine(known, arguments);
+  const po::variables_map values = readCommandLine(known, arguments, "config");
   if (options.help) return options;
   if (values.count("backend") > 0) {
     options.backend = backendOf(values["backend"].as<std::string>());

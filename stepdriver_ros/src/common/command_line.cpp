@@ -14,7 +14,8 @@ namespace stepdriver {
 namespace po = boost::program_options;
 
 po::variables_map readCommandLine(const po::options_description& known,
-                                  const std::vector<std::string>& arguments) {
+                                  const std::vector<std::string>& arguments,
+                                  const std::string& meant) {
   namespace style = po::command_line_style;
   po::variables_map options;
   try {
@@ -23,7 +24,10 @@ po::variables_map readCommandLine(const po::options_description& known,
                                           .style(style::unix_style & ~style::allow_guessing)
                                           .run();
     for (const po::option& option : parsed.options) {
-      if (option.string_key.empty()) throw Error(option.value.front() + " isn't known");
+      if (!option.string_key.empty()) continue;
+      const std::string& word = option.value.front();
+      throw Error(
+          fmt::format("{} stands without an option; did you mean --{} {}?", word, meant, word));
     }
     po::store(parsed, options);
     po::notify(options);

@@ -12,10 +12,11 @@ namespace stepdriver {
 /// Reads the arguments of a program: long options with their full names, short options, and nothing
 /// else. Fills in the variables of the descriptions.
 ///
+/// @param meant the option that a word without one was probably for.
 /// @throw Error if they can't be understood.
 boost::program_options::variables_map readCommandLine(
     const boost::program_options::options_description& known,
-    const std::vector<std::string>& arguments);
+    const std::vector<std::string>& arguments, const std::string& meant);
 
 /// The value of an option that was read as a string; empty if it wasn't given.
 ///

@@ -71,7 +71,7 @@ Options parseOptions(const std::vector<std::string>& arguments) {
   add("axis", po::value(&wizard.axis));
   add("output", po::value(&wizard.output));
   add("overwrite", po::bool_switch(&wizard.overwrite));
-  const po::variables_map values = readCommandLine(known, arguments);
+  const po::variables_map values = readCommandLine(known, arguments, "driver");
   if (options.help) return options;
   readPart(values, "slow", options.speeds.slow);
   readPart(values, "fast", options.speeds.fast);

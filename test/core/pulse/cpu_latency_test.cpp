@@ -95,6 +95,16 @@ TEST_F(CpuLatency, IsHeldWhileWakeUpsAreMeasured) {
   EXPECT_EQ(measureWakeUps(clock, "").rights.latency_error, -1);
 }
 
+TEST(RealtimeRights, TellWhereEachIsGranted) {
+  EXPECT_EQ(
+      RealtimeRights({0, EPERM, 0})
+          .text()
+          .find("SCHED_FIFO 50; memory not locked (Operation not permitted): `@realtime - memlock "
+                "unlimited` in /etc/security/limits.d allows it to the group realtime"),
+      0U)
+      << RealtimeRights({0, EPERM, 0}).text();
+}
+
 TEST(RealtimeRights, TellHowTheProcessorsAreKeptAwakeOrWhatToDo) {
   const auto text = [](int error) { return RealtimeRights{0, 0, error}.text(); };
   EXPECT_EQ(text(-1), "SCHED_FIFO 50; memory locked");
