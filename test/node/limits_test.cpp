@@ -74,7 +74,8 @@ TEST(Limits, RefuseWhatIsBeyondTheConfiguredOnes) {
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const auto answer = setLimits(node, bad);
     EXPECT_FALSE(answer.success) << bad;
-    expectSays(answer.message, "the max_speed must be a finite number");
+    expectSays(answer.message,
+               " m/s, but must be a finite number above 0, or 0 for the configured");
   }
   const auto too_fast = setLimits(node, 0.05);
   EXPECT_TRUE(too_fast.success);

@@ -127,10 +127,11 @@ TEST_F(MoveActionTest, RejectsWhatMoveToRefusesAndSaysWhy) {
     const char* words;
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const Bad& bad : {Bad{goalTo(nan), "the position must be a finite number"},
-                         Bad{goalTo(0.3), "above the soft limit max_position 0.2 m"},
-                         Bad{goalTo(0.1, -1.0), "the velocity must be a finite number"},
-                         Bad{goalTo(0.1, 0.5), "above the maximum 0.1 m/s"}}) {
+  for (const Bad& bad :
+       {Bad{goalTo(nan), "the position is nan m, but must be a finite number"},
+        Bad{goalTo(0.3), "above the soft limit max_position 0.2 m"},
+        Bad{goalTo(0.1, -1.0), "the velocity is -1 m/s, but must be a finite number"},
+        Bad{goalTo(0.1, 0.5), "above the maximum 0.1 m/s"}}) {
     EXPECT_EQ(run(bad.goal), State::REJECTED) << bad.words;
     expectEnd(MoveResult::REFUSED, bad.words);
     MoveTo::Request request;

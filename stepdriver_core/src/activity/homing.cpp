@@ -349,7 +349,7 @@ void Homing::conclude(const std::string& message, bool stands) {
   result_.axis = axis_.name();
   result_.position = axis_.positionNow();
   result_.message = message;
-  if (stands) result_.message += axis_.show(result_.position);
+  if (stands) result_.message += axis_.showPlace(result_.position);
   outcome_->set(result_);
   finish();
 }

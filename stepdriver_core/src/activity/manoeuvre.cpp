@@ -51,7 +51,7 @@ axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis,
   result.position = axis.positionNow();
   result.duration = durationOf(context, goal, state.end_time);
   if (end == axis::MoveEnd::kReached) {
-    result.message = fmt::format("{} reached {}", axis.name(), axis.show(result.position));
+    result.message = fmt::format("{} reached {}", axis.name(), axis.showPlace(result.position));
     return result;
   }
   result.message = standsAt(axis, goal, why);
@@ -91,10 +91,10 @@ Failure failureOf(const std::exception& error) {
 
 std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why) {
   const std::string not_at =
-      goal.target ? ", not at " + axis.show(axis.positionOf(static_cast<double>(*goal.target)))
+      goal.target ? ", not at " + axis.showPlace(axis.positionOf(static_cast<double>(*goal.target)))
                   : "";
-  return fmt::format("{} stands at {}{}: {}", axis.name(), axis.show(axis.positionNow()), not_at,
-                     why);
+  return fmt::format("{} stands at {}{}: {}", axis.name(), axis.showPlace(axis.positionNow()),
+                     not_at, why);
 }
 
 Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join)
@@ -533,10 +533,10 @@ axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Orde
   } else if (by.goal.kind == Goal::Kind::kTogether) {
     what = "a motion together with other axes";
   } else {
-    what = "a move to " + axis.show(axis.positionOf(static_cast<double>(*by.goal.target)));
+    what = "a move to " + axis.showPlace(axis.positionOf(static_cast<double>(*by.goal.target)));
   }
-  result.message =
-      fmt::format("{} was at {} when {} took over", axis.name(), axis.show(result.position), what);
+  result.message = fmt::format("{} was at {} when {} took over", axis.name(),
+                               axis.showPlace(result.position), what);
   return result;
 }
 

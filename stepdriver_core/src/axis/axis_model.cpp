@@ -107,8 +107,9 @@ pulse::Nanoseconds AxisModel::restartInterval() const {
 double AxisModel::checkedLimit(const char* what, double wanted, double configured, double lowest,
                                const char* per, config::LimitSource source) const {
   if (!std::isfinite(wanted) || wanted < 0.0) {
-    refuse(
-        fmt::format("the {} must be a finite number, above 0 or 0 for what is configured", what));
+    refuse(fmt::format(
+        "the {} is {}, but must be a finite number above 0, or 0 for the configured one", what,
+        show(wanted, per)));
   }
   // The bound must not be below itself after the configuration's rounding.
   const double bound = lowest / config.steps_per_unit;
@@ -168,6 +169,11 @@ void AxisModel::refuseUnlessReady() const {
   if (motor.power().wantsSleep()) refuse("asleep; wake it first");
 }
 
+void AxisModel::refuseUnlessFinite(const char* what, double value, const char* per) const {
+  if (std::isfinite(value)) return;
+  refuse(fmt::format("the {} is {}, but must be a finite number", what, show(value, per)));
+}
+
 void AxisModel::refuseTooFast(double speed) const {
   if (speed <= maxSpeed() * (1.0 + 1e-12)) return;
   refuse(fmt::format("the velocity {} is above the maximum {}", show(speed, "/s"),
@@ -176,7 +182,9 @@ void AxisModel::refuseTooFast(double speed) const {
 
 double AxisModel::checkedVelocity(double velocity) const {
   if (!std::isfinite(velocity) || velocity < 0.0) {
-    refuse("the velocity must be a finite number, above 0 or 0 for the maximum");
+    refuse(
+        fmt::format("the velocity is {}, but must be a finite number above 0, or 0 for the maximum",
+                    show(velocity, "/s")));
   }
   refuseTooFast(velocity);
   return velocity > 0.0 ? std::min(velocity, maxSpeed()) : maxSpeed();

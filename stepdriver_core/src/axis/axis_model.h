@@ -56,6 +56,8 @@ class AxisModel {
   double positionNow() const { return positionOf(static_cast<double>(jointCount())); }
   /// A value with its unit, for messages.
   std::string show(double value, const char* per = "") const { return pathAxis().show(value, per); }
+  /// Where it stands or comes to rest, as messages show it.
+  std::string showPlace(double at) const { return pathAxis().showPlace(at); }
   /// @}
 
   /// @name For paths of several axes
@@ -90,6 +92,7 @@ class AxisModel {
   void refuseUnlessHomed() const;
   /// Closed, at fault, disabled or asleep.
   void refuseUnlessReady() const;
+  void refuseUnlessFinite(const char* what, double value, const char* per = "") const;
   void refuseTooFast(double speed) const;
   void refuseBeyondLimits(double at, const std::string& what) const {
     pathAxis().refuseBeyondLimits(at, what);

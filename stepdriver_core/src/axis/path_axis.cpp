@@ -40,6 +40,10 @@ std::string PathAxis::show(double value, const char* per) const {
   return fmt::format("{:.9g} {}{}", value, kind == config::Kind::kLinear ? "m" : "rad", per);
 }
 
+std::string PathAxis::showPlace(double position) const {
+  return config::placeText(position, kind, steps_per_unit);
+}
+
 std::string PathAxis::showLimit(double value, config::LimitSource source, const char* per) const {
   return fmt::format("{}, from {}", show(value, per), config::sourceText(source));
 }

@@ -39,8 +39,10 @@ struct PathAxis {
   /// [microsteps/s^2] The larger of acceleration and deceleration.
   double mostAcceleration() const;
 
-  /// "0.1 m", "0.1 rad/s"
+  /// A value that was asked for or configured: "0.1 m", "0.1 rad/s".
   std::string show(double value, const char* per = "") const;
+  /// Where the axis stands or comes to rest: "0.1 m".
+  std::string showPlace(double position) const;
   /// A limit with its source: "0.1 m, from robot_description".
   std::string showLimit(double value, config::LimitSource source, const char* per = "") const;
   /// @throw Refused always: "x: why".

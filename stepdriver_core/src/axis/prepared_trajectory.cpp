@@ -87,7 +87,7 @@ void requireStart(const PathAxis& axis, const motion::Waypoint& first, const Pat
   if (std::abs(first.position - count) <= axis.microsteps) return;
   axis.refuse(fmt::format(
       "the trajectory begins at {}, but the axis stands at {}; they may differ by one full step",
-      axis.show(axis.positionOf(first.position)), axis.show(axis.positionOf(count))));
+      axis.showPlace(axis.positionOf(first.position)), axis.showPlace(axis.positionOf(count))));
 }
 
 double jerkOf(const Profile& profile) {

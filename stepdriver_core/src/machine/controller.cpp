@@ -238,7 +238,7 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
 void Controller::setTarget(Goal& goal, axis::AxisModel& axis, double position, bool relative) {
   refuseUnlessReadyToMove(axis);
   if (!relative) axis.refuseUnlessHomed();
-  if (!std::isfinite(position)) axis.refuse("the position must be a finite number");
+  axis.refuseUnlessFinite("position", position);
   const double count =
       relative ? relativeOrigin(axis) + position * axis.stepsPerUnit() : axis.countOf(position);
   axis.refuseBeyondLimits(relative ? axis.positionOf(count) : position, "the position");
@@ -269,6 +269,9 @@ void Controller::serve(const MoveRounds& wanted, const Ack& call) {
     moved.refuse(
         "the steps of a round are not known: configure steps_per_round or full_steps_per_round");
   }
+  if (!std::isfinite(wanted.rounds)) {
+    moved.refuse(fmt::format("rounds is {}, but must be a finite number", wanted.rounds));
+  }
   const double way = wanted.rounds * moved.config.steps_per_round / moved.config.steps_per_unit;
   serve(MoveTo{wanted.axis, way, true, wanted.velocity}, call);
 }
@@ -296,7 +299,7 @@ void Controller::serve(const PlanMove& wanted, const Ack& call) {
 
 void Controller::serve(const Jog& wanted, const Ack& call) {
   axis::AxisModel& moved = axis(wanted.axis);
-  if (!std::isfinite(wanted.velocity)) moved.refuse("the velocity must be a finite number");
+  moved.refuseUnlessFinite("velocity", wanted.velocity, "/s");
   const Activity* owner = activities_.owner(moved);
   const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
   const Goal* current = motion != nullptr && moved.moving() ? motion->goalOf(moved) : nullptr;
@@ -563,10 +566,10 @@ void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
   if (common != count) {
     const double place = changed.positionOf(changed.jointAt(static_cast<double>(common)));
     if (!changed.config.align_on_microstep_change) {
-      changed.refuse(
-          fmt::format("1/{} has no position at {}; the nearest that both modes have is {}: move "
-                      "there first, or configure align_on_microstep_change",
-                      wanted.microsteps, changed.show(changed.positionNow()), changed.show(place)));
+      changed.refuse(fmt::format(
+          "1/{} has no position at {}; the nearest that both modes have is {}: move "
+          "there first, or configure align_on_microstep_change",
+          wanted.microsteps, changed.showPlace(changed.positionNow()), changed.showPlace(place)));
     }
     refuseUnlessReadyToMove(changed);
     changed.refuseBeyondLimits(place, "the common position");
@@ -580,7 +583,7 @@ void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
 void Controller::serve(const SetPosition& wanted, const Ack& /*call*/) {
   axis::AxisModel& changed = axis(wanted.axis);
   refuseUnlessFree(changed, "its position is set");
-  if (!std::isfinite(wanted.position)) changed.refuse("the position must be a finite number");
+  changed.refuseUnlessFinite("position", wanted.position);
   changed.refuseBeyondLimits(wanted.position, "the position");
   changed.position.declare(wanted.position -
                            static_cast<double>(changed.jointCount()) / changed.stepsPerUnit());

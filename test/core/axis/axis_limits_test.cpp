@@ -214,10 +214,12 @@ TEST_F(AxisLimitsTest, RefusesWhatIsBeyondTheConfiguredOnesAndChangesNothing) {
             "the acceleration 2.5 m/s^2 is above 2 m/s^2, from the configuration"},
         Bad{{0.5, 0, 3, 0}, "the deceleration 3 m/s^2 is above 2 m/s^2, from the configuration"},
         Bad{{0.5, 0, 0, 5}, "the jerk 5 m/s^3 is above 4 m/s^3, from the configuration"},
-        Bad{{-1, 0, 0, 0}, "the max_speed must be a finite number"},
-        Bad{{kNaN, 0, 0, 0}, "the max_speed must be a finite number"},
-        Bad{{0.5, kInfinity, 0, 0}, "the acceleration must be a finite number"},
-        Bad{{0.5, 0, 0, kNaN}, "the jerk must be a finite number"}}) {
+        Bad{{-1, 0, 0, 0},
+            "the max_speed is -1 m/s, but must be a finite number above 0, or 0 for the configured "
+            "one"},
+        Bad{{kNaN, 0, 0, 0}, "the max_speed is nan m/s, but must be a finite number"},
+        Bad{{0.5, kInfinity, 0, 0}, "the acceleration is inf m/s^2, but must be a finite number"},
+        Bad{{0.5, 0, 0, kNaN}, "the jerk is nan m/s^3, but must be a finite number"}}) {
     EXPECT_REFUSED(x().setLimits(bad.limits), bad.words);
     EXPECT_EQ(x().limits().max_speed, 1.0);
     EXPECT_EQ(x().limits().acceleration, 2.0);

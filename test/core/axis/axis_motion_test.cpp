@@ -232,7 +232,8 @@ TEST_F(AxisMotion, TakesOverFromAJogWithAMoveAndTheOtherWayRound) {
 }
 
 TEST_F(AxisMotion, RefusesAJogThatItCannotDo) {
-  EXPECT_REFUSED(x().jog(std::numeric_limits<double>::infinity()), "finite");
+  EXPECT_REFUSED(x().jog(std::numeric_limits<double>::infinity()),
+                 "the velocity is inf m/s, but must be");
   EXPECT_REFUSED(x().jog(-1.01), "above the maximum 1 m/s");
   x().jog(0.0);
   x().enable(false);

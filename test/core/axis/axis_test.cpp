@@ -66,17 +66,20 @@ TEST(Axis, RefusesBadNumbersAndSendsNoPulse) {
   axis::Axis& x = bench.axis();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
-  EXPECT_REFUSED(x.moveTo(nan), "finite");
-  EXPECT_REFUSED(x.moveTo(-inf), "finite");
+  EXPECT_REFUSED(x.moveTo(nan), "x: the position is nan m, but must be a finite number");
+  EXPECT_REFUSED(x.moveTo(-inf), "the position is -inf m, but must be");
+  EXPECT_REFUSED(
+      x.moveTo(0.01, false, -0.05),
+      "the velocity is -0.05 m/s, but must be a finite number above 0, or 0 for the maximum");
   EXPECT_REFUSED(x.moveTo(0.01, false, nan), "velocity");
   EXPECT_REFUSED(x.moveTo(0.01, false, -0.1), "velocity");
   EXPECT_REFUSED(x.moveTo(0.01, false, 0.11), "above the maximum 0.1 m/s");
   EXPECT_REFUSED(x.moveTo(0.0201), "above the soft limit max_position 0.02 m");
   EXPECT_REFUSED(x.moveTo(-0.0101), "below the soft limit min_position -0.01 m");
   EXPECT_REFUSED(x.moveTo(0.021, true), "soft limit");
-  EXPECT_REFUSED(x.moveRounds(nan), "finite");
+  EXPECT_REFUSED(x.moveRounds(nan), "rounds is nan, but must be a finite number");
   EXPECT_REFUSED(x.moveRounds(1e300), "soft limit");
-  EXPECT_REFUSED(x.setPosition(nan), "finite");
+  EXPECT_REFUSED(x.setPosition(nan), "the position is nan m, but must be a finite number");
   EXPECT_REFUSED(x.setPosition(0.03), "soft limit");
   bench.machine->advance(1.0);
   EXPECT_EQ(bench.report().pulses_forward + bench.report().pulses_backward, 0);

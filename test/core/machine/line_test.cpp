@@ -379,7 +379,8 @@ TEST_F(Line, RefusesWhatItCannotDoAndMovesNothing) {
   EXPECT_EQ(refused({{"x", "q"}, {1.0, 1.0}}), "there is no axis q; there are x, y, c");
   EXPECT_EQ(refused({{"x", "x"}, {1.0, 1.0}}), "the axis x is named twice");
   EXPECT_EQ(refused({{"x", "y"}, {1.0}}), "there are 2 names, but 1 positions");
-  EXPECT_EQ(refused({{"x", "y"}, {1.0, std::nan("")}}), "y: the position must be a finite number");
+  EXPECT_EQ(refused({{"x", "y"}, {1.0, std::nan("")}}),
+            "y: the position is nan m, but must be a finite number");
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}, false, -1.0}),
             "x: the velocity of the line is -1, but must be 0 or above, and finite");
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}, false, 1.0, 1.0}),

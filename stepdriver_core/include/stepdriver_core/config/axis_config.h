@@ -25,6 +25,10 @@ constexpr double configUnitsPerUnit(Kind kind) {
   return kind == Kind::kLinear ? 1000.0 : 180.0 / 3.14159265358979323846;
 }
 
+/// A place of an axis with its unit, as messages show it: rounded to what a microstep is worth, so
+/// that the rounding of sums doesn't show. "0.05 m"
+std::string placeText(double position, Kind kind, double steps_per_unit);
+
 /// A line of the driver chip. An empty name: the pin isn't wired.
 struct Pin {
   std::string line;       ///< `chip:offset`, `label:offset` or the kernel's name

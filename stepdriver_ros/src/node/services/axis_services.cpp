@@ -98,17 +98,20 @@ bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
   });
 }
 
+std::string AxisServices::placeText(double position) const {
+  const config::AxisConfig& config = axis_.config();
+  const double scale = config.steps_per_unit * axis_.state().microsteps / config.microsteps;
+  return config::placeText(position, config.kind, scale);
+}
+
 std::string AxisServices::wayText(const axis::Move& move) const {
-  const char* const unit = unitOf(axis_.config().kind);
-  std::string text =
-      fmt::format("to {} {} in {} s", roundedText(move.target), unit, roundedText(move.duration));
-  const std::string rest = roundedText(move.rest);
-  if (rest != roundedText(move.target)) {
-    text += fmt::format("; it comes to rest at {} {}, the nearest microstep", rest, unit);
-  }
+  const std::string target = placeText(move.target);
+  const std::string rest = placeText(move.rest);
+  std::string text = fmt::format("to {} in {} s", target, roundedText(move.duration));
+  if (rest != target) text += fmt::format("; it comes to rest at {}, the nearest microstep", rest);
   if (move.overshoot > 0.0) {
     text += fmt::format("; it can't stop before that, goes {} {} beyond, and comes back",
-                        roundedText(move.overshoot), unit);
+                        roundedText(move.overshoot), unitOf(axis_.config().kind));
   }
   return text;
 }
@@ -159,8 +162,8 @@ bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& r
 bool AxisServices::setPosition(SetPosition::Request& request, SetPosition::Response& response) {
   respond(response, [&] {
     axis_.setPosition(request.position);
-    response.message = fmt::format("{}: stands at {} {}", axis_.config().name,
-                                   roundedText(request.position), unitOf(axis_.config().kind));
+    response.message =
+        fmt::format("{}: stands at {}", axis_.config().name, placeText(request.position));
   });
   response.position = axis_.state().position;
   return true;

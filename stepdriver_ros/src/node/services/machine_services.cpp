@@ -42,9 +42,9 @@ void moveLine(machine::Machine& machine, const MoveLine::Request& request,
     return;
   }
   for (const auto& [name, own] : move.members) {
-    const config::Kind kind = machine.axis(name).config().kind;
-    response.message += fmt::format("{}{} to {} {}", response.message.empty() ? "" : ", ", name,
-                                    roundedText(own.target), unitOf(kind));
+    const config::AxisConfig& axis = machine.axis(name).config();
+    response.message += fmt::format("{}{} to {}", response.message.empty() ? "" : ", ", name,
+                                    config::placeText(own.target, axis.kind, axis.steps_per_unit));
     response.position.push_back(own.rest);
   }
   response.message =

@@ -58,7 +58,8 @@ std::vector<std::size_t> JogSubscriber::axesOf(const Jog& message) const {
       throw Refused("the axis " + message.name[i] + " is named twice");
     }
     if (!std::isfinite(message.velocity[i])) {
-      throw Refused(message.name[i] + ": the velocity must be a finite number");
+      throw Refused(fmt::format("{}: the velocity is {}, but must be a finite number",
+                                message.name[i], message.velocity[i]));
     }
     axes.push_back(index);
   }
