@@ -6,11 +6,14 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/wait.h"
 
 // Positions that outlast the node.
 
@@ -77,6 +80,25 @@ TEST_F(StateFile, SaysThatThePositionOfAKilledNodeIsUnverified) {
   expectSays(after.position_note.at(0), "wasn't shut down");
   end(SIGTERM);
   expectSays(node_.process().output(), "x: its position is unverified: the node that kept");
+}
+
+TEST_F(StateFile, SaysThatTheAxisOfAKilledNodeWasMovingAndFromWhere) {
+  node_.set("simulation/speed", 1.0);
+  node_.start();
+  standAt(0.008);
+  EXPECT_TRUE(node_.moveTo(0.2, false, 0.001).success);  // takes minutes
+  const auto text = [this] {
+    std::ifstream in(file());
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const auto has = [&text](const char* words) { return text().find(words) != std::string::npos; };
+  ASSERT_TRUE(waitUntil([&] { return has("80000 0.008") && has(" 1\n"); })) << text();
+  end(SIGKILL);
+  node_.start();
+  const AxisStates after = first();
+  EXPECT_FALSE(after.position_valid.at(0));
+  EXPECT_DOUBLE_EQ(after.position.at(0), 0.008);
+  expectSays(after.position_note.at(0), "wasn't shut down: the axis was moving, from 0.008 m");
 }
 
 TEST_F(StateFile, StopsTheStartWhereItCannotBe) {

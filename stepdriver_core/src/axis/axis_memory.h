@@ -8,16 +8,17 @@ namespace stepdriver::axis {
 struct AxisMemory {
   config::Kind kind = config::Kind::kLinear;
   double steps_per_unit = 0.0;  ///< [steps/unit] as configured
-  double position = 0.0;        ///< [unit] at rest
+  double position = 0.0;        ///< [unit] at rest, or where the current motion began
   double slack = 0.0;           ///< [unit] the part of the backlash that is taken up
   bool valid = false;           ///< the position could be trusted
   bool homed = false;
   bool at_home = false;  ///< the chip's translator was in its state after a reset
+  bool moving = false;
 
   bool operator==(const AxisMemory& other) const {
     return kind == other.kind && steps_per_unit == other.steps_per_unit &&
            position == other.position && slack == other.slack && valid == other.valid &&
-           homed == other.homed && at_home == other.at_home;
+           homed == other.homed && at_home == other.at_home && moving == other.moving;
   }
 };
 

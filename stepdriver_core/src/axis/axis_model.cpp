@@ -247,18 +247,30 @@ void AxisModel::noteHome() {
 // ---- over a restart ----
 
 AxisMemory AxisModel::memory() const {
-  AxisMemory memory;
-  memory.kind = config.kind;
-  memory.steps_per_unit = config.steps_per_unit;
-  memory.position = positionNow();
-  memory.slack = static_cast<double>(motor.state().slack) / stepsPerUnit();
-  memory.valid = position.isValid();
-  memory.homed = position.isHomed();
-  memory.at_home = motor.translator().isAtHome(motor.state().count);
+  AxisMemory memory = rest_;
+  memory.moving = moving();
   return memory;
 }
 
+void AxisModel::rememberRest() {
+  if (moving()) return;
+  rest_.kind = config.kind;
+  rest_.steps_per_unit = config.steps_per_unit;
+  rest_.position = positionNow();
+  rest_.slack = static_cast<double>(motor.state().slack) / stepsPerUnit();
+  rest_.valid = position.isValid();
+  rest_.homed = position.isHomed();
+  rest_.at_home = motor.translator().isAtHome(motor.state().count);
+}
+
 std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean) const {
+  if (!clean && kept.moving) {
+    return fmt::format(
+        "the node that kept this position wasn't shut down: the axis was moving, from {}, and it "
+        "is "
+        "not known where it stopped",
+        showPlace(kept.position));
+  }
   if (!clean) return "the node that kept this position wasn't shut down";
   if (!kept.valid) return "the position couldn't be trusted when it was kept";
   if (!config.holds_position_unpowered) {

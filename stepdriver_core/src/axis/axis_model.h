@@ -124,6 +124,8 @@ class AxisModel {
   /// @name Over a restart
   /// @{
   AxisMemory memory() const;
+  /// Called at the end of each turn: if the axis is at rest, a motion may begin from here.
+  void rememberRest();
   std::string whyUnverified(const AxisMemory& kept, bool clean) const;
   /// @}
 
@@ -143,6 +145,7 @@ class AxisModel {
                       const char* per,
                       config::LimitSource source = config::LimitSource::kConfiguration) const;
 
+  AxisMemory rest_;         // when it was last at rest
   AxisLimits limits_now_;   // of the current motion
   AxisLimits limits_next_;  // of motions that begin at rest; the speed also applies now
 };

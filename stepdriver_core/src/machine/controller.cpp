@@ -67,6 +67,7 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
   for (std::size_t i = 0; i < axes.size(); ++i) {
     context_.axes.push_back(std::make_unique<axis::AxisModel>(
         axes[i], lines[i], static_cast<int>(i), context_.mode, context_.levels, context_.lines));
+    context_.axes.back()->rememberRest();
   }
 }
 
@@ -81,6 +82,7 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   activities_.look();
   supervise();
   context_.pin_done.reset();
+  for (const auto& axis : context_.axes) axis->rememberRest();
   if (!awaiting_rest_.empty()) {
     const bool rests = std::none_of(context_.axes.begin(), context_.axes.end(),
                                     [](const auto& axis) { return axis->moving(); });
@@ -675,7 +677,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   }
   shown.path_axis = axis.pathAxis();
   shown.channel = axis.motor.state();
-  if (!axis.moving()) shown.memory = axis.memory();
+  shown.memory = axis.memory();
   return shown;
 }
 

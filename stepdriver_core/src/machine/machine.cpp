@@ -57,7 +57,9 @@ class Machine::Impl {
     shell_ =
         std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring.inputs.size(),
                                 Shell::Options{options.threaded, nanoseconds(options.write_timeout),
-                                               options.latency_device});
+                                               options.latency_device, [this] {
+                                                 if (keeper_) keeper_->noteMotion();
+                                               }});
     for (std::size_t i = 0; i < configs.size(); ++i) {
       auto axis = std::make_unique<MachineAxis>(configs[i], i, wiring.motor_lines[i], *shell_,
                                                 *lines_, names_);
@@ -196,9 +198,7 @@ class Machine::Impl {
     StateKeeper::Memories memories;
     const auto snapshot = shell_->snapshot();
     for (const MachineAxis* axis : own_axes_) {
-      if (const auto& memory = snapshot->axes.at(axis->id()).memory) {
-        memories.emplace(axis->config().name, *memory);
-      }
+      memories.emplace(axis->config().name, snapshot->axes.at(axis->id()).memory);
     }
     return memories;
   }

@@ -32,6 +32,14 @@ std::chrono::steady_clock::time_point steadyTime(std::int64_t time_ns) {
   return std::chrono::steady_clock::time_point(std::chrono::nanoseconds(time_ns));
 }
 
+/// Whether an axis that was at rest moves now.
+bool motionBegins(const MachineSnapshot& before, const MachineSnapshot& now) {
+  for (std::size_t i = 0; i < now.axes.size(); ++i) {
+    if (now.axes[i].state.moving && !before.axes[i].state.moving) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
@@ -42,6 +50,7 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
       lines_(std::move(lines)),
       inputs_(static_cast<int>(inputs)),
       threaded_(options.threaded),
+      on_motion_(options.on_motion),
       writers_(lines_, options.threaded, options.write_timeout_ns, [this] { wakeUp(); }),
       snapshot_(controller.snapshot()),
       levels_(inputs, 0),
@@ -361,8 +370,9 @@ void Shell::handle(decltype(Input::what) what) {
 }
 
 void Shell::carryOut(activity::Outputs& out) {
+  std::shared_ptr<const MachineSnapshot> shown = controller_.snapshot();
+  const bool begins = motionBegins(*snapshot_, *shown);
   {
-    std::shared_ptr<const MachineSnapshot> shown = controller_.snapshot();
     const std::lock_guard<std::mutex> lock(answers_mutex_);
     snapshot_.swap(shown);
     for (auto& [call, reply] : out.answers) {
@@ -381,6 +391,7 @@ void Shell::carryOut(activity::Outputs& out) {
   for (const activity::PinJob& job : out.pin_jobs) {
     writers_.write(job.id, {job.output, job.level});
   }
+  if (begins && on_motion_) on_motion_();
 }
 
 void Shell::postCommands() {

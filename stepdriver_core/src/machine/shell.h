@@ -36,6 +36,8 @@ class Shell : public pulse::NewsListener {
     std::int64_t write_timeout_ns =
         0;  ///< for one write of a line that the pulse thread doesn't time
     std::string latency_device;
+    /// Called when a motion begins, by the thread that all axes wait for: it returns at once.
+    std::function<void()> on_motion;
   };
 
   /// @param controller, engine, clock outlive the shell.
@@ -99,6 +101,7 @@ class Shell : public pulse::NewsListener {
   const std::shared_ptr<gpio::Lines> lines_;
   const int inputs_;
   const bool threaded_;
+  const std::function<void()> on_motion_;
   gpio::LineWriters writers_;
 
   // From clients and watchers.

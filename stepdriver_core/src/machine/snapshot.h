@@ -33,8 +33,8 @@ struct AxisSnapshot {
   std::optional<double> held_target;  ///< [unit]
   std::vector<Motion> motions;
   axis::PathAxis path_axis;
-  pulse::ChannelState channel;             ///< from the engine's last news
-  std::optional<axis::AxisMemory> memory;  ///< at rest
+  pulse::ChannelState channel;  ///< from the engine's last news
+  axis::AxisMemory memory;
 };
 
 /// All axes at the end of one turn of the controller.

@@ -22,7 +22,7 @@ constexpr const char* kTitle = "stepdriver state 1";
 constexpr const char* kClean = "clean";
 constexpr const char* kRunning = "running";
 constexpr const char* kColumns =
-    "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home";
+    "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home moving";
 
 [[noreturn]] void failed(const std::string& what, const std::string& path) {
   throw Error(fmt::format("the state file {} can't be {}: {}", path, what, std::strerror(errno)));
@@ -32,9 +32,9 @@ std::string textOf(const KeptState& state) {
   std::string text = fmt::format("{}\n{}\n{}\n", kTitle, state.clean ? kClean : kRunning, kColumns);
   for (const auto& [name, axis] : state.axes) {
     text +=
-        fmt::format("{} {} {:.17g} {:.17g} {:.17g} {:d} {:d} {:d}\n", name,
+        fmt::format("{} {} {:.17g} {:.17g} {:.17g} {:d} {:d} {:d} {:d}\n", name,
                     axis.kind == config::Kind::kLinear ? "linear" : "rotary", axis.steps_per_unit,
-                    axis.position, axis.slack, axis.valid, axis.homed, axis.at_home);
+                    axis.position, axis.slack, axis.valid, axis.homed, axis.at_home, axis.moving);
   }
   return text;
 }
@@ -82,7 +82,10 @@ axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
   line >> name >> kind >> axis.steps_per_unit >> axis.position >> axis.slack >> axis.valid >>
       axis.homed >> axis.at_home;
   axis.kind = kind == "rotary" ? config::Kind::kRotary : config::Kind::kLinear;
-  const bool whole = !line.fail() && !(line >> rest) && (kind == "linear" || kind == "rotary");
+  bool whole = !line.fail();
+  // Files of earlier versions end here.
+  if (!(line >> std::ws).eof()) whole = whole && static_cast<bool>(line >> axis.moving);
+  whole = whole && !(line >> rest) && (kind == "linear" || kind == "rotary");
   const bool finite = std::isfinite(axis.position) && std::isfinite(axis.slack);
   if (!whole || !finite || !(axis.steps_per_unit > 0.0)) name.clear();
   return axis;

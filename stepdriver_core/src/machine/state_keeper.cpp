@@ -45,11 +45,22 @@ void StateKeeper::start(std::function<Memories()> read, bool threaded) {
 
 void StateKeeper::run() {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (!wake_.wait_for(lock, kPeriod, [this] { return ended_; })) {
+  while (!ended_) {
+    wake_.wait_for(lock, kPeriod, [this] { return ended_ || motion_begins_; });
+    motion_begins_ = false;
     lock.unlock();
-    keep();
+    const bool written = keep();
     lock.lock();
+    // Whatever the axes do, the disk has this long between two writings.
+    if (written) wake_.wait_for(lock, kPeriod, [this] { return ended_; });
   }
+}
+
+// Not under the mutex, which is held while the disk writes. A call that the thread misses for that
+// is seen after the period.
+void StateKeeper::noteMotion() noexcept {
+  motion_begins_ = true;
+  wake_.notify_all();
 }
 
 bool StateKeeper::take(const Memories& memories) {
@@ -62,11 +73,13 @@ bool StateKeeper::take(const Memories& memories) {
   return changed;
 }
 
-void StateKeeper::keep() {
-  if (!read_) return;
+bool StateKeeper::keep() {
+  if (!read_) return false;
   const Memories memories = read_();
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!ended_ && take(memories)) save();
+  if (ended_ || !take(memories)) return false;
+  save();
+  return true;
 }
 
 void StateKeeper::close(const Memories& last) {

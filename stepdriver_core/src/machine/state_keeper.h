@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <functional>
 #include <map>
@@ -17,7 +18,7 @@ namespace stepdriver::machine {
 /// own.
 class StateKeeper {
  public:
-  /// Of the axes at rest, by name.
+  /// Of the axes, by name.
   using Memories = std::map<std::string, axis::AxisMemory>;
 
   /// The state of an earlier run.
@@ -39,8 +40,11 @@ class StateKeeper {
   /// @param threaded false: the owner of the machine calls keep(). @throw Error
   void start(std::function<Memories()> read, bool threaded);
 
-  /// Writes changes of axes at rest.
-  void keep();
+  /// Writes changes. @return whether there were any.
+  bool keep();
+
+  /// A motion begins: the file will soon say so. Returns at once, from any thread.
+  void noteMotion() noexcept;
 
   /// The machine is at rest, and stays so.
   void close(const Memories& last);
@@ -61,6 +65,7 @@ class StateKeeper {
   std::string error_;
   std::condition_variable wake_;
   bool ended_ = false;
+  std::atomic<bool> motion_begins_{false};
   std::thread thread_;
 };
 

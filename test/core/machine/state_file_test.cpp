@@ -121,6 +121,43 @@ TEST_F(StateFileTest, IsOneOfARunningMachineWhileItMoves) {
   start();
   EXPECT_DOUBLE_EQ(state().position, 0.008);  // where it rested last
   EXPECT_FALSE(state().position_valid);
+  EXPECT_EQ(state().position_note,
+            "the node that kept this position wasn't shut down: the axis was moving, from 0.008 m, "
+            "and it is not known where it stopped");
+}
+
+TEST_F(StateFileTest, SaysFromWhereTheMotionBeganThatALossOfPowerEnded) {
+  start();
+  standAt(0.008);
+  bench_->move(0.010);  // and on, before anything is written
+  x().moveTo(0.050);
+  bench_->machine->advance(0.2);
+  ASSERT_TRUE(state().moving);
+  crash();
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.010);
+  EXPECT_NE(state().position_note.find("was moving, from 0.01 m"), std::string::npos)
+      << state().position_note;
+}
+
+TEST_F(StateFileTest, DoesNotSayThatAnAxisMovedThatHadComeToRest) {
+  start();
+  standAt(0.008);
+  x().moveTo(0.050);
+  bench_->machine->advance(0.2);
+  bench_->machine->advance(10.0);
+  ASSERT_FALSE(state().moving);
+  crash();
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.050);
+  EXPECT_EQ(state().position_note, "the node that kept this position wasn't shut down");
+}
+
+TEST_F(StateFileTest, ReadsTheFilesOfEarlierVersions) {
+  std::ofstream(file_) << "stepdriver state 1\nclean\nx linear 80000 0.008 0 1 0 1\n";
+  start();
+  EXPECT_DOUBLE_EQ(state().position, 0.008);
+  EXPECT_TRUE(state().position_valid);
 }
 
 TEST_F(StateFileTest, DoesNotTrustAMotorThatNothingHeld) {
@@ -181,6 +218,7 @@ TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
            {head + "x linear 80000 nan 0 1 0 1\n", "line 3"},
            {head + "x linear 80000 0.008 0 1\n", "line 3"},
            {head + "x linear 80000 0.008 0 1 0 1 7\n", "line 3"},
+           {head + "x linear 80000 0.008 0 1 0 1 0 1\n", "line 3"},
            {head + "x linear -1 0.008 0 1 0 1\n", "line 3"},
            {head + "x crooked 80000 0.008 0 1 0 1\n", "line 3"},
            {twice, "line 4"}}) {
