@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <sensor_msgs/JointState.h>
 #include <std_srvs/Trigger.h>
+#include <stepdriver/AxisState.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Endstops.h>
 #include <stepdriver/Microstep.h>
@@ -99,6 +100,23 @@ TEST(LatchedTopics, ReadFalseWhereThereIsNoSwitch) {
   ASSERT_TRUE(endstops.waitFor([](const Endstops& e) { return e.name.size() == 1; }));
   EXPECT_EQ(endstops.messages().front().min.at(0), 0);
   EXPECT_EQ(endstops.messages().front().max.at(0), 0);
+}
+
+TEST(AxisStateTopic, ShowsOneAxisByItself) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const Recorder<AxisState> states(node.full("x/state"));
+  ASSERT_TRUE(states.waitFor([](const AxisState& s) { return s.enabled && !s.moving; }));
+  const auto answer = node.moveTo(0.05, false);
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_TRUE(states.waitFor([](const AxisState& s) {
+    return s.moving && s.position > 0.001 && s.velocity > 0.0 && s.target == 0.05 &&
+           s.time_left > 0.0 && std::abs(s.planned - s.position) < 0.001;
+  }));
+  EXPECT_TRUE(states.waitForLatest([](const AxisState& s) {
+    return !s.moving && s.velocity == 0.0 && s.position == 0.05 && s.position == s.target;
+  }));
 }
 
 TEST(AxisStatesTopic, ShowsAMoveUnderWay) {

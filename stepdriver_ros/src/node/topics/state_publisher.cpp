@@ -48,6 +48,8 @@ StatePublisher::StatePublisher(ros::NodeHandle node, ros::NodeHandle private_nod
   for (const auto& axis : machine.axes()) {
     joint_states_.name.push_back(axis->config().joint);
     endstops_.name.push_back(axis->config().name);
+    own_state_publishers_.push_back(
+        private_node.advertise<AxisState>(axis->config().name + "/state", kQueueSize, true));
   }
   const std::size_t axes = machine.axes().size();
   joint_states_.position.resize(axes);
@@ -93,6 +95,7 @@ void StatePublisher::run() {
       const bool due = now >= axis_states_due;
       // At rest nothing is repeated, except the periodic message for subscribers.
       publishAxisStates(!due || (!moving && axis_state_publisher_.getNumSubscribers() == 0));
+      publishStateOfEachAxis(due);
       if (due)
         axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
       poll_due = nextTime<Clock::time_point>(poll_due, moving ? kMovingPeriod : kRestPeriod, now);
@@ -102,6 +105,7 @@ void StatePublisher::run() {
   publishJointStates();
   publishEndstopsOnChange();
   publishAxisStates(false);
+  publishStateOfEachAxis(true);
 }
 
 bool StatePublisher::sleepUntil(Clock::time_point time) {
@@ -173,6 +177,35 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
     message.position_note.push_back(state.position_note);
   }
   axis_state_publisher_.publish(message);
+}
+
+void StatePublisher::publishStateOfEachAxis(bool due) {
+  const bool first = published_own_states_.empty();
+  if (first) published_own_states_ = states_;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    const axis::AxisState& state = states_[i];
+    if (!first && !(due && state.moving) && !differ(state, published_own_states_[i])) continue;
+    published_own_states_[i] = state;
+    AxisState message;
+    message.header.stamp = states_read_;
+    message.enabled = state.enabled;
+    message.asleep = state.asleep;
+    message.idle = state.idle;
+    message.moving = state.moving;
+    message.held = state.held;
+    message.homed = state.homed;
+    message.position_valid = state.position_valid;
+    message.microsteps = state.microsteps;
+    message.position = state.position;
+    message.planned = state.planned;
+    message.velocity = state.velocity;
+    message.target = state.target;
+    message.time_left = state.time_left;
+    message.fault = state.fault;
+    message.remedy = state.remedy;
+    message.position_note = state.position_note;
+    own_state_publishers_[i].publish(message);
+  }
 }
 
 }  // namespace stepdriver::ros_node

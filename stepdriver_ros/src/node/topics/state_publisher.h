@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <sensor_msgs/JointState.h>
+#include <stepdriver/AxisState.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Endstops.h>
 
@@ -43,12 +44,14 @@ class StatePublisher {
   void publishJointStates();
   void publishEndstopsOnChange();
   void publishAxisStates(bool only_on_change);
+  void publishStateOfEachAxis(bool due);
 
   const machine::Machine& machine_;
   const Clock::duration joint_state_period_;
   ros::Publisher joint_state_publisher_;
   ros::Publisher endstop_publisher_;
   ros::Publisher axis_state_publisher_;
+  std::vector<ros::Publisher> own_state_publishers_;  // of each axis
 
   // For the thread only.
   sensor_msgs::JointState joint_states_;
@@ -56,6 +59,7 @@ class StatePublisher {
   std::vector<axis::AxisState> states_;
   ros::Time states_read_;
   std::vector<axis::AxisState> published_states_;
+  std::vector<axis::AxisState> published_own_states_;
   bool endstops_published_ = false;
   std::vector<bool> endstops_unreadable_;  // of each axis
 
