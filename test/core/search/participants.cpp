@@ -522,7 +522,7 @@ void Participants::noteServed(Ask& asked) {
 std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes.at(axis);
-  if (now.memory) return now.memory->position;
+  if (!now.state.moving) return now.memory.position;
   const machine::AxisSnapshot::Motion& last = now.motions.back();
   if (!last.target && !last.slows_down) return std::nullopt;
   // Each turn on the way takes up the backlash again.
