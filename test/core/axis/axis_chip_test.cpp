@@ -115,7 +115,7 @@ TEST(AxisChip, RefusesAMicrostepModeThatHasNoPositionHere) {
   Bench bench({linearAxis("x")});
   axis::Axis& x = bench.axis();
   bench.move(163.0 / 80'000.0);
-  EXPECT_REFUSED(x.setMicrosteps(1), "1/1 has no position at 0.0020375 m; the nearest");
+  EXPECT_REFUSED(x.setMicrosteps(1), "1/1 has no position at 0.00204 m; the nearest");
   EXPECT_REFUSED(x.setMicrosteps(8), "no position");
   EXPECT_REFUSED(x.setMicrosteps(3), "it has 1, 2, 4, 8, 16");
   EXPECT_REFUSED(x.setMicrosteps(32), "no 1/32 mode");

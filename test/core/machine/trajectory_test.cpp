@@ -164,7 +164,8 @@ TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
   EXPECT_NE(why({{9.0, {0.1, -6.0}, {0.0, 0.0}, {}}}).find("below the soft limit"),
             std::string::npos);
   EXPECT_EQ(why({{0.5, {1.0, 0.0}, {0.0, 0.0}, {}}}),
-            "x: the trajectory's velocity is 3 m/s 0.25 s after its start, but the axis has 2 m/s");
+            "x: the trajectory's velocity is 3 m/s 0.25 s after its start, but the axis has 2 m/s, "
+            "from the configuration");
   EXPECT_EQ(why({{0.6, {0.72, 0.0}, {0.0, 0.0}, {}}}),
             "x: the trajectory's acceleration is 12 m/s^2 0 s after its start, but the axis has "
             "10 m/s^2");

@@ -7,7 +7,7 @@
 
 namespace stepdriver::node_test {
 
-/// What the master says of where a service is. The test fails if it knows none.
+/// Where a service is, as the master knows it. The test fails if it knows none.
 std::string serviceUri(const std::string& service);
 
 /// A client of services that sends whatever it likes. Each of its waits is bounded.
