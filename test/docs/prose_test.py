@@ -26,7 +26,7 @@ _CONDITION = (
 
 # Name: what it matches, and how often it may occur in pages and comments together.
 PHRASES = {
-    "conditional where": (_CONDITION, 21),
+    "conditional where": (_CONDITION, 26),
     "go on": (r"\b(?:go|goes|going|went) on\b(?! the )", 0),
     "as ... has it": (r"\bas (?:\S+ ){1,4}(?:has|have|had) (?:it|them)\b", 1),
     "none of": (r"\bnone of (?:it|them|that)\b", 1),
@@ -37,7 +37,7 @@ PHRASES = {
     "it is that": (r"\b[Ii]t is that\b|\b[Tt]hat is (?:what|why|how|the)\b", 3),
     "what holds": (r"\bwhat (?:then )?holds\b|\bholds? good\b", 1),
     "can be had": (r"\b(?:be|is|are|was) had\b", 0),
-    "who does": (r"(?:^|[.:;,(] ?|\b(?:by|to|of|for) )[Ww]ho(?:ever)? \w+s\b", 6),
+    "who does": (r"(?:^|[.:;,(] ?|\b(?:by|to|of|for) )[Ww]ho(?:ever)? \w+s\b", 7),
     "without effect": (r"\b[Ww]ithout (?:an? )?effect\b|\bnot else\b|\belse not\b", 0),
     "held against": (r"\bh(?:e|o)ld (?:them |it |\w+ )?against\b", 1),
     "gone by": (r"\bgone by\b|\bnot any more\b|\bno more (?:of|use)\b", 1),

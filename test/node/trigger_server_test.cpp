@@ -189,7 +189,7 @@ TEST_F(TriggerServerTest, IsNotHeldUpByAClientThatReadsNoAnswers) {
   ASSERT_TRUE(other.introduce(kService, true));
   std::string requests;
   for (int i = 0; i < 10000; ++i) requests += lengthBytes(0);
-  // Until no more of them is taken: its answers have filled all that lies between.
+  // Until it accepts nothing more: its answers have filled all that lies between.
   bool full = false;
   for (int i = 0; i < 100000 && !full; ++i) {
     full = deaf.sendAtOnce(requests) == 0;

@@ -32,7 +32,7 @@ TEST(VirtualClock, GoesFromEventToEventExactly) {
   EXPECT_EQ(clock.now(), 0);
   clock.waitUntil(123'456'789'012'345);
   EXPECT_EQ(clock.now(), 123'456'789'012'345);
-  clock.waitUntil(5);  // gone by
+  clock.waitUntil(5);  // in the past
   EXPECT_EQ(clock.now(), 123'456'789'012'345);
 }
 

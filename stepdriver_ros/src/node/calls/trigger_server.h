@@ -60,7 +60,7 @@ class TriggerServer {
     Connection(Descriptor its_socket, const TriggerServices& services)
         : socket(std::move(its_socket)), session(services) {}
 
-    /// Receives and sends what can be now. @return false: it is to be closed.
+    /// Receives and sends what can be now. @return false: close it.
     bool serve();
     bool receive();
     bool send();
