@@ -8,20 +8,20 @@ namespace stepdriver::activity {
 namespace {
 
 // If the joint reaches its target upwards, all of the backlash is taken up there; if it reaches it
-// downwards, nothing is. At rest on its target it stays; a moving joint counts from where it would
-// stop.
+// downwards, nothing is. It depends on where the joint would stop, which the motor's place alone
+// doesn't tell: part of the backlash may be open. At rest on its target it stays.
 std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
                          const motion::MotionState& from, const motion::MotionLimits& within) {
   const std::int64_t down = *goal.target;
   if (axis.backlash() == 0 || goal.of_motor) return down;
   const std::int64_t up = down + axis.backlash();
-  if (!axis.moving()) {
-    const std::int64_t way = down - axis.jointCount();
-    return way > 0 ? up : way < 0 ? down : axis.motor.state().count;
-  }
-  const double rest = motion::planStop(0, from, within).endPosition().value();
-  if (from.velocity > 0.0) return rest <= static_cast<double>(up) ? up : down;
-  return rest >= static_cast<double>(down) ? down : up;
+  const std::int64_t count = axis.motor.state().count;
+  const double rest = axis.moving() ? motion::planStop(0, from, within).endPosition().value()
+                                    : static_cast<double>(count);
+  const double way = static_cast<double>(down) - axis.jointAt(rest);
+  if (way != 0.0) return way > 0.0 ? up : down;
+  if (!axis.moving()) return count;
+  return from.velocity > 0.0 ? up : down;
 }
 
 }  // namespace
@@ -76,7 +76,9 @@ axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::P
                           ? static_cast<double>(*goal.target)
                           : axis.jointAt(profile.endPosition().value());
   move.rest = axis.positionOf(rest);
-  move.target = axis.positionOf(rest + goal.remainder);
+  const bool jogs = goal.kind == Goal::Kind::kJog;
+  move.target =
+      jogs ? move.rest : axis.positionOf(static_cast<double>(*goal.target) + goal.remainder);
   move.duration = static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9;
   move.overshoot = overshoot / axis.stepsPerUnit();
   return move;

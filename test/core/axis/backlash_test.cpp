@@ -61,6 +61,25 @@ TEST_F(Backlash, IsTakenUpAtEachReversalAndIsNoPartOfThePosition) {
   expectClean();
 }
 
+TEST_F(Backlash, IsTakenUpForATargetThatComesInTheMiddleOfTakingItUp) {
+  for (const std::int64_t off : {-25, -5, 5, 25}) {
+    for (const double after : {0.0, 2e-3, 8e-3, 2e-2}) {
+      for (const double away : {0.005, 0.015}) {
+        SetUp();
+        moveTo(0.010);
+        x().moveTo(away);
+        bench->machine->advance(after);
+        const double target = 0.010 + static_cast<double>(off) / 80'000.0;
+        const axis::MoveResult result = x().wait(x().moveTo(target));
+        EXPECT_EQ(result.end, MoveEnd::kReached);
+        EXPECT_NEAR(position(), target, 1e-12)
+            << off << " steps after " << after << " s towards " << away;
+        expectClean();
+      }
+    }
+  }
+}
+
 TEST_F(Backlash, LetsTheJointStandWhileItIsTakenUp) {
   x().moveTo(0.010);
   std::int64_t taken = 0;

@@ -563,6 +563,11 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
       oracle_.complain(who + " comes to rest at " + std::to_string(moves[i].rest) +
                        " m, not at the microstep nearest to " + std::to_string(moves[i].target));
     }
+    if (!asked.relative && i < asked.ways.size() &&
+        std::abs(moves[i].rest - asked.ways[i]) > 0.501 / scale) {
+      oracle_.complain(who + " comes to rest at " + std::to_string(moves[i].rest) +
+                       " m, but was sent to " + std::to_string(asked.ways[i]));
+    }
     if (!asked.relative || !asked.targets[i]) continue;
     // What it counts from is the target of the last move, half a step from where it stands at most.
     const double half_step = 0.51 * configs_[axis].microsteps / configs_[axis].steps_per_unit;
