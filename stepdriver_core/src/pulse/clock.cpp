@@ -111,9 +111,11 @@ void VirtualClock::waitUntil(Nanoseconds time) {
 // A thread that is only slow falls behind by little from wait to wait, and nothing is late.
 void VirtualClock::takeStall() {
   const Nanoseconds lag = paced() - now_;
-  if (static_cast<double>(lag - lag_) <= static_cast<double>(kStall) * speed_) {
+  if (woken_) {
+    lag_ = std::min(lag_, lag);
+  } else if (static_cast<double>(lag - lag_) <= static_cast<double>(kStall) * speed_) {
     lag_ = lag;
-  } else if (!woken_) {
+  } else {
     now_ += lag - lag_;
   }
 }
@@ -127,12 +129,13 @@ void VirtualClock::wake() {
 void VirtualClock::hold() {
   const std::lock_guard<std::mutex> lock(mutex_);
   now_ = current();
-  ++holds_;
+  if (holds_++ == 0) held_from_ = paced();
 }
 
 void VirtualClock::release() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  --holds_;
+  // On real lines nothing stands still for it.
+  if (--holds_ == 0) lag_ += paced() - held_from_;
   changed_.notify_all();
 }
 

@@ -45,25 +45,15 @@ TEST(VirtualClock, StandsStillAfterAWake) {
   EXPECT_EQ(clock.now(), 1'000'000);
 }
 
-/// Holds a paced clock for some real time in the middle of a wait.
-/// @return by how much the wait ended late.
-Nanoseconds latenessAfter(std::chrono::nanoseconds pause, double speed) {
-  VirtualClock clock(speed);
+TEST(VirtualClock, IsNotLateAfterAHold) {
+  VirtualClock clock(1.0);
   const Nanoseconds due = 1'000'000;
   clock.hold();
   std::thread waiter([&] { clock.waitUntil(due); });
-  std::this_thread::sleep_for(pause);
+  std::this_thread::sleep_for(std::chrono::nanoseconds(VirtualClock::kStall + 200'000'000));
   clock.release();
   waiter.join();
-  return clock.now() - due;
-}
-
-TEST(VirtualClock, IsLateAfterAStallAsRealLinesWouldBe) {
-  const std::chrono::nanoseconds pause(VirtualClock::kStall + 200'000'000);
-  for (const double speed : {0.5, 1.0, 20.0}) {
-    const auto expected = static_cast<double>(pause.count()) * speed;
-    EXPECT_GT(static_cast<double>(latenessAfter(pause, speed)), 0.9 * expected) << speed;
-  }
+  EXPECT_EQ(clock.now(), due);
 }
 
 TEST(VirtualClock, IsNeverLateBecauseItsThreadIsSlow) {

@@ -119,6 +119,7 @@ class VirtualClock : public Clock {
   bool waiting_ = false;
   bool woken_ = false;
   int holds_ = 0;
+  Nanoseconds held_from_ = 0;  // by the pace
 };
 
 }  // namespace stepdriver::pulse
