@@ -77,15 +77,22 @@ class Graph:
 
     def join_parts(self):
         """Returns the length of the lines that join them."""
-        parts, added = self._parts(), 0.0
-        joined = parts.pop(0)
-        while parts:
-            distance, here, there, nearest = min(
-                (self._distance(a, b), a, b, i) for i, part in enumerate(parts)
-                for a in joined for b in part)
+        joined, *parts = self._parts()
+        part_of = {node: part for part in parts for node in part}
+        nearest = {node: (math.inf, node) for node in part_of}  # of what is joined already
+        added = 0.0
+        while nearest:
+            for node, (distance, _) in nearest.items():
+                closest = min(joined, key=lambda other, node=node: self._distance(node, other))
+                nearest[node] = min((distance, nearest[node][1]),
+                                    (self._distance(node, closest), closest))
+            there = min(nearest, key=lambda node: nearest[node][0])
+            distance, here = nearest[there]
             self._add(here, there)
             added += distance
-            joined += parts.pop(nearest)
+            joined = part_of[there]
+            for node in joined:
+                del nearest[node]
         return added
 
     def _odd(self):

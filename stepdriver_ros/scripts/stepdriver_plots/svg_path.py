@@ -3,6 +3,7 @@
 import math
 import xml.etree.ElementTree as xml
 
+from .drawn_path import offset
 from .errors import BadDrawing
 
 # A curve becomes chords that are this much of the drawing's diagonal off it at most: 0.02 mm at
@@ -22,15 +23,15 @@ def read_svg(path):
                          f"({error})") from error
     try:
         svg = svgelements.SVG.parse(str(path), ppi=MM_PER_INCH)
-        shapes = [(element, svgelements.Path(element)) for element in svg.elements()
-                  if isinstance(element, svgelements.Shape)]
+        segments = [segment for element in svg.elements()
+                    if isinstance(element, svgelements.Shape)
+                    for segment in svgelements.Path(element)]
         refuse_undrawable(path, svg, svgelements)
     except (OSError, xml.ParseError, LookupError, ValueError, TypeError, AttributeError,
             ArithmeticError) as error:
         raise BadDrawing(f"{path}: can't be read as SVG: {error}") from error
     except RecursionError as error:
         raise BadDrawing(f"{path}: its groups are nested too deeply to be read") from error
-    segments = [segment for _, shape in shapes for segment in shape]
     refuse_endless_places(path, segments)
     return strokes_of(segments, svgelements)
 
@@ -79,19 +80,9 @@ def chords(curve, begin, end, tolerance, halvings):
     middle = (begin + end) / 2
     ends = [place(curve.point(t)) for t in (begin, end)]
     # A curve may cross its chord in the middle.
-    off = max(distance(place(curve.point(t)), *ends)
+    off = max(math.hypot(*offset(place(curve.point(t)), *ends))
               for t in (middle, (begin + middle) / 2, (middle + end) / 2))
     if halvings == 0 or off <= tolerance and halvings < FINEST - 1:
         return [ends[1]]
     return (chords(curve, begin, middle, tolerance, halvings - 1) +
             chords(curve, middle, end, tolerance, halvings - 1))
-
-
-def distance(point, begin, end):
-    """From a point to a chord."""
-    way = (end[0] - begin[0], end[1] - begin[1])
-    length = math.hypot(*way)
-    off = (point[0] - begin[0], point[1] - begin[1])
-    if length == 0.0:
-        return math.hypot(*off)
-    return abs(way[0] * off[1] - way[1] * off[0]) / length
