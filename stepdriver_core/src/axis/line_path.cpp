@@ -62,28 +62,31 @@ void LinePath::takeLimits() {
   if (stop_jerk < kNone) stop_limits_.jerk = stop_jerk;
 }
 
-// The speed of the linear axes if one of them moves, otherwise of the rotary ones.
+config::Kind LinePath::kindOfVelocity() const {
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const bool moves = ways_[i].value() != 0.0;
+    if (moves && axes_[i].kind == config::Kind::kLinear) return config::Kind::kLinear;
+  }
+  return config::Kind::kRotary;
+}
+
 double LinePath::pathSpeed(double velocity) const {
-  double linear = 0.0;
-  double rotary = 0.0;
+  double square = 0.0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const double way = ways_[i].value() / axes_[i].steps_per_unit;
-    (axes_[i].kind == config::Kind::kLinear ? linear : rotary) += way * way;
+    if (axes_[i].kind == kindOfVelocity()) square += way * way;
   }
-  return velocity * static_cast<double>(length_) / std::sqrt(linear > 0.0 ? linear : rotary);
+  return velocity * static_cast<double>(length_) / std::sqrt(square);
 }
 
 double LinePath::checkedSpeed(double velocity) const {
   const double speed = pathSpeed(velocity);
   if (speed <= limits_.max_speed * (1.0 + 1e-12)) return std::min(speed, limits_.max_speed);
-  const bool linear = std::any_of(axes_.begin(), axes_.end(), [this](const PathAxis& axis) {
-    return axis.kind == config::Kind::kLinear && ways_[&axis - axes_.data()].value() != 0.0;
-  });
   axes_.front().refuse(fmt::format(
       "the velocity {0} {2} of the line is above the {1} {2} that the limits of its axes "
       "allow in its direction",
       numberText(velocity), numberText(velocity * limits_.max_speed / speed),
-      linear ? "m/s" : "rad/s"));
+      kindOfVelocity() == config::Kind::kLinear ? "m/s" : "rad/s"));
 }
 
 double LinePath::durationAt(double speed) const {

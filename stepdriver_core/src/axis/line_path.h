@@ -31,6 +31,8 @@ class LinePath : public SharedPath {
 
  private:
   void takeLimits();
+  /// Linear if a linear axis moves: then the velocity of the line is that of the linear axes.
+  config::Kind kindOfVelocity() const;
   double pathSpeed(double velocity) const;
   double checkedSpeed(double velocity) const;
   double durationAt(double speed) const;
