@@ -94,8 +94,8 @@ void StatePublisher::run() {
                                       [](const axis::AxisState& state) { return state.moving; });
       const bool due = now >= axis_states_due;
       // At rest nothing is repeated, except the periodic message for subscribers.
-      publishAxisStates(!due || (!moving && axis_state_publisher_.getNumSubscribers() == 0));
       publishStateOfEachAxis(due);
+      publishAxisStates(!due || (!moving && axis_state_publisher_.getNumSubscribers() == 0));
       if (due)
         axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
       poll_due = nextTime<Clock::time_point>(poll_due, moving ? kMovingPeriod : kRestPeriod, now);
@@ -104,8 +104,8 @@ void StatePublisher::run() {
   readStates();
   publishJointStates();
   publishEndstopsOnChange();
-  publishAxisStates(false);
   publishStateOfEachAxis(true);
+  publishAxisStates(false);
 }
 
 bool StatePublisher::sleepUntil(Clock::time_point time) {
@@ -179,13 +179,12 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
   axis_state_publisher_.publish(message);
 }
 
+// Before publishAxisStates(), which then keeps the states as those that are known.
 void StatePublisher::publishStateOfEachAxis(bool due) {
-  const bool first = published_own_states_.empty();
-  if (first) published_own_states_ = states_;
+  const bool first = published_states_.empty();
   for (std::size_t i = 0; i < states_.size(); ++i) {
     const axis::AxisState& state = states_[i];
-    if (!first && !(due && state.moving) && !differ(state, published_own_states_[i])) continue;
-    published_own_states_[i] = state;
+    if (!first && !(due && state.moving) && !differ(state, published_states_[i])) continue;
     AxisState message;
     message.header.stamp = states_read_;
     message.enabled = state.enabled;

@@ -59,7 +59,6 @@ class StatePublisher {
   std::vector<axis::AxisState> states_;
   ros::Time states_read_;
   std::vector<axis::AxisState> published_states_;
-  std::vector<axis::AxisState> published_own_states_;
   bool endstops_published_ = false;
   std::vector<bool> endstops_unreadable_;  // of each axis
 
