@@ -20,6 +20,9 @@ Nanoseconds steadyNow() {
   return static_cast<Nanoseconds>(time.tv_sec) * 1'000'000'000 + time.tv_nsec;
 }
 
+// How often a thread that waits for a paced clock looks at the time.
+constexpr Nanoseconds kLook = VirtualClock::kStall / 10;
+
 // Sleeps until the time of CLOCK_MONOTONIC or until the word changes from this value, or for a
 // shorter time.
 void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32_t value) {
@@ -76,8 +79,10 @@ Nanoseconds VirtualClock::current() const {
   return std::clamp(paced(), now_, std::max(now_, awaited_));
 }
 
-Nanoseconds VirtualClock::paced() const {
-  return std::llround(static_cast<double>(steadyNow() - started_) * speed_);
+Nanoseconds VirtualClock::paced() const { return atPace(steadyNow() - started_); }
+
+Nanoseconds VirtualClock::atPace(Nanoseconds real) const {
+  return std::llround(static_cast<double>(real) * speed_);
 }
 
 Nanoseconds VirtualClock::now() {
@@ -90,22 +95,39 @@ void VirtualClock::waitUntil(Nanoseconds time) {
   awaited_ = time;
   waiting_ = true;
   while (!woken_ && now_ < time) {
-    if (holds_ > 0 || (time == kNever && speed_ == 0.0)) {
+    if (holds_ > 0 && speed_ > 0.0 && time != kNever) {
+      changed_.wait_for(lock, std::chrono::nanoseconds(kLook));
+      look();
+    } else if (holds_ > 0 || (time == kNever && speed_ == 0.0)) {
       changed_.wait(lock);
     } else if (speed_ == 0.0) {
       now_ = time;
     } else {
       now_ = current();
       if (now_ >= time) break;
-      // A wait for an event years ahead is split: the sum with now() must not overflow.
-      const double wall_ns = std::min(3.6e12, static_cast<double>(time - now_) / speed_);
-      changed_.wait_for(lock, std::chrono::nanoseconds(std::llround(wall_ns)));
+      const auto wall_ns = static_cast<double>(time - now_) / speed_;
+      // A wait for a wake is split as well: the sum with now() must not overflow.
+      const double longest = time == kNever ? 3.6e12 : static_cast<double>(kLook);
+      changed_.wait_for(lock, std::chrono::nanoseconds(std::llround(std::min(longest, wall_ns))));
+      look();
     }
   }
   if (woken_) now_ = current();
-  if (speed_ > 0.0) takeStall();
+  if (speed_ > 0.0) {
+    look();
+    takeStall();
+  }
   woken_ = false;
   waiting_ = false;
+}
+
+// A hold excuses no stall: a thread that waits for an event looks at the time so often that it
+// misses to look only if it doesn't run.
+void VirtualClock::look() {
+  const Nanoseconds now = steadyNow();
+  const Nanoseconds unseen = now - std::max(looked_, held_since_);
+  if (holds_ > 0 && awaited_ != kNever && unseen > kStall) held_since_ += unseen;
+  looked_ = now;
 }
 
 // A thread that is only slow falls behind by little from wait to wait, and nothing is late.
@@ -113,7 +135,7 @@ void VirtualClock::takeStall() {
   const Nanoseconds lag = paced() - now_;
   if (woken_) {
     lag_ = std::min(lag_, lag);
-  } else if (static_cast<double>(lag - lag_) <= static_cast<double>(kStall) * speed_) {
+  } else if (lag - lag_ <= atPace(kStall)) {
     lag_ = lag;
   } else {
     now_ += lag - lag_;
@@ -129,13 +151,14 @@ void VirtualClock::wake() {
 void VirtualClock::hold() {
   const std::lock_guard<std::mutex> lock(mutex_);
   now_ = current();
-  if (holds_++ == 0) held_from_ = paced();
+  if (holds_++ == 0) held_since_ = steadyNow();
 }
 
 void VirtualClock::release() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  look();
   // On real lines nothing stands still for it.
-  if (--holds_ == 0) lag_ += paced() - held_from_;
+  if (--holds_ == 0) lag_ += atPace(steadyNow() - held_since_);
   changed_.notify_all();
 }
 

@@ -1,9 +1,13 @@
 #include "stepdriver_core/pulse/clock.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <thread>
 
 namespace stepdriver::pulse {
@@ -54,6 +58,46 @@ TEST(VirtualClock, IsNotLateAfterAHold) {
   clock.release();
   waiter.join();
   EXPECT_EQ(clock.now(), due);
+}
+
+// The process whose clock is held while it is suspended: tells its parent that it is ready, and
+// goes on when that says so.
+[[noreturn]] void beSuspendedInAHold(int ready, int go) {
+  VirtualClock clock(1.0);
+  const Nanoseconds due = 1'000'000;
+  clock.hold();
+  std::thread waiter([&] { clock.waitUntil(due); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  char byte = 0;
+  const bool told = write(ready, &byte, 1) == 1 && read(go, &byte, 1) == 1;
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  clock.release();
+  waiter.join();
+  _exit(told && clock.now() >= due + VirtualClock::kStall ? 0 : 1);
+}
+
+TEST(VirtualClock, IsLateIfItsProcessIsSuspendedInAHold) {
+  std::array<int, 2> ready{};
+  std::array<int, 2> go{};
+  ASSERT_EQ(pipe(ready.data()), 0);
+  ASSERT_EQ(pipe(go.data()), 0);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) beSuspendedInAHold(ready[1], go[0]);
+  close(ready[1]);
+  close(go[0]);
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  ASSERT_EQ(kill(child, SIGSTOP), 0);
+  std::this_thread::sleep_for(std::chrono::nanoseconds(VirtualClock::kStall + 500'000'000));
+  ASSERT_EQ(kill(child, SIGCONT), 0);
+  ASSERT_EQ(write(go[1], &byte, 1), 1);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  close(ready[0]);
+  close(go[1]);
 }
 
 TEST(VirtualClock, IsNeverLateBecauseItsThreadIsSlow) {

@@ -107,6 +107,8 @@ class VirtualClock : public Clock {
  private:
   Nanoseconds current() const;
   Nanoseconds paced() const;
+  Nanoseconds atPace(Nanoseconds real) const;
+  void look();
   void takeStall();
 
   const double speed_;
@@ -114,12 +116,14 @@ class VirtualClock : public Clock {
   std::mutex mutex_;
   std::condition_variable changed_;
   Nanoseconds now_ = 0;
-  Nanoseconds awaited_ = 0;
+  Nanoseconds awaited_ = kNever;
   Nanoseconds lag_ = 0;  // behind its pace, at the end of the last wait
   bool waiting_ = false;
   bool woken_ = false;
   int holds_ = 0;
-  Nanoseconds held_from_ = 0;  // by the pace
+  // [ns] of CLOCK_MONOTONIC:
+  Nanoseconds held_since_ = 0;  // later by the stalls in it
+  Nanoseconds looked_ = 0;      // when a waiting thread last looked at the time
 };
 
 }  // namespace stepdriver::pulse
