@@ -166,20 +166,27 @@ install_packages() {
 
 # ---- builds ----
 
-# Configures a build folder; discards a cache that was made for another path.
+# discard_foreign_build SOURCES FOLDER: discards a build that was made for sources at another path.
+discard_foreign_build() {
+  local from=$1 into=$2
+  [[ -f $into/CMakeCache.txt ]] || return 0
+  grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$from" "$into/CMakeCache.txt" || rm -rf "$into"
+}
+
 configure() {
   local from=$1 into=$2
   shift 2
-  if [[ -f $into/CMakeCache.txt ]] &&
-    ! grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$from" "$into/CMakeCache.txt"; then
-    rm -rf "$into"
-  fi
+  discard_foreign_build "$from" "$into"
   cmake -S "$from" -B "$into" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "$@"
 }
 
 configure_core() { configure "$src/stepdriver_core" "$build/core" "$@"; }
 configure_catkin() {
+  discard_foreign_build "$src" "$build/catkin"
+  # catkin writes the environment of the tests when it configures, and leaves out the path of the
+  # messages' Python modules if that folder doesn't exist yet.
+  mkdir -p "$build/catkin/devel/lib/python3/dist-packages"
   configure "$src" "$build/catkin" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DCMAKE_INSTALL_PREFIX="$build/install" "$@"
 }

@@ -70,13 +70,12 @@ std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
 axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::Profile& profile,
                   double overshoot) {
   axis::Move move;
-  // A path may reverse, which takes up the backlash again: the motor's end doesn't determine the
+  // A motion may reverse, which takes up the backlash again: the motor's end doesn't determine the
   // joint's.
-  const double rest = goal.kind == Goal::Kind::kTogether
-                          ? static_cast<double>(*goal.target)
-                          : axis.jointAt(profile.endPosition().value());
-  move.rest = axis.positionOf(rest);
   const bool jogs = goal.kind == Goal::Kind::kJog;
+  const double rest = jogs || goal.of_motor ? axis.jointAt(profile.endPosition().value())
+                                            : static_cast<double>(*goal.target);
+  move.rest = axis.positionOf(rest);
   move.target =
       jogs ? move.rest : axis.positionOf(static_cast<double>(*goal.target) + goal.remainder);
   move.duration = static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9;

@@ -80,6 +80,23 @@ TEST_F(Backlash, IsTakenUpForATargetThatComesInTheMiddleOfTakingItUp) {
   }
 }
 
+TEST_F(Backlash, IsNoPartOfWhatAMoveThatTurnsSaysOfItsEnd) {
+  for (const double away : {0.1, -0.1}) {
+    for (const int off : {-90, -31, -30, -20, -10, -1, 1, 10, 20, 30, 31, 90, 400}) {
+      SetUp();
+      x().moveTo(away);
+      bench->machine->advance(0.15);
+      const double target = position() + off / 80'000.0;
+      const axis::Move move = x().moveTo(target);
+      const axis::MoveResult result = x().wait(move);
+      EXPECT_EQ(result.end, MoveEnd::kReached);
+      EXPECT_NEAR(move.rest, target, 1e-12) << off << " steps away, towards " << away;
+      EXPECT_NEAR(position(), target, 1e-12) << off << " steps away, towards " << away;
+      expectClean();
+    }
+  }
+}
+
 TEST_F(Backlash, LetsTheJointStandWhileItIsTakenUp) {
   x().moveTo(0.010);
   std::int64_t taken = 0;
