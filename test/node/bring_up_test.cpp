@@ -118,6 +118,20 @@ const std::vector<BadBringUp> kBadBringUps = {
      "joint_state_rte",
      {"did you mean joint_state_rate"}},
     {"RateOutOfRange", setting("joint_state_rate", 2000), "joint_state_rate", {"2000", "1000"}},
+    {"ClockThatStands",
+     [](NodeUnderTest& node) {
+       node.set("publish_clock", true);
+       node.set("simulation/speed", 0.0);
+     },
+     "publish_clock",
+     {"simulation/speed is 0", "above 0"}},
+    {"ClockOfRealLines",
+     [](NodeUnderTest& node) {
+       node.set("publish_clock", true);
+       node.set("gpio/backend", "libgpiod");
+     },
+     "publish_clock",
+     {"gpio/backend is libgpiod", "only the simulated rig"}},
     {"IdleWithoutThePin",
      [](NodeUnderTest& node) {
        node.set("axes/x/idle_timeout_s", 10.0);

@@ -6,12 +6,14 @@
 #include <stepdriver/Home.h>
 #include <stepdriver/HomeAction.h>
 #include <stepdriver/HomeAxes.h>
+#include <stepdriver/HomeAxesAction.h>
 
 #include <future>
 #include <memory>
 #include <mutex>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "support/node_under_test.h"
 #include "support/recorder.h"
@@ -266,6 +268,64 @@ TEST_F(HomingAction, IsNotReplacedByAnOlderGoalThatComesLater) {
   ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count())));
   EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::SUCCEEDED)
       << client->getResult()->message;
+}
+
+class MachineHomingAction : public Homing {
+ protected:
+  using Client = actionlib::SimpleActionClient<HomeAxesAction>;
+
+  void start() {
+    node.start();
+    client = std::make_unique<Client>(node.full("homing"), true);
+    ASSERT_TRUE(client->waitForServer(ros::Duration(kBound.count())));
+  }
+  actionlib::SimpleClientGoalState run(const HomeAxesGoal& goal) {
+    client->sendGoal(goal);
+    EXPECT_TRUE(client->waitForResult(ros::Duration(kBound.count()))) << "no result comes";
+    return client->getState();
+  }
+
+  std::unique_ptr<Client> client;
+};
+
+TEST_F(MachineHomingAction, HomesTheAxesAndTellsEachOne) {
+  start();
+  const Recorder<HomeAxesActionFeedback> feedback(node.full("homing/feedback"));
+  ASSERT_TRUE(waitUntil([&] { return feedback.connected(); }));
+  EXPECT_EQ(run({}), actionlib::SimpleClientGoalState::SUCCEEDED);
+  const auto result = client->getResult();
+  expectSays(result->message, "x is homed");
+  ASSERT_EQ(result->name, std::vector<std::string>{"x"});
+  EXPECT_TRUE(result->homed.at(0));
+  expectStandsHomed(result->position.at(0));
+  std::set<std::string> phases;
+  for (const auto& message : feedback.messages()) {
+    for (const std::string& phase : message.feedback.phase) phases.insert(phase);
+    for (const std::string& name : message.feedback.name) EXPECT_EQ(name, "x");
+  }
+  EXPECT_EQ(phases.count("seeking"), 1U);
+}
+
+TEST_F(MachineHomingAction, AbortsWithTheReason) {
+  start();
+  HomeAxesGoal goal;
+  goal.name = {"x", "w"};
+  EXPECT_EQ(run(goal), actionlib::SimpleClientGoalState::ABORTED);
+  expectSays(client->getResult()->message, "there is no axis w");
+  EXPECT_TRUE(client->getResult()->name.empty());
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST_F(MachineHomingAction, DeceleratesWhenItIsCancelled) {
+  node.set("simulation/speed", 1.0);
+  start();
+  client->sendGoal({});
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 100; }));
+  client->cancelGoal();
+  ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::PREEMPTED);
+  expectSays(client->getResult()->message, "it was cancelled");
+  EXPECT_FALSE(client->getResult()->homed.at(0));
 }
 
 }  // namespace

@@ -187,6 +187,7 @@ TEST(FollowJointTrajectory, HasTheMd5sumsOfControlMsgs) {
   EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryGoal>(), "69636787b6ecbde4d61d711979bc7ecb");
   EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryResult>(), "493383b18409bfb604b4e26c676401d2");
   EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryFeedback>(), "10817c60c2486ef6b33e97dcd87f4474");
+  EXPECT_STREQ(md5sum<msgs::JointTrajectoryControllerState>(), "10817c60c2486ef6b33e97dcd87f4474");
   EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryActionGoal>(), "cff5c1d533bf2f82dd0138d57f4304bb");
   EXPECT_STREQ(md5sum<msgs::FollowJointTrajectoryActionResult>(),
                "c4fb3b000dc9da4fd99699380efcc5d9");

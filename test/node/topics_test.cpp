@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <rosgraph_msgs/Clock.h>
 #include <sensor_msgs/JointState.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisState.h>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "support/control_msgs_client.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/wait.h"
@@ -20,6 +22,7 @@
 namespace stepdriver::node_test {
 namespace {
 
+using action_msgs::JointTrajectoryControllerState;
 using sensor_msgs::JointState;
 
 TEST(JointStates, KeepTheirRateWhileClientsWait) {
@@ -151,6 +154,67 @@ TEST(WaitingClients, HoldUpNoOtherCall) {
   EXPECT_NE(waiting.wait_for(std::chrono::seconds(0)), std::future_status::ready)
       << "the calls took as long as the move";
   EXPECT_TRUE(waiting.get().success);
+}
+
+TEST(ControllerState, IsThePlanAndWhatThePulsesDid) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const Recorder<JointTrajectoryControllerState> states(node.full("state"));
+  ASSERT_TRUE(waitUntil([&] { return states.count() > 0; }));
+  EXPECT_TRUE(node.moveTo(0.05, true).success);
+  EXPECT_TRUE(states.waitForLatest([](const JointTrajectoryControllerState& state) {
+    return state.actual.positions.at(0) == 0.05;
+  }));
+  double fastest = 0.0;
+  for (const JointTrajectoryControllerState& state : states.messages()) {
+    ASSERT_EQ(state.joint_names, std::vector<std::string>{"x_joint"});
+    const double off = state.desired.positions.at(0) - state.actual.positions.at(0);
+    EXPECT_DOUBLE_EQ(state.error.positions.at(0), off);
+    EXPECT_LT(std::abs(off), 3.0 / 80'000.0) << "within the pulses of a few milliseconds";
+    EXPECT_EQ(state.actual.velocities.at(0), state.desired.velocities.at(0));
+    EXPECT_EQ(state.error.velocities.at(0), 0.0);
+    fastest = std::max(fastest, state.desired.velocities.at(0));
+  }
+  EXPECT_NEAR(fastest, 0.1, 1e-9);
+}
+
+TEST(RigClock, IsPublishedIfItIsAskedFor) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 10.0);
+  node.set("publish_clock", true);
+  node.start();
+  const Recorder<rosgraph_msgs::Clock> clock("/clock");
+  const auto now = [&] { return clock.messages().back().clock; };
+  ASSERT_TRUE(waitUntil([&] { return clock.count() > 1; }));
+  const ros::Time before = now();
+  const auto moved = node.moveTo(0.2, true);
+  EXPECT_TRUE(moved.success) << moved.message;
+  EXPECT_TRUE(waitUntil([&] { return (now() - before).toSec() >= moved.duration; }))
+      << "the move took " << moved.duration << " s of the rig";
+  const auto messages = clock.messages();
+  for (std::size_t i = 1; i < messages.size(); ++i) {
+    EXPECT_GE(messages[i].clock, messages[i - 1].clock) << "it went back";
+  }
+}
+
+// Nodes with use_sim_time take their time from it, this one too.
+TEST(RigClock, StampsTheStatesWithSimulatedTime) {
+  ros::param::set("/use_sim_time", true);
+  NodeUnderTest node;
+  node.set("simulation/speed", 100.0);
+  node.set("publish_clock", true);
+  node.start();
+  ros::param::del("/use_sim_time");
+  const Recorder<JointState> states(node.beside("joint_states"));
+  const Recorder<rosgraph_msgs::Clock> clock("/clock");
+  ASSERT_TRUE(waitUntil([&] { return clock.count() > 0 && states.count() > 0; }));
+  EXPECT_TRUE(node.moveTo(0.2, true).success);
+  const ros::Time first = clock.messages().front().clock;
+  EXPECT_TRUE(states.waitForLatest([&](const JointState& state) {
+    return state.header.stamp >= first + ros::Duration(2.0) &&
+           state.header.stamp <= clock.messages().back().clock;
+  })) << "0.2 m take more than 2 s of the rig";
 }
 
 }  // namespace

@@ -19,6 +19,18 @@ NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& na
       reader.number("joint_state_rate", kJointStateRates, config.joint_state_rate);
   config.jog_timeout = reader.number("jog_timeout", kJogTimeouts, config.jog_timeout);
   config.urdf_limits = reader.boolean("urdf_limits", config.urdf_limits);
+  config.publish_clock = reader.boolean("publish_clock", config.publish_clock);
+  if (config.publish_clock && config.backend != setup::GpioBackend::kSimulated) {
+    reader.contradiction(
+        "publish_clock",
+        "is true, but gpio/backend is libgpiod, so that the clock is the computer's; only "
+        "the simulated rig has a time of its own");
+  } else if (config.publish_clock && config.simulation.speed == 0.0) {
+    reader.contradiction(
+        "publish_clock",
+        "is true, but simulation/speed is 0, and then time stands still while nothing "
+        "moves; give a speed above 0");
+  }
   config.hardware_id = reader.text("hardware_id", config.hardware_id);
   reader.rejectUnknown();
   return config;

@@ -14,6 +14,7 @@ struct NodeConfig : setup::MachineConfig {
   double joint_state_rate = 50.0;  ///< [Hz]
   double jog_timeout = 0.5;        ///< [s] without a jog message until the axis comes to rest
   bool urdf_limits = true;         ///< the limits of robot_description apply as well
+  bool publish_clock = false;      ///< the time of the simulated rig on /clock
   std::string hardware_id;         ///< for diagnostics; empty: made from the other facts
 };
 
@@ -23,6 +24,7 @@ struct NodeConfig : setup::MachineConfig {
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
 /// jog_timeout: 0.5               # [s] from 0.02 to 60
 /// urdf_limits: true              # those of robot_description hold too
+/// publish_clock: false           # true: the time of the simulated rig on /clock, for use_sim_time
 /// hardware_id: ""                # of diagnostics; empty: the host and the driver chips
 /// @endcode
 ///

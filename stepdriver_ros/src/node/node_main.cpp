@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <deque>
 #include <exception>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "common/node_start.h"
 #include "node/actions/action_statuses.h"
 #include "node/actions/homing_action.h"
+#include "node/actions/line_action.h"
 #include "node/actions/move_actions.h"
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
@@ -23,6 +25,7 @@
 #include "node/services/axis_services.h"
 #include "node/services/machine_home_service.h"
 #include "node/services/machine_services.h"
+#include "node/topics/clock_publisher.h"
 #include "node/topics/jog_subscriber.h"
 #include "node/topics/state_publisher.h"
 #include "node/topics/trajectory_command.h"
@@ -57,10 +60,12 @@ the lines and ends.
               ~move_line  ~hold  ~resume
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states  /diagnostics  ~jog, ~command (subscribed)
-  actions     ~AXIS/move  ~AXIS/homing  ~follow_joint_trajectory
+  topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  /diagnostics
+              /clock (with ~publish_clock)  ~jog, ~command (subscribed)
+  actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
-              ~state_file  ~hardware_id  ~urdf_limits  ~simulation  robot_description
+              ~state_file  ~hardware_id  ~urdf_limits  ~publish_clock  ~simulation
+              robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
 written, 3 the computer is too slow for its axes and ~realtime is enforce, 64 wrong usage.
@@ -71,7 +76,8 @@ Start it with: roslaunch stepdriver axis.launch
 ///
 /// @return the exit code.
 int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
-             TrajectoryAction& trajectory_action, StatePublisher& publisher) {
+             LineAction& line_action, TrajectoryAction& trajectory_action,
+             StatePublisher& publisher) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -80,6 +86,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
     exit_code = kExitGpio;
   }
   move_actions.tellEnded();
+  line_action.tellEnded();
   trajectory_action.tellEnded();
   queues.finish(kLastAnswers);
   publisher.stop();
@@ -152,7 +159,9 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
         onQueue(queues.control(), ros::NodeHandle(private_node, axis.config().name)), axis,
         statuses);
   }
+  const MachineHomingAction machine_homing_action(private_node, machine, statuses);
   MoveActions move_actions(private_node, machine, queues, statuses);
+  LineAction line_action(private_node, machine, queues, statuses);
   const MachineHomeService machine_home_service(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
@@ -164,6 +173,8 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
       node, private_node, machine, queues,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
       config.max_lateness);
+  std::optional<ClockPublisher> clock_publisher;
+  if (config.publish_clock) clock_publisher.emplace(private_node, hardware.clock());
   queues.start();
   publisher.start();
   ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
@@ -178,7 +189,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
     }
   }
   ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
-  return shutDown(machine, queues, move_actions, trajectory_action, publisher);
+  return shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
 }
 
 /// @return the exit code.

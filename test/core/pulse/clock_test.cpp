@@ -61,7 +61,7 @@ TEST(VirtualClock, IsNotLateAfterAHold) {
 }
 
 // The process whose clock is held while it is suspended: tells its parent that it is ready, and
-// goes on when that says so.
+// continues when the parent says so.
 [[noreturn]] void beSuspendedInAHold(int ready, int go) {
   VirtualClock clock(1.0);
   const Nanoseconds due = 1'000'000;

@@ -50,12 +50,17 @@ class Oracle {
     if (meaning.ends_hold) endHolds();
   }
 
-  void answered(std::uint64_t call, bool success, pulse::Nanoseconds now) {
+  /// @param at_fault each axis, at the answer.
+  void answered(std::uint64_t call, bool success, pulse::Nanoseconds now,
+                const std::array<bool, kAxes>& at_fault) {
     const auto found = calls_.find(call);
     if (found == calls_.end()) return;
     const Call& ended = found->second;
     open_.erase(std::remove(open_.begin(), open_.end(), call), open_.end());
-    if (!success) return;
+    if (!success) {
+      if (ended.meaning.recovers) recoveredInPart(ended.order, at_fault);
+      return;
+    }
     const Meaning& meaning = ended.meaning;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (!meaning.axes[axis]) continue;
@@ -149,9 +154,10 @@ class Oracle {
     }
   }
 
-  // The acceleration that a trajectory itself has at a place is missing to a stop along it there.
+  // The acceleration that a trajectory itself has at a place is missing to a stop along it there,
+  // and one axis may limit the stop first and then the other.
   pulse::Nanoseconds slowingOf(std::size_t axis) const {
-    return on_curve_[axis] ? slowing_[axis] * 5 / 4 : slowing_[axis];
+    return on_curve_[axis] ? slowing_[axis] * 3 / 2 : slowing_[axis];
   }
 
   // Axes that share a path take as long as the slowest of them.
@@ -173,6 +179,18 @@ class Oracle {
       const Call& open = calls_.at(call);
       return open.meaning.recovers && open.order > stop && open.order < motion;
     });
+  }
+
+  /// A recover that fails for one axis ends the faults of the others.
+  void recoveredInPart(std::uint64_t order, const std::array<bool, kAxes>& at_fault) {
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      for (Quiet& quiet : quiets_[axis]) {
+        const bool recovered = !at_fault[axis] && quiet.order < order;
+        if (recovered && quiet.kind == Meaning::Quiet::kEmergency) {
+          quiet.kind = Meaning::Quiet::kAtRest;
+        }
+      }
+    }
   }
 
   void endQuiet(std::size_t axis, std::uint64_t order, const Meaning& meaning) {

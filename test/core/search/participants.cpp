@@ -1,6 +1,7 @@
 #include "search/participants.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 
@@ -178,7 +179,12 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   answered_[call] = asked.name;
   note("answer of " + asked.name +
        (reply.failure ? ": " + reply.failure->text : std::string(": done")));
-  oracle_.answered(call, !reply.failure, clock_.now());
+  std::array<bool, kAxes> at_fault{};
+  const auto snapshot = controller_->snapshot();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    at_fault[axis] = !snapshot->axes[axis].state.fault.empty();
+  }
+  oracle_.answered(call, !reply.failure, clock_.now(), at_fault);
   if (!reply.failure && asked.meaning.quiet == Meaning::Quiet::kSlowsDown) checkSlowing(asked);
   const auto* moves = std::get_if<std::vector<axis::Move>>(&reply.value);
   if (!reply.failure && !asked.goals.empty()) {

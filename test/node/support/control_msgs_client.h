@@ -9,8 +9,10 @@
 
 #ifdef STEPDRIVER_HAS_CONTROL_MSGS
 #include <control_msgs/FollowJointTrajectoryAction.h>
+#include <control_msgs/JointTrajectoryControllerState.h>
 #else
 #include <stepdriver/FollowJointTrajectoryAction.h>
+#include <stepdriver/JointTrajectoryControllerState.h>
 #endif
 
 namespace stepdriver::node_test {

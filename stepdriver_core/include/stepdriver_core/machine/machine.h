@@ -61,9 +61,8 @@ class Machine {
   ///
   /// @param backend, clock outlive the machine.
   /// @throw GpioError if a line can't be requested; then no line is held.
-  /// @throw Refused with MachineOptions::enforce, naming what this computer can't do; no line is
-  /// held
-  ///   then.
+  /// @throw Refused with MachineOptions::enforce, naming what this computer can't do; then no line
+  ///   is held.
   Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 
@@ -147,6 +146,8 @@ class Machine {
   ///
   /// @throw Refused while the emergency-stop input is active or can't be read; then nothing is
   ///   cleared.
+  /// @throw Error if an axis can't recover, because its chip still reports a fault or a line can't
+  ///   be written; it names the axis, which stays at fault. The other axes have recovered.
   void recover();
 
   /// Refuses every command from now on, decelerates, and disables the axes that are configured so.

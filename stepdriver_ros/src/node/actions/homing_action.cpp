@@ -1,74 +1,46 @@
 #include "homing_action.h"
 
+#include <algorithm>
 #include <exception>
+
+#include "node/homing_results.h"
 
 namespace stepdriver::ros_node {
 namespace {
 
 constexpr std::chrono::milliseconds kFeedbackPeriod{100};
-constexpr const char* kNewerGoal = "a newer goal has come";
 
 }  // namespace
 
+bool HomingReports::due(const std::vector<axis::HomingPhase>& phases) {
+  const Clock::time_point now = Clock::now();
+  if (phases == told_ && now < told_at_ + kFeedbackPeriod) return false;
+  told_ = phases;
+  told_at_ = now;
+  return true;
+}
+
+// ---- one axis ----
+
 HomingAction::HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses)
-    : axis_(axis),
-      server_(
-          node, "homing", statuses, [this](const GoalHandle& goal) { take(goal); },
-          [this](const GoalHandle& goal) { cancel(goal); }) {
-  server_.start();
-}
+    : axis_(axis), goals_(node, "homing", statuses, [this](auto& goal, const auto& cancelled) {
+        home(goal, cancelled);
+      }) {}
 
-void HomingAction::take(const GoalHandle& goal) {
-  GoalHandle newer = goal;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (const auto& other : {current_, next_}) {
-    if (!other || newer.getGoalID().stamp >= other->getGoalID().stamp) continue;
-    newer.setCanceled({}, kNewerGoal);
-    return;
-  }
-  if (next_) next_->setCanceled({}, kNewerGoal);
-  next_ = newer;
-  cancelled_ = true;
-  if (homing_) return;
-  thread_ = std::async(std::launch::async, [this] { homeForAll(); });
-  homing_ = true;
-}
-
-void HomingAction::cancel(const GoalHandle& goal) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (current_ && *current_ == goal) cancelled_ = true;
-  if (!next_ || *next_ != goal) return;
-  next_->setCanceled({}, "it was cancelled before it began");
-  next_.reset();
-}
-
-void HomingAction::homeForAll() {
-  while (beginNext()) home();
-}
-
-bool HomingAction::beginNext() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  current_ = next_;
-  next_.reset();
-  cancelled_ = false;
-  homing_ = current_.has_value();
-  if (current_) current_->setAccepted();
-  return homing_;
-}
-
-bool HomingAction::isCancelled() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return cancelled_;
-}
-
-void HomingAction::home() {
+void HomingAction::home(Goals::GoalHandle& goal, const std::function<bool()>& cancelled) {
+  HomingReports reports;
   HomeResult answer;
   axis::HomingEnd end = axis::HomingEnd::kFailed;
   try {
-    told_ = axis::HomingPhase::kNone;
-    const axis::HomingResult result = axis_.home([this] {
-      tell();
-      return isCancelled();
+    const axis::HomingResult result = axis_.home([&] {
+      const axis::AxisState state = axis_.state();
+      if (reports.due({state.homing})) {
+        HomeFeedback feedback;
+        feedback.phase = axis::nameOf(state.homing);
+        feedback.position = state.position;
+        goal.publishFeedback(feedback);
+      }
+      return cancelled();
     });
     end = result.end;
     answer.message = result.message;
@@ -77,24 +49,63 @@ void HomingAction::home() {
   }
   answer.position = axis_.state().position;
   if (end == axis::HomingEnd::kHomed) {
-    current_->setSucceeded(answer, answer.message);
+    goal.setSucceeded(answer, answer.message);
   } else if (end == axis::HomingEnd::kCancelled) {
-    current_->setCanceled(answer, answer.message);
+    goal.setCanceled(answer, answer.message);
   } else {
-    current_->setAborted(answer, answer.message);
+    goal.setAborted(answer, answer.message);
   }
 }
 
-void HomingAction::tell() {
-  const axis::AxisState state = axis_.state();
-  const Clock::time_point now = Clock::now();
-  if (state.homing == told_ && now < told_at_ + kFeedbackPeriod) return;
-  told_ = state.homing;
-  told_at_ = now;
-  HomeFeedback feedback;
-  feedback.phase = axis::nameOf(state.homing);
-  feedback.position = state.position;
-  current_->publishFeedback(feedback);
+// ---- all axes ----
+
+MachineHomingAction::MachineHomingAction(const ros::NodeHandle& node, machine::Machine& machine,
+                                         ActionStatuses& statuses)
+    : machine_(machine),
+      goals_(node, "homing", statuses,
+             [this](auto& goal, const auto& cancelled) { home(goal, cancelled); }) {}
+
+void MachineHomingAction::home(Goals::GoalHandle& goal, const std::function<bool()>& cancelled) {
+  HomingReports reports;
+  HomeAxesResult answer;
+  std::vector<axis::HomingResult> results;
+  try {
+    results = machine_.home(goal.getGoal()->name, [&] {
+      report(goal, reports);
+      return cancelled();
+    });
+    answer.message = messageOf(results);
+  } catch (const std::exception& error) {
+    answer.message = error.what();
+  }
+  for (const axis::HomingResult& result : results) {
+    answer.name.push_back(result.axis);
+    answer.homed.push_back(result.end == axis::HomingEnd::kHomed);
+    answer.position.push_back(result.position);
+  }
+  if (!results.empty() && areAllHomed(results)) {
+    goal.setSucceeded(answer, answer.message);
+  } else if (std::any_of(results.begin(), results.end(), [](const axis::HomingResult& result) {
+               return result.end == axis::HomingEnd::kCancelled;
+             })) {
+    goal.setCanceled(answer, answer.message);
+  } else {
+    goal.setAborted(answer, answer.message);
+  }
+}
+
+void MachineHomingAction::report(Goals::GoalHandle& goal, HomingReports& reports) const {
+  HomeAxesFeedback feedback;
+  std::vector<axis::HomingPhase> phases;
+  for (const auto& axis : machine_.axes()) {
+    const axis::AxisState state = axis->state();
+    phases.push_back(state.homing);
+    if (state.homing == axis::HomingPhase::kNone) continue;
+    feedback.name.push_back(axis->config().name);
+    feedback.phase.emplace_back(axis::nameOf(state.homing));
+    feedback.position.push_back(state.position);
+  }
+  if (reports.due(phases)) goal.publishFeedback(feedback);
 }
 
 }  // namespace stepdriver::ros_node

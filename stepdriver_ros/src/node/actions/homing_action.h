@@ -2,55 +2,64 @@
 
 #include <ros/node_handle.h>
 #include <stepdriver/HomeAction.h>
+#include <stepdriver/HomeAxesAction.h>
 
 #include <chrono>
-#include <future>
-#include <mutex>
-#include <optional>
+#include <functional>
 #include <string>
+#include <vector>
 
-#include "action_server.h"
-#include "stepdriver_core/axis/axis.h"
+#include "action_statuses.h"
+#include "serial_action.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 
-/// The action `homing` of one axis, below its name. Its goals run one after the other: a newer one
-/// cancels the current one, and those that haven't begun. While there are goals it has a thread
-/// that waits for them.
+/// When a homing in progress is reported: at each new phase of an axis, and each 0.1 s.
+class HomingReports {
+ public:
+  /// @param phases of the axes that are reported. @return whether a report is due.
+  bool due(const std::vector<axis::HomingPhase>& phases);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::vector<axis::HomingPhase> told_;
+  Clock::time_point told_at_;
+};
+
+/// The action `homing` of one axis, below its name.
 class HomingAction {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
   /// @param axis, statuses outlive the action; before its end the machine has been shut down.
   HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses);
-  HomingAction(const HomingAction&) = delete;
-  HomingAction& operator=(const HomingAction&) = delete;
 
  private:
-  using Clock = std::chrono::steady_clock;
-  using Server = ActionServer<HomeAction>;
-  using GoalHandle = Server::GoalHandle;
+  using Goals = SerialAction<HomeAction>;
 
-  void take(const GoalHandle& goal);
-  void cancel(const GoalHandle& goal);
-  void homeForAll();
-  /// Begins the next goal. @return whether there is one.
-  bool beginNext();
-  bool isCancelled();
-  void home();
-  void tell();
+  void home(Goals::GoalHandle& goal, const std::function<bool()>& cancelled);
 
   axis::Axis& axis_;
-  Server server_;
-  // For the thread only.
-  axis::HomingPhase told_ = axis::HomingPhase::kNone;
-  Clock::time_point told_at_;
+  Goals goals_;  // last: its thread uses the others
+};
 
-  std::mutex mutex_;
-  std::optional<GoalHandle> current_;
-  std::optional<GoalHandle> next_;
-  bool cancelled_ = false;  // the current one
-  bool homing_ = false;     // the thread runs
-  std::future<void> thread_;
+/// The action ~homing of the whole machine: its axes in their configured order.
+class MachineHomingAction {
+ public:
+  /// @param node the node's private handle, with the queue of the goals and cancels.
+  /// @param machine, statuses outlive the action; before its end the machine has been shut down.
+  MachineHomingAction(const ros::NodeHandle& node, machine::Machine& machine,
+                      ActionStatuses& statuses);
+
+ private:
+  using Goals = SerialAction<HomeAxesAction>;
+
+  void home(Goals::GoalHandle& goal, const std::function<bool()>& cancelled);
+  void report(Goals::GoalHandle& goal, HomingReports& reports) const;
+
+  machine::Machine& machine_;
+  Goals goals_;  // last: its thread uses the machine
 };
 
 }  // namespace stepdriver::ros_node

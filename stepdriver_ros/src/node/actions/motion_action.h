@@ -8,6 +8,7 @@
 #include <iterator>
 #include <list>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -36,10 +37,7 @@ class MotionAction {
   ///
   /// @return whether there may be current goals.
   bool poll() {
-    // A new goal may wait for a chip to wake up, or take long to plan; this thread must poll others
-    // too.
-    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-    if (!lock.owns_lock()) return true;
+    const std::lock_guard<std::mutex> lock(mutex_);
     concludeEnded();
     polls_ = (polls_ + 1) % kPollsPerFeedback;
     for (Following& following : under_way_) watch(following, polls_ == 0);
@@ -84,43 +82,75 @@ class MotionAction {
   /// Checks a current motion, and reports on it.
   virtual void watch(Following& following, bool tell) = 0;
 
+  /// A cancel of the goal that begin() is about to begin. Its motion is stopped when it has begun.
+  virtual void cancelBeginning(const GoalHandle& /*handle*/) {}
+
+  // Goals come one after another. One may wait for a chip to wake up or for axes to come to rest,
+  // or take long to plan: cancels and the other goals don't wait for that.
   void take(GoalHandle handle) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
-      handle.setCanceled({}, "it was cancelled before it began");
-      return;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (isCancelled(handle)) {
+        handle.setCanceled({}, kCancelledBefore);
+        return;
+      }
+      beginning_ = handle;
     }
     try {
       Following following = begin(handle);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      beginning_.reset();
+      const bool cancelled = isCancelled(handle);
       handle.setAccepted();
       for (Following& older : under_way_) takeOver(following, older);
       under_way_.push_back(std::move(following));
+      if (cancelled) cancel(under_way_.back());
       concludeEnded();
       begun_();
     } catch (const Error& error) {
-      reject(handle, error);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      beginning_.reset();
+      if (isCancelled(handle)) {
+        handle.setCanceled({}, kCancelledBefore);
+      } else {
+        reject(handle, error);
+      }
+      concludeEnded();
     }
+  }
+
+  static bool isCancelled(const GoalHandle& handle) {
+    return handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING;
   }
 
   void cancel(const GoalHandle& handle) {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (beginning_ && *beginning_ == handle) cancelBeginning(handle);
     for (Following& following : under_way_) {
-      if (following.handle != handle) continue;
-      following.preempted_by = "it was cancelled";
-      stop(following);
+      if (following.handle == handle) cancel(following);
     }
   }
 
+  void cancel(Following& following) {
+    following.preempted_by = "it was cancelled";
+    stop(following);
+  }
+
+  // While a goal begins, nothing is concluded: it may be what ended an older one.
   void concludeEnded() {
+    if (beginning_) return;
     for (auto following = under_way_.begin(); following != under_way_.end();) {
       following = conclude(*following) ? under_way_.erase(following) : std::next(following);
     }
   }
 
+  static constexpr const char* kCancelledBefore = "it was cancelled before it began";
+
   const std::function<void()> begun_;
   std::mutex mutex_;
   Server server_;
   std::list<Following> under_way_;
+  std::optional<GoalHandle> beginning_;
   int polls_ = 0;
 };
 

@@ -2,40 +2,11 @@
 
 #include <ros/console.h>
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include "move_end.h"
+
 namespace stepdriver::ros_node {
-namespace {
-
-int endOf(axis::MoveEnd end) {
-  switch (end) {
-    case axis::MoveEnd::kReached:
-      return MoveResult::REACHED;
-    case axis::MoveEnd::kStopped:
-      return MoveResult::STOPPED;
-    case axis::MoveEnd::kReplaced:
-      return MoveResult::REPLACED;
-    case axis::MoveEnd::kEndstopMin:
-      return MoveResult::ENDSTOP_MIN;
-    case axis::MoveEnd::kEndstopMax:
-      return MoveResult::ENDSTOP_MAX;
-    case axis::MoveEnd::kEmergencyStop:
-      return MoveResult::EMERGENCY_STOP;
-    case axis::MoveEnd::kFault:
-    case axis::MoveEnd::kCompanion:  // the motion of one axis has no companions
-      break;
-  }
-  return MoveResult::FAULT;
-}
-
-double progressOf(double from, double position, double target) {
-  const double way = std::abs(target - from);
-  return way > 0.0 ? std::clamp(1.0 - std::abs(target - position) / way, 0.0, 1.0) : 1.0;
-}
-
-}  // namespace
 
 AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis,
                                ActionStatuses& statuses, std::function<void()> begun)
@@ -76,13 +47,7 @@ bool AxisMoveAction::conclude(FollowingMove& following) {
   result.message = ended->message;
   result.position = ended->position;
   result.duration = ended->duration;
-  if (ended->end == axis::MoveEnd::kReached) {
-    following.handle.setSucceeded(result, result.message);
-  } else if (ended->end == axis::MoveEnd::kReplaced || !following.preempted_by.empty()) {
-    following.handle.setCanceled(result, result.message);
-  } else {
-    following.handle.setAborted(result, result.message);
-  }
+  reportEnd(following.handle, result, following.preempted_by);
   return true;
 }
 

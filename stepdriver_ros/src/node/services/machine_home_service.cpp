@@ -2,29 +2,15 @@
 
 #include <ros/console.h>
 
-#include <algorithm>
 #include <exception>
 #include <string>
 #include <vector>
 
+#include "node/homing_results.h"
 #include "respond.h"
 
 namespace stepdriver::ros_node {
 namespace {
-
-bool areAllHomed(const std::vector<axis::HomingResult>& results) {
-  return std::all_of(results.begin(), results.end(), [](const axis::HomingResult& result) {
-    return result.end == axis::HomingEnd::kHomed;
-  });
-}
-
-std::string messageOf(const std::vector<axis::HomingResult>& results) {
-  std::string text;
-  for (const axis::HomingResult& result : results) {
-    text += (text.empty() ? "" : "; ") + result.message;
-  }
-  return text;
-}
 
 void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names) {
   try {

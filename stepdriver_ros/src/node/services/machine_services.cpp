@@ -13,21 +13,12 @@
 #include <utility>
 
 #include "common/text.h"
+#include "node/line_request.h"
 #include "respond.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::ros_node {
 namespace {
-
-machine::LineRequest lineRequest(const MoveLine::Request& request) {
-  machine::LineRequest line;
-  line.names = request.name;
-  line.positions = request.position;
-  line.relative = request.relative != 0;
-  line.velocity = request.velocity;
-  line.duration = request.duration;
-  return line;
-}
 
 void moveLine(machine::Machine& machine, const MoveLine::Request& request,
               MoveLine::Response& response) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "node/actions/follow_joint_trajectory.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::ros_node {
@@ -43,6 +44,8 @@ StatePublisher::StatePublisher(ros::NodeHandle node, ros::NodeHandle private_nod
       joint_state_period_(std::chrono::duration_cast<Clock::duration>(
           std::chrono::duration<double>(1.0 / joint_state_rate))),
       joint_state_publisher_(node.advertise<sensor_msgs::JointState>("joint_states", kQueueSize)),
+      controller_state_publisher_(
+          private_node.advertise<action_msgs::JointTrajectoryControllerState>("state", kQueueSize)),
       endstop_publisher_(private_node.advertise<Endstops>("endstops", kQueueSize, true)),
       axis_state_publisher_(private_node.advertise<AxisStates>("axis_states", kQueueSize, true)) {
   for (const auto& axis : machine.axes()) {
@@ -125,6 +128,23 @@ void StatePublisher::publishJointStates() {
     joint_states_.velocity[i] = states_[i].velocity;
   }
   joint_state_publisher_.publish(joint_states_);
+  if (controller_state_publisher_.getNumSubscribers() > 0) publishControllerState();
+}
+
+void StatePublisher::publishControllerState() {
+  action_msgs::JointTrajectoryControllerState message;
+  message.header.stamp = states_read_;
+  message.joint_names = joint_states_.name;
+  for (const axis::AxisState& state : states_) {
+    message.desired.positions.push_back(state.planned);
+    message.actual.positions.push_back(state.position);
+    message.error.positions.push_back(state.planned - state.position);
+    // The only velocity of an axis is that of its plan.
+    message.desired.velocities.push_back(state.velocity);
+    message.actual.velocities.push_back(state.velocity);
+    message.error.velocities.push_back(0.0);
+  }
+  controller_state_publisher_.publish(message);
 }
 
 void StatePublisher::publishEndstopsOnChange() {

@@ -17,8 +17,8 @@
 
 namespace stepdriver::ros_node {
 
-/// Publishes joint_states, ~endstops and ~axis_states from a thread of its own, so that waiting
-/// calls don't slow it down. One thread calls start() and stop().
+/// Publishes joint_states, ~endstops, ~axis_states, each axis's state and ~state from a thread of
+/// its own, so that waiting calls don't slow it down. One thread calls start() and stop().
 class StatePublisher {
  public:
   /// @param node, private_node handles of the node, and of its private names.
@@ -42,6 +42,7 @@ class StatePublisher {
   bool sleepUntil(Clock::time_point time);
   void readStates();
   void publishJointStates();
+  void publishControllerState();
   void publishEndstopsOnChange();
   void publishAxisStates(bool only_on_change);
   void publishStateOfEachAxis(bool due);
@@ -49,6 +50,7 @@ class StatePublisher {
   const machine::Machine& machine_;
   const Clock::duration joint_state_period_;
   ros::Publisher joint_state_publisher_;
+  ros::Publisher controller_state_publisher_;
   ros::Publisher endstop_publisher_;
   ros::Publisher axis_state_publisher_;
   std::vector<ros::Publisher> own_state_publishers_;  // of each axis

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "stepdriver_core/machine/coordinated_move.h"
+
+namespace stepdriver::ros_node {
+
+/// @tparam Fields those of a request of the service move_line, or of a goal of the action.
+template <typename Fields>
+machine::LineRequest lineRequest(const Fields& fields) {
+  machine::LineRequest line;
+  line.names = fields.name;
+  line.positions = fields.position;
+  line.relative = fields.relative != 0;
+  line.velocity = fields.velocity;
+  line.duration = fields.duration;
+  return line;
+}
+
+}  // namespace stepdriver::ros_node
