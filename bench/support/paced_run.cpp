@@ -197,7 +197,7 @@ PacedFigures runNanosleep(double rate, double seconds) {
   pulse::SteadyClock clock;
   const double used = processSeconds();
   std::thread([&] {
-    figures.scheduler_error = pulse::askForScheduler();
+    figures.scheduler_error = pulse::askForScheduler(pulse::kRealtimePriority);
     const pulse::CpuLatencyHold awake;
     const Nanoseconds begin = clock.now() + kBegin;
     for (std::size_t i = 0; i < count; ++i) {

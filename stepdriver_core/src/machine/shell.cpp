@@ -8,6 +8,7 @@
 #include <chrono>
 #include <utility>
 
+#include "pulse/realtime.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -238,7 +239,8 @@ void Shell::watchInputs() {
 
 void Shell::run() {
   pthread_setname_np(pthread_self(), "controller");
-  prctl(PR_SET_TIMERSLACK, 1);
+  // Without that right it works too, and a stop may wait for a processor.
+  if (clock_.keepsRealTime()) pulse::askForScheduler(pulse::kPromptPriority);
   bool holding = false;
   for (;;) {
     std::int64_t until = writers_.deadline().value_or(pulse::kNever);

@@ -101,7 +101,7 @@ Capability asPulseThread(Clock& clock, const std::string& latency_device,
     capability.rights.latency_error = awake->error();
   }
   std::thread([&] {
-    capability.rights.scheduler_error = askForScheduler();
+    capability.rights.scheduler_error = askForScheduler(kRealtimePriority);
     if (!measure_calls(capability)) return;
     capability.lateness = latenessOf(clock, &Clock::waitUntil, kMeasuredWakeUps);
     capability.sleep_lateness = latenessOf(clock, &Clock::sleepUntil, kMeasuredSleeps);

@@ -35,8 +35,10 @@ void PulseThread::setAlarm(Nanoseconds time) {
 void PulseThread::run() {
   pthread_setname_np(pthread_self(), "pulse");
   if (clock_.realtime()) {
-    scheduler_error_ = askForScheduler();
+    scheduler_error_ = askForScheduler(kRealtimePriority);
     touchStack();
+  } else if (clock_.keepsRealTime()) {
+    askForScheduler(kPromptPriority);  // a rig without that right is only slower
   }
   while (!stopping_) {
     const Nanoseconds due = engine_.serve();

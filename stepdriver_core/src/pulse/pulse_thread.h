@@ -15,7 +15,9 @@ namespace stepdriver::pulse {
 /// A thread that serves an engine.
 ///
 /// It requests SCHED_FIFO 50, locked memory and processors that don't sleep if the clock is a
-/// real-time one. If any of these is refused, it works without it, and rights() says so.
+/// real-time one. If any of these is refused, it works without it, and rights() says so. On a
+/// virtual clock that keeps real time it requests a lower priority, so that a stop doesn't wait for
+/// a processor.
 class PulseThread {
  public:
   /// @param engine, clock outlive the thread. @param listener is told when an alarm goes off; may

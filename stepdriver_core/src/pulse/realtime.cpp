@@ -57,11 +57,11 @@ constexpr std::size_t kStackDepth = 64 << 10;
 
 }  // namespace
 
-int askForScheduler() {
+int askForScheduler(int priority) {
   // The default slack of 50 us is half of the lateness of a wake-up.
   prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
   sched_param parameters{};
-  parameters.sched_priority = kRealtimePriority;
+  parameters.sched_priority = priority;
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
 }
 

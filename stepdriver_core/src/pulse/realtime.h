@@ -2,12 +2,15 @@
 
 namespace stepdriver::pulse {
 
-/// The priority that askForScheduler() requests.
+/// The SCHED_FIFO priority of a thread that serves pulses on real lines.
 constexpr int kRealtimePriority = 50;
+/// That of threads whose work is short and must not wait while all processors are busy: the
+/// controller, and on a rig that keeps real time also the pulses.
+constexpr int kPromptPriority = 10;
 
 /// Requests SCHED_FIFO, and timers without slack, for the calling thread.
 /// @return 0, or the errno of the refusal.
-int askForScheduler();
+int askForScheduler(int priority);
 
 /// Locks the present and future memory of the process: pages that were used once stay in memory.
 /// Code and data of the program and its libraries are loaded first, except for tables of more than

@@ -43,6 +43,10 @@ class Clock {
   /// permissions.
   virtual bool realtime() const { return false; }
 
+  /// Whether it takes as long as real time, or longer, from one event to the next. The threads that
+  /// serve it then sleep most of the time, and request to run before others when they wake up.
+  virtual bool keepsRealTime() const { return realtime(); }
+
   /// While anyone holds the clock, a virtual clock stands still; a real one continues.
   virtual void hold() {}
   virtual void release() {}
@@ -101,6 +105,7 @@ class VirtualClock : public Clock {
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
   void wake() override;
+  bool keepsRealTime() const override { return speed_ > 0.0 && speed_ <= 1.0; }
   void hold() override;
   void release() override;
 

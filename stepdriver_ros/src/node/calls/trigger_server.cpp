@@ -10,6 +10,7 @@
 #include <ros/this_node.h>
 #include <ros/transport/transport_tcp.h>
 #include <ros/xmlrpc_manager.h>
+#include <sched.h>
 #include <sys/eventfd.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -103,6 +104,14 @@ void tellMaster(const char* method, const std::string& service, const std::strin
   }
 }
 
+/// Calls that end motions don't wait for a processor while the node plans. It is no loss if that
+/// right isn't granted. Pulses have a higher priority.
+void runBeforeOthers() {
+  sched_param parameters{};
+  parameters.sched_priority = sched_get_priority_min(SCHED_FIFO);
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+}
+
 Descriptor acceptFrom(const Descriptor& listening) {
   Descriptor socket(accept4(listening.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   const int on = 1;
@@ -136,6 +145,7 @@ void TriggerServer::start() {
     pthread_setname_np(pthread_self(), name_.c_str());
     // Calls wait for the pulse thread in naps that are shorter than the default slack, 50 us.
     prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
+    runBeforeOthers();
     serveAll();
   });
 }
