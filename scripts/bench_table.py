@@ -1,8 +1,9 @@
 #!/usr/bin/python3
-"""Prints the table of bench/figures.txt from the JSON that the benchmarks have written; bench.sh
-calls it: bench_table.py FIGURES.TXT TABLE.JSON RESULT.JSON...
+"""Prints the table of bench/figures.txt from the JSON files of the benchmarks.
 
-Exit code 0: every target that was measured is held.
+bench.sh calls it: bench_table.py FIGURES.TXT TABLE.JSON RESULT.JSON...
+
+Exit code 0: no benchmark failed, and every target that was measured is met.
 """
 
 import json
@@ -14,7 +15,7 @@ QUANTITY = re.compile(r"\{([^{}]+):([a-z0-9_]+)\}")
 
 
 def read_results(names):
-    """The values of each field of each benchmark, and what failed."""
+    """The values of each field of each benchmark, and the messages of those that failed."""
     values, failed = {}, []
     for name in names:
         with open(name) as file:
@@ -40,13 +41,13 @@ def read_figures(name):
 
 
 def measured(expression, values):
-    """None where a benchmark has not run."""
+    """None if one of the benchmarks has not run."""
     if any(found not in values for found in QUANTITY.findall(expression)):
         return None
     medians = QUANTITY.sub(lambda found: repr(statistics.median(values[found.groups()])), expression)
     if re.search(r"[^-+*/(). e0-9]", medians):
         sys.exit(f"{expression}: not an expression of figures")
-    return eval(medians)  # numbers and their operators only
+    return eval(medians)  # contains only numbers and operators
 
 
 def verdict(target, value):
@@ -55,8 +56,8 @@ def verdict(target, value):
     if target == "-":
         return ""
     sign, number = target.split()
-    held = value <= float(number) if sign == "<=" else value >= float(number)
-    return "held" if held else "MISSED"
+    met = value <= float(number) if sign == "<=" else value >= float(number)
+    return "met" if met else "MISSED"
 
 
 def shown(value):
@@ -76,8 +77,8 @@ def main():
     with open(table, "w") as file:
         json.dump({"figures": rows, "failed": failed}, file, indent=1)
     width = max(len(row["figure"]) for row in rows)
-    print(f"{'figure':{width}} | target  | measured          | held or missed")
-    print(f"{'-' * width} | ------- | ----------------- | --------------")
+    print(f"{'figure':{width}} | target  | measured          | met or missed")
+    print(f"{'-' * width} | ------- | ----------------- | -------------")
     for row in rows:
         value = f"{shown(row['measured'])} {row['unit']}".strip()
         print(f"{row['figure']:{width}} | {row['target']:7} | {value:17} | {row['verdict']}".rstrip())

@@ -16,7 +16,7 @@ UNITS = {"position": "steps", "speed": "steps/s", "acceleration": "steps/s$^2$"}
 class Trace:
     def __init__(self, folder, name):
         self.marks = []
-        self.steps = {}  # of each axis: times [s] and counts
+        self.steps = {}  # for each axis: times [s] and counts
         with open(folder / (name + ".csv"), newline="") as file:
             for kind, axis, time_ns, what in csv.reader(file):
                 time = int(time_ns) * 1e-9
@@ -32,7 +32,7 @@ class Trace:
 
 
 def draw(folder, picture, curves, what, width=6.4):
-    """curves: (trace, axis, label) of each; what: a panel for each of these quantities."""
+    """curves: (trace, axis, label) for each; what: the quantities, each of which gets a panel."""
     figure, panels = plt.subplots(len(what), 1, sharex=True, squeeze=False,
                                   figsize=(width, 0.5 + 1.35 * len(what)))
     for quantity, panel in zip(what, panels[:, 0]):
@@ -54,7 +54,7 @@ def draw(folder, picture, curves, what, width=6.4):
 
 
 def draw_half_steps(folder, trace):
-    """The edges, and the curve that they come from: 8 steps at 2000 steps/s^2."""
+    """The edges, and the curve that they follow: 8 steps at 2000 steps/s^2."""
     figure, panel = plt.subplots(figsize=(6.4, 2.4))
     times, counts = trace.steps["x"]
     begin = times[0] - (2 * 0.5 / 2000) ** 0.5
@@ -75,7 +75,7 @@ def draw_half_steps(folder, trace):
 
 
 def draw_path(folder, trace):
-    """One axis over the other, and the two points that the trajectory goes through."""
+    """One axis over the other, and the two points through which the trajectory passes."""
     events = sorted((time, axis, count) for axis in "xy" for time, count in zip(*trace.steps[axis]))
     place = {"x": 0, "y": 0}
     xs, ys = [0], [0]

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Runs the commands of the project's pages, and looks at what they say.
+"""Runs the commands of the project's pages, and checks their output.
 
 usage: test/docs/commands_test.py [PAGE...]
 
-In an environment with stepdriver. commands.yaml has for each page what comes of its commands; one
-that isn't there, or not at its place, fails. Each page has a ROS master, a folder and a thread of
-its own. Exit code 0: all is as the pages have it; 1: not.
+Needs an environment with stepdriver. commands.yaml lists the commands of each page, in order, and their
+expected results; a command that is missing there, or in the wrong place, is a failure. Each page has a
+ROS master, a folder and a thread of its own. Exit code 0: all pages are right; 1: otherwise.
 """
 
 import concurrent.futures
@@ -24,7 +24,7 @@ import yaml
 
 import pages
 
-BOUND = 120  # [s] for whatever must come; a machine under load takes its time
+BOUND = 120  # [s] limit of each wait: long enough for a machine under load
 TABLE = pages.ROOT / "test/docs/commands.yaml"
 
 
@@ -39,8 +39,8 @@ def free_port():
 
 
 def lives(group):
-    """Whether any process of a group runs: rosbag ends before what it has started, and that writes the
-    bag."""
+    """Whether any process of a group is running. The leader alone isn't enough: rosbag ends before its
+    children, which write the bag."""
     for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
         try:
             state, _, pgrp = stat.read_text(encoding="utf-8").rpartition(")")[2].split()[:3]
@@ -52,7 +52,7 @@ def lives(group):
 
 
 class Page:
-    """The person who follows a page: terminals, and a folder with what the page supposes."""
+    """The reader who follows a page, with terminals and a folder that has the files that it assumes."""
 
     def __init__(self, name, folder):
         self.name = name
@@ -75,7 +75,7 @@ class Page:
         self.port = port
 
     def begin(self):
-        """One master for all that is launched after one another."""
+        """Starts the master that all launches of this page share."""
         self.master = self.open(["rosmaster", "--core", "-p", str(self.port)], "master.log")
         deadline = time.monotonic() + BOUND
         while not self.parameters.is_online():
@@ -86,14 +86,14 @@ class Page:
     def open(self, command, log):
         with (self.folder / log).open("w") as output:
             return subprocess.Popen(
-                # What is started ends with this program, however that ends.
+                # The process ends with this program, however that ends.
                 ["setpriv", "--pdeathsig", "TERM", *command],
                 cwd=self.folder, env=self.environment, start_new_session=True,
                 stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
             )
 
     def here(self, command):
-        """What the page supposes where it is on this machine."""
+        """The command with the page's paths replaced by those of this machine."""
         here = {
             "build/install": os.environ["CMAKE_PREFIX_PATH"].split(":")[0],
             "/path/to/": f"{self.folder}/",
@@ -117,7 +117,8 @@ class Page:
     def start(self, entry, command):
         if command.startswith("roslaunch ") and not entry.get("beside"):
             self.end()
-            # Launch files clear what was set before them; a second one of the same roslaunch sets more.
+            # A launch file clears parameters that were set before it, so a second launch file of the same
+            # roslaunch sets the speed.
             speed = entry.get("speed", 1.0)
             (self.folder / "speed.launch").write_text(
                 f'<launch><param name="/stepdriver/simulation/speed" value="{speed}"/></launch>')
@@ -127,7 +128,8 @@ class Page:
         self.until(self.started[-1], entry["until"], self.folder / log)
 
     def until(self, process, check, log):
-        """Waits until a command does what it is to do, or, without one, until this has said it."""
+        """Waits until the command of `check` succeeds; without one, until the process has printed the
+        expected text."""
         deadline = time.monotonic() + BOUND
         while True:
             try:
@@ -139,7 +141,7 @@ class Page:
             time.sleep(0.2)
 
     def end(self):
-        """Ctrl-C in each terminal, the newest first."""
+        """Presses Ctrl-C in each terminal, the newest first."""
         while self.started:
             self.end_one(self.started.pop())
 
@@ -153,7 +155,7 @@ class Page:
         process.wait()
 
     def follow(self, entries):
-        """What went wrong, a text for each command."""
+        """Returns a text for each command that failed, and the number of commands that ran."""
         wrong, ran = [], 0
         if all("elsewhere" in entry for entry in entries):
             return wrong, ran
@@ -181,7 +183,7 @@ class Page:
 
 
 def differences(page, entries):
-    """Where the table isn't what the page says."""
+    """Differences between the table and the page."""
     on_page = list(pages.commands(pages.text_of(page)))
     in_table = [
         entry.get("run") or entry.get("start") or entry["elsewhere"]
@@ -200,7 +202,7 @@ def differences(page, entries):
 
 
 def untested(page, entries):
-    """Commands that are said to be tested elsewhere, and where nothing is."""
+    """Commands that are marked as tested elsewhere, but without a reason or an existing test."""
     stages = re.findall(
         r"^ *(?:.* \|\| )?stage ([\w-]+) ", (pages.ROOT / "scripts/test.sh").read_text(), re.M
     )
@@ -220,8 +222,8 @@ def follow(page, entries):
 
 
 def main():
-    # As in a terminal: where this is run in the background the signal may be ignored, and programs
-    # inherit that.
+    # As in a terminal. If this runs in the background, the signal may be ignored, and programs inherit
+    # that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     table = yaml.safe_load(TABLE.read_text(encoding="utf-8"))
     wanted = sys.argv[1:] or pages.names()

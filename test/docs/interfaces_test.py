@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Holds docs/interfaces.md against the nodes that run: two_axes.launch and joystick.launch.
+"""Compares docs/interfaces.md with running nodes: two_axes.launch and joystick.launch.
 
 usage: test/docs/interfaces_test.py
 
-Names, types, fields and latching, in both directions. Exit code 0: they agree; 1: not.
+Compares names, types, fields and latching, in both directions. Exit code 0: they agree; 1: otherwise.
 """
 
 import re
@@ -18,7 +18,7 @@ import pages
 
 NODE = "/stepdriver"
 PAGE = "docs/interfaces.md"
-# Of every node, of roscpp and of what else the launch files start.
+# Interfaces that every roscpp node has, and those of other nodes of the launch files.
 OF_ROS = r".*/(get_loggers|set_logger_level)|/rosout(_agg)?|/tf(_static)?"
 
 
@@ -35,7 +35,7 @@ def full_name(name, axis):
 
 
 def on_page(heading, axes=("x", "r")):
-    """The cells of each row by the full names that it is about."""
+    """The cells of each row, by the full names that the row describes."""
     return {full_name(row[0], axis): row for row in rows(heading) for axis in axes}
 
 
@@ -55,7 +55,7 @@ def compare(what, there, said):
 
 def services(running):
     said = on_page("Services")
-    # Of an axis without a homing, and without switches.
+    # An axis without homing and without switches doesn't have these.
     for name in ("r/home", "rig/r/press_min", "rig/r/press_max"):
         if f"{NODE}/{name}" not in running:
             said.pop(f"{NODE}/{name}")
@@ -75,7 +75,7 @@ def services(running):
 
 
 def actions(topics):
-    """Their types by their names, and what is wrong; takes their topics away."""
+    """Returns the differences of the actions, and removes their topics from `topics`."""
     there = {}
     for name, of_type in list(topics.items()):
         if name.endswith("/goal") and of_type.endswith("ActionGoal"):
@@ -109,7 +109,7 @@ def actions(topics):
 
 
 def latched(name):
-    """Whether a topic's publisher says so when it is connected to."""
+    """Whether the publisher of a topic says in its connection header that it is latched."""
     heard = []
     subscriber = rospy.Subscriber(name, rospy.AnyMsg, heard.append)
     while not heard and not rospy.is_shutdown():

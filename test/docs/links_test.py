@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Checks that everything exists that the pages link to or name: files, messages, launch arguments.
+"""Checks that the links, files, messages and launch arguments in the pages exist.
 
 usage: test/docs/links_test.py
 
-Exit code 0: all are there; 1: not.
+Exit code 0: all of them exist; 1: otherwise.
 """
 
 import re
@@ -16,7 +16,7 @@ ENDINGS = "cpp|h|launch|md|msg|py|rst|rules|sh|srv|svg|test|txt|urdf|yaml"
 
 
 def anchors(page):
-    """What headings can be linked as."""
+    """The anchors of a page's headings."""
     for line in pages.prose(pages.text_of(page)).splitlines():
         if line.startswith("#"):
             heading = line.strip("# ").lower()
@@ -40,11 +40,11 @@ def is_there(name, files):
         if not re.search(r"/$|\.(h|cpp)$", name):
             return True  # a parameter: `gpio/backend`
         place = rf"stepdriver_core/(include/stepdriver_core|src)/{re.escape(name)}"
-        # There is a folder config/ too.
+        # There is also a folder config/ outside the core.
         return any(re.search(place, file) for file in files) or (pages.ROOT / name).exists()
     if "/" not in name:
         return any(file.endswith(f"/{name}") for file in files)
-    # A program goes by its source.
+    # A program is found by its source.
     return any(list(pages.ROOT.glob(name.rstrip("/") + ending)) for ending in ("", ".cpp"))
 
 
@@ -61,7 +61,7 @@ def missing_files(page, files):
 
 
 def unsaid_messages():
-    """Messages in the first column of troubleshooting.md that the programs don't have."""
+    """Messages in the first column of troubleshooting.md that no program prints."""
     page = "docs/troubleshooting.md"
     sources = "".join(
         file.read_text(encoding="utf-8")
@@ -80,7 +80,7 @@ def unsaid_messages():
 
 
 def wrong_arguments():
-    """Launch files whose arguments aren't those in the table of interfaces.md."""
+    """Arguments that are only in a launch file, or only in the table of interfaces.md."""
     page, heading, said = "docs/interfaces.md", "Launch files", set()
     [rows] = [rows for under, rows in pages.tables(pages.text_of(page)) if under == heading]
     for file, _, text in rows[1:]:
@@ -94,7 +94,7 @@ def wrong_arguments():
 
 
 def main():
-    # Those of the reader, and what is made.
+    # Files of the reader, and generated folders.
     of_reader = {"my_axis.yaml", "my_axes.yaml", "NAME.yaml", "controllers.yaml"}
     made = re.compile(r"build.*|\.git")
     tops = [top for top in pages.ROOT.iterdir() if top.is_dir() and not made.fullmatch(top.name)]

@@ -38,7 +38,7 @@ def text_of(page):
 
 
 def _blocks(text):
-    """Yields (language, lines) of fenced blocks, and (None, lines) of what is between them."""
+    """Yields (language, lines) for fenced blocks, and (None, lines) for the text between them."""
     language, lines = None, []
     for line in text.splitlines():
         fence = re.match(r"\s*```\s*(\w*)\s*$", line)
@@ -66,7 +66,7 @@ def prose(text):
 
 
 def without_blocks(text):
-    """A page whose fenced blocks are empty lines: each line keeps its number."""
+    """A page whose fenced blocks are replaced by empty lines, so that each line keeps its number."""
     kept, in_block = [], False
     for line in text.splitlines():
         fence = re.match(r"\s*```", line)
@@ -75,7 +75,7 @@ def without_blocks(text):
     return "\n".join(kept)
 
 
-# Strings come first: what they contain is no comment.
+# Strings come first in the patterns: what they contain isn't a comment.
 _CPP = r'''R"\((?:.|\n)*?\)"|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])'|(//[^\n]*(?:\n\s*//[^\n]*)*)'''
 _HASH = r"""'[^'\n]*'|"[^"\n]*"|((?<!\S)#[^\n]*(?:\n\s*#[^\n]*)*)"""
 _XML = r"""((?<=doc=")[^"]*|<!--(?:.|\n)*?-->)"""
@@ -86,7 +86,7 @@ _COMMENTS = {
 
 
 def comments(name):
-    """The comments of a source file: for each the number of its first line, and its text as one line."""
+    """Yields the number of the first line of each comment in a source file, and its text as one line."""
     pattern = _COMMENTS.get(name.rpartition(".")[2])
     if not pattern:
         return
@@ -105,8 +105,8 @@ def _of_sentences(text):
 
 
 def commands(text):
-    """All commands of a page, in its order: the lines of blocks that aren't of text, YAML, CMake or
-    C++, and whole commands in sentences."""
+    """All commands of a page, in order: the lines of blocks, except those of text, YAML, CMake and C++,
+    and whole commands in sentences."""
     for language, lines in _blocks(text):
         if language is None:
             yield from _of_sentences("\n".join(lines))
@@ -115,7 +115,7 @@ def commands(text):
 
 
 def tables(text):
-    """The tables of a page: for each the heading that it stands under, and its rows of cells."""
+    """The tables of a page: for each its heading, and its rows of cells."""
     heading, rows = "", []
     for line in prose(text).splitlines() + [""]:
         if line.startswith("|"):

@@ -43,13 +43,13 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   const auto end = draw();
   EXPECT_EQ(end.code, 0);
   // From (5, 0): 400 and 800, 1600, 1200, then back.
-  expectSays(end.output, "6800 pulses, off the lines at most by");
+  expectSays(end.output, "6800 pulses, at most this far off the lines:");
   expectSays(end.output, "line 4 of 4, 71 of 71 mm, 100 %");
   for (const std::string axis : {"x", "y"}) {
     const std::size_t place = end.output.find(" mm in " + axis + " (microstep 0.0125 mm)");
     ASSERT_NE(place, std::string::npos) << end.output;
     const double off = std::stod(end.output.substr(end.output.find_last_of(" \n", place - 1)));
-    EXPECT_LE(off, 0.0125) << axis << " [mm]: no place is a microstep off the lines";
+    EXPECT_LE(off, 0.0125) << axis << " [mm]: no position is a microstep off the lines";
     EXPECT_GT(off, 0.001) << axis << " [mm]: no slope is more exact than its half steps";
   }
   expectSays(picture.text(), "x [mm]");
@@ -64,7 +64,7 @@ TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {
   write("10 10\n30 10\n");
   const auto end = draw();
   EXPECT_EQ(end.code, 0);
-  expectSays(end.output, "joint_states; what the axes did in between isn't known");
+  expectSays(end.output, "joint_states; the path between them is unknown");
   EXPECT_TRUE(picture.exists());
 }
 

@@ -14,7 +14,7 @@ PROGRAM = support.SCRIPTS / "plot_motion"
 
 
 class BagTest(unittest.TestCase):
-    """The program itself: what it reads a bag with is ROS's."""
+    """Runs the program itself, as it reads a bag with ROS's own library."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -44,8 +44,8 @@ class BagTest(unittest.TestCase):
 
     def test_says_what_the_bag_lacks(self):
         for arguments, words in ((["--joint", "y_joint"], "no joint y_joint; it has: x_joint"),
-                                 (["--topic", "/nothing"], "nothing moves there"),
-                                 (["--from", "5"], "nothing moves there")):
+                                 (["--topic", "/nothing"], "no motion of at least 4 samples"),
+                                 (["--from", "5"], "no motion of at least 4 samples")):
             code, error = self.draw(*arguments)
             self.assertEqual(code, 1)
             self.assertIn(words, error)

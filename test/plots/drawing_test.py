@@ -26,7 +26,7 @@ class DrawingTest(unittest.TestCase):
 
     def test_says_which_line_is_no_point(self):
         for text, words in (("1 2\n3\n", "line 2: 3: isn't a point"), ("1 two\n", "line 1"),
-                            ("1 nan\n", "finite"), ("1 2\n", "there is no line in it")):
+                            ("1 nan\n", "finite"), ("1 2\n", "contains no line")):
             with self.assertRaises(BadDrawing) as caught:
                 self.read("points.txt", text)
             self.assertIn(words, str(caught.exception))

@@ -13,7 +13,7 @@ def lines_of(strokes):
 
 class OneStrokeTest(unittest.TestCase):
     def check(self, strokes, start=(0.0, 0.0)):
-        """Every line is drawn; what it says of lengths is so."""
+        """Checks that every line is drawn, and that the lengths are right."""
         found = one_stroke(strokes, start)
         drawn, wanted = lines_of([found.stroke]), lines_of(strokes)
         for line in wanted:
@@ -34,7 +34,7 @@ class OneStrokeTest(unittest.TestCase):
         self.assertEqual(len(found.stroke), 9)
 
     def test_goes_back_along_a_line_that_leads_nowhere(self):
-        # A star of three rays: two are the beginning and the end, the third is drawn twice.
+        # A star of three rays: the stroke begins and ends with two of them, and draws the third twice.
         middle = (0.0, 0.0)
         found = self.check([[middle, (1.0, 0.0)], [middle, (0.0, 2.0)], [middle, (-3.0, 0.0)]],
                            (-3.0, 0.0))

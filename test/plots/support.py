@@ -1,4 +1,4 @@
-"""Where the modules under test are, and motions for them."""
+"""The path to the modules under test, and motions for them."""
 
 import pathlib
 import sys
@@ -23,7 +23,7 @@ $end
 
 
 def vcd(levels, edges):
-    """A trace of an axis x: the levels of STEP and DIR at the begin; (us, "a" or "b", level)."""
+    """A trace of an axis x. levels: the first levels of STEP and DIR; edges: (us, "a" or "b", level)."""
     return VCD % levels + "".join(f"#{time}\n{level}{pin}\n" for time, pin, level in edges)
 
 

@@ -1,1 +1,1 @@
-"""What the programs that draw motions share; none of it needs ROS."""
+"""Shared by the programs that draw motions. Only driver_node.py and trail.py need ROS."""

@@ -1,4 +1,4 @@
-"""A command line and the kinds of its arguments."""
+"""A parser of command lines, and types of arguments."""
 
 import argparse
 import math
@@ -7,11 +7,11 @@ import sys
 
 from .figure import FORMATS
 
-WRONG_USAGE = 64  # as the package's other commands have it
+WRONG_USAGE = 64  # the exit code of all commands of this package
 
 
 class Parser(argparse.ArgumentParser):
-    """With an epilog that keeps its lines, and the exit code for wrong usage."""
+    """Keeps the lines of the epilog, and exits with WRONG_USAGE if the usage is wrong."""
 
     def __init__(self, **options):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)

@@ -1,31 +1,31 @@
-"""What is to be drawn: strokes in millimetres on two axes."""
+"""A drawing: strokes in millimetres on two axes."""
 
 import math
 
 from .errors import BadDrawing, refuse_endless
 from .svg_path import read_svg
 
-MARGIN = 0.05  # of the smaller side, where a drawing is fitted into the axes' limits
+MARGIN = 0.05  # of the smaller side, if a drawing is fitted into the axes' limits
 
 
 def read_drawing(path):
-    """Strokes of a file, and whether they are places in mm; those of an SVG have to be placed."""
+    """The strokes of a file, and whether they are positions in mm. An SVG's have to be placed first."""
     refuse_endless(path)
     if path.suffix.lower() == ".svg":
         strokes, in_place = read_svg(path), False
-        # Its y goes down, the axes' goes up.
+        # In an SVG, y points down; on the axes, it points up.
         strokes = [[(x, -y) for x, y in stroke] for stroke in strokes]
     else:
         strokes, in_place = read_points(path), True
     strokes = [without_repeats(stroke) for stroke in strokes]
     strokes = [stroke for stroke in strokes if len(stroke) > 1]
     if not strokes:
-        raise BadDrawing(f"{path}: there is no line in it")
+        raise BadDrawing(f"{path}: contains no line")
     return strokes, in_place
 
 
 def read_points(path):
-    """Lines of `x y` or `x, y` in mm; an empty one begins another stroke, # a comment."""
+    """Reads lines of `x y` or `x, y` in mm. An empty line begins a new stroke, # a comment."""
     strokes = [[]]
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -44,7 +44,7 @@ def point(words, where):
     try:
         x, y = (float(word) for word in words)
     except ValueError:
-        raise BadDrawing(f"{where}: isn't a point: two numbers in mm, x and y") from None
+        raise BadDrawing(f"{where}: isn't a point; a point is two numbers in mm, x and y") from None
     if not (math.isfinite(x) and math.isfinite(y)):
         raise BadDrawing(f"{where}: must be finite numbers")
     return x, y
@@ -61,14 +61,17 @@ def bounds(strokes):
 
 
 def placed(strokes, limits, scale=None, corner=None):
-    """Scaled by mm per unit, the lower left corner at a place in mm; where these aren't given, as
-    large as the limits allow, and in their middle."""
+    """The strokes at their positions in mm.
+
+    scale: mm per unit; by default as large as the limits allow. corner: position of the lower left
+    corner [mm]; by default the drawing is centred between the limits.
+    """
     box = bounds(strokes)
     sizes = [high - low for low, high in box]
     if scale is None or corner is None:
         if any(value is None for limit in limits for value in limit):
-            raise BadDrawing("the axes have no soft limits to fit the drawing into: give its scale "
-                             "and its corner")
+            raise BadDrawing("the axes have no soft limits to fit the drawing into: give --scale "
+                             "and --corner")
     if scale is None:
         rooms = [high - low for low, high in limits]
         free = [room - 2 * MARGIN * min(rooms) for room in rooms]
@@ -81,7 +84,7 @@ def placed(strokes, limits, scale=None, corner=None):
 
 
 def refuse_beyond(strokes, axes, limits):
-    """Before anything moves: half of a drawing is none."""
+    """Called before anything moves, so that no drawing is left unfinished."""
     for stroke in strokes:
         for place in stroke:
             for axis, value, (low, high) in zip(axes, place, limits):
@@ -92,8 +95,8 @@ def refuse_beyond(strokes, axes, limits):
 
 
 def refuse_too_fast(lines, axes, speeds, speed):
-    """speeds: of each axis alone [mm/s]. The node refuses a line that is too fast; the drawing is
-    refused before its first one."""
+    """speeds: the maximum of each axis alone [mm/s]. The node refuses a line that is too fast; this
+    refuses the drawing before its first line."""
     for begin, end, _ in lines:
         ways = [abs(there - here) for here, there in zip(begin, end)]
         time = max(way / most for way, most in zip(ways, speeds))
@@ -106,7 +109,8 @@ def refuse_too_fast(lines, axes, speeds, speed):
 
 
 def segments(start, strokes):
-    """(from, to, whether it is part of the drawing) of each line, ways between strokes too."""
+    """Yields (from, to, whether it is part of the drawing) for each line, also for those between
+    strokes."""
     here = start
     for stroke in strokes:
         for i, there in enumerate(stroke):

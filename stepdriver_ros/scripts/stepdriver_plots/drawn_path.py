@@ -1,11 +1,11 @@
-"""Where the two axes of a drawing have really been, and how far that is from its lines."""
+"""The path that the two axes of a drawing really took, and how far it is from the lines."""
 
 
 def path_of_pulses(start, steps, unit_steps):
-    """Places after each pulse of either axis.
+    """Positions after each pulse of either axis.
 
-    start: where both were; steps: of each axis the times and the counts, of which the first is one
-    off the start; unit_steps: the way of a microstep of each.
+    start: their positions before the first pulse; steps: for each axis the times and the counts,
+    which begin one step from the start; unit_steps: the size of a microstep of each axis.
     """
     events = []
     for axis, (times, counts) in enumerate(steps):
@@ -18,7 +18,7 @@ def path_of_pulses(start, steps, unit_steps):
 
 
 def cut_to_lines(path, pulses):
-    """The parts of the path, of as many pulses each; a part begins where the last one ended."""
+    """Cuts the path into parts of that many pulses each. A part begins where the previous one ended."""
     parts, begin = [], 0
     for count in pulses:
         parts.append(path[begin:begin + count + 1])
@@ -27,7 +27,7 @@ def cut_to_lines(path, pulses):
 
 
 def offset(place, begin, end):
-    """(x, y) from the nearest point of a line between two points to a place."""
+    """(x, y): a position minus the nearest point of the line between two points."""
     way = (end[0] - begin[0], end[1] - begin[1])
     off = (place[0] - begin[0], place[1] - begin[1])
     square = way[0] ** 2 + way[1] ** 2
@@ -37,6 +37,6 @@ def offset(place, begin, end):
 
 
 def deviations(parts, lines):
-    """(x, y): how far in each axis the places of a part are off its line at most."""
+    """(x, y): the largest distance in each axis between the positions of a part and its line."""
     offsets = [offset(place, *line) for part, line in zip(parts, lines) for place in part]
     return tuple(max(abs(value) for value in values) for values in zip(*offsets))

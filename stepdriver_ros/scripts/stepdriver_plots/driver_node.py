@@ -1,4 +1,4 @@
-"""What the programs ask of a running stepdriver_node. The only part here that needs ROS."""
+"""The services and parameters of a running stepdriver_node. Needs ROS."""
 
 import math
 
@@ -7,19 +7,19 @@ import rospy
 
 from .errors import NodeError
 
-CONNECT = 10.0  # [s] how long a node may take until it has its services
+CONNECT = 10.0  # [s] a node may take this long to advertise its services
 
 
 class DriverNode:
     def __init__(self, name):
         if not rosgraph.is_master_online():
             raise NodeError(f"no ROS master answers at {rosgraph.get_master_uri()}: is roslaunch "
-                            "running, and ROS_MASTER_URI right?")
+                            "running, and is ROS_MASTER_URI right?")
         self.name = rospy.resolve_name(name)
         self._proxies = {}
 
     def call(self, service, kind, **fields):
-        """Calls a service below the node's name; raises NodeError where it isn't accepted."""
+        """Calls a service below the node's name. Raises NodeError if the call fails or is refused."""
         full = f"{self.name}/{service}"
         try:
             if full not in self._proxies:
@@ -27,8 +27,8 @@ class DriverNode:
                 self._proxies[full] = rospy.ServiceProxy(full, kind, persistent=True)
             answer = self._proxies[full](**fields)
         except rospy.ROSException as error:
-            raise NodeError(f"the service {full} isn't there: is the node called {self.name}, and "
-                            f"has it such an axis? ({error})") from error
+            raise NodeError(f"the service {full} doesn't exist: is the node called {self.name}, "
+                            f"and does it have this axis? ({error})") from error
         except rospy.ServiceException as error:
             raise NodeError(f"the service {full} failed: {error}") from error
         if not getattr(answer, "success", True):
@@ -42,7 +42,7 @@ class DriverNode:
         return self.param(f"axes/{axis}/{key}", default)
 
     def scale(self, axis):
-        """How pictures show an axis: how many of the unit in one of ROS's, and its name."""
+        """The unit in which pictures show an axis: how many of it are one ROS unit, and its name."""
         if self.axis_param(axis, "max_speed_mm_s") is not None:
             return 1000.0, "mm"
         if self.axis_param(axis, "max_speed_deg_s") is not None:
@@ -50,10 +50,10 @@ class DriverNode:
         axes = ", ".join(sorted(self.param("axes", {})))
         raise NodeError(f"{self.name} has no axis {axis}: its axes are {axes}" if axes else
                         f"the parameter {self.name}/axes has no axis; it must have {axis}. Is {self.name} the "
-                        "name of the node, and does it run?")
+                        "name of the node, and is it running?")
 
     def wiring(self, axis):
-        """Whether STEP and DIR are inverted on their lines."""
+        """Whether the lines of STEP and DIR are inverted."""
         both = bool(self.axis_param(axis, "common_anode", False))
         return [both != bool(self.axis_param(axis, f"invert/{pin}", False))
                 for pin in ("step", "dir")]

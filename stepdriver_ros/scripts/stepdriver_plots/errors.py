@@ -1,14 +1,14 @@
-"""Why something can't be drawn."""
+"""The reasons why something can't be drawn."""
 
 import pathlib
 
 
 class Undrawable(Exception):
-    """Says what is wrong, and what was to be expected."""
+    """Says what is wrong, and what was expected."""
 
 
 def refuse_endless(path):
-    """Devices and pipes have no end that a reader could wait for."""
+    """Refuses devices and pipes: reading them might never end."""
     path = pathlib.Path(path)
     if path.exists() and not path.is_file():
         raise Undrawable(f"{path}: isn't a file")
@@ -19,8 +19,8 @@ class BadTrace(Undrawable):
 
 
 class BadDrawing(Undrawable):
-    """What is to be drawn can't be."""
+    """The drawing can't be read, or can't be drawn with these axes."""
 
 
 class NodeError(Undrawable):
-    """The node isn't there, or refuses."""
+    """The node can't be reached, or refuses a request."""

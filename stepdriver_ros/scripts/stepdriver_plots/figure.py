@@ -1,4 +1,4 @@
-"""How the pictures look, and the graphs of a motion."""
+"""The style of the pictures, and the graphs of motions and drawings."""
 
 import matplotlib
 
@@ -6,7 +6,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
 from matplotlib.ticker import MaxNLocator, MultipleLocator  # noqa: E402
 
-# The same motion makes the same file.
+# With a fixed hash salt, the same motion gives the same file.
 matplotlib.rcParams.update({
     "svg.hashsalt": "stepdriver",
     "svg.fonttype": "none",
@@ -20,7 +20,8 @@ matplotlib.rcParams.update({
 })
 COLOURS = ["#1f6fb4", "#d9661f", "#2b8a3e", "#8a3ea8", "#7a6a20", "#555555"]
 FORMATS = ("svg", "png")
-# Differences of differences of edges at whole nanoseconds: this many of them are above the noise.
+# The times of edges are whole nanoseconds. With this many samples, their third differences stay above
+# the noise.
 SAMPLES = 250
 
 
@@ -32,7 +33,7 @@ def save(figure, path):
 
 
 def draw_motion(curves, path, title=""):
-    """The graphs of one or more axes of one unit: velocity and step period over position; position,
+    """Draws one or more axes with the same unit: velocity and step period over position; position,
     velocity, acceleration and jerk over time."""
     unit = curves[0].unit
     figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2))
@@ -67,13 +68,13 @@ def draw_motion(curves, path, title=""):
 
 
 def say_in(panel, text):
-    """In place of a graph that there is none of."""
+    """Shows a text in place of a graph."""
     panel.text(0.5, 0.5, text, ha="center", va="center", transform=panel.transAxes,
                color="#777777")
 
 
 def same_ticks(panel):
-    """On equal scales a tick is as long on both axes."""
+    """Gives both axes, whose scales are equal, the same distance between ticks."""
     spans = [high - low for low, high in (panel.get_xlim(), panel.get_ylim())]
     step = MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, max(spans))[1]
     for axis in (panel.xaxis, panel.yaxis):
@@ -81,8 +82,8 @@ def same_ticks(panel):
 
 
 def draw_drawing(lines, parts, limits, path, title, axes=("x", "y")):
-    """What was to be drawn, and over it what was: parts are (places, whether it is of the
-    drawing). Of the limits those that there are make a frame."""
+    """Draws the lines, and over them the path of the axes. parts: (positions, whether they belong to
+    the drawing). If both axes have both limits, a frame shows them."""
     figure, panel = plt.subplots(figsize=(6.4, 5.6))
     labels = {}
     (left, right), (low, high) = limits

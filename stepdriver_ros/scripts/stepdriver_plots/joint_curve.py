@@ -4,10 +4,10 @@ from .step_curve import REST, differences
 
 
 class JointCurve:
-    """A joint as sensor_msgs/JointState has it: positions and speeds at times [s]."""
+    """A joint of sensor_msgs/JointState: positions and speeds at times [s]."""
 
     def __init__(self, times, places, speeds, label="", unit="m", step=None):
-        """step: the unit's way of one microstep, where it is known."""
+        """step: the size of a microstep in the unit, if it is known."""
         self.times = times
         self.places = places
         self.speeds = speeds
@@ -15,7 +15,7 @@ class JointCurve:
         self.unit = unit
         self.step = step
 
-    has_jerk_limit = True  # as far as states tell
+    has_jerk_limit = True  # joint states can't show that there is none
 
     def coarse(self, _samples):
         return self
@@ -36,6 +36,6 @@ class JointCurve:
         return self.places, self.speeds
 
     def period_over_position(self):
-        """[us] from step to step, while it moves."""
+        """[us] from step to step, while the joint moves."""
         moving = [(p, v) for p, v in zip(self.places, self.speeds) if abs(v) * REST >= self.step]
         return [p for p, _ in moving], [self.step / abs(v) * 1e6 for _, v in moving]

@@ -1,4 +1,4 @@
-"""Makes one stroke of a drawing, for a pen that can't be lifted."""
+"""Turns a drawing into one stroke, for a pen that can't be lifted."""
 
 import heapq
 import math
@@ -8,15 +8,15 @@ OneStroke = namedtuple("OneStroke", "stroke length twice added")
 OneStroke.__doc__ = """Points, and [the drawing's unit] the length of the stroke, how much of that is
 drawn twice, and how much joins parts of the drawing that don't touch."""
 
-SAME = 1e-6  # of the drawing's size: points that are closer are one
+SAME = 1e-6  # of the drawing's size: points that are closer than this count as one
 
 
 def one_stroke(strokes, start):
-    """Goes along every line once, and along some a second time where no other way leads on. Parts
-    that don't touch are joined by the shortest lines between their points. What is drawn twice is
-    kept short, but need not be the least that is possible.
+    """Follows every line once, and some lines twice if there is no other way to continue. Parts that
+    don't touch are joined by the shortest lines between their points. The length that is drawn twice
+    is kept short, but isn't always the minimum.
 
-    start: where the pen stands; the stroke begins as near to it as it can.
+    start: position of the pen; the stroke begins as near to it as possible.
     """
     graph = Graph(strokes)
     added = graph.join_parts()
@@ -27,13 +27,13 @@ def one_stroke(strokes, start):
 
 
 class Graph:
-    """Points, and lines between them, each as often as it is to be drawn."""
+    """Points, and how often each line between two of them has to be drawn."""
 
     def __init__(self, strokes):
         points = [point for stroke in strokes for point in stroke]
         size = max(max(values) - min(values) for values in zip(*points))
         self._grid = SAME * size
-        self._places = {}  # of each point of the grid
+        self._places = {}  # position of each point of the grid
         self._lines = defaultdict(lambda: defaultdict(int))  # [from][to]: how often
         for stroke in strokes:
             nodes = [self._node(point) for point in stroke]
@@ -58,7 +58,7 @@ class Graph:
                    for there, count in ends.items()) / 2
 
     def _parts(self):
-        """The nodes of each part that hangs together."""
+        """The nodes of each connected part."""
         parts, seen = [], set()
         for first in self._lines:
             if first in seen:
@@ -76,10 +76,10 @@ class Graph:
         return parts
 
     def join_parts(self):
-        """Returns the length of the lines that join them."""
+        """Joins all parts, and returns the length of the lines that join them."""
         joined, *parts = self._parts()
         part_of = {node: part for part in parts for node in part}
-        nearest = {node: (math.inf, node) for node in part_of}  # of what is joined already
+        nearest = {node: (math.inf, node) for node in part_of}  # among the nodes joined so far
         added = 0.0
         while nearest:
             for node, (distance, _) in nearest.items():
@@ -99,8 +99,8 @@ class Graph:
         return [node for node, ends in self._lines.items() if sum(ends.values()) % 2]
 
     def double_between_odd(self, start):
-        """At a point with an odd number of lines a stroke begins or ends: all but two of them are
-        paired by lines that are drawn twice. Returns the length of these."""
+        """A stroke must begin or end at each point with an odd number of lines. Draws lines twice to
+        pair all but two of these points, and returns the length of those lines."""
         odd = self._odd()
         if len(odd) <= 2:
             return 0.0
@@ -122,7 +122,7 @@ class Graph:
         return min(nodes, key=lambda node: math.dist(self._places[node], place))
 
     def _shortest(self, begin, wanted):
-        """(node, length, the nodes on the way) of each that is wanted."""
+        """Yields (node, length, the nodes on the way) for each wanted node."""
         lengths, before, left = {begin: 0.0}, {}, [(0.0, begin)]
         while left and wanted:
             length, node = heapq.heappop(left)
@@ -141,7 +141,7 @@ class Graph:
                     heapq.heappush(left, (further, other))
 
     def walk(self, start):
-        """All lines in one go, by Hierholzer's algorithm."""
+        """All lines in one stroke, by Hierholzer's algorithm."""
         odd = self._odd()
         node = self._nearest(odd or list(self._lines), start)
         path, stroke = [node], []

@@ -3,15 +3,15 @@
 from collections import namedtuple
 
 Piece = namedtuple("Piece", "duration position velocity acceleration jerk")
-SAMPLES = 200  # of each piece
+SAMPLES = 200  # for each piece
 
 
 class PlanCurve:
-    """The pieces as the service plan answers them: duration, position, velocity, acceleration and
-    jerk of each."""
+    """The pieces of a move from the service plan: duration, position, velocity, acceleration and jerk
+    of each."""
 
     def __init__(self, pieces, label="", unit="m", step=None):
-        """step: the unit's way of one microstep."""
+        """step: the size of a microstep in the unit."""
         self.label = label
         self.unit = unit
         self.step = step
@@ -21,7 +21,7 @@ class PlanCurve:
             self.starts.append(self.starts[-1] + piece.duration)
 
     def scaled(self, factor, unit):
-        """The same in another unit, of which each of this one's has so many."""
+        """The same move in another unit. factor: how many of it are one of this curve's unit."""
         pieces = [Piece(piece.duration, piece.position * factor, piece.velocity * factor,
                         piece.acceleration * factor, piece.jerk * factor) for piece in self.pieces]
         step = None if self.step is None else self.step * factor
@@ -29,7 +29,7 @@ class PlanCurve:
 
     @property
     def has_jerk_limit(self):
-        """Else the acceleration jumps from one piece to the next."""
+        """If false, the acceleration jumps from one piece to the next."""
         return any(piece.jerk != 0.0 for piece in self.pieces)
 
     def coarse(self, _samples):
@@ -62,8 +62,7 @@ class PlanCurve:
         return self.position()[1], self.speed()[1]
 
     def period_over_position(self):
-        """[us] from step to step; not within the first and the last step of a way, whose speed
-        begins or ends at rest."""
+        """[us] from step to step, except within one step of a position of rest."""
         places, speeds = self.speed_over_position()
         peak = max((abs(s) for s in speeds), default=0.0)
         rests = [p for p, s in zip(places, speeds) if abs(s) <= 1e-9 * peak]

@@ -1,25 +1,25 @@
 """Position, speed, acceleration and jerk from the times of STEP edges alone.
 
-At each edge the motion is on a half-step line; the speed between two edges is the way from line to
-line over the time, the acceleration the change from one speed to the next, and so on.
+At each edge the motion crosses a half-step line. The speed between two edges is the distance between
+their lines divided by the time, the acceleration is the rate of change of the speed, and so on.
 """
 
-REST = 0.1  # [s] without a step: it stands
-GAP = float("nan")  # breaks off the line of a graph
+REST = 0.1  # [s] without a step means standstill
+GAP = float("nan")  # interrupts the line of a graph
 
 
 def differences(times, values):
-    """Times between the samples, and the rates of change there."""
+    """The times halfway between samples, and the rates of change at those times."""
     at = [(a + b) / 2 for a, b in zip(times, times[1:])]
     changes = zip(times, times[1:], values, values[1:])
     return at, [(w - v) / (b - a) for a, b, v, w in changes]
 
 
 class StepCurve:
-    """One axis: where it is on the half-step lines that its edges were at."""
+    """One axis: the half-step line that it crosses at each edge."""
 
     def __init__(self, times, places, label="", unit="steps", step=1.0):
-        """times [s] of the edges, places in the unit; step: the unit's way of one of them."""
+        """times [s] of the edges; places in the unit; step: the size of a microstep in the unit."""
         self.times = times
         self.places = places
         self.label = label
@@ -28,15 +28,15 @@ class StepCurve:
 
     @classmethod
     def of_counts(cls, times, counts, label="", unit="steps", step=1.0):
-        """From the count after each edge; before the first one it was 0."""
+        """From the count after each edge; the count before the first edge is 0."""
         places = [(before + count) / 2 * step for before, count in zip([0] + counts, counts)]
         return cls(times, places, label, unit, step)
 
-    has_jerk_limit = True  # as far as edges tell
+    has_jerk_limit = True  # edges can't show that there is none
 
     def coarse(self, samples):
-        """The same from fewer of the edges, about so many: what is noise from one nanosecond to
-        the next in differences of differences, isn't there."""
+        """The same curve from only about this many edges. That removes the noise that whole
+        nanoseconds cause in differences of differences."""
         stretches = self._stretches()
         window = sum(self.times[s[-1]] - self.times[s[0]] for s in stretches) / samples
         kept = [i for stretch in stretches for i in self._thinned(stretch, window)]
@@ -88,7 +88,7 @@ class StepCurve:
             lambda times, places: differences(*differences(*differences(times, places))))
 
     def _of_each_motion(self, derivative):
-        """Of each motion between two rests for itself: there is none over a standstill."""
+        """The derivative of each motion between two rests, with a gap at each standstill."""
         at, values = [], []
         for stretch in self._stretches():
             own_at, own_values = derivative([self.times[i] for i in stretch],
@@ -114,7 +114,7 @@ class StepCurve:
             if time - before <= REST:
                 at.append((here + place) / 2)
                 values.append(value(place - here, time - before))
-            else:  # it stands: the line of the graph breaks off
+            else:  # standstill: interrupts the line of the graph
                 at.append(place)
                 values.append(GAP)
         return at, values

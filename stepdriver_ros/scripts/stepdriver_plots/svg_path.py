@@ -1,4 +1,4 @@
-"""Reads the lines of an SVG file; svgelements knows its shapes, curves and transforms."""
+"""Reads the lines of an SVG file with svgelements, which handles shapes, curves and transforms."""
 
 import math
 import xml.etree.ElementTree as xml
@@ -6,16 +6,16 @@ import xml.etree.ElementTree as xml
 from .drawn_path import offset
 from .errors import BadDrawing
 
-# A curve becomes chords that are this much of the drawing's diagonal off it at most: 0.02 mm at
-# 200 mm.
+# A curve becomes chords. Their largest distance from the curve is this part of the drawing's diagonal:
+# 0.02 mm for 200 mm.
 TOLERANCE = 1e-4
-FINEST = 12  # halvings of a curve
+FINEST = 12  # a curve is halved at most this many times
 MM_PER_INCH = 25.4  # a file in mm, cm or inches is read in mm
 
 
 def read_svg(path):
-    """Strokes: lists of points (x, y), y downwards, in mm if the file has a physical size, else in
-    its own units."""
+    """Strokes: lists of points (x, y), with y pointing down, in mm if the file has a physical size,
+    otherwise in its own units."""
     try:
         import svgelements
     except ImportError as error:
@@ -39,8 +39,8 @@ def read_svg(path):
 def refuse_undrawable(path, svg, svgelements):
     for element in svg.elements():
         if isinstance(element, (svgelements.Text, svgelements.Image)):
-            raise BadDrawing(f"{path}: {type(element).__name__.lower()} isn't drawn: make it a "
-                             "path in the program that the file comes from")
+            raise BadDrawing(f"{path}: {type(element).__name__.lower()} isn't drawn: convert it to "
+                             "a path in your drawing program")
 
 
 def refuse_endless_places(path, segments):
@@ -76,10 +76,10 @@ def place(point):
 
 
 def chords(curve, begin, end, tolerance, halvings):
-    """The ends of chords along a part of a curve."""
+    """The end points of chords along a part of a curve."""
     middle = (begin + end) / 2
     ends = [place(curve.point(t)) for t in (begin, end)]
-    # A curve may cross its chord in the middle.
+    # The middle alone isn't enough: a curve may cross its chord there.
     off = max(math.hypot(*offset(place(curve.point(t)), *ends))
               for t in (middle, (begin + middle) / 2, (middle + end) / 2))
     if halvings == 0 or off <= tolerance and halvings < FINEST - 1:

@@ -1,4 +1,4 @@
-"""The line that a pen leaves behind, for rviz."""
+"""The line that a pen has drawn, for rviz."""
 
 HEIGHT = 0.001  # [m] above the paper
 WIDTH = 0.0015  # [m]
@@ -8,7 +8,7 @@ class Trail:
     """Publishes visualization_msgs/Marker, latched."""
 
     def __init__(self, topic, frame):
-        # Here, so that what only reads files needs no ROS.
+        # Imported here, so that programs that only read files don't need ROS.
         from visualization_msgs.msg import Marker
         import rospy
         self._publisher = rospy.Publisher(topic, Marker, queue_size=1, latch=True)

@@ -1,13 +1,13 @@
-"""Reads the pin trace that the simulated rig writes, and others of its kind."""
+"""Reads pin traces such as those that the simulated rig writes."""
 
 from .errors import BadTrace, refuse_endless
 
 
 class PinTrace:
-    """The pins of a VCD file: for each axis and pin its level at the begin and its edges."""
+    """The pins of a VCD file: for each axis and pin, its first level and its edges."""
 
     def __init__(self, path):
-        self.levels = {}  # (axis, pin): level at the begin
+        self.levels = {}  # (axis, pin): first level
         self.edges = {}   # (axis, pin): [(time in ns, level)]
         self._names = {}
         self._scale = None
@@ -21,13 +21,13 @@ class PinTrace:
             raise BadTrace(f"{path} isn't a VCD file: it has no $timescale, or no $var")
 
     def axes(self):
-        """Names of those that have a STEP and a DIR line with a level."""
+        """The names of the axes whose STEP and DIR lines both have a level."""
         return [axis for axis, pin in self.levels
                 if pin == "step" and (axis, "dir") in self.levels]
 
     def counts(self, axis, invert_step=None, invert_dir=None):
-        """Times [s] of the steps and the count after each. Where it isn't said how the pins are
-        wired, the level that STEP rests at tells, and DIR is as STEP (common anode inverts both).
+        """The times [s] of the steps, and the count after each. By default, STEP is inactive at its
+        first level, and DIR is inverted if STEP is (common anode inverts both).
         """
         resting = self.levels[axis, "step"]
         active = not resting if invert_step is None else not invert_step
@@ -79,7 +79,7 @@ class PinTrace:
 
 
 def scale_of(text):
-    """[ns] of a VCD file's unit of time."""
+    """A VCD file's unit of time in ns."""
     for unit, size in (("ns", 1), ("us", 1000), ("ms", 10**6)):
         if text.endswith(unit):
             return int(text[:-len(unit)]) * size
