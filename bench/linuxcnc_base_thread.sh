@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Measures how late the base thread of LinuxCNC is on this computer, if linuxcnc-uspace is installed:
-# for each rate of bench/paced.cpp, the largest error of one period according to its component
-# timedelta. Prints one line for each rate; without LinuxCNC it says so, and exits with 0.
+# Measures how late LinuxCNC's base thread is on this computer, if linuxcnc-uspace is installed: for each
+# rate of bench/paced.cpp, the largest error of one period according to LinuxCNC's component timedelta.
+# Prints one line for each rate. Without LinuxCNC it prints that, and exits with 0.
 set -euo pipefail
 
 usage() {
@@ -17,12 +17,12 @@ case ${1:-} in
   '' | [0-9]*) seconds=${1:-1} ;;
   *) usage >&2 && exit 2 ;;
 esac
-command -v halrun >/dev/null || { echo "linuxcnc-uspace isn't installed: no base thread to compare with" && exit; }
+command -v halrun >/dev/null || { echo "linuxcnc-uspace isn't installed, so there is no base thread to compare with" && exit; }
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 chmod 755 "$folder"
-# It refuses to run as root.
+# LinuxCNC refuses to run as root.
 as_user=()
 (($(id -u) != 0)) || as_user=(setpriv --reuid nobody --regid nogroup --clear-groups env "HOME=$folder/home")
 mkdir -m 777 "$folder/home"

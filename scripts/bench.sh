@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures how fast it is, and prints each figure against its target.
+# Measures the speed of the core and the node, and compares each figure with its target.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -63,11 +63,11 @@ if [[ -x /usr/bin/roscore || -x /usr/bin/catkin_make ]]; then
 fi
 
 say "" "Medians of $repetitions repetitions, on $(nproc) cores, load $(cut -d' ' -f1 /proc/loadavg)" ""
-held=0
+status=0
 /usr/bin/python3 "$root/scripts/bench_table.py" "$root/bench/figures.txt" "$bench/table.json" \
-  "$bench"/*_bench.json || held=$?
+  "$bench"/*_bench.json || status=$?
 
 say "" "Paced runs, lateness in us" ""
-"$bench/core/bench/paced" "${paced[@]}" --json "$bench/paced.json" || held=$?
+"$bench/core/bench/paced" "${paced[@]}" --json "$bench/paced.json" || status=$?
 "$root/bench/linuxcnc_base_thread.sh" || say "LinuxCNC's base thread couldn't be measured"
-((held == 0))
+((status == 0))

@@ -2,7 +2,7 @@
 # Shared by demo.sh, test.sh and test_in_root.sh: paths, Debian packages, builds, ROS and cleanup.
 # Sourced, never run; needs `set -euo pipefail`.
 
-# Debian's own tools and Python first, whatever else is on PATH, and numbers with a point.
+# Prefer Debian's own tools and Python, whatever else is on PATH; print numbers with a decimal point.
 export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH"
 export LC_ALL=C.UTF-8 PYTHONNOUSERSITE=1 PYTHONDONTWRITEBYTECODE=1
 unset PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV PYENV_VERSION
@@ -90,8 +90,8 @@ choose_build_folder() {
   if [[ -n ${STEPDRIVER_BUILD:-} ]]; then
     mkdir -p "$STEPDRIVER_BUILD" || die "can't make the build folder $STEPDRIVER_BUILD"
     build=$(cd "$STEPDRIVER_BUILD" && pwd -P)
-    safe_path "$build" || die "STEPDRIVER_BUILD=$build: catkin can't build there; take a path" \
-      "of letters, digits and _ . / + - only"
+    safe_path "$build" || die "STEPDRIVER_BUILD=$build: catkin can't build there; use a path that" \
+      "has only letters, digits and _ . / + -"
   elif safe_path "$root" && mkdir -p "$root/build" 2>/dev/null && [[ -w $root/build ]]; then
     build=$root/build
   else
@@ -110,19 +110,19 @@ choose_build_folder() {
     ln -sfnT "$root" "$src"
   fi
   mkdir -p "$build/log"
-  # Nothing of ROS goes to the home folder or over the network.
+  # ROS writes nothing to the home folder, and uses no network but the loopback.
   export ROS_HOME=$build/ros ROS_IP=127.0.0.1
 }
 
-# Runs a command with its output in a file; shows the end of it only if the command fails.
-# A function as the command must join its own commands with &&.
+# Runs a command with its output in a file; shows the end of the output only if the command fails.
+# If the command is a function, it must join its own commands with &&.
 quietly() {
   local log=$build/log/$1.log
   shift
   run "$@" >"$log" 2>&1
   ((run_status == 0)) && return
   tail -n 200 "$log" >&2
-  say "failed with exit code $run_status: $*" "all of its output: $log" >&2
+  say "failed with exit code $run_status: $*" "its full output: $log" >&2
   return "$run_status"
 }
 
@@ -141,7 +141,7 @@ install_packages() {
   local wanted present missing as_root=()
   mapfile -t wanted <<<"$(list_packages "$@")"
   [[ -x /usr/bin/dpkg-query && -x /usr/bin/apt-get ]] ||
-    die "this isn't Debian: install what stands in scripts/packages.txt by hand"
+    die "this isn't Debian: install the packages of scripts/packages.txt yourself"
   present=$(dpkg-query -W -f='${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null |
     sed -n 's/^installed //p') || true
   mapfile -t missing <<<"$(printf '%s\n' "${wanted[@]}" | grep -vxF -e "$present")"
@@ -151,10 +151,10 @@ install_packages() {
     command -v sudo >/dev/null ||
       die "as root, run: apt-get install --no-install-recommends ${missing[*]}"
     as_root=(sudo -n)
-    # A password is typed here: apt-get runs in the background, away from the terminal.
+    # Asks for the password now, because apt-get runs in the background, away from the terminal.
     if [[ -t 0 || -t 2 ]]; then sudo -v || die "needs root to install packages"; fi
   fi
-  say "Installing ${#missing[@]} Debian packages and what they need:"
+  say "Installing ${#missing[@]} Debian packages and their dependencies:"
   fold -s -w 92 <<<"${missing[*]}" | indent
   local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
     apt-get -q -y -o DPkg::Lock::Timeout=600 -o Acquire::Retries=3)
@@ -194,14 +194,14 @@ build_catkin() {
   configure_catkin "$@" &&
     cmake --build "$build/catkin" -j "$jobs"
 }
-# What is there to be used. The devel space is for the tests: below the sources as it is, roslaunch
-# finds the launch files twice there, and rosrun no program.
+# The install space is for use, and the devel space only for tests: it lies below the sources, so in it
+# roslaunch finds each launch file twice, and rosrun finds no program.
 install_catkin() { cmake --install "$build/catkin"; }
 
 # ---- ROS ----
 
-# The environment of a devel or install space, and a master of our own: another roscore on this
-# machine, on whatever port, isn't touched.
+# Sets the environment of a devel or install space, and a free port for a master of our own. Other
+# roscores on this machine aren't affected.
 use_ros() {
   local setup=$1/setup.bash
   getent hosts localhost >/dev/null || die "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Brings up an axis on the simulated rig, moves it and shows what came out of its pins.
+# Brings up an axis on the simulated rig, moves it and shows what its pins did.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -35,7 +35,7 @@ problem() {
   problems=$((problems + 1))
 }
 
-# The value of a field in what rosservice or rostopic printed; of the only axis, where it's a list.
+# The value of a field in the output of rosservice or rostopic. A list has only one axis here.
 field() { sed -n "s/^$2: *//p" <<<"$1" | head -n 1 | tr -d '[]'; }
 
 same_place() { awk -v a="$1" -v b="$2" 'BEGIN { exit !(a != "" && (a - b) ^ 2 < 1e-6 ^ 2) }'; }
@@ -123,17 +123,17 @@ if grep -E 'process has died|escalating to SIGTERM' "$log" >&2; then
 fi
 
 say "" "The pin trace: $trace"
-# compress: shortens pauses of more than 1000 ns; otherwise sigrok reads each nanosecond of them.
+# compress shortens pauses of more than 1000 ns; otherwise sigrok reads each nanosecond of them.
 look=(sigrok-cli -i "$trace" -I vcd:compress=1000 -P stepper_motor:step=step:dir=dir
   -A stepper_motor=position)
 if [[ ! -s $trace ]]; then
   problem "there is no trace"
 else
-  # It prints a position when the next step comes: the farthest one while the axis was at rest there.
+  # The decoder prints a position only when the next step comes. The largest one is where the axis turned.
   decoded=$("${look[@]}" </dev/null 2>"$build/log/sigrok.log" |
     sed -n 's/^stepper_motor-1: \(-\?[0-9]*\) steps$/\1/p') || true
   far=$(sort -n <<<"$decoded" | tail -n 1)
-  say "The stepper_motor decoder of sigrok-cli, which isn't ours, reads there: out to ${far:-no} steps"
+  say "The stepper_motor decoder of sigrok-cli, an independent program, reads: out to ${far:-no} steps"
   [[ $far == "$steps" ]] || problem "that isn't $steps steps"
   say "Look at it:" \
     "    gtkwave $trace" \
@@ -142,4 +142,4 @@ else
 fi
 
 ((problems == 0)) || die "$problems thing(s) above went wrong"
-say "" "All of it agrees. To go on by hand, in each terminal first:" "    source $build/install/setup.bash"
+say "" "All of these agree. To continue by hand, first run in each terminal:" "    source $build/install/setup.bash"

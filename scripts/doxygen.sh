@@ -21,7 +21,7 @@ case ${1:-} in
   *) usage >&2 && exit 2 ;;
 esac
 
-# doxygen_warnings [SETTING=VALUE...]: runs it, and says its warnings, which it may call errors.
+# doxygen_warnings [SETTING=VALUE...]: runs doxygen, and prints its warnings; it calls some of them errors.
 doxygen_warnings() {
   {
     cat "$root/Doxyfile"
@@ -57,5 +57,5 @@ warnings=$(
 )
 [[ -z $warnings ]] || say "$warnings"
 say "doxygen $(doxygen --version): $(grep -cE '(warning|error): ' <<<"$warnings" || true) warnings"
-[[ -z $warnings && -s $build/doxygen/html/index.html ]] || die "the comments need a hand (above)"
-say "The pages: $build/doxygen/html/index.html"
+[[ -z $warnings && -s $build/doxygen/html/index.html ]] || die "correct the comments that are listed above"
+say "The manual: $build/doxygen/html/index.html"

@@ -26,7 +26,7 @@ esac
 
 export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH" LC_ALL=C.UTF-8
 missing() {
-  printf 'libgpiod2.sh: libgpiod 2 cannot be had: %s\n' "$*" >&2
+  printf 'libgpiod2.sh: libgpiod 2 is not available: %s\n' "$*" >&2
   exit 77
 }
 
@@ -45,15 +45,15 @@ if [[ -n $found ]]; then
   exit
 fi
 
-# ---- where from ----
+# ---- the source ----
 
 for tool in apt-get apt-cache dpkg-deb; do
-  command -v "$tool" >/dev/null || missing "there is no $tool: this isn't a Debian"
+  command -v "$tool" >/dev/null || missing "there is no $tool: this isn't Debian"
 done
 # shellcheck disable=SC1091
 suite=$(. /etc/os-release && [[ ${ID:-} == debian ]] && printf '%s' "${VERSION_CODENAME:-}") ||
-  missing "this isn't a Debian"
-[[ -n $suite ]] || missing "/etc/os-release names no suite of Debian"
+  missing "this isn't Debian"
+[[ -n $suite ]] || missing "/etc/os-release has no VERSION_CODENAME"
 # shellcheck disable=SC2016
 mirror=$(apt-get indextargets --format '$(LABEL) $(REPO_URI)' 2>/dev/null |
   sed -n 's/^Debian //p' | head -n 1) || true
@@ -77,13 +77,13 @@ apt=(-o Dir::State="$work" -o Dir::State::lists="$work/lists" -o Dir::State::sta
 apt-get "${apt[@]}" -q update >"$work/log" 2>&1 ||
   missing "$mirror $suite-backports doesn't answer: $(grep -m 1 '^[EW]:' "$work/log" || true)"
 version=$(apt-cache "${apt[@]}" policy libgpiod-dev | sed -n 's/^ *Candidate: *//p')
-[[ $version == 2.* ]] || missing "$suite-backports has libgpiod-dev ${version:-in no version}"
+[[ $version == 2.* ]] || missing "$suite-backports has libgpiod-dev ${version:-(none)}, not 2"
 (cd "$work/debs" && apt-get "${apt[@]}" -q download libgpiod-dev libgpiod3) >"$work/log" 2>&1 ||
   missing "the download failed: $(grep -m 1 '^E:' "$work/log" || true)"
 for package in "$work"/debs/*.deb; do dpkg-deb -x "$package" "$work/root"; done
 grep -qs gpiod_api_version "$work/root/usr/include/gpiod.h" ||
   missing "the package libgpiod-dev $version has no gpiod.h of version 2"
 
-# Another run may have been faster: then keep its folder.
+# If another run was faster, its folder is kept.
 mv -T "$work/root" "$cache/$version" 2>/dev/null || true
 newest

@@ -42,11 +42,11 @@ STEPDRIVER_TRACES=$traces quietly pictures-traces "$build/core/test/core/machine
 drawn=$(cd "$pictures" && ls)
 shown=$(grep -o 'pictures/[a-z_]*[.]svg' "$root/docs/motion.md" | sed 's|.*/||' | sort -u)
 [[ $drawn == "$shown" ]] || die "docs/motion.md shows" \
-  "${shown//$'\n'/ }, but drawn were ${drawn//$'\n'/ }"
+  "${shown//$'\n'/ }, but this drew ${drawn//$'\n'/ }"
 if [[ $(/usr/bin/python3 -c 'import matplotlib; print(matplotlib.__version__)') == 3.6.* ]]; then
   diff -rq "$root/docs/pictures" "$pictures" ||
-    die "docs/pictures isn't what the motions are now; run scripts/motion_pictures.sh"
-  say "All pictures are as the motions are now."
+    die "docs/pictures doesn't show the current motions; run scripts/motion_pictures.sh"
+  say "All pictures show the current motions."
 else
   say "All pictures can be drawn."
 fi

@@ -31,7 +31,7 @@ build_node() {
 }
 [[ -n ${STEPDRIVER_CATKIN:-} ]] || quietly node-bench-build build_node
 use_ros "$catkin/devel"
-# One of 8000 steps/s each, as in config/a4988.yaml.
+# Axes of 8000 steps/s, as in config/a4988.yaml.
 configuration() {
   local i
   say "gpio: {backend: simulated}" "axes:"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Lets a machine run the installed node as a service, with its groups, device rule and limits.
+# Prepares a machine to run the installed node as a service: groups, a device rule, limits and units.
 set -euo pipefail
 
 usage() {

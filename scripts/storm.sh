@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Sends all kinds of requests at once to a running node, and judges the results.
+# Sends all kinds of requests to a running node from several clients at once, and judges the results.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -38,8 +38,8 @@ say "Building"
 quietly storm-build build_storm
 use_ros "$build/catkin/devel"
 say "Seed $seed, for $minutes minutes"
-# The judgement comes after the storm: reading the trace of an hour takes a while.
-# Another node has a sanitizer, whose own memory grows.
+# The judgement follows the storm: reading the trace of an hour takes a while. A node that STEPDRIVER_NODE
+# names has a sanitizer, whose own memory grows.
 rostest --text "$src/test/node/storm/storm.test" "seconds:=$((minutes * 60))" "seed:=$seed" \
   "limit:=$((minutes * 90 + 300))" ${STEPDRIVER_NODE:+most_growth:=300} | tee "$build/log/storm.log"
 # With --text the exit code of rostest is meaningless.

@@ -14,8 +14,8 @@ Installs missing packages, builds, and runs the named parts; all of them by defa
           headers; the links of the pages, and the files that they name; the English of pages and
           comments
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that use
-          the installed library; the exact results of its benchmarks; the pictures of docs/motion.md from
-          this build
+          the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
+          with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
           (test/kernel), with each libgpiod of this Debian; includes --core
   --ros   the catkin package, its rostests, its install space with all commands and the service, a
@@ -110,8 +110,8 @@ check_prose() {
 }
 check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 
-# Each file with the compile commands of the build that compiles it. Of the two adapters to libgpiod,
-# that is the one for the installed version.
+# Checks each file with the compile commands of the build that compiles it. Only the adapter for the
+# installed version of libgpiod is compiled.
 tidy_all() {
   local status=0
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | tidy core || status=1
@@ -192,7 +192,7 @@ test_kernel() {
   bash "$src/test/kernel/rig_test.sh" "$build/core/test/kernel/trace_to_vcd"
   STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --chip rig:rig:8 -- \
     bash "$src/test/operations/udev_test.sh"
-  # Here memory may be locked.
+  # On this kernel, memory may be locked.
   in_kernel -- "$build/core/test/core/pulse_thread_calls_test" --gtest_filter='*NoMemoryThatIsMissing'
   test_lines_in_kernel "$build/core"
   test_waveform_in_kernel "$build/core"
@@ -202,7 +202,7 @@ test_lines_in_kernel() {
     --gtest_filter='*LinesConformance.*:Libgpiod*'
 }
 
-# Whole machines there; compares their pulses with the kernel's own trace.
+# Runs whole machines on that kernel, and compares their pulses with the kernel's own trace.
 test_waveform_in_kernel() {
   local tests=$1/test/kernel traces=$1/traces run
   rm -rf "$traces"
@@ -217,10 +217,10 @@ test_waveform_in_kernel() {
 }
 in_kernel() {
   STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" "$@" | tee "$build/log/in-kernel.log"
-  ! grep -qF '[  SKIPPED ]' "$build/log/in-kernel.log" || die "what must run there was skipped"
+  ! grep -qF '[  SKIPPED ]' "$build/log/in-kernel.log" || die "tests that must run on the test kernel were skipped"
 }
 
-# The same with libgpiod 2 if the system's version is 1.
+# The same tests with libgpiod 2, if the system's version is 1.
 test_kernel_gpiod2() {
   local unpacked status=0
   unpacked=$(bash "$src/scripts/libgpiod2.sh" 2>"$build/log/libgpiod2.log") || status=$?
@@ -261,13 +261,13 @@ test_node_in_kernel() {
     --dir "$header:27" --enable "$header:22" --shortest-interval $((1000000000 * 3 / 4 / 160))
 }
 
-# stepdriver_check there, with and without lines that it can have.
+# stepdriver_check on that kernel, with lines that it can have and with lines that it can't.
 test_check_in_kernel() {
   bash "$src/test/kernel/check_test.sh" "$build/catkin/devel/lib/stepdriver/stepdriver_check" \
     "$build/core/test/kernel/check_waveform"
 }
 
-# Nothing but the install space is on any path here.
+# Only the install space is on any path here.
 check_install() {
   local share=$build/install/share/stepdriver launch_file program
   rm -rf "$build/install"
@@ -293,19 +293,19 @@ check_install() {
   fi
 }
 
-# Every installed command, and the service, as far as that goes without a systemd that runs.
+# Every installed command, and the service, as far as possible without a running systemd.
 check_operations() {
   use_ros "$build/install"
   bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
-# A catkin package that depends on what was installed.
+# A catkin package that depends on the installed package.
 check_dependent() {
   use_ros "$build/install"
   bash "$src/test/library/catkin_test.sh" "$build/install"
 }
 
-# The commands of the pages, with what was installed.
+# The commands of the pages, with the installed package.
 check_docs() {
   use_ros "$build/install"
   /usr/bin/python3 -B "$root/test/docs/commands_test.py"
@@ -315,14 +315,13 @@ check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
 # ---- sanitizers: builds by the presets asan and tsan
 
-# Builds TARGETS of the sources in SOURCE in $build/NAME-PRESET, without the tests that nothing here runs.
-# build_sanitized SOURCE NAME PRESET TARGET...
+# build_sanitized SOURCE NAME PRESET TARGET...: builds only these targets of SOURCE in $build/NAME-PRESET.
 build_sanitized() {
   cmake -S "$1" --preset "$3" -B "$build/$2-$3" &&
     cmake --build "$build/$2-$3" -j "$jobs" --target "${@:4}"
 }
 
-# Exports what the test preset of that name sets.
+# Exports the environment of the test preset of that name.
 use_test_preset() {
   local exports
   # shellcheck disable=SC2016  # sourceDir is CMake's.
@@ -341,17 +340,18 @@ sanitize_core() {
   local preset=$1 excluded=$2
   quietly "$preset-core-build" build_sanitized "$src/stepdriver_core" core "$preset" "${@:3}"
   use_test_preset "$preset"
-  # How many schedules the search samples of each kind.
+  # The number of schedules of each kind that the search samples.
   STEPDRIVER_SCHEDULES=2000 ctest --test-dir "$build/core-$preset" -j "$jobs" --timeout 300 \
     --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|$excluded"
 }
-# Except for those that take minutes there. The search has one thread: ThreadSanitizer has nothing to find in it.
+# Tests that take minutes with a sanitizer are excluded. The search has one thread, so ThreadSanitizer has
+# nothing to find in it.
 slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess'
 sanitize_core_asan() { sanitize_core asan "$slow_tests" machine_tests pulse_tests search_tests; }
 sanitize_core_tsan() { sanitize_core tsan "$slow_tests" gpio_tests machine_tests pulse_tests; }
 
-# sanitize_node PRESET TEST...: a storm and tests of --ros. Only the node that they start has the sanitizer. It
-# writes its findings to files, as not every test reads all that its node prints.
+# sanitize_node PRESET TEST...: runs a storm and tests of --ros. Only the node that they start has the
+# sanitizer. It writes its findings to files, because not every test reads all that its node prints.
 sanitize_node() {
   local preset=$1 findings=$build/log/$1-findings name status=0
   shift
@@ -385,8 +385,8 @@ choose_build_folder
 rm -rf "$build/ros"
 install_packages core ccache "${parts[@]}" "$(wants ros && echo trace)" \
   "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)" "$(wants sanitize && echo ros)"
-# Later compilers than Debian 12's may warn of more. All builds have the same option: ccache shares only
-# what was compiled with the same options.
+# Compilers newer than Debian 12's may have more warnings. All builds have the same option, because ccache
+# shares only results of the same options.
 strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
 [[ $(c++ -dumpversion) != 12* ]] || strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=ON
 
@@ -395,7 +395,7 @@ if wants lint; then
   stage doxygen check_doxygen
   stage links check_links
   stage prose check_prose
-  # Debian 12's clang says what the format is; another one formats some lines in its own way.
+  # The format is that of Debian 12's clang; other versions format some lines differently.
   if [[ $(clang-format --version) == *' 14.'* ]]; then
     stage format check_format
   else

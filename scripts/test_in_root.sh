@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Shows that the two commands work on a fresh machine: makes one, and runs them there.
+# Makes a fresh system, and runs demo.sh and test.sh in it.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -39,7 +39,7 @@ command -v debootstrap >/dev/null || die "needs debootstrap: apt-get install deb
 
 # ---- the base ----
 
-# Where this machine's apt gets the suites of Debian from, or Debian's own address.
+# The mirror from which this machine's apt gets the suites, or the default address.
 mirror_of() {
   local label=$1 default=$2 found
   # shellcheck disable=SC2016
@@ -48,7 +48,7 @@ mirror_of() {
   printf '%s' "${found:-$default}"
 }
 
-# How this machine's apt reaches them: proxies, certificates, what it checks.
+# How this machine's apt reaches the mirrors: proxies, certificates, checks.
 apt_transport() {
   apt-config dump | grep -E '^Acquire::(http|https|Check-|Retries|ForceIPv)' || true
 }
@@ -113,8 +113,8 @@ fi | tar -C "$work$checkout" --no-same-owner -x
 
 # ---- the run ----
 
-# A mount and a process namespace of its own, where allowed: whatever it mounts or starts ends
-# with it.
+# The run has its own mount and process namespaces, if that is allowed: whatever it mounts or starts
+# ends with it.
 inside=(chroot "$work")
 if unshare --mount --pid --fork --kill-child true 2>/dev/null; then
   # shellcheck disable=SC2016
@@ -123,7 +123,7 @@ if unshare --mount --pid --fork --kill-child true 2>/dev/null; then
       mount -t devpts -o ptmxmode=0666 devpts "$1/dev/pts" || true
     exec chroot "$@"' in_root "$work")
 else
-  say "No namespaces here: going on without /proc, /dev/shm and /dev/pts"
+  say "Namespaces aren't allowed here: continuing without /proc, /dev/shm and /dev/pts"
 fi
 
 in_root() {

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A master and nodes on two hosts: two network namespaces with a cable between them.
+# Measures nodes on two hosts with one master. The hosts are network namespaces that a cable joins.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
@@ -26,9 +26,9 @@ choose_build_folder
 install_packages core ros bench
 catkin=${STEPDRIVER_CATKIN:-$build/bench/catkin}
 node=$catkin/devel/lib/stepdriver/stepdriver_node
-[[ -x $node && -x $catkin/devel/lib/stepdriver/node_listener ]] || die "$node isn't there: run scripts/node_bench.sh first"
+[[ -x $node && -x $catkin/devel/lib/stepdriver/node_listener ]] || die "$node doesn't exist: run scripts/node_bench.sh first"
 configuration=$build/bench/node_6.yaml
-[[ -f $configuration ]] || die "$configuration isn't there: run scripts/node_bench.sh first"
+[[ -f $configuration ]] || die "$configuration doesn't exist: run scripts/node_bench.sh first"
 use_ros "$catkin/devel"
 nodes=4
 seconds=8
@@ -56,7 +56,7 @@ done
 export ROS_MASTER_URI=http://$address_a:11311
 on_a() { ROS_IP=$address_a ip netns exec "$host_a" "$@"; }
 on_b() { ROS_IP=$address_b ip netns exec "$host_b" "$@"; }
-# Starts a job of its own process group on host a.
+# Starts a job on host a, in its own process group.
 start_on_a() {
   local log=$1
   shift
@@ -71,7 +71,7 @@ for ((i = 0; i < 300; i++)); do
   ! on_b rosparam list >/dev/null 2>&1 || break
   sleep 0.1
 done
-say "The master is reached from the other host"
+say "The other host can reach the master"
 
 # Processor time of all nodes on host a, in ticks, and their number.
 node_ticks() {
@@ -103,19 +103,19 @@ for ((i = 0; i < nodes; i++)); do
 done
 sleep 3
 read -r ticks running <<<"$(node_ticks)"
-((running == nodes)) || die "$running of $nodes nodes run; their output is in $build/log/two-hosts-*.log"
+((running == nodes)) || die "only $running of $nodes nodes are running; their output is in $build/log/two-hosts-*.log"
 sleep "$seconds"
 read -r more running <<<"$(node_ticks)"
-wait "$listener" || die "not all nodes are heard on the other host: $(tail -n "$nodes" "$heard")"
+wait "$listener" || die "the other host doesn't hear all nodes: $(tail -n "$nodes" "$heard")"
 while read -r topic first rate; do
-  say "$topic is heard on the other host after $(((first - begin) / 1000000)) ms, at $rate Hz"
+  say "The other host hears $topic after $(((first - begin) / 1000000)) ms, at $rate Hz"
 done < <(grep '^/' "$heard")
-say "$running nodes on one host use at rest, each on average: $(awk -v ticks="$((more - ticks))" \
+say "$running nodes on one host, at rest, use on average: $(awk -v ticks="$((more - ticks))" \
   -v per_second="$(getconf CLK_TCK)" -v nodes="$nodes" -v seconds="$seconds" \
-  'BEGIN { printf "%.2f", 100 * ticks / per_second / seconds / nodes }') % of a core"
+  'BEGIN { printf "%.2f", 100 * ticks / per_second / seconds / nodes }') % of a core each"
 
 on_b rosparam load "$configuration" /stepdriver
 on_b "$catkin/devel/lib/stepdriver/node_bench" "$node" 6 "$build/bench/two_hosts.json" \
   >"$build/log/two-hosts-bench.log" 2>&1 || die "node_bench failed: see $build/log/two-hosts-bench.log"
-say "A node on the other host, with its master across the cable:"
+say "A node on the other host, whose master is at the other end of the cable:"
 sed 's/.*{"name": [^,]*, //; s/[]}]*$//; s/, /\n/g' "$build/bench/two_hosts.json" | indent

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Runs stepdriver_check on the test kernel, in virtual time, against simulated GPIO chips and what
-# the kernel says of their lines.
+# Runs stepdriver_check on the test kernel, in virtual time, with simulated GPIO chips, and compares its
+# output with the kernel's own account of their lines.
 set -euo pipefail
 
 usage() {
   cat <<'END_OF_USAGE'
 usage: test/kernel/check_test.sh STEPDRIVER_CHECK CHECK_WAVEFORM
 
-Both are programs that CMake builds, the second from check_waveform.cpp. Exit status 0: all passed;
-77: this machine can't run the test kernel.
+CMake builds both programs, the second one from check_waveform.cpp. Exit status 0: all passed; 1: a test
+failed; 77: this machine can't run the test kernel.
 END_OF_USAGE
 }
 
@@ -22,7 +22,7 @@ fail() {
   exit 1
 }
 
-# ---- inside: each is a command that run.sh runs ----
+# ---- inside: commands that run.sh runs ----
 
 is_held() { gpioinfo | grep -E "X_DIR.*gpioset" >/dev/null; }
 
@@ -45,7 +45,7 @@ inside_held() {
   return "$status"
 }
 
-# It is told to end two seconds after it began to move.
+# Interrupts the command two seconds after the axis began to move.
 inside_interrupted() {
   local status=0
   "$@" &
@@ -60,7 +60,7 @@ inside_interrupted() {
 chips=(--chip 'motors:rig:16:1=X_STEP,2=X_DIR,3=X_ENABLE'
   --chip 'switches:ends:8:2=X_MIN,3=X_MAX')
 
-# configuration MAX_SPEED_MM_S [MORE]: of an axis with 80 steps/mm, in $scratch/axis.yaml.
+# configuration MAX_SPEED_MM_S [MORE]: writes an axis with 80 steps/mm to $scratch/axis.yaml.
 configuration() {
   cat >"$scratch/axis.yaml" <<END
 axes:
@@ -79,7 +79,7 @@ ${2:-}
 END
 }
 
-# ends STATUS COMMAND...: what the command, on that kernel, prints is in $scratch/out.
+# ends STATUS COMMAND...: runs a command on that kernel, with its output in $scratch/out.
 ends() {
   local wanted=$1 status=0
   shift
@@ -92,9 +92,9 @@ checks() {
   shift
   ends "$wanted" "$stepdriver_check" --config "$scratch/axis.yaml" "$@"
 }
-says() { grep -qE -e "$1" "$scratch/out" || fail "not said: $1: $(<"$scratch/out")"; }
+says() { grep -qE -e "$1" "$scratch/out" || fail "not printed: $1; the output: $(<"$scratch/out")"; }
 
-# edges OFFSET LEVEL: how often the chip `rig` set the line to this level from the other one.
+# edges OFFSET LEVEL: how often the line of the chip `rig` changed to this level.
 edges() {
   awk -v offset="$1" -v level="$2" '
     /^# chip rig / { line = $4 + offset }
@@ -138,7 +138,7 @@ says_who_holds_a_line_and_measures_the_wake_ups() {
   says '^NOT GOOD: 1 line '
 }
 
-says_which_chips_there_are_where_one_is_missing() {
+says_which_chips_there_are_if_one_is_missing() {
   configuration 10.0
   sed -i 's/rig:3/no-such-chip:3/' "$scratch/axis.yaml"
   checks 2
@@ -211,6 +211,6 @@ trap 'rm -rf "$scratch"' EXIT
 
 run_tests finds_everything_in_order_without_an_edge \
   says_who_holds_a_line_and_measures_the_wake_ups \
-  says_which_chips_there_are_where_one_is_missing says_which_axis_asks_for_too_much \
+  says_which_chips_there_are_if_one_is_missing says_which_axis_asks_for_too_much \
   lists_what_is_wrong_in_the_configuration moves_nothing_on_the_simulated_rig \
   moves_exactly_forth_and_back ends_a_move_disabled_where_it_is_interrupted

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What check_waveform prints and how it ends, for a trace that is written by hand.
+# Checks the output and exit codes of check_waveform for a trace that is written by hand.
 set -euo pipefail
 
 usage() {
@@ -46,7 +46,7 @@ ends() {
   "$check_waveform" "$scratch/trace" "$@" >"$scratch/out" 2>&1 || status=$?
   ((status == wanted)) || fail "exit status $status, not $wanted: $* gives: $(<"$scratch/out")"
 }
-says() { grep -qF -e "$1" "$scratch/out" || fail "not said: $1: $(<"$scratch/out")"; }
+says() { grep -qF -e "$1" "$scratch/out" || fail "not printed: $1; the output: $(<"$scratch/out")"; }
 
 lines=(--step rig:1 --dir rig:2 --enable rig:3)
 a4988=(--axis x --driver a4988 "${lines[@]}")

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Simulated GPIO chips (the kernel's gpio-sim): makes them and plays what is wired to their lines.
-# run.sh has them made by this, and $GPIO_SIM is its path inside.
+# Makes simulated GPIO chips (the kernel's gpio-sim), and plays what is wired to their lines. run.sh makes
+# its chips with this script; on the test kernel, $GPIO_SIM is its path.
 set -euo pipefail
 
 usage() {
@@ -12,12 +12,12 @@ usage: gpio_sim.sh create NAME:LABEL:LINES[:OFFSET=LINE_NAME,...]
        gpio_sim.sh path LABEL
        gpio_sim.sh remove LABEL
 
-create  makes a chip: NAME is its device's in configfs, LABEL is what libgpiod finds it by
-pull    drives an input from outside: an endstop is pressed with it
+create  makes a chip: NAME is its device in configfs, LABEL is the label by which libgpiod finds it
+pull    drives an input from outside, for example to press an endstop
 value   prints the level of a line, 0 or 1, whoever drives it
 base    prints the number of the chip's first line in the gpio tracepoints
 path    prints the chip's folder in sysfs; sim_gpio<OFFSET>/pull and /value are in it
-remove  takes the chip away, as when its cable is pulled out
+remove  removes the chip, as if its cable were pulled out
 END_OF_USAGE
 }
 
@@ -44,7 +44,7 @@ create() {
     mkdir "$device/bank0/line$number"
     echo "$name" >"$device/bank0/line$number/name"
   done <<<"${names:+$names,}"
-  echo 1 >"$device/live" || die "the chip $label can't be brought to life"
+  echo 1 >"$device/live" || die "the chip $label can't be activated"
 }
 
 # The configfs folder of the chip with that label.

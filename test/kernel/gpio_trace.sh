@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Records what the kernel does to its GPIO lines: the tracepoints events/gpio. `run.sh --trace`
-# calls it around a command; it works as well on any machine whose kernel has them, as root.
+# Records what the kernel does to its GPIO lines, with the tracepoints events/gpio. `run.sh --trace`
+# calls it before and after a command. As root, it works on any machine whose kernel has the tracepoints.
 set -euo pipefail
 
 usage() {
@@ -8,10 +8,10 @@ usage() {
 usage: gpio_trace.sh start
        gpio_trace.sh stop FILE
 
-start  begins an empty record
-stop   ends it and writes it to FILE: the kernel's text, with the times in nanoseconds of the
-       clock CLOCK_MONOTONIC. Ahead of it stands "# chip LABEL BASE LINES" for each GPIO chip.
-       Fails where the kernel had to drop events
+start  begins an empty recording
+stop   ends the recording and writes it to FILE: a line "# chip LABEL BASE LINES" for each GPIO chip,
+       then the kernel's text, with times in nanoseconds of CLOCK_MONOTONIC. Fails if the kernel had
+       to drop events
 END_OF_USAGE
 }
 
@@ -23,7 +23,7 @@ die() {
 tracing=/sys/kernel/tracing
 [[ -d $tracing/events/gpio ]] || die "this kernel has no gpio tracepoints in $tracing"
 
-# 32 bytes for each write of a line: there is room for a million of them.
+# Each write of a line takes 32 bytes, so the buffer has room for a million.
 start() {
   echo 0 >"$tracing/tracing_on"
   echo mono >"$tracing/trace_clock"
@@ -45,8 +45,8 @@ chips() {
   done
 }
 
-# The kernel writes its text in microseconds, and nanoseconds only without the text (option raw).
-# The events are the same, in the same order, so the times of the one go into the other.
+# The kernel's text has times in microseconds; times in nanoseconds are only in the raw output. Both have
+# the same events in the same order, so this puts the times of the raw output into the text.
 in_nanoseconds() {
   local times=$1
   awk -v times="$times" '
@@ -82,7 +82,7 @@ stop() {
   echo 0 >"$tracing/options/raw"
   { chips && in_nanoseconds "$times" <"$tracing/trace"; } >"$file" ||
     die "the trace couldn't be written to $file"
-  ((lost == 0)) || die "the kernel dropped $lost events: there is room for a million"
+  ((lost == 0)) || die "the kernel dropped $lost events: the buffer has room for a million"
 }
 
 case "${1:-} $#" in

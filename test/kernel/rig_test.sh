@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Shows that the rig works, with libgpiod's own tools: what a test on it relies on.
+# Tests the test kernel and its chips with libgpiod's own tools: other tests rely on them.
 set -euo pipefail
 
 usage() {
   cat <<'END_OF_USAGE'
 usage: test/kernel/rig_test.sh TRACE_TO_VCD
 
-TRACE_TO_VCD is the program that CMake builds from trace_to_vcd.cpp. Exit status 0: all passed;
-77: this machine can't run the test kernel.
+TRACE_TO_VCD is the program that CMake builds from trace_to_vcd.cpp. Exit status 0: all passed; 1: a test
+failed; 77: this machine can't run the test kernel.
 END_OF_USAGE
 }
 
@@ -16,30 +16,30 @@ this=$here/$(basename "${BASH_SOURCE[0]}")
 # shellcheck source=test/kernel/run_tests.sh
 source "$here/run_tests.sh"
 
-# ---- inside: each is a command that run.sh runs ----
+# ---- inside: commands that run.sh runs ----
 
 fail() {
   printf 'FAILED: %s\n' "$*" >&2
   exit 1
 }
 
-# until_true SECONDS COMMAND...
+# until_true SECONDS COMMAND...: repeats a command until it succeeds.
 until_true() {
   local end=$((SECONDS + $1))
   shift
   until "$@"; do
-    ((SECONDS < end)) || fail "didn't come true: $*"
+    ((SECONDS < end)) || fail "still false: $*"
     sleep 0.02
   done
 }
 
-# The tools of libgpiod 2 don't know labels.
+# The tools of libgpiod 2 don't accept labels.
 chip_of() { basename "$("$GPIO_SIM" path "$1")"; }
 
-# Those of 1 and 2 take other arguments.
+# The tools of libgpiod 1 and 2 take different arguments.
 libgpiod_1() { [[ $(gpiodetect --version) == *' v1.'* ]]; }
 
-# Sets lines, OFFSET=VALUE, and holds them until it is told to end.
+# Sets lines, OFFSET=VALUE, and holds them until the process is told to end.
 hold_lines() {
   local chip
   chip=$(chip_of "$1")
@@ -194,12 +194,12 @@ virtual_time_is_exact_and_repeats() {
     "$trace_to_vcd" "$scratch/virtual$run" "$scratch/virtual$run.vcd" x.step=rig:1
   done
   cmp "$scratch/virtual1.vcd" "$scratch/virtual2.vcd"
-  # Calculating takes no time: what comes on top of the 100 s are the reads of the clock.
+  # Calculating takes no time: only reads of the clock add to the 100 s.
   step=$(sed -n 's/^#\(1[0-9]*\)$/\1/p' "$scratch/virtual1.vcd" | head -n 1)
   ((step >= 100000000000 && step < 100010000000)) || fail "100 s of sleep took $step ns"
 }
 
-# The steps of a motion may fall on the ticks, each of them.
+# Every step of a motion may coincide with a tick.
 virtual_time_never_throttles() { rig --time-travel --timeout 60 -- bash "$this" --inside ticks; }
 
 # ---- all of it ----

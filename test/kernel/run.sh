@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs a command as root on a kernel of its own that has simulated GPIO chips.
+# Runs a command as root on its own kernel, which has simulated GPIO chips.
 set -euo pipefail
 
 usage() {
@@ -7,31 +7,31 @@ usage() {
 usage: test/kernel/run.sh [OPTION...] [--] COMMAND [ARGUMENT...]
        test/kernel/run.sh --check
 
-Boots the test kernel (build_kernel.sh; built the first time), an ordinary process, and runs the
-command as root in it: with this machine's files, this environment and working directory, no
-standard input, and its output where this one's goes. Ends with the command's exit status.
+Boots the test kernel as an ordinary process (the first time, build_kernel.sh builds it), and runs the
+command on it as root, with this machine's files, the caller's environment and working directory, no
+standard input, and the caller's standard output and error.
 
   --chip NAME:LABEL:LINES[:OFFSET=LINE_NAME,...]
-                  makes a GPIO chip before; may be given several times (see gpio_sim.sh)
-  --trace FILE    writes there what happened to the lines (see gpio_trace.sh, trace_to_vcd)
-  --time-travel   virtual time: sleeping takes none of the real one, calculating none of the virtual
-                  one, and every run has the same times. Only reading the clock takes 256 ns, and
-                  each event of a trace reads it. Not for ROS: where a thread polls without reading
-                  the clock, the time doesn't go on
-  --tmpfs FOLDER  an empty one in its place, inside only; may be given several times
-  --directory DIR working directory in place of this one
-  --memory MB     of the machine, 512 by default
-  --timeout S     ends the machine after that many seconds, 120 by default
-  --check         no command: boots and says whether this machine can. Exit status 77 and the reason
-                  where it can't
+                  makes a GPIO chip first; may be given several times (see gpio_sim.sh)
+  --trace FILE    writes to FILE what happened to the lines (see gpio_trace.sh, trace_to_vcd)
+  --time-travel   virtual time: sleeping takes no real time, calculating takes no virtual time, and
+                  every run has the same times. Each read of the clock takes 256 ns, and each event of
+                  a trace reads it. Not for ROS: virtual time stops while a thread polls without
+                  reading the clock
+  --tmpfs FOLDER  hides FOLDER behind an empty one for the command; may be given several times
+  --directory DIR working directory of the command (default: the caller's)
+  --memory MB     memory of the machine (default: 512)
+  --timeout S     ends the machine after that many seconds (default: 120)
+  --check         takes no command: boots, and tells whether this machine can run the kernel. If not,
+                  prints the reason and exits with 77
 
-Inside, the files are the machine's own, writable; /proc, /sys, /dev and /run are the kernel's,
-and so are the processes and the network (only the loopback, 127.0.0.1). $GPIO_SIM is the path of
-gpio_sim.sh: "$GPIO_SIM" pull LABEL OFFSET up|down presses an endstop.
-What the command leaves running ends with it.
+The command sees this machine's own files, and can write to them. /proc, /sys, /dev, /run, the processes
+and the network (only the loopback, 127.0.0.1) are those of the test kernel. $GPIO_SIM is the path of
+gpio_sim.sh: "$GPIO_SIM" pull LABEL OFFSET up|down presses an endstop. Processes that the command leaves
+running end with it.
 
-Exit status: the command's; 124 where it took too long, 125 where the machine couldn't be set up
-or died, after a message that begins with "run.sh:".
+Exit status: the command's; 124 if it took too long; 125 if the machine couldn't be set up or died. After
+124 and 125 there is a message that begins with "run.sh:".
 END_OF_USAGE
 }
 
@@ -89,7 +89,7 @@ here=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd -P)
     "User-Mode Linux needs an x86_64 machine; this is $(uname -m)"
 kernel=$(bash "$here/build_kernel.sh") || fail 125 "there is no test kernel"
 
-# Built once for each version of its source, beside the kernels.
+# Built once for each version of its source, and kept next to the kernels.
 init=$(dirname "$(dirname "$kernel")")/init-$(sha256sum "$here/guest_init.cpp" | cut -c1-12)
 if [[ ! -x $init ]]; then
   new_init=$(mktemp "$init.XXXXXX")
@@ -100,8 +100,8 @@ fi
 
 # ---- the folder that host and guest share ----
 
-# Not under $TMPDIR: its path goes onto the kernel's command line, where blanks part the words, and
-# /run, /dev or a --tmpfs would hide it inside.
+# Not under $TMPDIR. The path goes onto the kernel's command line, where blanks separate words; and a
+# folder under /run, /dev or a --tmpfs would be hidden from the command.
 work=$(mktemp -d /var/tmp/stepdriver-run.XXXXXX)
 machine='' waiting=''
 # shellcheck disable=SC2317
@@ -131,10 +131,10 @@ GPIO_SIM=$work/gpio_sim.sh /usr/bin/env -0 >"$work/environment"
   echo 'set -eu; export PATH=/usr/bin:/bin:/usr/sbin:/sbin LC_ALL=C'
   for folder in "${tmpfs[@]}"; do printf 'mount -t tmpfs tmpfs %q\n' "$folder"; done
   for chip in "${chips[@]}"; do printf 'bash %s/gpio_sim.sh create %q\n' "$work" "$chip"; done
-  # Virtual time begins at the boot, and until the first ticks the timers are as coarse as those.
+  # Virtual time begins at boot, and until the first ticks, timers are as coarse as ticks.
   [[ -z $mode ]] || echo 'sleep 0.1'
-  # This kernel counts the time of a thread in ticks. On virtual time each step of a regular motion can
-  # meet one, and the real-time throttle would stop a thread that runs for microseconds.
+  # This kernel counts the time of a thread in ticks. In virtual time, each step of a regular motion can
+  # coincide with a tick; the real-time throttle would then stop a thread that runs only for microseconds.
   [[ -z $mode ]] || echo 'echo -1 >/proc/sys/kernel/sched_rt_runtime_us'
   [[ -z $trace ]] || printf 'bash %s/gpio_trace.sh start\n' "$work"
 } >"$work/before"
@@ -143,7 +143,7 @@ GPIO_SIM=$work/gpio_sim.sh /usr/bin/env -0 >"$work/environment"
   [[ -z $trace ]] || printf 'bash %s/gpio_trace.sh stop %s/trace\n' "$work" "$work"
 } >"$work/after"
 
-# The machine's memory is a file: in /dev/shm where it has the room. A container's often hasn't.
+# The machine's memory is a file, in /dev/shm if there is enough room. In a container there often isn't.
 memory_folder=/var/tmp
 if [[ -w /dev/shm ]] && (($(df --output=avail -k /dev/shm | tail -n 1) > (memory + 64) * 1024)); then
   memory_folder=/dev/shm
@@ -151,14 +151,15 @@ fi
 
 # ---- the run ----
 
-# Through `cat`: the kernel changes the settings of what it writes to, and they are the caller's.
+# The output goes through `cat`, because the kernel changes the settings of the terminal that it writes to,
+# which is the caller's.
 exec {out}> >(exec cat)
 copy_out=$!
 exec {err}> >(exec cat >&2)
 copy_err=$!
 
-# A process group of its own: the kernel is several processes. Where this script is killed, its
-# first process dies with it, and the rest with that.
+# The kernel is several processes, so it has its own process group. If this script is killed, the kernel's
+# first process dies with it, and the others with the first.
 set -m
 TMPDIR=$memory_folder setpriv --pdeathsig KILL "$kernel" mem="${memory}M" $mode \
   root=none rootfstype=hostfs rootflags=/ rw loglevel=4 console=tty0 umid=rig uml_dir="$work/uml/" \
@@ -177,7 +178,7 @@ group=$machine machine=
 wait "$copy_out" "$copy_err" || true
 
 show_console() {
-  echo "run.sh: the last of the kernel's own messages:" >&2
+  echo "run.sh: the kernel's last messages:" >&2
   tail -n 30 "$work/console" | tr -d '\r' | awk '{ print "    " $0 }' >&2
 }
 
@@ -187,12 +188,12 @@ case $verdict in
   'exit '*) ;;
   'error '*) fail 125 "${verdict#error }" ;;
   *)
-    # It looks at the machine before anything else.
+    # The kernel checks the machine before anything else.
     if [[ -n $check ]] && ! grep -q 'PROT_EXEC mmap in .*OK' "$work/console"; then
       fail 77 "User-Mode Linux can't run on this machine: $(tail -n 2 "$work/console" | tr -s '\r\n' ' ')"
     fi
     show_console
-    [[ $ended == "$group" ]] || fail 124 "the machine was ended after $timeout s: the command didn't"
+    [[ $ended == "$group" ]] || fail 124 "the machine was ended after $timeout s, because the command was still running"
     fail 125 "the kernel died"
     ;;
 esac

@@ -1,13 +1,13 @@
 # shellcheck shell=bash
-# Sourced by the tests of this folder that are bash functions.
+# Sourced by the scripts of this folder whose tests are bash functions.
 
-# run_tests NAME...: calls each function in a shell of its own, under `set -e`, and prints what
-# became of it. False where one failed.
+# run_tests NAME...: calls each function in its own subshell, under `set -e`, and prints its result.
+# Returns 1 if one failed.
 run_tests() {
   local test start status took failed=0
   for test; do
     start=$EPOCHREALTIME status=0
-    # In the background `set -e` holds inside it.
+    # In the background, so that `set -e` applies inside the subshell.
     (set -e; "$test") &
     wait $! || status=$?
     took=$((${EPOCHREALTIME/./} - ${start/./}))

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# A catkin package that depends on stepdriver: its target compiles with every header of the core, and links.
+# Tests that a catkin package that depends on stepdriver compiles with every header of the core, and links.
 set -euo pipefail
 
 usage() {
   cat <<'END_OF_USAGE'
 usage: test/library/catkin_test.sh PREFIX
 
-Builds test/library/catkin_user against the install space PREFIX, in an empty folder, and runs what was built.
-To be called in the environment of PREFIX. Exit status 0: all passed.
+Builds test/library/catkin_user in an empty folder against the install space PREFIX, and runs its program.
+Call it in the environment of PREFIX. Exit status 0: all passed.
 END_OF_USAGE
 }
 case ${1:-} in

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# The core as others use it: installed in an empty folder, found there by CMake and by pkg-config.
+# Tests the core as other projects use it: installed, and found by CMake and by pkg-config.
 set -euo pipefail
 
 usage() {
   cat <<'END_OF_USAGE'
 usage: test/library/library_test.sh BUILD COMPILER
 
-Installs the core that was built in the folder BUILD in an empty folder. There each header must compile by
-itself, and a program must link it by find_package() and by pkg-config. So must examples/move_axis, copied to
-an empty folder, which also does what it is for. Exit status 0: all passed.
+Installs the core from the build folder BUILD into an empty folder. Each installed header must compile by
+itself, and a program must link the core by find_package() and by pkg-config. So must a copy of
+examples/move_axis, which must also move its axis. Exit status 0: all passed.
 END_OF_USAGE
 }
 case ${1:-} in
@@ -43,7 +43,7 @@ done < <(cd "$prefix/include" && find . -name '*.h' | sed 's|^\./||' | sort)
 ((headers > 0)) || die "no header is installed"
 printf '%d headers compile, each by itself.\n' "$headers"
 
-# says WANTED FOLDER PROGRAM [ARGUMENT...]: runs it in the folder.
+# says WANTED FOLDER PROGRAM [ARGUMENT...]: runs a program in FOLDER and looks for WANTED in its output.
 says() {
   local said
   said=$(cd "$2" && "${@:3}" 2>&1) || die "${*:3} ended with $?: $said"
@@ -58,7 +58,7 @@ builds_by_cmake() {
     >"$scratch/configure.log" 2>&1 || die "$(<"$scratch/configure.log")"
   cmake --build "$1/build" >"$scratch/build.log" 2>&1 || die "$(<"$scratch/build.log")"
 }
-# builds_by_pkg_config SOURCE MODULE [OPTION]: it is called PROGRAM in the scratch folder.
+# builds_by_pkg_config SOURCE MODULE [OPTION]: builds $scratch/program.
 builds_by_pkg_config() {
   local flags
   read -ra flags < <(pkg-config ${3:+"$3"} --cflags --libs "$2")
@@ -77,7 +77,7 @@ if [[ -f $prefix/include/stepdriver_core/yaml.h ]]; then
 fi
 printf 'Programs link it by find_package()%s.\n' "${yaml:+, and move an axis}"
 
-# Elsewhere than it was installed: no installed file knows its place.
+# From a folder to which it was moved: no installed file contains its own path.
 mv "$prefix" "$scratch/moved"
 export PKG_CONFIG_PATH=$scratch/moved/lib/pkgconfig
 [[ -d $PKG_CONFIG_PATH ]] || die "there is no $PKG_CONFIG_PATH"

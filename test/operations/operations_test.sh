@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# The installed commands and what setup_system makes of a machine, without a systemd that runs.
+# Tests the installed commands, and a system that setup_system has prepared, without a running systemd.
 set -euo pipefail
 
 usage() {
   cat <<'END'
 usage: test/operations/operations_test.sh PREFIX
 
-PREFIX is an install space. Checks --help and exit codes of every installed command; sets up an
-empty root and holds it against systemd-analyze, udevadm and the node's messages; and runs the
-lines of the service there, with its limits, as an ordinary user. What needs root is skipped
-without. Exit status 0: all passed; 1: not.
+PREFIX is an install space. Checks --help and the exit codes of every installed command; sets up an empty
+root and checks it with systemd-analyze, udevadm and the node's messages; and runs the service's command
+lines as an ordinary user with its limits. Without root, the parts that need it are skipped. Exit status
+0: all passed; 1: otherwise.
 END
 }
 case ${1:-} in
@@ -29,7 +29,7 @@ scratch=$(mktemp -d)
 jobs_started=()
 finish() {
   local status=$? job
-  # Where it is killed, a roscore leaves its master behind.
+  # Not SIGKILL at first: a roscore that is killed leaves its master behind.
   kill -TERM "${jobs_started[@]}" 2>/dev/null || true
   for job in "${jobs_started[@]}"; do
     timeout 15 tail --pid="$job" -f /dev/null || kill -KILL "$job" 2>/dev/null || true
@@ -39,7 +39,7 @@ finish() {
 }
 trap finish EXIT
 
-# ends WANTED COMMAND...: runs it, with its output in $output.
+# ends WANTED COMMAND...: runs a command, with its output in $output, and checks its exit status.
 ends() {
   local wanted=$1 status=0
   shift
@@ -51,7 +51,7 @@ says() { [[ $output == *"$1"* ]] || fail "\"$1\" isn't in: $output"; }
 # ---- every command ----
 
 for command in "$bin"/*; do
-  [[ -f $command ]] || continue  # what some of them share
+  [[ -f $command ]] || continue  # a folder that some of them share
   ends 0 "$command" --help
   says "usage: ${command##*/}"
   says "xit code"
@@ -65,7 +65,7 @@ ends 1 "$bin/stepdriver_check" --config "$scratch/wrong.yaml"
 says 'is "a4989"'
 ends 1 "$bin/stepdriver_check" --config "$scratch/none.yaml"
 
-# ---- a machine that is set up ----
+# ---- a machine that setup_system has set up ----
 
 if (($(id -u) != 0)); then
   printf 'skipped without root: setup_system, the service\n'
@@ -83,20 +83,20 @@ grep -q '^stepdriver:' "$machine/etc/passwd" || fail "no user stepdriver"
 units=$machine/etc/systemd/system
 ! grep -rl '@prefix@' "$machine/etc" || fail "@prefix@ is left in these"
 
-# What the node tells people to write is what is installed.
+# The limits that the node's messages recommend are the installed ones.
 for limit in '@realtime - rtprio 98' '@realtime - memlock unlimited'; do
   grep -qxF -e "$limit" "$machine/etc/security/limits.d/stepdriver.conf" || fail "no limit $limit"
   grep -qF -e "$limit" "$bin/stepdriver_node" || fail "the node doesn't say $limit"
 done
 
-# So is the device that it tells of: for the group, and within the service's device policy.
+# The device that they name is open to the group, and allowed by the service's device policy.
 latency=/dev/cpu_dma_latency
 grep -qF "KERNEL==\"${latency##*/}\", GROUP=\"realtime\"" \
   "$machine/etc/udev/rules.d/60-stepdriver-gpio.rules" || fail "no rule for $latency"
 grep -qx "DeviceAllow=$latency rw" "$units/stepdriver.service" || fail "the service can't open $latency"
 grep -qF "$latency" "$bin/stepdriver_node" || fail "the node doesn't say $latency"
 
-# It warns of what it doesn't know, and ends with 0.
+# systemd-analyze exits with 0 even after a warning.
 for unit in stepdriver stepdriver-roscore; do
   output=$(systemd-analyze verify "$units/$unit.service" 2>&1) || fail "$unit.service: $output"
   [[ $output != *"$unit"* ]] || fail "$output"
@@ -121,20 +121,20 @@ lines_of() { unit_values "$1" | sed "s|/etc/stepdriver/|$scratch/|g"; }
 "${raised[@]}" true 2>/dev/null || raised=()  # a container may not
 service=("${raised[@]}" "${ordinary[@]}")
 "${service[@]}" test -x "$bin/stepdriver_node" || {
-  printf 'skipped, as others than root can'\''t reach %s: the service\n' "$prefix"
+  printf 'skipped, because only root can reach %s: the service\n' "$prefix"
   exit "$((failures > 0))"
 }
 ends 0 "${service[@]}" "$bin/stepdriver_check" --config "$config/a4988.yaml" --backend simulated
 if ((${#raised[@]} > 0)); then
   says "SCHED_FIFO 50; memory locked"
 else
-  printf 'skipped, as limits can'\''t be raised here: whether those of the service suffice\n'
+  printf 'skipped, because limits can'\''t be raised here: whether the limits of the service suffice\n'
 fi
 
-# Sets words to those of a line of a unit, which are quoted as in a shell.
+# Splits a line of a unit into words, which are quoted as in a shell.
 words=()
 words_of() { eval "words=($1)"; }
-# start FILE: runs the lines of the unit with a configuration; the node's output in node.log.
+# start FILE: runs the lines of the unit with a configuration, and the node with its output in node.log.
 start() {
   local line
   cp "$1" "$scratch/axes.yaml"
@@ -148,7 +148,7 @@ start() {
   node=$!
   jobs_started+=("$node")
 }
-# node_ends WANTED
+# node_ends WANTED: waits for the node, and checks its exit status.
 node_ends() {
   local status=0
   wait "$node" || status=$?
@@ -182,7 +182,7 @@ done
 kill -TERM "$node" 2>/dev/null || true
 node_ends 0
 grep -q '\[ *INFO\] Ending on SIGTERM' "$scratch/node.log" ||
-  fail "it doesn't say how it ended: $(<"$scratch/node.log")"
+  fail "the node doesn't print why it ended: $(<"$scratch/node.log")"
 
 ((failures == 0)) || exit 1
 printf 'the installed commands and the service are as they should be\n'
