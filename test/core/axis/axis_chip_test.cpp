@@ -176,7 +176,7 @@ TEST(AxisChip, CountsTheTranslatorFromHomeAfterAReset) {
   x.reset();
   EXPECT_FALSE(x.state().position_valid);
   EXPECT_DOUBLE_EQ(x.state().position, 163.0 / 80'000.0);
-  x.setMicrosteps(1);  // the translator is at Home, wherever the count is
+  x.setMicrosteps(1);  // the translator is at Home at any count
   EXPECT_DOUBLE_EQ(x.state().position, 163.0 / 80'000.0);
   x.wait(x.moveTo(0.0002, true));
   EXPECT_EQ(bench.pulses(), 164);

@@ -192,8 +192,8 @@ TEST(AxisIdle, StaysThroughAWakeUpThatFails) {
   }
 }
 
-// What holds the position is the mechanics, and if the translator goes Home only a place of that
-// phase: 64 microsteps at 1/16, 0.8 mm.
+// The position stays valid only if the mechanics hold it. If the translator goes Home, the position
+// must also be one of that phase: 64 microsteps at 1/16, 0.8 mm.
 TEST(AxisIdle, KeepsTheTrustOnlyWhereNothingCanHaveMoved) {
   struct Case {
     IdleAction action;

@@ -12,7 +12,7 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// 1000 steps/m, at most 1 m/s and 2 m/s^2, unless it says another.
+// 1000 steps/m, at most 1 m/s and 2 m/s^2, unless a test sets other limits.
 
 namespace stepdriver {
 namespace {
@@ -110,7 +110,7 @@ TEST_F(AxisLimitsTest, GoesFasterAgainWhereTheLimitIsRaised) {
   EXPECT_NEAR(velocity(), 1.0, 1e-9);
 }
 
-// With the lower deceleration it would pass its target, and here the soft limit too.
+// With the lower deceleration it would overshoot its target, and here the soft limit too.
 TEST_F(AxisLimitsTest, ComesToRestInTimeWhateverIsSetMeanwhile) {
   const axis::Move move = x().moveTo(50.0);
   advance(49.8);

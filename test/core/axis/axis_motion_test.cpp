@@ -13,7 +13,7 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// Motions that take over from others. In steps, unless stated otherwise: 1000 steps/m.
+// Motions that interrupt others. In steps, unless stated otherwise: 1000 steps/m.
 
 namespace stepdriver {
 namespace {
@@ -38,13 +38,13 @@ class AxisMotion : public testing::Test {
 
   axis::Axis& x() { return bench->axis(); }
   void advance(double seconds) { bench->machine->advance(seconds); }
-  /// Clock time until the axis rests [s].
+  /// Clock time until the axis is at rest [s].
   double timeToRest() {
     const std::int64_t begin = bench->clock.now();
     while (x().state().moving) advance(1e-5);
     return static_cast<double>(bench->clock.now() - begin) * 1e-9;
   }
-  /// Time until the speed is that [s].
+  /// Time until the axis reaches the speed [s].
   double timeToSpeed(double speed) {
     const std::int64_t begin = bench->clock.now();
     for (int i = 0; i < 1'000'000 && std::abs(x().state().velocity - speed) > 1e-9; ++i) {
@@ -112,7 +112,7 @@ TEST_F(AxisMotion, GoesOnToATargetFartherAheadWithoutSlowingDown) {
   EXPECT_NE(replaced.message.find("a move to 3 m took over"), std::string::npos)
       << replaced.message;
   EXPECT_EQ(x().wait(second).end, MoveEnd::kReached);
-  // As if the farther target had been the first: no time is lost.
+  // As if the farther target had been the first one: no time is lost.
   EXPECT_NEAR(static_cast<double>(bench->clock.now() - begin) * 1e-9, 3.5 + kLead, 1e-6);
   expectCleanAt(3000);
 }
@@ -359,7 +359,7 @@ TEST_F(AxisMotion, GoesOnFromAStopThatIsUnderWayOnlyByANewCommand) {
   expectCleanAt(2000);
 }
 
-// What takes over is planned a little ahead; the switch may be met before that.
+// The new motion is planned a little ahead; the switch may be met before it begins.
 TEST_F(AxisMotion, DoesNotGoOnFromASpeedThatAnEndstopHasEnded) {
   for (double ahead = 0.0; ahead < 2.0; ahead += 0.1) {  // [steps] before the switch
     SCOPED_TRACE(testing::Message() << ahead << " steps before the switch");

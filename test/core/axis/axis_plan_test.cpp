@@ -9,7 +9,7 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// What a move would be. At 80 microsteps/mm, 100 mm/s and 1000 mm/s^2.
+// Plans of moves, at 80 microsteps/mm, 100 mm/s and 1000 mm/s^2.
 
 namespace stepdriver {
 namespace {
@@ -30,7 +30,7 @@ double endSpeedOf(const MovePiece& piece) {
   return piece.velocity + piece.duration * (piece.acceleration + piece.duration * piece.jerk / 2.0);
 }
 
-/// Piece after piece, from rest or a speed to rest at the target.
+/// Expects pieces that join, from the first state to rest at the target.
 void expectJoined(const MovePlan& plan, double from, double speed) {
   double duration = 0.0;
   for (const MovePiece& piece : plan.pieces) {

@@ -123,7 +123,7 @@ TEST(Axis, EndsAtAnEndstopByNameWithTheExactCount) {
   EXPECT_NEAR(bench.report().carriage, 5.0, 1e-9);
   EXPECT_EQ(x.endstops().max, true);
   EXPECT_EQ(x.endstops().min, false);
-  // Only towards min from here.
+  // From here, the axis may only move towards min.
   EXPECT_REFUSED(x.moveTo(0.001, true), "max endstop is active");
   EXPECT_EQ(x.wait(x.moveTo(-0.001, true)).end, axis::MoveEnd::kReached);
   EXPECT_EQ(bench.pulses(), 320);
@@ -186,7 +186,7 @@ TEST(Axis, StopsWithItsDecelerationAndMovesAgainOnlyWhenTold) {
   EXPECT_EQ(result.end, axis::MoveEnd::kStopped);
   EXPECT_NE(result.message.find("not at 0.08 m: it was stopped"), std::string::npos)
       << result.message;
-  // v^2 / 2a = 5 mm, after the millisecond of the hand-over.
+  // v^2 / 2a = 5 mm, after the lead of a millisecond.
   EXPECT_NEAR(result.position - here, 0.005 + 0.0001, 2.0 / 80'000.0);
   const std::int64_t pulses = bench.pulses();
   bench.machine->advance(2.0);

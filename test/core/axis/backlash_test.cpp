@@ -31,7 +31,7 @@ class Backlash : public testing::Test {
   }
 
   axis::Axis& x() { return bench->axis(); }
-  /// Of the motor, as the rig has counted its pulses.
+  /// The motor's position, from the pulses that the rig has counted.
   std::int64_t motor() { return bench->pulses(); }
   double position() { return x().state().position; }
   void moveTo(double position_m) { EXPECT_EQ(bench->move(position_m).end, MoveEnd::kReached); }
@@ -121,7 +121,7 @@ TEST_F(Backlash, IsThereForATargetThatIsReplacedOnTheWay) {
   EXPECT_EQ(x().wait(back).end, MoveEnd::kReached);
   EXPECT_EQ(motor(), 800);
   EXPECT_DOUBLE_EQ(position(), 0.010);
-  // One that it can't stop before: it comes back to it from above.
+  // The axis can't stop before this target, so it returns to it from above.
   x().moveTo(0.050);
   bench->machine->advance(0.3);
   const double passing = position() + 0.001;
@@ -141,7 +141,7 @@ TEST_F(Backlash, IsTakenUpBeforeALine) {
   EXPECT_EQ(motor(), 400);
   EXPECT_EQ(bench->pulses("y"), 800);
   EXPECT_DOUBLE_EQ(position(), 0.005);
-  // y waited for it: its first step comes after the last one that x took for the backlash.
+  // y waited for x: its first step comes after the last step that takes up the backlash of x.
   const auto x_steps = bench->trace->times("x", "step", true);
   const auto y_steps = bench->trace->times("y", "step", true);
   EXPECT_GT(y_steps.front(), x_steps[800 + 2 * kBacklash - 1]);

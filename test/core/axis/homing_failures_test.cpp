@@ -11,7 +11,7 @@
 #include "stepdriver_core/error.h"
 #include "support/homing_bench.h"
 
-// How a homing ends that doesn't find its switch, and what it takes for a glitch.
+// How a homing ends if it doesn't find its switch, and what it takes for a glitch.
 
 namespace stepdriver {
 namespace {
@@ -26,7 +26,7 @@ using test::violationsOf;
 
 class HomingFailure : public HomingTest {
  protected:
-  /// Not homed, at rest, enabled, with these words in the message.
+  /// Expects the axis not homed, at rest and enabled, and these words in the message.
   void expectFailed(const HomingResult& result, const std::string& words,
                     HomingEnd end = HomingEnd::kFailed) {
     EXPECT_EQ(result.end, end);
@@ -47,7 +47,7 @@ class HomingFailure : public HomingTest {
     bench->rig.setFaults("x", faults);
   }
 
-  /// Homes, and does something once, when the axis has moved this far in a phase [steps].
+  /// Homes, and calls a function once the axis has moved this far in a phase [steps].
   HomingResult homeAnd(HomingPhase phase, std::int64_t steps, const std::function<void()>& action) {
     std::optional<std::int64_t> entered;
     bool done = false;
@@ -128,7 +128,7 @@ TEST_F(HomingFailure, SaysWhyOfAStopInAnyPhase) {
 }
 
 TEST_F(HomingFailure, EndsWithAStopWhileTheSwitchSettles) {
-  // Between two strokes nothing is under way that a stop could end.
+  // Between two strokes no motion is under way that a stop could end.
   bool done = false;
   const HomingResult result = x().home([&] {
     if (done || !x().endstops().min.value_or(false)) return false;
@@ -205,8 +205,8 @@ TEST_F(HomingFailure, TakesTheFirstContactOfASwitchThatBounces) {
   EXPECT_NEAR(x().state().position - -0.1, carriage() + 0.1 - 0.5 * kStep, 1e-9);
 }
 
-// It opens again for less than the debounce time after the latch has ended, and the contact after
-// that comes too late to count.
+// The switch opens again for less than the debounce time after the latch has ended; the contact
+// after that comes too late to count.
 TEST_F(HomingFailure, TakesNoContactForTheFirstThatComesAfterTheLatch) {
   std::int64_t ended = 0;
   int changes = 0;

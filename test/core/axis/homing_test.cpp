@@ -31,7 +31,7 @@ using test::violationsOf;
 
 TEST_F(HomingTest, TakesTheHalfStepLineWhereTheSwitchClosedForTheTriggerPoint) {
   expectHomed(x().home());
-  // The step to the switch at -8000 steps went out where the curve crossed -7999.5: 2 mm off that
+  // The step to the switch at -8000 steps was sent when the curve crossed -7999.5. 2 mm from there
   // is -7839.5, which rounds to -7840.
   EXPECT_NEAR(carriage(), -0.098, 1e-9);
   EXPECT_NEAR(x().state().position, -0.1 + 159.5 * kStep, 1e-12);
@@ -113,7 +113,7 @@ class HomingOfSeveral : public testing::Test {
     bench = std::make_unique<Bench>(configs);
   }
 
-  /// When an axis made its first and its last step.
+  /// The times at which an axis made its first and its last step.
   std::pair<std::int64_t, std::int64_t> stepsOf(const std::string& axis) {
     const auto times = bench->trace->times(axis, "step", true);
     return {times.front(), times.back()};
@@ -173,7 +173,7 @@ TEST_F(HomingOfSeveral, RefusesWithoutAStep) {
   EXPECT_EQ(bench->pulses("x"), 0);
 }
 
-// ---- what a homing is worth ----
+// ---- how exact a homing is, and how long it is valid ----
 
 TEST_F(HomingTest, FindsTheSamePlaceFromRandomOnes) {
   std::mt19937 random(20);
@@ -349,7 +349,7 @@ TEST(HomingThreaded, WorksWithAPulseThreadOfItsOwn) {
   EXPECT_EQ(violationsOf(bench.report()), "");
 }
 
-/// A rig that tells of no edge.
+/// A rig that reports no edges.
 class SilentRig : public sim::Rig {
  public:
   using sim::Rig::Rig;

@@ -9,7 +9,7 @@
 #include "stepdriver_core/axis/axis.h"
 #include "support/bench.h"
 
-// A relative move counts from the commanded position, which no microstep need be at.
+// A relative move counts from the commanded position, which need not be at a microstep.
 
 namespace stepdriver {
 namespace {
@@ -135,7 +135,7 @@ TEST_F(RelativeMoves, AreToldWithTheirTargetAndWhereTheyComeToRest) {
   EXPECT_NEAR(on.rest, 3.0 * kMicrostep, 1e-12);
 }
 
-/// What makes the commanded position the one where the axis stands.
+/// Actions after which the commanded position is the actual position of the axis.
 struct Ending {
   const char* name;
   std::function<void(Bench&)> happen;

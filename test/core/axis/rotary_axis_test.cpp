@@ -7,7 +7,7 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// Axes that turn on and on: a rotary one without soft limits, and a wheel.
+// Axes that turn without end: a rotary one without soft limits, and a wheel.
 
 namespace stepdriver {
 namespace {

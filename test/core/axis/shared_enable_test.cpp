@@ -120,7 +120,7 @@ TEST_F(SharedEnable, IsKeptOverAShutdownForTheOneThatWantsIt) {
     bench->axis("x").enable(x_enabled);
     bench->axis("y").enable(true);
     bench->machine.reset();
-    // What the chip of y does is y's own: its SLEEP and RESET are at their safe levels.
+    // The other pins of y's chip are its own: SLEEP and RESET are at their safe levels.
     EXPECT_EQ(bench->report("x").energized, x_enabled);
     EXPECT_FALSE(bench->report("y").energized);
   }

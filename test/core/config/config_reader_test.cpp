@@ -165,7 +165,7 @@ TEST(ConfigReader, KeepsNumbersInTheirRange) {
   struct Case {
     ConfigValue value;
     Range range;
-    std::string message;  // empty: right
+    std::string message;  // empty: no issue
   };
   const std::vector<Case> cases{
       {0.0, Range::positive(), "is 0.0, but must be above 0"},

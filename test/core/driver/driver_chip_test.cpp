@@ -87,7 +87,7 @@ TEST(Chip, IsFoundByTheNameInConfigurations) {
   EXPECT_EQ(findDriverChip(""), nullptr);
 }
 
-/// The DRV8825's gap is what a pulse leaves of the 4 us between two steps.
+/// The DRV8825's gap is the part of the 4 us between two steps that remains after the pulse.
 struct TimingFigures {
   Model model;
   std::int64_t high, low, dir, mode, enable, wake;

@@ -24,7 +24,7 @@ struct Call {
   }
 };
 
-/// What the kernel would see.
+/// The requests that reach the kernel.
 struct Kernel {
   std::vector<Call> calls;
   int error = 0;

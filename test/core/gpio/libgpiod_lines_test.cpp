@@ -15,7 +15,7 @@
 #include "support/gpio_sim.h"
 #include "support/other_program.h"
 
-// What is libgpiod's alone; lines_conformance_test.cpp has what all backends share.
+// Tests of libgpiod alone; lines_conformance_test.cpp has the tests that all backends share.
 
 namespace stepdriver::gpio {
 namespace {
@@ -202,7 +202,7 @@ TEST_F(LibgpiodOnGpioSim, FailWhenTheirChipIsUnpluggedAndLeaveTheOthersAlone) {
   EXPECT_EQ(lines->read(0), -ENODEV);
   EXPECT_EQ(lines->read(1), -ENODEV);
   EXPECT_EQ(lines->read(2), 0);
-  // Kernels before 6.5 don't wake who polls the lines of a chip that goes.
+  // Kernels before 6.5 don't wake a thread that polls the lines of a chip when the chip disappears.
   EdgeEvent event{};
   const int waited = lines->waitForEdges(50'000'000, &event, 1);
   EXPECT_TRUE(waited == 0 || waited == -ENODEV) << waited;

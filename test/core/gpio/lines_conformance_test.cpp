@@ -12,7 +12,7 @@
 #include "stepdriver_core/gpio/lines.h"
 #include "support/test_board.h"
 
-// What holds for every backend. The simulated one is tried everywhere, libgpiod if the kernel has
+// Tests for every backend. The simulated backend is always tested, libgpiod only if the kernel has
 // simulated chips.
 
 namespace stepdriver::gpio {
@@ -77,7 +77,7 @@ class LinesConformance : public testing::TestWithParam<TestBoardKind> {
 
   void pause() const { std::this_thread::sleep_for(std::chrono::nanoseconds(board->pace())); }
 
-  // Takes edges until there are none for a while.
+  // Takes edges until no more come for a while.
   std::vector<EdgeEvent> drain(Lines& lines) const {
     std::vector<EdgeEvent> all;
     EdgeEvent events[4];

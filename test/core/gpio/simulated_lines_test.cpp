@@ -16,7 +16,7 @@
 namespace stepdriver::gpio {
 namespace {
 
-/// Writes down what it is told, as `edge a 1 @5`.
+/// Writes down each call, as in `edge a 1 @5`.
 class Notebook : public Board {
  public:
   int lineIndex(const std::string& line) override { return names.indexOf(line); }

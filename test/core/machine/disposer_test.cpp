@@ -12,7 +12,7 @@
 namespace stepdriver::axis {
 namespace {
 
-/// Tells in which thread it was freed.
+/// Records the thread in which it was freed.
 class Plan {
  public:
   explicit Plan(std::promise<std::thread::id>& freed) : freed_(freed) {}

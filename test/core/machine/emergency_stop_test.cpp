@@ -34,7 +34,7 @@ machine::MachineOptions withInput(bool active_level) {
   return options;
 }
 
-/// Two axes, and a button that opens a contact to ground: high is stop.
+/// Two axes, and a button that opens a contact to ground: the high level means stop.
 class EmergencyStopInput : public testing::Test {
  protected:
   void make(const std::vector<config::AxisConfig>& axes, bool threaded = false,
@@ -157,8 +157,8 @@ TEST_F(EmergencyStopInput, IsSeenByTheWatcherOfAThreadedMachine) {
   EXPECT_LT(bench->pulses(), 7200);
 }
 
-// Whatever the moment: after a recover() that was accepted while the button is down every axis is
-// at fault still or again.
+// If a recover() is accepted while the button is down, at whatever moment, every axis is still, or
+// again, at fault.
 TEST_F(EmergencyStopInput, IsNeverLostToARecoverThatComesAtTheSameTime) {
   make({linearAxis("x"), linearAxis("y")}, true, 0.0);
   for (int i = 0; i < 200; ++i) {
@@ -176,7 +176,7 @@ TEST_F(EmergencyStopInput, IsNeverLostToARecoverThatComesAtTheSameTime) {
   }
 }
 
-/// Lines at which the pulse thread can be kept in a write.
+/// Lines that can keep the pulse thread in a write.
 class GatedLines : public test::PassingLines {
  public:
   using PassingLines::PassingLines;
@@ -191,7 +191,7 @@ class GatedLines : public test::PassingLines {
     return PassingLines::write(writes, count);
   }
 
-  /// @return whether a thread came to it within a minute.
+  /// @return whether a thread reached the write within a minute.
   bool close() {
     std::unique_lock<std::mutex> lock(mutex_);
     closed_ = true;
@@ -225,7 +225,7 @@ class GatedBackend : public gpio::Backend {
   gpio::Backend& backend_;
 };
 
-// The pulse thread is in a write when the emergency stop comes, and a recover comes before that has
+// The emergency stop comes while the pulse thread is in a write, and a recover before the write has
 // returned.
 TEST(EmergencyStop, IsNotLostIfARecoverComesBeforeItWasCarriedOut) {
   const std::vector<config::AxisConfig> axes = {linearAxis("x")};

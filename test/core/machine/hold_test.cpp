@@ -12,8 +12,8 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// A hold is a state of the machine: moving or not, it lasts until a resume or a stop of the
-// machine.
+// A hold is a state of the machine. Whether axes move or not, it lasts until a resume or a stop of
+// the machine.
 
 namespace stepdriver {
 namespace {
@@ -153,7 +153,7 @@ TEST_F(Hold, OfOneAxisAmongOthersDropsOnlyTheGoalThatIsStopped) {
   EXPECT_LT(bench->pulses("x"), 4000);
 }
 
-// x needs 2 s to come to rest: the hold comes long before that.
+// x needs 2 s to stop: the hold comes long before that.
 TEST(HoldOfAWaitingLine, LetsItBeginAfterTheResume) {
   config::AxisConfig slow = linearAxis("x");
   slow.deceleration = 0.005;

@@ -63,7 +63,7 @@ class Line : public testing::Test {
       while (axis->state().moving) advance(1e-4);
     }
   }
-  // Half a step of each axis is all that it may be off the line through the origin.
+  // Each axis may be at most half a step off the line through the origin.
   void expectOnTheLine(double x, double y) {
     const double along = std::hypot(x, y);
     const double off = (position("x") * y - position("y") * x) / along;
@@ -83,7 +83,7 @@ class Line : public testing::Test {
 };
 
 TEST_F(Line, IsAsFastAsTheAxisThatLimitsIt) {
-  // x takes 1/1 + 1/2 = 1.5 s for 1 m; y half of its way with half of x's acceleration.
+  // x takes 1/1 + 1/2 = 1.5 s for 1 m; y moves half as far with half the acceleration of x.
   const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.5}});
   EXPECT_NEAR(move.duration, 1.5, 1e-9);
   const CoordinatedResult result = machine().wait(move);
@@ -95,13 +95,13 @@ TEST_F(Line, IsAsFastAsTheAxisThatLimitsIt) {
 }
 
 TEST_F(Line, IsHeldToTheSmallestAccelerationAlongIt) {
-  // y needs 3 m with 4 m/s^2 and 1 m/s: 3 + 0.25 s; x would need less.
+  // y needs 3 + 0.25 s for 3 m with 4 m/s^2 and 1 m/s; x would need less.
   EXPECT_NEAR(start({{"x", "y"}, {-0.1, 3.0}}).duration, 3.25, 1e-9);
 }
 
 TEST_F(Line, PutsEachAxisOutAtItsOwnExactCrossings) {
   machine().wait(start({{"x", "y"}, {1.0, -0.7}}));
-  // While the path accelerates at a, axis i's step k is at sqrt(2 (k - 1/2)/(a n_i/n)).
+  // While the path accelerates at a, step k of axis i is at sqrt(2 (k - 1/2)/(a n_i/n)).
   const std::vector<std::int64_t> x = bench->trace->times("x", "step", true);
   const std::vector<std::int64_t> y = bench->trace->times("y", "step", true);
   ASSERT_EQ(x.size(), 1000U);
@@ -116,13 +116,14 @@ TEST_F(Line, PutsEachAxisOutAtItsOwnExactCrossings) {
   for (std::size_t k = 0; k < 80; ++k) {
     EXPECT_NEAR(static_cast<double>(y[k]) * 1e-9, begin + since(k, 700.0), 2e-9) << k;
   }
-  // They end within one step of each other: by symmetry they do as they began.
+  // They end within one step of each other, by symmetry with their beginning.
   EXPECT_LT(std::abs(x.back() - y.back()), y[1] - y[0]);
   expectClean();
 }
 
 TEST_F(Line, RunsAtAVelocityAlongThePath) {
-  // 3 and 4 m: 5 m at 0.5 m/s. Rotary axes go along.
+  // 3 and 4 m: 5 m at 0.5 m/s. The velocity is that of the linear axes; rotary axes move in
+  // proportion.
   const CoordinatedMove move = start({{"x", "y", "c"}, {3.0, 4.0, 1.0}, false, 0.5});
   advance(5.0);
   EXPECT_NEAR(bench->axis("x").state().velocity, 0.3, 1e-9);
@@ -147,7 +148,7 @@ TEST_F(Line, TakesTheTimeThatItIsGiven) {
 }
 
 TEST_F(Line, RefusesAVelocityAboveItsLimitsInItsDirection) {
-  // x has 1 m/s, so 3 and 4 m: 5/3 m/s.
+  // x may move at 1 m/s, so 3 and 4 m: 5/3 m/s.
   EXPECT_EQ(refusal([&] { start({{"x", "y"}, {3.0, 4.0}, false, 1.25}); }), "");
   machine().stop();
   awaitRest();
@@ -188,7 +189,7 @@ TEST_F(Line, StopsAllOfItsAxesAlongThePath) {
   expectOnTheLine(1.0, 0.7);
   const CoordinatedResult result = machine().wait(move);
   EXPECT_EQ(result.end, MoveEnd::kStopped);
-  // 0.8 s less the lead: 0.549 m, and 0.25 m to rest.
+  // 0.8 s minus the lead: 0.549 m, and 0.25 m to stop.
   EXPECT_NEAR(position("x"), 0.80, 0.003);
   EXPECT_TRUE(bench->axis("x").state().position_valid);
   EXPECT_TRUE(bench->axis("y").state().position_valid);
@@ -261,7 +262,7 @@ TEST_F(Line, GivesUpWhatIsHeldAtAStopADisableAndAnEmergencyStop) {
     if (how == 2) machine().emergencyStop();
     const CoordinatedResult result = machine().wait(move);
     EXPECT_EQ(result.end, how == 2 ? MoveEnd::kEmergencyStop : MoveEnd::kStopped) << result.message;
-    // Only a stop ends the hold; the others leave nothing to be resumed.
+    // Only a stop of the machine ends the hold; after the others there is nothing to resume.
     EXPECT_EQ(bench->axis("x").state().held, how != 0);
     EXPECT_EQ(bench->axis("y").state().held, how != 0);
     const std::int64_t before = bench->pulses("x");
@@ -328,7 +329,7 @@ TEST_F(Line, WaitsForTheRestOfWhatMovesBefore) {
   expectClean();
 }
 
-// 2.0 m and the line's 0.5 m, though the move is stopped after 0.8 s.
+// 2.0 m and the line's 0.5 m, although the move is stopped after 0.8 s.
 TEST_F(Line, RelativeToAMoveUnderWayCountsFromWhereThatWasToEnd) {
   const axis::Move move = bench->axis("x").moveTo(2.0);
   advance(0.8);

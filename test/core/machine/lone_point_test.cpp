@@ -8,7 +8,7 @@
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
-// A trajectory of one point with nothing but positions is a move from rest to rest in its time.
+// A trajectory of one point that has only positions is a move from rest to rest in its time.
 
 namespace stepdriver {
 namespace {
@@ -67,7 +67,7 @@ TEST_F(LonePoint, KeepsToTheJerkLimit) {
   std::vector<config::AxisConfig> axes{trajectoryAxis("x"), trajectoryAxis("y")};
   axes[0].jerk = 50.0;
   build(axes);
-  // 2 m/s, 10 m/s^2, 50 m/s^3: 0.2 s of jerk, four times.
+  // 2 m/s, 10 m/s^2, 50 m/s^3: four phases of jerk of 0.2 s each.
   const auto move = follow({{"x"}, {{0.9, {1.0}, {}, {}}}});
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(state("x").position, 1.0);

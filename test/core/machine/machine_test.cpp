@@ -27,7 +27,7 @@ TEST(Machine, TakesAllLinesOrNone) {
   pulse::VirtualClock clock;
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
   EXPECT_THROW(machine::Machine(configs, backend, clock, {false}), GpioError);
-  // Nothing is held: the same lines can be requested.
+  // All lines are released: they can be requested again.
   machine::Machine machine({configs[0]}, backend, clock, {false});
   EXPECT_EQ(machine.axes().size(), 1U);
 }
@@ -154,7 +154,7 @@ TEST(Machine, ServesItsPulsesInAThreadOfItsOwn) {
   EXPECT_EQ(violationsOf(bench.report("x")) + violationsOf(bench.report("y")), "");
 }
 
-// On the steady clock the machine is never on time, but the chip must not notice.
+// On the steady clock the machine is never exactly on time, but the chip must not notice.
 TEST(Machine, KeepsTheChipsTimesOnTheSteadyClockToo) {
   const config::AxisConfig config = linearAxis("x", driver::Model::kDrv8825);
   pulse::SteadyClock clock;
@@ -176,8 +176,8 @@ TEST(Machine, KeepsTheChipsTimesOnTheSteadyClockToo) {
   EXPECT_EQ(violationsOf(seen), "");
 }
 
-// Moves, stops, mode changes, disabling, sleep, resets and switches in any order: whatever happens,
-// the position is the count of the edges, the rig has nothing to object, and the limits hold.
+// Moves, stops, mode changes, disables, sleeps, resets and switches in any order. The position is
+// always the count of the edges, the rig sees no violation, and the limits are kept.
 class RandomCommands {
  public:
   RandomCommands(std::uint64_t seed, driver::Model model)
@@ -260,7 +260,7 @@ class RandomCommands {
     }
   }
 
-  // Commands that take over from one another in mid-motion.
+  // Commands that interrupt others in mid-motion.
   void wander() {
     axis::Axis& x = bench_.axis();
     for (int i = 0; i < 5; ++i) {
@@ -290,7 +290,7 @@ class RandomCommands {
     const axis::AxisState state = bench_.axis().state();
     const sim::RigAxisReport seen = bench_.report();
     ASSERT_EQ(violationsOf(seen), "");
-    // Each pulse since the last look was sent in this mode.
+    // All pulses since the last check were sent in this mode.
     const std::int64_t pulses = bench_.pulses() - pulses_;
     const int mode = pulses == 0 ? state.microsteps : seen.microsteps;
     position_ += static_cast<double>(pulses) / (80'000.0 * mode / 16.0);
@@ -300,8 +300,8 @@ class RandomCommands {
     ASSERT_LE(std::abs(state.position), 0.02 + 0.5 / 5000.0);
   }
 
-  // No two steps in one direction closer than the top speed has them. A step and the one back may
-  // be: the motion turns between them.
+  // Two steps in one direction are never closer than at top speed. A step and the step back may be,
+  // as the motion turns between them.
   void checkSpeeds() {
     const auto rises = bench_.trace->times("x", "step", true);
     ASSERT_GT(rises.size(), 1000U);

@@ -22,7 +22,7 @@ using test::Bench;
 using test::linearAxis;
 using test::MotionTrace;
 
-/// 1000 steps/s, 2000 steps/s^2, no limits of position.
+/// 1000 steps/s, 2000 steps/s^2, no soft limits.
 config::AxisConfig config(const std::string& name = "x") {
   config::AxisConfig config = linearAxis(name, 1000.0, 1.0, 2.0);
   config.endstop_min.reset();
@@ -61,7 +61,7 @@ class MotionPictures : public testing::Test {
     EXPECT_NEAR(result.duration, move.duration, 1e-8);
     return result.duration;
   }
-  /// From the step before which the speed was this one to the step after which it is that one.
+  /// From the step before which the speed was `from` to the step after which it is `to`.
   double timeOfChange(double from, double to) const {
     constexpr double kSame = 1e-3;
     const std::vector<MotionTrace::Step> all = trace->steps("x");
@@ -120,7 +120,7 @@ TEST_F(MotionPictures, SCurve) {
   EXPECT_NEAR(takes(1.0), 1.6, 1e-8);
   EXPECT_NEAR(trace->speedAt("x", 0.8), 1000.0, 1e-2);
   trace->keep("s_curve");
-  // Shorter ones, back again: too short for the speed, and for the acceleration too.
+  // Shorter moves, and back again: too short to reach the speed, or even the acceleration.
   EXPECT_NEAR(takes(0.75), 2.0 * ((std::sqrt(0.51) - 0.1) / 2.0 + 0.1), 1e-8);
   EXPECT_NEAR(takes(0.73), 4.0 * std::cbrt(20.0 / (2.0 * 20'000.0)), 1e-8);
 }
@@ -198,7 +198,7 @@ TEST_F(MotionPictures, LineWithHold) {
   EXPECT_EQ(bench->pulses("y"), 400);
   EXPECT_NEAR(trace->speedAt("x", 0.65), 1000.0, 1e-2);
   EXPECT_NEAR(trace->speedAt("y", 0.65), 400.0, 1e-2);
-  // When y steps, x is at 2.5 times as much, but for the half step that each may be off.
+  // When y steps, x is at 2.5 times its position, within the half step by which each may be off.
   const std::vector<MotionTrace::Step> of_x = trace->steps("x");
   for (const MotionTrace::Step& step : trace->steps("y")) {
     std::int64_t count = 0;
@@ -210,7 +210,7 @@ TEST_F(MotionPictures, LineWithHold) {
   trace->keep("line");
 }
 
-/// Two points; with accelerations the segments are quintics, without them cubics.
+/// Two points. With accelerations the segments are quintics, without them cubics.
 machine::TrajectoryRequest points(bool with_accelerations) {
   machine::TrajectoryRequest request{{"x"}, {{1.0, {0.4}, {0.6}, {}}, {2.0, {0.8}, {0.0}, {}}}};
   if (with_accelerations) {

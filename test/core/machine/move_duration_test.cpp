@@ -11,7 +11,7 @@
 namespace stepdriver {
 namespace {
 
-/// A machine of x and y whose every 50th write takes longer than a step: what is left slides.
+/// A machine of x and y. Every 50th write takes longer than a step, so the timeline slides.
 class LateMove : public testing::Test {
  protected:
   LateMove() {
@@ -42,7 +42,7 @@ class LateMove : public testing::Test {
 };
 
 constexpr double kStep = 1.0 / 80'000.0;  // [m]
-// From the beginning to the first edge and from the last one to the end, and one late write.
+// From the beginning to the first edge, from the last edge to the end, and one late write.
 constexpr double kTolerance = 1.2e-3;  // [s]
 
 TEST_F(LateMove, LastsAsLongAsItsEdges) {

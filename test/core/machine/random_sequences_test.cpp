@@ -14,8 +14,8 @@
 #include "support/random_motion.h"
 
 // A hundred thousand sequences of random commands on two axes, compared with what must always be
-// true: the position is the count of the edges, the limits hold by differentiating the trace, the
-// rig sees no violation, and the same seed gives the same trace.
+// true: the position is the count of the edges, the differentiated trace keeps the limits, the rig
+// sees no violation, and the same seed gives the same trace.
 
 namespace stepdriver {
 namespace {
@@ -28,7 +28,7 @@ using test::violationsOf;
 
 constexpr int kShards = 10;
 constexpr int kBatches = 50;     // of each shard, on a machine of its own
-constexpr int kSequences = 200;  // of each batch
+constexpr int kSequences = 200;  // in each batch
 
 constexpr double kSpeed = 0.1;         // m/s
 constexpr double kAcceleration = 2.0;  // m/s^2
@@ -79,9 +79,9 @@ class Batch {
  private:
   struct Watched {
     std::string name;
-    bool forward = false;     // as its DIR line is when a sequence begins
+    bool forward = false;     // level of the DIR line when a sequence begins
     double position = 0.0;    // from the pulses that the rig has counted
-    std::int64_t pulses = 0;  // of them
+    std::int64_t pulses = 0;  // number of pulses
     int microsteps = kMicrosteps;
   };
 
@@ -102,7 +102,7 @@ class Batch {
     bench_.machine->setSpeedOverride(1.0);
     if (random_.chance(0.5)) bench_.machine->stop();
     rest();
-    bench_.machine->stop();  // a jog that continues for ever, and what is held
+    bench_.machine->stop();  // a jog that would continue for ever, and a held motion
     rest();
     checkPositions();
     // A switch ends a motion in one step.
@@ -146,7 +146,7 @@ class Batch {
     }
   }
 
-  // Of these commands none is refused for any other reason.
+  // These commands are never refused for any other reason.
   void count(const Refused& refusal) {
     const std::string text = refusal.what();
     if (text.find(": held; resume or stop it first") != std::string::npos) {
@@ -163,7 +163,7 @@ class Batch {
   void changeMicrosteps() {
     Watched& axis = axes_[static_cast<std::size_t>(random_.whole(0, 1))];
     const int microsteps = 1 << random_.whole(2, 4);
-    // The nearest place that both modes have may be beyond a soft limit.
+    // The nearest position that both modes have may be beyond a soft limit.
     try {
       bench_.axis(axis.name).setMicrosteps(microsteps);
     } catch (const Refused& refusal) {
@@ -222,13 +222,13 @@ class Batch {
     return kStepsPerUnit * axis.microsteps / kMicrosteps;
   }
 
-  // A DIR change close to a step may slide the timeline: then times aren't those of the curve.
+  // A DIR change close to a step may slide the timeline; then the times aren't those of the curve.
   void checkLimits(const Watched& axis) {
     if (bench_.machine->figures().slipped != slipped_) return;
     const std::vector<Crossing> crossings = crossingsOf(axis);
     rows_ += crossings.size();
     const double scale = scaleOf(axis);
-    // What rounding adds is a hundredth of the limit at most.
+    // Rounding adds at most a hundredth of the limit.
     const double jerk_apart = std::cbrt(8.0 * kSpeed * 1e-9 / (0.01 * kJerk));
     const double apart = std::sqrt(4.0 * kSpeed * 1e-9 / (0.01 * kStopping));
     const test::Differences near = test::differencesOf(crossings, apart);

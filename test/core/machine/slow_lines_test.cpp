@@ -16,7 +16,7 @@
 #include "support/bench.h"
 #include "support/passing_lines.h"
 
-// A GPIO chip whose writes hang. Each axis has a chip of its own.
+// A GPIO chip whose writes hang. Each axis has its own chip.
 
 namespace stepdriver {
 namespace {
@@ -28,7 +28,7 @@ using test::violationsOf;
 
 constexpr std::chrono::seconds kBound{60};
 
-/// Writes of one line wait until they are let go.
+/// Writes of one line wait until the test releases them.
 class Gate {
  public:
   explicit Gate(std::string line) : line_(std::move(line)) {}
@@ -121,7 +121,7 @@ TEST_F(SlowLines, AHungWriteIsAFaultThatNamesTheLineAndDelaysNoOtherAxis) {
     }
   });
   while (gate_.waited() == 0) std::this_thread::yield();
-  // While it hangs everything else is answered, and x moves.
+  // While the write hangs, all other requests are answered, and x moves.
   auto others = std::async(std::launch::async, [this] {
     const axis::MoveResult result = axis("x").wait(axis("x").moveTo(0.002));
     axis("x").stop();
@@ -139,7 +139,7 @@ TEST_F(SlowLines, AHungWriteIsAFaultThatNamesTheLineAndDelaysNoOtherAxis) {
   EXPECT_NE(axis("y").state().fault.find("y.enable"), std::string::npos);
   EXPECT_EQ(axis("x").state().fault, "");
   EXPECT_TRUE(axis("y").state().enabled) << "nobody knows that it is not";
-  // The chip is back.
+  // The chip works again.
   gate_.open();
   machine_->recover();
   axis("y").enable(false);

@@ -15,7 +15,8 @@
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
 
-// Positions over a restart: 80 microsteps/mm, 1/16, so the translator is at Home every 0.8 mm.
+// Positions that survive a restart. 80 microsteps/mm, 1/16, so the translator is at Home every 0.8
+// mm.
 
 namespace stepdriver {
 namespace {
@@ -48,7 +49,7 @@ class StateFileTest : public testing::Test {
     const std::vector<config::AxisConfig> axes{config_};
     return std::make_unique<Bench>(axes, Bench::rigAxes(axes), threaded, 0.0, options);
   }
-  // As a loss of power leaves it.
+  // The state that a loss of power leaves.
   void crash() {
     const std::string kept = text();
     bench_.reset();
@@ -103,7 +104,7 @@ TEST_F(StateFileTest, DoesNotTrustThePositionOfANodeThatWasNotShutDown) {
   EXPECT_DOUBLE_EQ(state().position, 0.008);
   EXPECT_FALSE(state().position_valid);
   EXPECT_EQ(state().position_note, "the node that kept this position wasn't shut down");
-  // And not after a clean end either, until somebody says where it stands.
+  // Nor after a clean end, until somebody sets the position.
   start();
   EXPECT_EQ(state().position_note, "the position couldn't be trusted when it was kept");
   x().setPosition(0.0);
@@ -119,7 +120,7 @@ TEST_F(StateFileTest, IsOneOfARunningMachineWhileItMoves) {
   ASSERT_TRUE(state().moving);
   crash();
   start();
-  EXPECT_DOUBLE_EQ(state().position, 0.008);  // where it rested last
+  EXPECT_DOUBLE_EQ(state().position, 0.008);  // the last position of rest
   EXPECT_FALSE(state().position_valid);
   EXPECT_EQ(state().position_note,
             "the node that kept this position wasn't shut down: the axis was moving, from 0.008 m, "
@@ -129,7 +130,7 @@ TEST_F(StateFileTest, IsOneOfARunningMachineWhileItMoves) {
 TEST_F(StateFileTest, SaysFromWhereTheMotionBeganThatALossOfPowerEnded) {
   start();
   standAt(0.008);
-  bench_->move(0.010);  // and on, before anything is written
+  bench_->move(0.010);  // starts a second move before anything is written
   x().moveTo(0.050);
   bench_->machine->advance(0.2);
   ASSERT_TRUE(state().moving);
@@ -203,7 +204,8 @@ TEST_F(StateFileTest, KeepsWhatIsTakenUpOfABacklash) {
   start();
   EXPECT_NEAR(state().position, 0.008 - config_.backlash, 1e-12);
   EXPECT_TRUE(state().position_valid);
-  bench_->move(0.016 - config_.backlash);  // on in the same direction: nothing to take up
+  // Continues in the same direction: there is no backlash to take up.
+  bench_->move(0.016 - config_.backlash);
   EXPECT_EQ(bench_->pulses(), 640);
 }
 
@@ -259,7 +261,7 @@ TEST_F(StateFileTest, RefusesToStartWhereItCannotBeWritten) {
 TEST_F(StateFileTest, SaysWhereItCannotBeWrittenLater) {
   start();
   x().setPosition(0.0);
-  mkdir((file_ + ".new").c_str(), 0755);  // in the way, for root too
+  mkdir((file_ + ".new").c_str(), 0755);  // an obstacle, even for root
   bench_->move(0.008);
   bench_->machine->advance(0.001);
   EXPECT_EQ(bench_->machine->stateFileError(),

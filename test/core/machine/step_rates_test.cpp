@@ -176,7 +176,7 @@ TEST(WhyNotInRealtime, NamesRightsAndAxes) {
   }
 }
 
-/// What a machine does on a clock that is late and on lines that are slow.
+/// The rates of a machine on a late clock and slow lines.
 class MachineOnSlowHardware : public testing::Test {
  protected:
   MachineOnSlowHardware() {
@@ -230,10 +230,11 @@ TEST_F(MachineOnSlowHardware, MeasuresNothingUnasked) {
   EXPECT_FALSE(make(kHeld * 2, Measure::kNo)->capability());
 }
 
-// The formula is about the real engine: up to that rate its timeline stays, and above it slides.
+// The formula describes the real engine: up to this rate its timeline doesn't slide, above it does.
 class FormulaOnTheEngine : public MachineOnSlowHardware {
  protected:
-  /// @return the slips of moves of 1000 steps and more of all axes at once, each at its top speed.
+  /// @return the slips during moves of 1000 steps and more of all axes at once, each at its top
+  /// speed.
   std::uint64_t slips(std::vector<config::AxisConfig> configs) {
     for (config::AxisConfig& config : configs) config.start_speed = config.max_speed;
     machine::Machine machine(configs, backend, clock, {false});

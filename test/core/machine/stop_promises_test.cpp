@@ -16,9 +16,9 @@
 #include "support/bench.h"
 #include "support/refusal.h"
 
-// What is asked while a line waits for its axes: they come to rest, or take up their backlash. The
-// virtual clock is held meanwhile, so that the window is open for as long as the test needs it.
-// Steps are counted by the rig. x, y and z have 40 steps/mm.
+// Requests that come while a line waits for its axes, which are stopping or taking up their
+// backlash. The virtual clock is held meanwhile, so this state lasts as long as the test needs it.
+// The rig counts the steps. x, y and z have 40 steps/mm.
 
 namespace stepdriver {
 namespace {
@@ -29,7 +29,7 @@ using test::linearAxis;
 using test::violationsOf;
 
 constexpr std::chrono::seconds kBound{60};
-constexpr double kBacklash = 0.008;  // m, of y
+constexpr double kBacklash = 0.008;  // m, backlash of y
 constexpr std::int64_t kBacklashSteps = 320;
 
 /// @return whether the condition was met within the bound.
@@ -68,7 +68,7 @@ class StopPromises : public testing::Test {
   axis::Axis& axis(const std::string& name) { return bench->axis(name); }
   machine::Machine& machine() { return *bench->machine; }
 
-  /// Asks for a line of x and y in a thread of its own, and waits for its end if it is accepted.
+  /// Requests a line of x and y in another thread, which waits for its end if it is accepted.
   void askForLine(bool wait = true) {
     line_ = std::async(std::launch::async, [this, wait] {
       try {
@@ -80,7 +80,7 @@ class StopPromises : public testing::Test {
     });
   }
 
-  /// What became of it, when all axes are at rest.
+  /// The result of the line, once all axes are at rest.
   std::string whatBecameOfIt() {
     if (line_.wait_for(kBound) != std::future_status::ready) return "it has no answer";
     const bool rests = await([this] {
@@ -89,7 +89,7 @@ class StopPromises : public testing::Test {
     return rests ? line_.get() : "it has no end";
   }
 
-  /// A line is asked for while the clock stands, and y has begun to take up its backlash.
+  /// Requests a line while the clock is held, after y has begun to take up its backlash.
   void openWindow() {
     build(0.0, kBacklash);
     held_.emplace(bench->clock);

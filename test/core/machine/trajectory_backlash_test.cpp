@@ -10,7 +10,7 @@
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
-// Trajectories of an axis x that loses 30 steps at each reversal, and y that loses none.
+// Trajectories of an axis x with 30 steps of backlash, and an axis y without backlash.
 
 namespace stepdriver {
 namespace {
@@ -37,12 +37,12 @@ class TrajectoryWithBacklash : public test::TrajectoryBench {
   void expectWithin(double speed, double acceleration) {
     const test::Differences seen = differences("x", 0.01);
     EXPECT_LE(seen.speed, speed * 1000.0 * 1.01);
-    // 0.01 steps beside the curve over 10 ms are 400 steps/s^2.
+    // A deviation from the curve by 0.01 steps over 10 ms is 400 steps/s^2.
     EXPECT_LE(seen.acceleration, acceleration * 1000.0 * 1.01 + 400.0);
   }
 };
 
-/// Where the joint is by the motor's steps: it stands while the backlash is taken up.
+/// The joint's position by the motor's steps: it is at rest while the backlash is taken up.
 double jointAfter(const std::vector<Crossing>& steps, double time_s) {
   std::int64_t motor = 0;
   std::int64_t slack = 0;
@@ -66,7 +66,7 @@ double thereAndBackAt(double t) {
   return t < 1.0 ? 500.0 * quintic(t) : 500.0 - 300.0 * quintic(t - 1.0);
 }
 
-// When the joint crossed 250 steps on its way up is half a second after the trajectory's begin.
+// The joint crosses 250 steps on its way up half a second after the trajectory began.
 double beginOf(const std::vector<Crossing>& steps) {
   const auto middle = std::find_if(steps.begin(), steps.end(), [](const Crossing& step) {
     return step.position >= 250.0 + kBacklash;
@@ -85,7 +85,7 @@ TEST_F(TrajectoryWithBacklash, TakesItUpAtEachTurnWithinTheLimits) {
   expectWithin(2.0, 10.0);
   expectClean();
 
-  // While it is taken up, which lasts 0.16 s, the joint lags behind by no more than it is.
+  // While the backlash is taken up, for 0.16 s, the joint lags behind by at most the backlash.
   const auto steps = crossings("x");
   const double begin = beginOf(steps);
   for (double t = 0.0; t < 2.0; t += 0.01) {

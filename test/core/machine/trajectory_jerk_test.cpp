@@ -11,8 +11,7 @@
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
-// Trajectories of axes with a jerk limit, and what becomes of those at the limits that are to slow
-// down.
+// Trajectories of axes with a jerk limit, and trajectories at the limits, which have to slow down.
 
 namespace stepdriver {
 namespace {
@@ -38,7 +37,7 @@ class TrajectoryWithJerkLimit : public test::TrajectoryBench {
     build(axes);
   }
 
-  // The cubics leave the curve by up to 0.01 steps, which over 60 ms is a jerk of
+  // The cubics differ from the curve by up to 0.01 steps, which over 60 ms is a jerk of
   // 8 * 0.01 / 0.06^3 = 370 steps/s^3.
   void expectJerkWithin(double most) {
     EXPECT_LE(differences("x", 0.06).jerk, most * 1000.0 + 400.0);
@@ -115,7 +114,8 @@ TEST_F(TrajectoryWithJerkLimit, StopsAndChangesItsSpeedWithinIt) {
 
 class TrajectoryAtItsLimits : public test::TrajectoryBench {};
 
-// Up to 1 m/s at 10 m/s^2, and down to 0.2 m/s at as much, where it continues for seconds.
+// Up to 1 m/s at 10 m/s^2, and down to 0.2 m/s with the same deceleration, then constant for
+// seconds.
 std::vector<TrajectoryPoint> brakingHard() {
   const auto point = [](double time, double position, double velocity) {
     return TrajectoryPoint{time, {position, 0.0}, {velocity, 0.0}, {}};
@@ -165,7 +165,7 @@ TEST(SplineJerk, IsThatOfTheCurves) {
 TEST(SplineJerk, TellsWhereTheAccelerationJumpsMost) {
   const motion::SplineJerk found = motion::splineJerk(
       {0.0, 0.0, 7.0}, {{kSecond, 100.0, 150.0, {}}, {2 * kSecond, 200.0, 0.0, {}}});
-  // The first cubic's accelerations are 300 and 0, the second's 0 and -300.
+  // The first cubic's accelerations are 300 and 0, the second cubic's 0 and -300.
   EXPECT_NEAR(std::abs(found.acceleration_jump.value), 300.0, 1e-9);
   EXPECT_EQ(found.acceleration_jump.time_s, 2.0);
 }

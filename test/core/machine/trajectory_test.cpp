@@ -25,7 +25,7 @@ using test::trajectoryAxis;
 
 class Trajectory : public test::TrajectoryBench {};
 
-// The cubic s^2 (3 - 2 s) over 2 s, with s = t/2; for y half of it backwards.
+// The cubic s^2 (3 - 2 s) over 2 s, with s = t/2; y moves half as far, backwards.
 TrajectoryRequest cubic() { return {{"x", "y"}, {{2.0, {1.0, -0.5}, {0.0, 0.0}, {}}}}; }
 double cubicAt(double t) { return t * t / 4.0 * (3.0 - t); }
 
@@ -37,7 +37,8 @@ TEST_F(Trajectory, FollowsACubicToTheStep) {
   EXPECT_EQ(result.positions, (std::vector<double>{1.0, -0.5}));
   const auto x = bench->trace->times("x", "step", true);
   ASSERT_EQ(x.size(), 1000U);
-  // Each edge is where the curve crosses its half-step line: the begin is found from one of them.
+  // Each edge is where the curve crosses its half-step line; one of them gives the time of the
+  // begin.
   double low = 0.0;
   double high = 2.0;
   for (int i = 0; i < 100; ++i) {
@@ -72,7 +73,7 @@ TEST_F(Trajectory, IsHeldOnItsCurveAndResumed) {
   machine().hold();
   awaitRest();
   EXPECT_TRUE(state("x").held);
-  // Both at the same place of the curve: y is half of x, backwards.
+  // Both are at the same place of the curve: y moves half as far as x, backwards.
   EXPECT_NEAR(state("y").position, -0.5 * state("x").position, 0.0016);
   EXPECT_GT(state("x").position, cubicAt(0.9));
   advance(3.0);
@@ -98,7 +99,7 @@ TEST_F(Trajectory, StopsOnItsCurveWithinTheAccelerations) {
     highest = std::max(highest, std::abs(now - before) / 1e-3);
     before = now;
   }
-  // From 0.75 m/s, at most at 10 m/s^2, and not much more gently than that.
+  // Decelerates from 0.75 m/s with at most 10 m/s^2, and not with much less.
   EXPECT_LT(highest, 10.01);
   EXPECT_GT(highest, 5.0);
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
@@ -172,7 +173,7 @@ TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
   EXPECT_EQ(why({{0.0, {0.5, 0.0}, {0.0, 0.0}, {}}, {2.0, {1.0, 0.0}, {0.0, 0.0}, {}}}),
             "x: the trajectory begins at 0.5 m, but the axis stands at 0 m; they may differ by one "
             "full step");
-  // A cubic that leaves the limits between its points.
+  // A cubic that exceeds the limits between its points.
   EXPECT_NE(why({{4.0, {-4.9, 0.0}, {-1.0, 0.0}, {}}, {6.0, {-4.9, 0.0}, {0.0, 0.0}, {}}})
                 .find("below the soft limit"),
             std::string::npos);

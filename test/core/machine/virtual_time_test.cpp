@@ -4,7 +4,7 @@
 
 #include "support/homing_bench.h"
 
-// A machine with threads on a clock that waits for nobody: a wait ends at once.
+// A machine with threads on a clock that waits for nobody: each wait ends at once.
 
 namespace stepdriver {
 namespace {
@@ -13,8 +13,7 @@ using axis::HomingEnd;
 using test::Bench;
 using test::homingAxis;
 
-// Off the switch there are 5 mm to go: the pulse thread is through with them in less than a
-// millisecond.
+// After the switch opens, 5 mm remain: the pulse thread completes them in less than a millisecond.
 config::AxisConfig shortHoming(const std::string& name) {
   config::AxisConfig config = homingAxis(name);
   config.homing->max_travel = 0.005;
@@ -32,7 +31,7 @@ TEST(VirtualTime, DoesNotPassWhatASwitchSaysHoweverLateTheThreads) {
     }
     for (const axis::HomingResult& result : bench.machine->home()) {
       ASSERT_EQ(result.end, HomingEnd::kHomed) << i << ": " << result.message;
-      // The edge of the switch may come late; its place is known to within a step then.
+      // The edge of the switch may come late; then its position is known to within a step.
       const double carriage = bench.report(result.axis).carriage / 1000.0;
       EXPECT_NEAR(result.position, carriage, 2.0 * test::kStep) << i << ", " << result.axis;
     }

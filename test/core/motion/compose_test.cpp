@@ -13,7 +13,7 @@
 namespace stepdriver {
 namespace {
 
-// What q(s(t)) is at a time, by the chain rule from the two.
+// The value and the derivatives of q(s(t)) at a time, by the chain rule.
 double placeAt(const motion::Profile& curve, const motion::Piece& path, double seconds) {
   const motion::DoubleDouble s = path.positionAt(seconds);
   const std::int64_t s_ns = motion::splitNanoseconds(s).whole;
@@ -60,14 +60,14 @@ motion::Profile bend() {
 }
 
 TEST(Compose, StaysWithinItsErrorWhereTheRateChanges) {
-  // From full rate to a fifth of it: 0.6 s in 1 s, up from 0.7 s.
+  // From full rate to a fifth of it: 0.6 s in 1 s, rising from 0.7 s.
   const double worst = worstError(bend(), {1.0, 0.7, 1.0, -0.8, 0.0});
   EXPECT_LE(worst, motion::kComposeError * 1.001);
-  EXPECT_GT(worst, motion::kComposeError / 100.0);  // it is not cut finer than it must be
+  EXPECT_GT(worst, motion::kComposeError / 100.0);  // it isn't cut finer than necessary
 }
 
 TEST(Compose, StaysWithinItsErrorWhereTheSlopeOfTheRateChangesToo) {
-  // From full rate to rest at a slope that grows and one that falls.
+  // From full rate to rest, with a slope that rises and then falls.
   EXPECT_LE(worstError(bend(), {1.0, 0.7, 1.0, 0.0, -1.0}), motion::kComposeError * 1.001);
   EXPECT_LE(worstError(bend(), {1.0, 0.7, 0.5, -1.0, 1.0}), motion::kComposeError * 1.001);
 }

@@ -13,8 +13,8 @@
 #include "motion/spline.h"
 #include "motion/step_finder.h"
 
-// A trajectory whose tail is prepared before its head is known is the trajectory that is planned at
-// once.
+// A trajectory whose tail is prepared before its head is known is the same as a trajectory that is
+// planned at once.
 
 namespace stepdriver::motion {
 namespace {
@@ -35,7 +35,7 @@ class Random {
   std::mt19937 engine_;
 };
 
-/// Waypoints every 0.2 s, some of which stay where they are, or nearly.
+/// Waypoints every 0.2 s; at some of them the joint stays where it is, or nearly.
 std::vector<Waypoint> randomWaypoints(Random& random, int count) {
   std::vector<Waypoint> waypoints;
   double position = 0.0;

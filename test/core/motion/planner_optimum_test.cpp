@@ -15,10 +15,9 @@ namespace stepdriver::motion {
 namespace {
 
 // All motions whose jerk is -J, 0 or J over whole seconds, with J = 6 microsteps/s^3, run on a
-// lattice of whole numbers: a = 6 i, v = 3 n, p = m. A breadth-first search from rest on 0
-// backwards gives for each state of the lattice the least number of seconds that such a motion
-// needs to come to rest there. The fastest motion of all can only be faster than that, but not by
-// much.
+// lattice of whole numbers: a = 6 i, v = 3 n, p = m. A breadth-first search backwards from rest at
+// 0 gives, for each state of the lattice, the least number of seconds in which such a motion comes
+// to rest at 0. The fastest of all motions may be faster than that, but not by much.
 struct LatticeState {
   int a = 0;
   int v = 0;
@@ -29,7 +28,7 @@ class Lattice {
  public:
   static constexpr int kNever = 0x7fff;
 
-  // Highest a and v in lattice units. No way beyond 0 upwards where `below`.
+  // Highest a and v in lattice units. If `below`, the position must not exceed 0.
   Lattice(int acceleration, int deceleration, int speed, bool below)
       : acceleration_(acceleration),
         deceleration_(deceleration),
@@ -63,8 +62,8 @@ class Lattice {
   }
 
  private:
-  // What no second of jerk -1, 0 or 1 changes, and rest on 0 has: v - a is even, p - a is a
-  // multiple of 6.
+  // Rest at 0 has these properties, and no second of jerk -1, 0 or 1 changes them: v - a is even,
+  // and p - a is a multiple of 6.
   static bool onLattice(const LatticeState& s) {
     return (s.v - s.a) % 2 == 0 && (s.p - s.a) % 6 == 0;
   }
@@ -82,7 +81,7 @@ class Lattice {
     return static_cast<std::size_t>(row * (highest_ - kLowest + 1) + s.p - kLowest);
   }
 
-  // A second that turns round inside must keep the limits of both directions, and must not turn
+  // A second in which the motion turns must keep the limits of both directions, and must not turn
   // above the highest position.
   bool allowedBetween(const LatticeState& from, const LatticeState& to, int j) const {
     if (from.v * to.v >= 0) return true;
@@ -127,7 +126,7 @@ class Lattice {
   std::vector<std::int16_t> seconds_;
 };
 
-// The same for changes of velocity to `goal`, wherever they lead.
+// The same for changes of velocity to `goal`, whatever the final position.
 class VelocityLattice {
  public:
   VelocityLattice(int acceleration, int deceleration, int goal)
@@ -192,7 +191,8 @@ TEST_P(PlannerLattice, NoMotionOnALatticeIsFasterOrAvoidsAnOvershoot) {
   });
   EXPECT_GT(direct, 4000);
   EXPECT_GT(overshoots, 500);
-  // What whole seconds cost, of some 14 s: on a lattice twice as fine it is half.
+  // What the restriction to whole seconds costs, of some 14 s: with a lattice twice as fine it is
+  // half.
   EXPECT_LT(faster / (direct + overshoots), 1.1);
 }
 
@@ -220,8 +220,8 @@ TEST_P(PlannerLattice, NoChangeOfVelocityOnALatticeIsFaster) {
   }
 }
 
-// Without a jerk limit: brake where the way is too short or leads away, then a trapezoid from the
-// speed that is left.
+// Without a jerk limit: brake if the distance is too short or leads away, then a trapezoid from the
+// remaining speed.
 long double trapezoidTime(long double way, long double v, const MotionLimits& limits) {
   const long double a = limits.acceleration;
   const long double d = limits.deceleration;

@@ -28,7 +28,7 @@ TEST(PlannerProperties, EveryMoveFromAnyStateKeepsTheLimitsAndEndsOnItsTarget) {
   }
 }
 
-// About where stopping begins to be impossible, and turning in time, too.
+// Near the distance at which stopping, or turning in time, becomes impossible.
 TEST(PlannerProperties, HoldForTargetsAboutTheStoppingDistance) {
   Random random(7);
   int overshoots = 0;
@@ -59,7 +59,7 @@ TEST(PlannerProperties, HoldForTargetsAboutTheStoppingDistance) {
   EXPECT_GT(turns, 300);
 }
 
-// Limits and states of all orders of magnitude, each on its own.
+// Limits and states of all orders of magnitude, independently of each other.
 TEST(PlannerProperties, HoldForLimitsThatHaveNothingToDoWithEachOther) {
   Random random(2);
   for (int i = 0; i < 20000; ++i) {
@@ -126,7 +126,7 @@ TEST(PlannerProperties, APlanMayBeReplacedAtAnyMoment) {
       now += std::llround(seconds * 1e9);
       state = profile.stateAt(now);
       if (!random.chance(0.3)) continue;
-      // Some other limits, of the same order of magnitude: an override, another acceleration.
+      // Other limits of the same order of magnitude: an override, another acceleration.
       limits.max_speed *= random.within(0.5, 2.0);
       limits.acceleration *= random.within(0.5, 2.0);
       limits.deceleration *= random.within(0.5, 2.0);
@@ -150,8 +150,8 @@ TEST(PlannerProperties, ReplanningForTheSameTargetChangesNothing) {
                                     << "; at " << then << " ns " << state);
     const Plan second = planMove(then, state, target, limits);
     const double end = static_cast<double>(first.profile.endNs());
-    // On the way to a turn it may be as fast as it was, which is not the same later. And near the
-    // start speed the last bit of the velocity weighs more.
+    // On the way to a turn it may keep its speed, which isn't the same later. Near the start speed,
+    // the last bit of the velocity has a larger effect.
     const bool turns = first.profile.pieces().back().v0 * from.velocity < 0.0;
     if (limits.start_speed > 0.0 && turns) continue;
     const double doubt = limits.start_speed > 0.0 ? 1e3 : 2.0 + 1e-9 * end;

@@ -25,7 +25,7 @@ void expectSound(const Profile& profile, const MotionState& from, const MotionLi
   check.expectSteps(target);
 }
 
-// ---- new targets while it moves ----
+// ---- new targets during a motion ----
 
 TEST(PlanMove, TargetExactlyAtTheStoppingDistanceIsReachedByStopping) {
   // 1000^2/(2 * 2000) = 250 without a jerk limit; with it 1000/2 * (1000/2000 + 2000/20000) = 300.
@@ -44,7 +44,7 @@ TEST(PlanMove, TargetNearerThanTheStoppingDistanceIsPassedAndComeBackTo) {
   const Plan plan = planMove(0, at(0, 1000), 200, limits);
   expectSound(plan.profile, at(0, 1000), limits, 200);
   EXPECT_DOUBLE_EQ(plan.overshoot, 50.0);
-  // Stops after 0.5 s, 50 beyond; back over 50: a triangle.
+  // Stops after 0.5 s, 50 steps beyond; back over 50 steps with a triangle.
   EXPECT_DOUBLE_EQ(seconds(plan.profile), 0.5 + 2.0 * std::sqrt(50.0 / 2000.0));
 }
 
@@ -68,8 +68,8 @@ TEST(PlanMove, TargetBehindIsTurnedToWithoutPassingIt) {
 }
 
 TEST(PlanMove, TurnsShortOfATargetThatItCouldOnlyRestBeyond) {
-  // At the full deceleration of 2000 the speed is gone after 250 microsteps, but the deceleration
-  // is not: to rest there it must have eased before, and that takes 250.83.
+  // At the full deceleration of 2000 the speed is 0 after 250 microsteps, but the deceleration
+  // isn't. To be at rest there, it must decrease earlier, and that takes 250.83.
   const MotionLimits limits{0, 1000, 2000, 2000, 20000};
   const MotionState braking = at(0, 1000, -2000);
   const Profile stop = planStop(0, braking, limits);
@@ -151,7 +151,7 @@ TEST(StartSpeed, TurnsRoundAtRestOnAWholeMicrostep) {
     Step last;
     while (finder.next(step)) {
       if (last.direction > 0 && step.direction < 0) {
-        // Half a microstep each way from the start speed of 100 on: v^2 = 100^2 + 2000.
+        // Half a microstep in each direction, starting at 100: v^2 = 100^2 + 2000.
         EXPECT_GE(step.time_ns - last.time_ns, 9'544'511);
       }
       last = step;

@@ -13,7 +13,7 @@
 #include "motion/spline.h"
 #include "motion/step_finder.h"
 
-// Excerpts compute their pieces when they are asked for. Here the same pieces are made beforehand.
+// Excerpts compute their pieces on demand. Here the same pieces are made in advance.
 
 namespace stepdriver::motion {
 namespace {
@@ -31,7 +31,7 @@ Shared randomCourse(std::mt19937& random, int points) {
   return std::make_shared<const Profile>(planSpline(0, {}, waypoints));
 }
 
-/// One piece at a constant rate for each piece of the course that the stretch runs through.
+/// One piece at a constant rate for each piece of the course in the stretch.
 void appendAtRate(std::vector<Piece>& pieces, const Profile& course, const Piece& stretch) {
   const DoubleDouble rate(stretch.v0, stretch.v0_rest);
   const DoubleDouble end = stretch.positionAt(stretch.duration);
@@ -85,7 +85,7 @@ void expectSame(const Profile& seen, const Profile& wanted) {
   }
 }
 
-/// A path from a random place on: to another rate, to rest, or at the rate of the beginning.
+/// A path from a random place: to another rate, to rest, or at the rate of the beginning.
 Profile randomPath(std::mt19937& random, const Profile& course) {
   std::uniform_real_distribution<double> share(0.0, 1.0);
   const DoubleDouble end = course.duration();

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kEnd = 10.0;
 
-// The rate and its slope are continuous where they must be, and keep to the limits.
+// Checks that the rate and its slope are continuous if they must be, and keep the limits.
 void expectSound(const Profile& path, const RateLimits& limits, double most_jerk) {
   for (std::size_t i = 0; i < path.pieces().size(); ++i) {
     const Piece& piece = path.pieces()[i];
@@ -43,7 +43,7 @@ TEST(Rate, FallsEvenlyToRest) {
 }
 
 TEST(Rate, FallsToRestWithAJerkLimitInTheTimeOfTheClosedForm) {
-  // slope/jerk + 1/slope where the slope is reached.
+  // slope/jerk + 1/slope if the slope is reached.
   const Profile path = planRate(0, {2.0, 1.0, 0.0}, 0.0, {4.0, 32.0}, 0.0, kEnd);
   EXPECT_NEAR(path.duration().value(), 0.125 + 0.25, 1e-12);
   EXPECT_NEAR(path.endPosition().value(), 2.0 + 0.375 / 2.0, 1e-12);
@@ -84,7 +84,7 @@ TEST(Rate, NeverRunsBackwardsNorFasterWhateverComesInBetween) {
     const double wanted = unit(random) < 0.5 ? 1.0 : unit(random);
     const double after = unit(random) < 0.5 ? 0.0 : unit(random);
     const Profile path = planRate(0, from, wanted, second, after, 1000.0);
-    // What the current slope takes to end may be as much as it took to begin.
+    // Ending the current slope may take as much as beginning it.
     expectSound(path, second, std::max(first.jerk, second.jerk) * (1.0 + 1e-6));
     EXPECT_NEAR(path.endPosition().value(), 1000.0, 1e-9) << i;
     if (testing::Test::HasFailure()) return;

@@ -13,8 +13,8 @@ namespace stepdriver::motion {
 namespace {
 
 // The double S of the textbooks (Biagiotti and Melchiorri, Trajectory Planning for Automatic
-// Machines and Robots) in long double, from rest to rest with a start speed: its peak found by
-// bisection, its position by summing up its seven phases, its times by bisection.
+// Machines and Robots) in long double, from rest to rest with a start speed. Its peak and its times
+// are found by bisection, its position by adding up its seven phases.
 class DoubleS {
  public:
   DoubleS(long double length, const MotionLimits& limits)
@@ -47,7 +47,7 @@ class DoubleS {
     return p;
   }
 
-  /// When the position is `line`, between two times around it.
+  /// The time at which the position is `line`, between two times around it.
   long double timeOf(long double line, long double low, long double high) const {
     for (int i = 0; i < 70; ++i) {
       const long double middle = (low + high) / 2.0L;
@@ -109,14 +109,14 @@ TEST(SCurve, TakesTheTimeOfTheClosedFormInEachCase) {
   // Neither speed nor acceleration reaches its limit: 32 l/j is the cube of the time.
   EXPECT_DOUBLE_EQ(seconds(10, {0, 1000, 2000, 2000, 20000}), std::cbrt(32.0 * 10 / 20000));
   EXPECT_EQ(fromRest(10, {0, 1000, 2000, 2000, 20000}).pieces().size(), 3U);
-  // The acceleration only: t = a/j + sqrt((a/j)^2 + 4 l/a).
+  // Reaches only the limit of the acceleration: t = a/j + sqrt((a/j)^2 + 4 l/a).
   EXPECT_DOUBLE_EQ(seconds(300, {0, 1000, 2000, 2000, 20000}),
                    0.1 + std::sqrt(0.01 + 4.0 * 300 / 2000));
   EXPECT_EQ(fromRest(300, {0, 1000, 2000, 2000, 20000}).pieces().size(), 5U);
-  // The speed only: l/v + 2 sqrt(v/j).
+  // Reaches only the limit of the speed: l/v + 2 sqrt(v/j).
   EXPECT_DOUBLE_EQ(seconds(1000, {0, 1000, 20000, 20000, 20000}), 1.0 + 2.0 * std::sqrt(0.05));
   EXPECT_EQ(fromRest(1000, {0, 1000, 20000, 20000, 20000}).pieces().size(), 5U);
-  // Each of them just reached: there is one phase less each time.
+  // Each limit is just reached: there is one phase less each time.
   EXPECT_DOUBLE_EQ(seconds(600, {0, 1000, 2000, 2000, 20000}), 1.2);
   EXPECT_EQ(fromRest(600, {0, 1000, 2000, 2000, 20000}).pieces().size(), 5U);
   EXPECT_DOUBLE_EQ(seconds(40, {0, 200, 2000, 2000, 20000}), 0.4);
@@ -151,7 +151,7 @@ TEST(SCurve, TakesTheTimeOfTheTextbookForAllOrdersOfMagnitude) {
   }
 }
 
-// Each step within a nanosecond of where long double finds it.
+// Each step is within a nanosecond of the result in long double.
 void expectTextbookSteps(std::int64_t length, const MotionLimits& limits) {
   SCOPED_TRACE(testing::Message() << length << " microsteps, " << limits);
   const DoubleS textbook(length, limits);
@@ -196,7 +196,7 @@ TEST(SCurve, IsExactAtTheEndOf2To40Steps) {
   const std::int64_t length = std::int64_t{1} << 40;
   const MotionLimits limits{0, 19999.7, 12345.6, 2345.6, 54321.0};
   const Profile profile = fromRest(length, limits);
-  // Seen backwards the end is the beginning of the mirrored motion.
+  // Reversed in time, the end is the beginning of the mirrored motion.
   const DoubleS mirrored(length, {0, 19999.7, 2345.6, 12345.6, 54321.0});
   const DoubleDouble total = profile.duration();
   StepFinder tail(profile, length - 2000);
@@ -232,7 +232,7 @@ TEST(SCurve, IsExactInPhasesOfWeeks) {
 }
 
 TEST(SCurve, IsExactAtBothEndsOfALongSwing) {
-  // From one turning point to the other under one jerk: each end is the other's mirror image.
+  // From one turning point to the other with one jerk: the two ends are mirror images.
   const double a = 2000.0;
   const double j = 0.125;
   const std::int64_t length = 341'333'333'333;  // 2 a^3/(3 j^2) less a third

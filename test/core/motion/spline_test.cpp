@@ -55,7 +55,7 @@ struct Textbook {
   bool quintic() const { return c[4] != 0.0L || c[5] != 0.0L; }
 };
 
-/// The first time after `low` at which the textbook is on a half-step line [s].
+/// The first time after `low` at which the textbook's motion is on a half-step line [s].
 long double crossing(const Textbook& textbook, long double line, long double low,
                      long double high) {
   for (int i = 0; i < 100; ++i) {
@@ -67,7 +67,8 @@ long double crossing(const Textbook& textbook, long double line, long double low
 
 MotionState restAt(double position) { return {position, 0.0, 0.0}; }
 
-// At 40 times of each segment; to rounding for lines and cubics, to the stated error for quintics.
+// Compares 40 times of each segment: lines and cubics up to rounding, quintics up to the stated
+// error.
 void expectTextbook(const Profile& profile, Waypoint begin, std::vector<Waypoint> waypoints) {
   waypoints.back().position = std::nearbyint(waypoints.back().position);
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
@@ -143,7 +144,7 @@ TEST(Spline, StepsOfACubicComeWithinANanosecond) {
   EXPECT_FALSE(finder.next(step));
 }
 
-// In place rather than in time: at its ends the axis hardly moves.
+// Compares positions rather than times, because the axis hardly moves at the ends.
 TEST(Spline, StepsOfAQuinticComeWhereThePolynomialIsWithinAHundredthOfAStep) {
   const std::vector<Waypoint> waypoints{{2 * kSecond, 10000.0, 0.0, 0.0}};
   const Textbook textbook({0, 0.0, 0.0, 0.0}, waypoints[0]);
@@ -164,8 +165,8 @@ TEST(Spline, StepsOfAQuinticComeWhereThePolynomialIsWithinAHundredthOfAStep) {
   EXPECT_FALSE(finder.next(step));
 }
 
-// If both segments at a waypoint have a velocity for it, they join without a jump; so do the cubics
-// that a quintic is made of.
+// If both segments at a waypoint have a velocity for it, they join without a jump. So do the cubics
+// that approximate a quintic.
 TEST(Spline, JoinsWithoutAJumpOfVelocity) {
   std::mt19937_64 random(20261122);
   for (int round = 0; round < 1000; ++round) {
@@ -187,8 +188,8 @@ TEST(Spline, JoinsWithoutAJumpOfVelocity) {
   }
 }
 
-// From rest to rest the textbook has them in closed form: 1.5 L/T at T/2 and 6 L/T^2 at both ends
-// for the cubic, 15/8 L/T at T/2 and 10/sqrt(3) L/T^2 at T/2 -+ T/sqrt(12) for the quintic.
+// From rest to rest the textbook has the peaks in closed form: 1.5 L/T at T/2 and 6 L/T^2 at both
+// ends for the cubic, 15/8 L/T at T/2 and 10/sqrt(3) L/T^2 at T/2 -+ T/sqrt(12) for the quintic.
 TEST(Spline, OfASegmentFromRestToRestHasThePeaksOfTheTextbook) {
   const double length = 10000.0;
   const double time = 2.0;

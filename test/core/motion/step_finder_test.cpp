@@ -48,7 +48,7 @@ TEST(StepFinder, TurnsRoundInsideAPiece) {
   for (std::size_t k = 0; k < 12; ++k) {
     EXPECT_EQ(steps[k].direction, 1);
     EXPECT_EQ(steps[23 - k].direction, -1);
-    // Up and down are mirror images about the turning point.
+    // The ways up and down are mirror images about the turning point.
     EXPECT_NEAR(static_cast<double>(steps[k].time_ns + steps[23 - k].time_ns), 2.0 * v * 1e9, 2.0);
   }
 }
@@ -91,7 +91,8 @@ TEST(StepFinder, FollowsRandomCubicsLikeBisectionDoes) {
     while (finder.next(step)) {
       ASSERT_GE(step.time_ns, last) << "round " << round;
       last = step.time_ns;
-      // The crossing lies within 1 ns of the step: the curve is on either side of the line there.
+      // The crossing lies within 1 ns of the step: 1 ns before and after it, the curve is on
+      // different sides of the line.
       const long double line = count + 0.5L * step.direction;
       const long double t = step.time_ns * 1e-9L;
       const long double before = at(std::max(0.0L, t - 1e-9L)) - line;
@@ -139,7 +140,7 @@ TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
         line <= way ? std::sqrt(2.0L * line / acceleration) : ramp + (line - way) / speed;
     ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 1.0L) << "step " << k;
   }
-  // The same motion entered 30,000 steps before its end.
+  // The same motion, entered 30,000 steps before its end.
   const std::int64_t late = steps - 30000;
   StepFinder tail(profile, late);
   for (std::int64_t k = late; k < steps; ++k) {
@@ -154,7 +155,7 @@ TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
 }
 
 TEST(StepFinder, IsExactAtTheEndOfALongSlowdown) {
-  // From 20,000 steps/s at 1 step/s^2: v^2 - 2 d s leaves nothing of a double there.
+  // From 20,000 steps/s at 1 step/s^2: in doubles, v^2 - 2 d s would lose all its digits.
   const std::int64_t steps = 400'000'000;
   const Profile profile = planFromRest(0, 0, steps, {0.0, 20000.0, 1e6, 1.0});
   const long double ramps = 20000.0L / 1e6L + 20000.0L;
@@ -171,7 +172,7 @@ TEST(StepFinder, IsExactAtTheEndOfALongSlowdown) {
 }
 
 TEST(StepFinder, IsExactInLongRampsFromSlowSpeeds) {
-  // Hours from rest to full speed: just below and above where it takes another form of the root.
+  // Hours from rest to full speed: just below and above the switch to another form of the root.
   for (const double speed : {19'000.0, 21'000.0}) {
     const auto exact = [](long double line) { return std::sqrt(25.0L + 2.0L * line) - 5.0L; };
     const Profile profile = onePiece(speed, 0.0, 5.0, 1.0, 0.0);

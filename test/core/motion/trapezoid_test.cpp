@@ -11,7 +11,7 @@
 namespace stepdriver::motion {
 namespace {
 
-// The textbook motion in long double, built another way: by times, not by pieces.
+// The textbook motion in long double, built in another way: from times, not from pieces.
 struct Textbook {
   long double start, peak, up_time, cruise_time, down_time, up, cruise, length, a, d;
 

@@ -22,7 +22,7 @@ using test::LateClock;
 using test::linearAxis;
 using test::SlowBackend;
 
-/// Counts 1, 2, 3 ... of a step.
+/// Returns step, 2 step, 3 step ...
 auto rising(Nanoseconds step) {
   return [step, next = Nanoseconds{0}]() mutable { return next += step; };
 }

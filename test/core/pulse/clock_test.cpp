@@ -101,13 +101,13 @@ TEST(VirtualClock, IsLateIfItsProcessIsSuspendedInAHold) {
 }
 
 TEST(VirtualClock, IsNeverLateBecauseItsThreadIsSlow) {
-  VirtualClock clock(1e6);  // a pace that nothing keeps
+  VirtualClock clock(1e6);  // a pace that no computer can keep
   const auto begin = std::chrono::steady_clock::now();
   auto last = begin;
   for (Nanoseconds time = 1'000; last - begin < std::chrono::milliseconds(1200); time += 1'000) {
     clock.waitUntil(time);
     const auto now = std::chrono::steady_clock::now();
-    if (now - last > std::chrono::milliseconds(900)) return;  // this computer stalled itself
+    if (now - last > std::chrono::milliseconds(900)) return;  // this computer stalled
     last = now;
     ASSERT_EQ(clock.now(), time);
   }

@@ -18,7 +18,7 @@
 namespace stepdriver::pulse {
 namespace {
 
-/// A file in place of the kernel's device.
+/// A file instead of the kernel's device.
 class CpuLatency : public testing::Test {
  protected:
   void SetUp() override { std::ofstream(device).flush(); }
@@ -26,7 +26,7 @@ class CpuLatency : public testing::Test {
 
   bool isOpen() const {
     for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-      std::error_code gone;  // the listing's own
+      std::error_code gone;  // set for the listing's own descriptor
       if (std::filesystem::read_symlink(entry.path(), gone) == device) return true;
     }
     return false;

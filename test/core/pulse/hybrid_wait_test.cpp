@@ -22,7 +22,7 @@ constexpr Nanoseconds kSecond = 1'000'000'000;
 TEST(GuardLearner, ComesToTheNinetyNinthPercentileOfTheSleeps) {
   std::mt19937_64 random(1);
   GuardLearner learner;
-  // Evenly from 20 to 120 us: 99 of 100 are below 119 us.
+  // Evenly distributed from 20 to 120 us: 99 of 100 are below 119 us.
   std::uniform_int_distribution<Nanoseconds> lateness(20'000, 120'000);
   int late = 0;
   constexpr int kSleeps = 50'000;
@@ -83,7 +83,8 @@ TEST(RunningShare, SavesUpNoSleep) {
   EXPECT_GT(share.rest(), 0);
 }
 
-/// A thread on a processor that is late as it is told to be, and a clock for whoever runs in it.
+/// A thread on a processor that wakes it late by a given time, and a clock for the code that runs
+/// in it.
 class FakeThread : public Clock {
  public:
   explicit FakeThread(std::optional<Nanoseconds> guard = {}) : wait_(guard) {}
@@ -101,13 +102,13 @@ class FakeThread : public Clock {
   Nanoseconds guard() const override { return wait_.guard(); }
   void pass(Nanoseconds time) { processor.waitUntil(now() + time); }
 
-  // The share of a stretch of time in which it was running.
+  // The share of a period in which the thread was running.
   double shareOf(Nanoseconds begin, Nanoseconds end) const {
     return 1.0 - static_cast<double>(asleepBefore(end) - asleepBefore(begin)) /
                      static_cast<double>(end - begin);
   }
 
-  // The most of it in any stretch of this length.
+  // The largest share in any period of this length.
   double mostRunningIn(Nanoseconds length) {
     double most = shareOf(0, length);
     for (const Sleep& sleep : sleeps) {
@@ -122,13 +123,13 @@ class FakeThread : public Clock {
   struct Sleep {
     Nanoseconds begin;
     Nanoseconds end;
-    Nanoseconds before;  // that it has slept
+    Nanoseconds before;  // total sleep before this one
   };
   std::vector<Sleep> sleeps;
   VirtualClock processor;
 
  private:
-  static constexpr Nanoseconds kLook = 250;  // at the clock, in a spin
+  static constexpr Nanoseconds kLook = 250;  // duration of a read of the clock, while spinning
 
   Nanoseconds asleepBefore(Nanoseconds time) const {
     const auto after = std::upper_bound(
@@ -243,14 +244,14 @@ TEST(HybridWait, RestsShortlyAfterAStall) {
   FakeThread thread;
   thread.pass(kMillisecond);
   thread.waitUntil(thread.now() + kMillisecond);
-  thread.pass(20 * kSecond);  // to it, that was a run
+  thread.pass(20 * kSecond);  // counts as running time
   const Nanoseconds now = thread.now();
   thread.waitUntil(now);
   EXPECT_GT(thread.now(), now + RunningShare::kRest - kMicrosecond);
   EXPECT_LT(thread.now(), now + RunningShare::kLongestRest + 50 * kMicrosecond);
 }
 
-/// The engine on a thread and lines that can't do what is asked of them.
+/// An engine whose thread and lines can't keep up with the requested rate.
 class EngineBehind : public testing::TestWithParam<int> {
  protected:
   static ChannelConfig config(int channel) {
@@ -262,7 +263,7 @@ class EngineBehind : public testing::TestWithParam<int> {
   }
 };
 
-// A write costs what it does in the kernel of test/kernel: a pulse takes longer than its interval.
+// A write costs as much as in the test kernel: a pulse takes longer than its interval.
 TEST_P(EngineBehind, LeavesTheOtherThreadsTheirShareAndOnlyEverSpreadsThePulses) {
   FakeThread thread;
   test::RecordingLines lines(thread.processor);

@@ -19,7 +19,7 @@ TEST(LatenessHistogram, HasPercentilesWithinASixteenthAboveTheExactOnes) {
   LatenessHistogram histogram;
   std::vector<Nanoseconds> times;
   for (int i = 0; i < 20'000; ++i) {
-    // From nanoseconds to seconds, each decade as often as the others.
+    // From nanoseconds to seconds, each decade with the same frequency.
     const double exponent = std::uniform_real_distribution<double>(0.0, 9.5)(random);
     times.push_back(std::llround(std::pow(10.0, exponent)));
     histogram.add(times.back());
@@ -72,7 +72,7 @@ TEST(LatenessRecord, TellsTheLastWholeSecondAndAllOfIt) {
   EXPECT_EQ(record.lastSecond(10 * kSecond).count, 1U) << "of a window that was used before";
 }
 
-// A reader never sees fewer than were there before it began, nor more than after it.
+// A reader never sees fewer values than there were before its read, nor more than after it.
 TEST(LatenessRecord, IsReadByAnotherThreadWhileItIsWritten) {
   LatenessRecord record;
   std::atomic<std::uint64_t> written{0};

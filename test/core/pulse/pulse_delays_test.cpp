@@ -16,7 +16,7 @@ namespace {
 
 constexpr Nanoseconds kMillisecond = 1'000'000;
 constexpr Nanoseconds kMaxLateness = 5 * kMillisecond;
-// The scales of a line's axes to its path, and so their speeds.
+// The ratios of a line's axes to its path, and so their speeds.
 constexpr double kScales[] = {1.0, -0.61, 0.083};
 constexpr std::size_t kAxes = 3;
 
@@ -31,7 +31,7 @@ void PrintTo(const Delay& delay, std::ostream* out) {  // NOLINT: GoogleTest's n
   *out << delay.name;
 }
 
-/// A line of three axes, in which the pulse thread is held up once.
+/// A line of three axes, in which the pulse thread is delayed once.
 class DelayedLine : public PulseEngineTest {
  protected:
   static constexpr double kRestartSpeed = 400.0;  // [microsteps/s]
@@ -60,7 +60,7 @@ class DelayedLine : public PulseEngineTest {
     return lines.rises(static_cast<int>(axis) * kLinesPerChannel);
   }
 
-  // No interval is below three quarters of its plan, and none is shorter on account of the delay.
+  // No interval is below three quarters of its plan, and none is shorter because of the delay.
   void expectNothingBunched(std::size_t axis) const {
     const auto plan = planOf(axis);
     const auto rises = risesOf(axis);
@@ -83,7 +83,7 @@ TEST_P(PulseDelays, BunchNothingKeepTheAxesOnTheirLineAndFaultWhereTheyMust) {
   runOut();
   for (std::size_t i = 0; i < kAxes; ++i) expectNothingBunched(i);
   if (GetParam().faults) {
-    // The fastest axis can't continue; all end in the same instant, with nothing sent after it.
+    // The fastest axis can't continue. All axes end at the same instant, and no pulse follows.
     EXPECT_EQ(engine->channel(0).end, EndReason::kTooLate);
     EXPECT_GT(engine->channel(0).end_lateness, kMaxLateness);
     EXPECT_EQ(engine->channel(0).end_abrupt, true);
@@ -103,7 +103,7 @@ TEST_P(PulseDelays, BunchNothingKeepTheAxesOnTheirLineAndFaultWhereTheyMust) {
     const auto plan = planOf(i);
     const auto rises = risesOf(i);
     ASSERT_EQ(rises.size(), plan.size()) << i;
-    // All are as late from then on: by what the timeline has slid. Before it, by nothing.
+    // After the delay, all are late by as much as the timeline slid. Before it, none is late.
     EXPECT_EQ(rises.front(), plan.front().time_ns) << i;
     EXPECT_EQ(rises.back(), plan.back().time_ns + slipped) << i;
     for (std::size_t k = 0; k < plan.size(); ++k) {
@@ -116,7 +116,7 @@ TEST_P(PulseDelays, BunchNothingKeepTheAxesOnTheirLineAndFaultWhereTheyMust) {
   }
 }
 
-// 20,000 microsteps/s and 300: the motor starts at up to 400.
+// 20,000 microsteps/s and 300: the motor can start at up to 400.
 INSTANTIATE_TEST_SUITE_P(
     , PulseDelays,
     testing::Values(Delay{"HalfAMillisecondFast", kMillisecond / 2, 20'000.0, false},
@@ -145,13 +145,13 @@ TEST_F(DelayedLine, CountsOnceWhereTheWriteIsSlowToo) {
   EXPECT_EQ(engine->lateness().max, engine->state().worst_lateness);
 }
 
-// The slow write leaves each axis less time than the one before it: the timeline is slid for each.
+// The slow write leaves each axis less time than the one before, so the timeline slides for each.
 TEST_F(DelayedLine, CountsOnceForAllAxesOfAnInstant) {
   make({config(0), config(1), config(2)}, 1'000 * kMillisecond);
   for (const int axis : {0, 1, 2}) {
     const Nanoseconds interval = kMillisecond >> axis;
     const double speed = 1e9 / static_cast<double>(interval);
-    // Their first steps are half an interval after their starts, and at one instant.
+    // Their first steps come half an interval after their starts, at the same instant.
     follow(cruise(2 * kMillisecond - interval / 2, 0, 100, speed), axis);
   }
   runUntil(9 * kMillisecond + 900'000);

@@ -40,7 +40,7 @@ TEST_F(PulseEngineTest, KeepsDirSetupAndHoldWhateverThePlanWants) {
   for (const ChannelConfig& channel : {config(0), slow_dir}) {
     lines.edges.clear();
     make({channel});
-    // Forward and at once back, with a last and a first step 10 ns apart.
+    // Forward and immediately back: the last step forward and the first step back are 10 ns apart.
     const double speed = 50'000.0;
     const Nanoseconds start = clock.now() + 1'000'000;
     follow(cruise(start, 0, 3, speed));
@@ -55,7 +55,7 @@ TEST_F(PulseEngineTest, KeepsDirSetupAndHoldWhateverThePlanWants) {
 
 TEST_F(PulseEngineTest, SlidesAPlanThatIsTooFastForTheChip) {
   make({config(0)});
-  follow(cruise(1'000'000, 0, 1000, 1e6));  // a step each microsecond; the chip wants 4
+  follow(cruise(1'000'000, 0, 1000, 1e6));  // a step each microsecond; the chip needs 4
   runOut();
   const auto rises = lines.rises(0);
   ASSERT_EQ(rises.size(), 1000U);
@@ -119,7 +119,7 @@ TEST_F(PulseEngineTest, SlidesTheTimelineOfAllAxesByAGap) {
   ASSERT_EQ(slow.size(), 20U);
   for (std::size_t k = 1; k < fast.size(); ++k) ASSERT_GE(fast[k] - fast[k - 1], 750'000);
   for (std::size_t k = 1; k < slow.size(); ++k) ASSERT_GE(slow[k] - slow[k - 1], 7'500'000);
-  // Both are as late at the end: they stay on their line.
+  // Both axes are equally late at the end: they stay on their line.
   const Nanoseconds slipped = engine->state().slipped;
   EXPECT_NEAR(static_cast<double>(slipped), 50e6, 2e6);
   EXPECT_EQ(fast.back(), 1'000'000 + 199'500'000 + slipped);
@@ -162,7 +162,7 @@ TEST_F(PulseEngineTest, FaultsBeyondTheLimitAndNotAtIt) {
 
 TEST_F(PulseEngineTest, GoesOnAfterAGapAtASpeedThatTheMotorStartsFrom) {
   make({config(0)}, 5'000'000);
-  restart_interval = 1'000'000;  // just so: closer ones are too fast
+  restart_interval = 1'000'000;  // exactly this is allowed; closer steps are too fast
   follow(cruise(1'000'000, 0, 200, 1000.0));
   runUntil(100'000'000);
   clock.waitUntil(clock.now() + 10'000'000);
@@ -182,7 +182,7 @@ TEST_F(PulseEngineTest, FinishesThePulseThatIsOutAtAnEmergencyStop) {
   EXPECT_EQ(lines.edges.back().time, rose + 1'900);
   EXPECT_EQ(lines.rises(0).size(), 1U);
   EXPECT_EQ(engine->channel(0).end, EndReason::kEmergencyStop);
-  // Nothing moves while it lasts, and nothing that was ordered in it moves after it.
+  // Nothing moves during the hold, and no motion that was ordered during it moves after it.
   follow(cruise(clock.now() + 1'000'000, 1, 100, 1000.0));
   runOut();
   engine->clearEmergencyStop(engine->stopsServed());
@@ -384,7 +384,7 @@ TEST_F(PulseEngineTest, FollowsEachProfileFromItsStartThoughTheNextOneIsThereAlr
   runOut();
   EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
   EXPECT_EQ(engine->channel(0).count, 0);
-  // The step that the first one has at 11.5 ms is none any more.
+  // The first profile's step at 11.5 ms is cancelled.
   EXPECT_EQ(lines.rises(0).size(), 20U);
 }
 

@@ -53,7 +53,7 @@ TEST_F(PulseGroups, EndsAllWhereOneLineFailsWithTheStepsOfThatInstantCounted) {
 }
 
 TEST_F(PulseGroups, SendsNoStepOfTheInstantAtWhichAnotherMeetsItsEndstop) {
-  // Both orders: the one that meets it is looked at before the other one, or after it.
+  // Both orders: the channel that meets its endstop is served before the other one, or after it.
   for (const int meets : {0, 1}) {
     SCOPED_TRACE(meets);
     lines.inputs[0] = 0;

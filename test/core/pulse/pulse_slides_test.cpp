@@ -5,7 +5,7 @@
 
 #include "support/pulse_engine_bench.h"
 
-// What a late pulse and a slow write do to the other channels, and what is left of it afterwards.
+// Effects of a late pulse and a slow write on the other channels, and what remains of them later.
 
 namespace stepdriver::pulse {
 namespace {
@@ -174,9 +174,9 @@ TEST_F(PulseSlides, AFallThatFailedMayHaveHappenedAndCountsForTheLowTime) {
   EXPECT_EQ(engine->serve(), kNever) << "it tries again and again";
   ASSERT_EQ(engine->channel(0).end, EndReason::kLineError);
   lines.broken = -1;
-  lines.levels[0] = false;  // so it had
+  lines.levels[0] = false;  // it had this level before
   const Nanoseconds failed = clock.now();
-  follow(cruise(failed, 1, 2, 500'000.0));  // its step a microsecond later
+  follow(cruise(failed, 1, 2, 500'000.0));  // its step comes a microsecond later
   runOut();
   EXPECT_EQ(lines.rises(0).back(), failed + config(0).step_low);
 }

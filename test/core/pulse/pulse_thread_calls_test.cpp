@@ -26,7 +26,7 @@
 using stepdriver::test::is_watched;
 using stepdriver::test::thread_calls;
 
-// In front of the library's, for the whole program.
+// Replace the library's functions in the whole program.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   if (is_watched) ++thread_calls->allocations;
   if (void* memory = std::malloc(size)) return memory;
@@ -47,7 +47,7 @@ const LockCall kLibraryLock = reinterpret_cast<LockCall>(dlsym(RTLD_NEXT, "pthre
 
 extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) noexcept {
   if (is_watched) ++thread_calls->locks;
-  // Before that is known there is one thread.
+  // Until the functions are found, there is only one thread.
   return kLibraryLock == nullptr ? 0 : kLibraryLock(mutex);
 }
 
@@ -56,18 +56,19 @@ namespace {
 
 constexpr int kChannels = 3;
 
-/// What a pulse thread must not do, done in a write: does the test see it? Deep calls it may.
+/// Checks that the test notices a misdeed of the pulse thread, done in a write. Deep calls are
+/// allowed.
 enum class Misdeed { kNone, kAllocation, kLock, kSystemCall, kNewMemory, kDeepCall };
 
-/// Lines whose calls are an ioctl each, as those of a GPIO chip are. The first write has its thread
-/// watched from then on.
+/// Lines whose calls are an ioctl each, like those of a GPIO chip. The first write starts the watch
+/// on its thread.
 class WatchingLines : public gpio::Lines {
  public:
   explicit WatchingLines(Misdeed misdeed) : misdeed_(misdeed) {}
 
   int write(const gpio::LineWrite* /*writes*/, std::size_t /*count*/) noexcept override {
     if (!is_watched) {
-      allocate();  // what it does the first time has system calls in it
+      allocate();  // its first call makes system calls
       test::watchThisThread();
     } else if (misdeed_ == Misdeed::kDeepCall) {
       callDeeply();
@@ -108,12 +109,13 @@ class WatchingLines : public gpio::Lines {
   const std::string name_ = "a line";
 };
 
-/// A pulse thread on the steady clock and an order of another target every few milliseconds.
+/// A pulse thread on the steady clock, which gets an order with a new target every few
+/// milliseconds.
 class Retargeting {
  public:
   explicit Retargeting(Misdeed misdeed) : lines_(misdeed) {}
 
-  // Until so many targets were taken; then pins, inputs, and an emergency stop.
+  // Waits until this many targets were taken; then pins, inputs, and an emergency stop.
   void run(int targets) {
     for (int taken = 0; taken < targets;) {
       if (retarget(taken % 2 == 0 ? 4'000 : -3'000)) ++taken;
@@ -155,10 +157,10 @@ class Retargeting {
     return configs;
   }
 
-  // @return whether it came in time.
+  // @return whether it happened in time.
   bool retarget(std::int64_t target) {
     const Nanoseconds start = (clock_.now() - engine_.state().slipped) + 20'000'000;
-    // On a machine that stalls the motion may be over by now.
+    // On a machine that stalls, the motion may already be over.
     const ChannelState now = engine_.channel(0);
     const bool rests = now.following == 0;
     const motion::MotionState state =
@@ -193,7 +195,7 @@ class Retargeting {
   std::uint64_t attempts_ = 0;
 };
 
-/// Runs it in a process of its own, which the filter ends with.
+/// Runs the misdeed in a process of its own, because the filter ends the process.
 class PulseThreadCalls : public testing::Test {
  protected:
   void SetUp() override {
@@ -208,7 +210,7 @@ class PulseThreadCalls : public testing::Test {
     const pid_t child = fork();
     ASSERT_GE(child, 0);
     if (child == 0) {
-      auto* retargeting = new Retargeting(misdeed);  // its thread can't end any more
+      auto* retargeting = new Retargeting(misdeed);  // its thread can't end after this
       retargeting->run(20);
       _exit(0);
     }

@@ -3,7 +3,7 @@
 
 #include "search/participants.h"
 
-/// What a script is made of.
+/// The acts that a script is made of.
 namespace stepdriver::search {
 namespace {
 

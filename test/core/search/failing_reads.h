@@ -10,12 +10,12 @@
 
 namespace stepdriver::search {
 
-/// Lines of which one input can't be read for some time.
+/// Lines with an input that can't be read for some time.
 class FailingReads : public gpio::Lines {
  public:
   explicit FailingReads(std::unique_ptr<gpio::Lines> lines) : lines_(std::move(lines)) {}
 
-  /// Reads of this input fail with an errno from now on. @param input -1: all succeed.
+  /// From now on, reads of this input fail with an errno. @param input -1: all reads succeed.
   void fail(int input, int error) {
     input_ = input;
     error_ = error;

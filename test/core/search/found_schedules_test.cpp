@@ -5,7 +5,7 @@
 
 #include "search/participants.h"
 
-/// Schedules that the search has found to break a promise.
+/// Schedules for which the search has found a broken promise.
 namespace stepdriver::search {
 namespace {
 

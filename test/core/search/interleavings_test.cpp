@@ -16,7 +16,7 @@
 namespace stepdriver::search {
 namespace {
 
-/// Steps after which the second request comes: from at once to a long way into a motion.
+/// Steps between the two requests: from none to a long way into a motion.
 constexpr std::array<std::size_t, 9> kAfter = {0, 1, 2, 4, 8, 16, 60, 200, 500};
 constexpr std::size_t kVariants = 2;
 constexpr std::size_t kShards = 16;
@@ -36,7 +36,7 @@ std::string textOf(const Schedule& schedule) {
 
 std::vector<std::string> play(const Schedule& schedule) { return Participants(schedule).run(); }
 
-/// What it is about, whatever the numbers.
+/// The subject of a message, without its numbers.
 std::string kindOf(const std::vector<std::string>& wrong) {
   std::string kind = wrong.empty() ? "" : wrong.front();
   kind.erase(std::remove_if(kind.begin(), kind.end(),
@@ -45,7 +45,7 @@ std::string kindOf(const std::vector<std::string>& wrong) {
   return kind;
 }
 
-/// Leaves out what isn't needed for it to fail in the same way.
+/// Leaves out everything that isn't needed for the same failure.
 Schedule shrink(Schedule failing, const std::string& kind) {
   for (bool smaller = true; smaller;) {
     smaller = false;
@@ -85,7 +85,7 @@ void deviate(Schedule& schedule, std::mt19937_64& random) {
 
 std::size_t pairs() { return acts().size() * acts().size() * kAfter.size() * kVariants; }
 
-/// Each pair of acts, each time between them, each variant: by one number.
+/// Maps a number to a pair of acts, a time between them, and a variant.
 Schedule pairOf(std::size_t number) {
   const auto take = [&number](std::size_t count) {
     const std::size_t digit = number % count;
@@ -110,10 +110,10 @@ Schedule tripleOf(std::mt19937_64& random) {
   return schedule;
 }
 
-/// About 141,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is how many are
-/// played of each kind that is sampled, STEPDRIVER_FIRST_SEED the seed that they begin with, and
-/// STEPDRIVER_FAILURES after how many failures a test ends. A seed means the same schedule whatever
-/// these are.
+/// About 141,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is the number of
+/// schedules of each sampled kind, STEPDRIVER_FIRST_SEED the first seed, and STEPDRIVER_FAILURES
+/// the number of failures after which a test ends. A seed means the same schedule, whatever these
+/// values are.
 class Interleavings : public testing::TestWithParam<std::size_t> {
  protected:
   /// @return whether to continue.
@@ -136,7 +136,7 @@ class Interleavings : public testing::TestWithParam<std::size_t> {
     return text != nullptr ? std::strtoull(text, nullptr, 10) : usual;
   }
   static std::size_t mostFailures() { return wanted("STEPDRIVER_FAILURES", 3); }
-  /// Calls with each seed of this shard, until it says that this is enough.
+  /// Calls with each seed of this shard, until the callee says that it is enough.
   void forEachSeed(const std::function<bool(std::uint64_t seed)>& play_seed) {
     const std::size_t first = wanted("STEPDRIVER_FIRST_SEED", 0);
     const std::size_t end = first + wanted("STEPDRIVER_SCHEDULES", 40'000);

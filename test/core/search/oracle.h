@@ -20,29 +20,29 @@ constexpr std::size_t kAxes = 3;
 /// What a call means for the pulses of the axes.
 struct Meaning {
   enum class Quiet { kNone, kAtRest, kSlowsDown, kHeld, kEmergency };
-  Quiet quiet = Quiet::kNone;  ///< that its answer promises
+  Quiet quiet = Quiet::kNone;  ///< promised by its answer
   bool moves = false;          ///< it may begin a motion
-  bool resumes = false;        ///< it may continue with what is held
+  bool resumes = false;        ///< it may resume a held motion
   bool recovers = false;
-  bool ends_hold = false;   ///< whatever its answer, motions may begin after a hold before it
+  bool ends_hold = false;   ///< whatever its answer, motions may begin in spite of an earlier hold
   std::uint64_t as_of = 0;  ///< nothing must have stopped it since this Oracle::moment(); 0: any
-  std::array<bool, kAxes> axes{};  ///< that it is about
-  bool on_curve = false;           ///< it moves them along a trajectory
+  std::array<bool, kAxes> axes{};  ///< the axes of the call
+  bool on_curve = false;           ///< it moves its axes along a trajectory
 };
 
-/// Judges pulses by the answers that clients got: after the answer of a stop no pulse goes out that
-/// isn't of a later motion.
+/// Judges pulses by the answers that clients got. After the answer of a stop, only pulses of later
+/// motions are allowed.
 class Oracle {
  public:
-  /// @param slowing the longest deceleration of each axis alone, with what is added to it.
-  /// @param slipped motion time is clock time less this.
+  /// @param slowing the longest deceleration of each axis alone, with a margin.
+  /// @param slipped motion time is clock time minus this.
   Oracle(const std::array<pulse::Nanoseconds, kAxes>& slowing,
          std::function<pulse::Nanoseconds()> slipped)
       : slowing_(slowing), slipped_(std::move(slipped)) {}
 
   std::vector<std::string> complaints;
 
-  /// The controller was handed a call.
+  /// A call was handed to the controller.
   void served(std::uint64_t call, const std::string& name, const Meaning& meaning) {
     calls_[call] = {meaning.as_of != 0 ? meaning.as_of : moment(), name, meaning};
     if (meaning.moves || meaning.resumes || meaning.recovers) open_.push_back(call);
@@ -64,7 +64,7 @@ class Oracle {
     const Meaning& meaning = ended.meaning;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (!meaning.axes[axis]) continue;
-      // A recover may have ended the fault of this axis while it still waits for another one.
+      // A recover may have ended the fault of this axis while it still waits for another axis.
       for (Quiet& quiet : quiets_[axis]) {
         const bool recovered = (meaning.recovers && quiet.order < ended.order) ||
                                (meaning.moves && isRecoveredFrom(quiet.order, ended.order));
@@ -90,7 +90,7 @@ class Oracle {
     }
   }
 
-  /// After the answer of this call: nothing later may move the axis.
+  /// After the answer of this call, no later motion may move the axis.
   bool isLatest(std::uint64_t call, std::size_t axis) const {
     const std::uint64_t order = calls_.at(call).order;
     return last_motion_[axis] <= order &&
@@ -100,19 +100,19 @@ class Oracle {
            });
   }
 
-  /// One was asked for: from then on no pulse begins.
+  /// An emergency stop was requested: from now on no pulse may begin.
   void emergencyStopped(pulse::Nanoseconds now) {
     for (auto& quiets : quiets_) {
       quiets.push_back({moment(), Meaning::Quiet::kEmergency, "emergency stop", now, false});
     }
   }
 
-  /// Later than all that was served until now.
+  /// Later than everything that was served until now.
   std::uint64_t moment() { return ++order_; }
 
   void rose(std::size_t axis, pulse::Nanoseconds time) {
     for (const Quiet& quiet : quiets_[axis]) {
-      // A late pulse slides what is left of a motion, its deceleration too.
+      // A late pulse slides the rest of a motion, and its deceleration too.
       if (time - (quiet.slows ? slipped_() : 0) < quiet.since || mayHaveBegun(axis, quiet))
         continue;
       complain("axis " + std::to_string(axis) + " steps at " + std::to_string(time) +
@@ -134,7 +134,7 @@ class Oracle {
     std::uint64_t order = 0;
     Meaning::Quiet kind = Meaning::Quiet::kNone;
     std::string name;
-    pulse::Nanoseconds since = 0;  // if it slows down, motion time; else clock time
+    pulse::Nanoseconds since = 0;  // motion time if it decelerates, otherwise clock time
     bool slows = false;
   };
 
@@ -154,8 +154,8 @@ class Oracle {
     }
   }
 
-  // The acceleration that a trajectory itself has at a place is missing to a stop along it there,
-  // and one axis may limit the stop first and then the other.
+  // A stop along a trajectory can't use the acceleration that the trajectory itself has there, and
+  // first one axis may limit it and then the other.
   pulse::Nanoseconds slowingOf(std::size_t axis) const {
     return on_curve_[axis] ? slowing_[axis] * 3 / 2 : slowing_[axis];
   }
@@ -173,7 +173,7 @@ class Oracle {
     }
   }
 
-  /// A recover that came after one and before the other is under way.
+  /// A recover that came after the first stop and before the second is under way.
   bool isRecoveredFrom(std::uint64_t stop, std::uint64_t motion) const {
     return std::any_of(open_.begin(), open_.end(), [&](std::uint64_t call) {
       const Call& open = calls_.at(call);
@@ -203,7 +203,7 @@ class Oracle {
                  quiets.end());
   }
 
-  // A later motion that isn't answered yet may be under way already.
+  // A later motion may already be under way before its answer.
   bool mayHaveBegun(std::size_t axis, const Quiet& quiet) const {
     return std::any_of(open_.begin(), open_.end(), [&](std::uint64_t id) {
       const Call& call = calls_.at(id);

@@ -16,14 +16,14 @@ constexpr pulse::Nanoseconds kSecond = 1'000 * kMillisecond;
 constexpr pulse::Nanoseconds kWriteTimeout = 500 * kMillisecond;
 constexpr pulse::Nanoseconds kInputPeriod = 100 * kMillisecond;
 constexpr pulse::Nanoseconds kMaxLateness = 5 * kMillisecond;
-/// That the engine is late at the most; more than it can make good.
+/// The engine is at most this late; that is more than it can make up for.
 constexpr pulse::Nanoseconds kLatestPass = 8 * kMillisecond;
-/// From the answer of a stop to the beginning of the deceleration; and if the engine is late and
-/// refuses plans.
+/// From the answer of a stop to the beginning of the deceleration, without and with a late engine
+/// that refuses plans.
 constexpr pulse::Nanoseconds kLead = 2 * kMillisecond;
 constexpr pulse::Nanoseconds kLongestLead = 40 * kMillisecond;
 constexpr const char* kEmergencyStop = "emergency_stop";
-/// How often a stream of jogs comes, and how many of them.
+/// The period of a stream of jogs, and their number.
 constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
 constexpr int kJogs = 12;
 constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
@@ -71,7 +71,7 @@ std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs)
   return names;
 }
 
-/// Of each axis, the most that a deceleration takes, and 10 %.
+/// For each axis, the longest deceleration, and 10 %.
 std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
                                                 const Schedule& schedule) {
   const bool late =
@@ -288,7 +288,7 @@ bool Participants::step() {
   }
   if (!late && script_ && next_item_ < schedule_.items.size() &&
       clients_[static_cast<std::size_t>(schedule_.items[next_item_].client)].idle()) {
-    beginItem();  // nothing happens any more that it could wait for
+    beginItem();  // no event can come that it could wait for
     return true;
   }
   if (!late) return false;
@@ -334,7 +334,7 @@ void Participants::go(Who who) {
       return takeRead(read);
     }
     case Who::kRequest: {
-      // What was seen before the request was handed over comes before it.
+      // Everything that was seen before the request was handed over comes before it.
       for (; !edges_.empty(); edges_.pop_front()) handle(machine::InputEdge{edges_.front()});
       for (; !reads_.empty(); reads_.pop_front()) takeRead(reads_.front());
       Ask asked = std::move(requests_.front());
@@ -382,13 +382,14 @@ void Participants::write() {
   if (jobs_.front().returns <= clock_.now()) {
     const Job job = jobs_.front();
     jobs_.pop_front();
-    // What has waited behind one that hung isn't wanted any more; what hung is done late.
+    // Writes that have waited behind a hanging write are dropped; the hanging write itself is done
+    // late.
     const bool hung = job.told && job.returns > job.deadline;
     int error = job.error;
     const gpio::LineWrite line{job.job.output, job.job.level};
     if (error == 0 && (!job.told || hung)) error = lines_->write(&line, 1);
     if (!job.told) pins_done_.push_back({job.job.id, error});
-    // Those behind it begin now.
+    // The writes behind it begin now.
     if (!jobs_.empty()) jobs_.front().returns = std::max(jobs_.front().returns, clock_.now());
     return;
   }
@@ -488,7 +489,7 @@ void Participants::post(int client, const std::string& name, machine::Request re
   }
 }
 
-// What it gives a goal, and by how far.
+// Notes the axes that the request gives a goal, and the distances.
 void Participants::noteGoals(Ask& asked) {
   if (const auto* move = std::get_if<machine::MoveTo>(&asked.request)) {
     asked.goals = {move->axis};
@@ -510,7 +511,7 @@ void Participants::noteGoals(Ask& asked) {
   }
 }
 
-// It is handed to the controller now.
+// Now it is handed to the controller.
 void Participants::noteServed(Ask& asked) {
   const auto found = open_.find(asked.id);
   if (found == open_.end()) return;
@@ -524,7 +525,8 @@ void Participants::noteServed(Ask& asked) {
   }
 }
 
-// The position at which the joint comes to rest as things are; none while that isn't known.
+// The position at which the joint will come to rest from its present state; no value if that is
+// unknown.
 std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes.at(axis);
@@ -547,7 +549,7 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   return now.origin + (motor - slack) / now.steps_per_unit;
 }
 
-// A motion that was begun, from what its call said it would.
+// Checks the motions that a call has begun against its answer.
 void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& moves) {
   if (moves.size() != asked.goals.size()) {
     return oracle_.complain(asked.name + " succeeds with " + std::to_string(moves.size()) +
@@ -575,7 +577,8 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
                        " m, but was sent to " + std::to_string(asked.ways[i]));
     }
     if (!asked.relative || !asked.targets[i]) continue;
-    // What it counts from is the target of the last move, half a step from where it stands at most.
+    // A relative goal counts from the target of the last move, which is at most half a step from
+    // the actual position.
     const double half_step = 0.51 * configs_[axis].microsteps / configs_[axis].steps_per_unit;
     if (std::abs(moves[i].target - *asked.targets[i]) > half_step) {
       oracle_.complain(who + " goes to " + std::to_string(moves[i].target) + " m, not to " +
@@ -584,7 +587,7 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
   }
 }
 
-// Whatever still moves after a stop has an owner that slows it down.
+// An axis that still moves after a stop has an owner that decelerates it.
 void Participants::checkSlowing(const Ask& asked) {
   const auto snapshot = controller_->snapshot();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -645,7 +648,7 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
   }
-  // There and a little back; smooth, as an axis without a start speed can't jump.
+  // Forward and a little back; smooth, because an axis without a start speed can't jump.
   static constexpr std::array<double, 3> places = {0.4, 1.0, 0.7};
   static constexpr std::array<double, 3> speeds = {3.0, 0.0, 0.0};
   std::vector<axis::TrajectoryPoint> points(places.size());
@@ -662,7 +665,7 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
     note(std::string("the trajectory is refused: ") + refused.what());
     return;
   }
-  // Posting it is a step of its own.
+  // Posting the request is a separate step.
   Client& who = clients_[static_cast<std::size_t>(client)];
   who.next = [this, client, axes, size, stops, tries, prepared, meaning] {
     post(client, "follow trajectory", machine::FollowTrajectory{axes, prepared, stops}, meaning);
@@ -755,7 +758,7 @@ void Participants::mendLines() {
   }
 }
 
-// ---- the whole ----
+// ---- all participants together ----
 
 bool Participants::playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest) {
   const std::size_t began = steps_;
@@ -808,7 +811,7 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
   const pulse::ChannelState state = engine_->channel(static_cast<int>(axis));
   const sim::RigAxisReport report = rig_.report(configs_[axis].name);
   const std::int64_t pulses = report.pulses_forward + report.pulses_backward;
-  // An edge down that could not be written leaves out the next one up.
+  // If a falling edge could not be written, the next rising edge is left out.
   if (!steps_failed_[axis] && static_cast<std::int64_t>(state.pulses) != pulses) {
     oracle_.complain(who + ": the engine counts " + std::to_string(state.pulses) +
                      " pulses, the rig " + std::to_string(pulses));
@@ -822,7 +825,7 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
   if (!violations.empty()) oracle_.complain(who + ": " + violations);
 }
 
-// A position that is said to be valid is where the carriage is.
+// If a position is said to be valid, the carriage is there.
 void Participants::checkRest() {
   if (position_changed_) return;
   const auto snapshot = controller_->snapshot();
@@ -921,7 +924,7 @@ std::vector<std::string> Participants::run() {
   const auto played = [this] {
     return next_item_ == schedule_.items.size() && clients_[0].idle() && clients_[1].idle();
   };
-  // What is held is answered when it continues, or is stopped.
+  // Held goals are answered when they continue, or are stopped.
   const auto held = [this] {
     return !clients_[0].waits_for_stops && !clients_[1].waits_for_stops &&
            controller_->snapshot()->axes.front().state.held;
@@ -933,7 +936,7 @@ std::vector<std::string> Participants::run() {
     }
     if (oracle_.complaints.empty()) oracle_.complain("the script doesn't come to its end");
   }
-  // What the last answers promise has to be true for a while.
+  // The promises of the last answers must remain true for a while.
   const pulse::Nanoseconds later = clock_.now() + kQuietIsWatched;
   if (oracle_.complaints.empty()) {
     playUntil([&] { return clock_.now() >= later; }, kLongestCall);

@@ -25,16 +25,16 @@
 
 namespace stepdriver::search {
 
-/// Who can go next.
+/// Participants that can take the next step.
 enum class Who {
-  kNews,     ///< the controller takes what the engine has done
+  kNews,     ///< the controller takes what the engine has reported
   kPinDone,  ///< the controller takes a pin that was written, or failed
   kInput,    ///< the controller takes a level or an edge
   kRequest,  ///< the controller takes a request, and the levels that its caller has read
   kTimer,    ///< the controller is told that time has passed
   kEngine,   ///< a pass of the engine
-  kWriter,   ///< whoever writes the slow lines
-  kWatcher,  ///< whoever watches the inputs
+  kWriter,   ///< the writer of the slow lines
+  kWatcher,  ///< the watcher of the inputs
   kClientA,
   kClientB,
   kClock,
@@ -42,22 +42,21 @@ enum class Who {
 constexpr std::size_t kParticipants = 11;
 const char* nameOf(Who who);
 
-/// From the n-th step after the script's first request on, a participant has to wait for some
-/// steps.
+/// From the n-th step after the script's first request, a participant has to wait for some steps.
 struct Deviation {
   std::size_t from = 0;
   Who who = Who::kNews;
   std::size_t steps = 0;
 };
 
-/// A line of a script: what a client does, or what happens to the machine.
+/// A line of a script: an action of a client, or an event of the machine.
 struct Item {
-  std::size_t act = 0;    ///< by its index in acts()
+  std::size_t act = 0;    ///< index in acts()
   int client = 0;         ///< 0 or 1
   std::size_t after = 0;  ///< steps after the item before it
 };
 
-/// All that decides what happens.
+/// Everything that determines the course of a run.
 struct Schedule {
   int variant = 0;
   std::vector<Item> items;
@@ -66,7 +65,7 @@ struct Schedule {
 
 class Participants;
 
-/// Something that can be done.
+/// An action of a client, or an event.
 struct Act {
   std::string name;
   std::function<void(Participants&, int client)> begin;
@@ -75,25 +74,25 @@ const std::vector<Act>& acts();
 /// @return its index. @throw std::out_of_range
 std::size_t actNamed(const std::string& name);
 
-/// A controller, an engine and a rig, without threads: one step of one participant at a time, in
-/// the order that the schedule says.
+/// A controller, an engine and a rig, without threads. In each step one participant acts; the
+/// schedule determines which.
 class Participants {
  public:
   explicit Participants(const Schedule& schedule);
 
-  /// Plays the whole schedule, ends what is left over, and tries whether all axes move again.
-  /// @return what was wrong; empty: nothing.
+  /// Plays the whole schedule, ends what is still active, and checks that all axes can move again.
+  /// @return the failure; empty if there is none.
   std::vector<std::string> run();
 
   std::size_t steps() const { return steps_; }
-  /// Writes down each step from now on.
+  /// From now on, writes down each step.
   void keepLog() { log_ = true; }
   const std::vector<std::string>& log() const { return lines_of_log_; }
 
-  /// @name What acts do
+  /// @name Actions of the acts
   /// @{
   void post(int client, const std::string& name, machine::Request request, const Meaning& meaning);
-  /// Jogs as a joystick does, and doesn't look at what becomes of it.
+  /// Jogs as a joystick does, without waiting for a result.
   void streamJog(int client, std::size_t axis);
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
   void emergencyStop(int client);
@@ -120,12 +119,12 @@ class Participants {
     std::string name;
     machine::Request request;
     Meaning meaning;
-    std::vector<std::size_t> goals;  ///< axes that it gives a goal
+    std::vector<std::size_t> goals;  ///< axes for which it has a goal
     bool together = false;           ///< along one path
     bool relative = false;
-    std::vector<double> ways;  ///< of a relative one, by goal
+    std::vector<double> ways;  ///< of a relative goal, by goal
     std::vector<std::optional<double>> targets;
-    std::array<std::size_t, kAxes> orders{};  ///< of each axis when it was served
+    std::array<std::size_t, kAxes> orders{};  ///< of each axis, when the call was served
     std::vector<machine::InputRead> reads;
     pulse::Nanoseconds posted = 0;
     std::size_t posted_step = 0;
@@ -138,15 +137,15 @@ class Participants {
     bool told = false;
   };
   struct Client {
-    std::uint64_t waits_for = 0;  // a call; 0: none
+    std::uint64_t waits_for = 0;  // a call; 0: doesn't wait
     std::optional<std::uint64_t> waits_for_stops;
     std::function<void()> next;   // its next step
-    pulse::Nanoseconds from = 0;  // clock time before which it doesn't take that
+    pulse::Nanoseconds from = 0;  // clock time before which it doesn't take its next step
     std::function<void(const activity::Reply&)> on_answer;
     pulse::Nanoseconds since = 0;
     bool idle() const { return waits_for == 0 && !waits_for_stops && !next; }
   };
-  /// A motion that was ordered from the engine.
+  /// A motion that the engine was ordered to make.
   struct Ordered {
     std::uint64_t serial = 0;
     bool together = false;
@@ -185,7 +184,7 @@ class Participants {
   void checkSlowing(const Ask& asked);
   void serveEngine();
   activity::Reply ask(const std::string& name, machine::Request request, const Meaning& meaning);
-  /// Plays on until this is so. @return false if it takes too long.
+  /// Plays on until the condition is true. @return false if that takes too long.
   bool playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest);
   bool atRest();
   void checkCounts(const std::string& when);
@@ -209,7 +208,7 @@ class Participants {
   std::unique_ptr<machine::Controller> controller_;
   News news_;
 
-  // Of the shell.
+  // Participants of the shell.
   std::deque<Ask> requests_;
   std::deque<machine::InputRead> reads_;
   std::deque<gpio::EdgeEvent> edges_;
@@ -226,8 +225,7 @@ class Participants {
   int next_pin_error_ = 0;
   pulse::Nanoseconds next_pin_hang_ = 0;
 
-  // Of the clients.
-  // The two of the script, and one that begins and ends the whole.
+  // The clients: the two of the script, and one that begins and ends the run.
   static constexpr int kProbe = 2;
   std::array<Client, 3> clients_;
   std::map<std::uint64_t, Ask> open_;

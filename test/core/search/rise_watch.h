@@ -10,7 +10,7 @@
 
 namespace stepdriver::search {
 
-/// Tells of each rising STEP edge of the rig, with the number of its axis.
+/// Reports each rising STEP edge of the rig, with the number of its axis.
 class RiseWatch : public sim::PinTrace {
  public:
   explicit RiseWatch(std::vector<std::string> axes) : axes_(std::move(axes)) {}

@@ -15,7 +15,7 @@ using test::plainAxis;
 
 constexpr double kTravel = 0.2;  // [mm] a full step, as in plainAxis()
 
-/// A max switch at 1 mm and a min switch at -1 mm: 5 full steps either way.
+/// A max switch at 1 mm and a min switch at -1 mm: 5 full steps in either direction.
 RigAxisSpec axisWithSwitches() {
   RigAxisSpec spec = plainAxis(Model::kTb6600);
   spec.max_switch.emplace();

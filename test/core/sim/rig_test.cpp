@@ -117,7 +117,7 @@ TEST(Rig, RotorSnapsToTheNearestPlaceWithTheTranslatorsPhase) {
   for (const int counted : {1, 3, 4, 5, 7}) {
     HandRig bench(Model::kA4988);
     bench.ready().set("x.enable", true).wait(1'000).pulse(counted).set("x.enable", false);
-    const int full_steps = counted - 4 * ((counted + 1) / 4);  // -1, 0 or 1 from where it stood
+    const int full_steps = counted - 4 * ((counted + 1) / 4);  // -1, 0 or 1 from the first position
     EXPECT_DOUBLE_EQ(bench.report().carriage, kTravel * full_steps) << counted << " steps";
     EXPECT_EQ(bench.report().translator, 16 * counted);
   }

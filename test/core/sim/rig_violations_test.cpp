@@ -27,8 +27,8 @@ const std::vector<Model>& allModels() {
   return all;
 }
 
-/// Runs the edges of `scenario` with each margin around the limit: exactly the limit is fine, 1 ns
-/// less is one violation of that kind and no other.
+/// Runs the edges of `scenario` with margins around the limit: exactly the limit is no violation,
+/// and 1 ns less is one violation of that kind and no other.
 template <typename Scenario>
 void expectLimit(Model model, std::int64_t limit, Violation violation, Scenario scenario) {
   const std::string name = driver::driverChipOf(model).title;

@@ -13,7 +13,7 @@ namespace stepdriver::config {
 
 using Lines = std::vector<std::string>;
 
-/// The least that a linear axis needs.
+/// The minimum that a linear axis needs.
 inline ConfigValue linearAxis(const std::string& chip = "gpiochip0") {
   return mapOf({{"driver", "a4988"},
                 {"pins", mapOf({{"step", chip + ":17"}, {"dir", chip + ":27"}})},
@@ -46,7 +46,7 @@ inline Lines issuesOf(const ConfigValue& axes) {
 
 inline Lines issuesOfX(const ConfigValue& axis) { return issuesOf(mapOf({{"x", axis}})); }
 
-/// Reads an axis that must be right.
+/// Reads an axis that must be valid.
 inline AxisConfig readX(const ConfigValue& axis) {
   std::vector<ConfigIssue> issues;
   const auto configs = config::readAxes(mapOf({{"x", axis}}), "/axes", issues);
@@ -54,12 +54,12 @@ inline AxisConfig readX(const ConfigValue& axis) {
   return configs.empty() ? AxisConfig{} : configs.front();
 }
 
-/// The one issue of an axis x.
+/// The only issue of an axis x.
 inline Lines lineOfX(const std::string& path, const std::string& message) {
   return {"/axes/x/" + path + ": " + message};
 }
 
-/// One change of a good axis, and the one issue that it makes there; no message: none.
+/// A change of a valid axis, and the only issue that it causes; an empty message means no issue.
 struct Change {
   std::string path;
   ConfigValue value;

@@ -43,7 +43,7 @@ inline config::AxisConfig linearAxis(const std::string& name,
   return config;
 }
 
-/// The same at another scale [steps/unit], speed and acceleration.
+/// The same axis with another scale [steps/unit], speed and acceleration.
 inline config::AxisConfig linearAxis(const std::string& name, double scale, double speed,
                                      double acceleration) {
   config::AxisConfig config = linearAxis(name);
@@ -53,7 +53,7 @@ inline config::AxisConfig linearAxis(const std::string& name, double scale, doub
   return config;
 }
 
-/// The rig's side of an axis: switches at -100 mm and 100 mm, the carriage at 0.
+/// The axis on the rig: switches at -100 mm and 100 mm, the carriage at 0.
 inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
   const auto wire = [](const config::Pin& pin) { return sim::Wire{pin.line, pin.inverted}; };
   sim::RigAxisSpec spec;
@@ -86,7 +86,7 @@ inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
   return spec;
 }
 
-/// A machine on the simulated rig, on a virtual clock that whoever waits drives.
+/// A machine on the simulated rig. Any thread that waits drives its virtual clock.
 class Bench {
  public:
   explicit Bench(const std::vector<config::AxisConfig>& axes, bool threaded = false,
@@ -113,7 +113,7 @@ class Bench {
   axis::Axis& axis(const std::string& name = "x") { return machine->axis(name); }
   sim::RigAxisReport report(const std::string& name = "x") { return rig.report(name); }
 
-  /// Forward less backward pulses that the chip has seen.
+  /// Forward minus backward pulses that the chip has seen.
   std::int64_t pulses(const std::string& name = "x") {
     const sim::RigAxisReport seen = report(name);
     return seen.pulses_forward - seen.pulses_backward;
@@ -130,7 +130,7 @@ class Bench {
   std::unique_ptr<machine::Machine> machine;
 };
 
-/// What a report has against the axis, in words.
+/// The violations of the axis in a report, in words.
 inline std::string violationsOf(const sim::RigAxisReport& report) {
   std::string text;
   for (const auto& [kind, count] : report.violations) {

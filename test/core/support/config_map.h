@@ -14,7 +14,7 @@ inline ConfigValue::Map mapOf(std::initializer_list<ConfigValue::Map::value_type
   return ConfigValue::Map(entries);
 }
 
-/// The map that the last part of a path as `x/pins/step` is in; created if it is missing.
+/// The map that contains the last part of a path such as `x/pins/step`; created if it is missing.
 inline ConfigValue::Map& mapAt(ConfigValue& root, const std::string& path, std::string& last) {
   ConfigValue* at = &root;
   std::string::size_type begin = 0;

@@ -6,14 +6,13 @@
 
 namespace stepdriver::test {
 
-/// A moment at which the position is known: a step goes out where the curve crosses its half-step
-/// line.
+/// A time at which the position is known: a step is sent when the curve crosses its half-step line.
 struct Crossing {
   std::int64_t time_ns = 0;
   double position = 0.0;  ///< [microsteps]
 };
 
-/// The highest speed, acceleration and jerk that a row of steps proves.
+/// The highest speed, acceleration and jerk that a sequence of steps proves.
 struct Differences {
   double speed = 0.0;         ///< [microsteps/s]
   double acceleration = 0.0;  ///< [microsteps/s^2]

@@ -12,7 +12,7 @@
 
 namespace stepdriver::test {
 
-/// A clock that passes for real time, and is as late as it is told to be.
+/// A clock that counts as real time, with a given lateness.
 class LateClock : public pulse::Clock {
  public:
   using Nanoseconds = pulse::Nanoseconds;
@@ -26,7 +26,7 @@ class LateClock : public pulse::Clock {
 
   void pass(Nanoseconds time) { now_ += time; }
 
-  /// The lateness of the next wait that comes too late to return at once.
+  /// The lateness of the next wait that is too late to return at once.
   std::function<Nanoseconds()> spun = [] { return 0; };
   std::function<Nanoseconds()> slept = [] { return 0; };
   Nanoseconds spin_guard = 0;
@@ -40,7 +40,7 @@ class LateClock : public pulse::Clock {
   Nanoseconds now_ = 1'000'000'000;
 };
 
-/// Lines whose calls take time on a LateClock. It keeps what was written; inputs read high.
+/// Lines whose calls take time on a LateClock. They remember what was written; inputs read high.
 class SlowBackend : public gpio::Backend {
  public:
   explicit SlowBackend(LateClock& clock) : clock_(clock) {}
@@ -48,7 +48,7 @@ class SlowBackend : public gpio::Backend {
   std::unique_ptr<gpio::Lines> request(const std::vector<gpio::OutputRequest>& outputs,
                                        const std::vector<gpio::InputRequest>& inputs) override;
 
-  /// What the next call costs.
+  /// The duration of the next call.
   std::function<pulse::Nanoseconds()> write_cost = [] { return 0; };
   std::function<pulse::Nanoseconds(const std::string& line)> read_cost = [](const auto&) {
     return 0;
@@ -59,7 +59,7 @@ class SlowBackend : public gpio::Backend {
   struct Write {
     std::string line;
     bool level;
-    bool edge;  ///< it had the other level
+    bool edge;  ///< it had the other level before
     pulse::Nanoseconds time;
   };
   std::vector<Write> written;

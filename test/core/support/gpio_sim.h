@@ -28,14 +28,14 @@ inline void writeText(const std::string& path, const std::string& text) {
   }
 }
 
-/// The lines of a chip of the kernel's gpio-sim, as what is wired to them sees them.
+/// The lines of a chip of the kernel's gpio-sim, seen from the devices that are wired to them.
 class GpioSimLines {
  public:
   static constexpr const char* kFolder = "/sys/kernel/config/gpio-sim";
 
   GpioSimLines() = default;
 
-  /// @param device of a chip that is there: its name in configfs.
+  /// @param device of an existing chip: its name in configfs.
   explicit GpioSimLines(const std::string& device) {
     const std::string folder = std::string(kFolder) + "/" + device;
     name_ = readText(folder + "/bank0/chip_name");
@@ -62,7 +62,7 @@ class GpioSimLines {
   std::string lines_;
 };
 
-/// A chip of the kernel's gpio-sim, there for as long as this object. Needs root and configfs.
+/// A chip of the kernel's gpio-sim, which exists as long as this object. Needs root and configfs.
 class GpioSimChip {
  public:
   using Names = std::vector<std::pair<unsigned, std::string>>;
@@ -98,7 +98,7 @@ class GpioSimChip {
   bool level(unsigned offset) const { return lines_.level(offset); }
   void drive(unsigned offset, bool level) const { lines_.drive(offset, level); }
 
-  /// As a cable that is pulled out; the chip doesn't come back.
+  /// Removes the chip for good, like a cable that is pulled out.
   void unplug() {
     writeText(folder_ + "/live", "0");
     there_ = false;

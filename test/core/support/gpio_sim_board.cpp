@@ -19,8 +19,8 @@ namespace {
 
 constexpr const char* kTracing = "/sys/kernel/tracing";
 
-/// Every level that the kernel sets an output to, from its own tracepoint; in a buffer of its own,
-/// so that another trace continues undisturbed.
+/// Records every level that the kernel sets an output to, from the kernel's own tracepoint. It has
+/// its own buffer, so that another trace continues undisturbed.
 class OutputTrace {
  public:
   OutputTrace() {
@@ -42,7 +42,7 @@ class OutputTrace {
 
   bool there() const { return there_; }
 
-  /// What was set since the last call, by the kernel's number of the line.
+  /// The levels that were set since the last call, by the kernel's number of the line.
   std::vector<std::pair<int, bool>> take() {
     std::vector<std::pair<int, bool>> sets;
     std::ifstream trace(folder_ + "/trace");

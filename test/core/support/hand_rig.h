@@ -12,7 +12,8 @@
 
 namespace stepdriver::test {
 
-/// An axis `x` with every pin that its chip has wired plainly, 0.2 mm a full step, no switches.
+/// An axis `x` with every pin that its chip has, without inversion, 0.2 mm for a full step, no
+/// switches.
 inline sim::RigAxisSpec plainAxis(driver::Model model, const std::string& name = "x") {
   const driver::DriverChip& chip = driver::driverChipOf(model);
   sim::RigAxisSpec spec;
@@ -44,14 +45,14 @@ inline std::string inWords(const Violations& violations) {
   return text.empty() ? "none" : text;
 }
 
-/// A rig whose edges are made by hand, at times that only the test moves on.
+/// A rig whose edges are made by hand. Time advances only if the test says so.
 struct HandRig {
   explicit HandRig(const std::vector<sim::RigAxisSpec>& specs)
       : trace(std::make_shared<sim::MemoryTrace>()), rig(specs, trace) {}
   explicit HandRig(const sim::RigAxisSpec& spec) : HandRig(std::vector<sim::RigAxisSpec>{spec}) {}
   explicit HandRig(driver::Model model) : HandRig(plainAxis(model)) {}
 
-  /// Requests all lines of an axis so that it may step in full steps, and waits until it can.
+  /// Requests all lines of an axis so that it can make full steps, and waits until it is ready.
   HandRig& ready(const std::string& axis = "x") {
     request(axis + ".step", false);
     request(axis + ".dir", true);
@@ -75,7 +76,7 @@ struct HandRig {
     return *this;
   }
 
-  /// Pulses that no chip finds too fast, the last one with its low time.
+  /// Pulses slow enough for every chip, including the low time of the last one.
   HandRig& pulse(int count = 1, const std::string& line = "x.step") {
     for (int i = 0; i < count; ++i) set(line, true).wait(kHalf).set(line, false).wait(kHalf);
     return *this;

@@ -14,8 +14,8 @@ namespace stepdriver::test {
 
 inline constexpr double kStep = 1.0 / 80'000.0;  // [m]
 
-/// On the rig with its switches at -100 mm and 100 mm. Towards min at 50 mm/s, latched at 5 mm/s, 2
-/// mm off the trigger point, which is at -0.1 m.
+/// On the rig with its switches at -100 mm and 100 mm: approaches min at 50 mm/s, latches at 5
+/// mm/s, and backs off 2 mm from the trigger point, which is at -0.1 m.
 inline config::AxisConfig homingAxis(const std::string& name = "x") {
   config::AxisConfig config = linearAxis(name);
   config::HomingConfig homing;
@@ -41,7 +41,8 @@ class HomingTest : public testing::Test {
   axis::Axis& x() { return bench->axis(); }
   double carriage() { return bench->report().carriage / 1000.0; }
 
-  /// Homed, with the trigger point at the offset, whose place on the rig is `place` [m].
+  /// Expects the axis homed, with the trigger point at the offset; its position on the rig is
+  /// `place` [m].
   void expectHomed(const axis::HomingResult& result, double place = -0.1) {
     EXPECT_EQ(result.end, axis::HomingEnd::kHomed) << result.message;
     const axis::AxisState state = x().state();

@@ -7,7 +7,7 @@
 
 namespace stepdriver::test {
 
-/// The lines of a board that keeps them by name.
+/// The lines of a board that identifies them by name.
 class LineNames {
  public:
   int indexOf(const std::string& line) {

@@ -12,20 +12,21 @@
 
 namespace stepdriver::test {
 
-/// What the STEP and DIR lines of a bench did, as pictures of a motion are drawn from it.
+/// Records the edges of the STEP and DIR lines of a bench, from which pictures of a motion are
+/// drawn.
 class MotionTrace {
  public:
   struct Step {
-    double time = 0.0;       ///< [s] of the edge, after the trace's making
-    std::int64_t count = 0;  ///< of the axis after it
+    double time = 0.0;       ///< [s] of the edge, after the trace began
+    std::int64_t count = 0;  ///< of the axis after the edge
   };
 
-  /// @param bench outlives the trace; its axes stand at 0.
+  /// @param bench outlives the trace; its axes are at 0.
   explicit MotionTrace(Bench& bench) : bench_(bench), begin_ns_(bench.clock.now()) {}
 
   double now() const { return seconds(bench_.clock.now()); }
 
-  /// Words at this time, for the picture.
+  /// Puts a label at this time into the picture.
   void mark(const std::string& words) { marks_.emplace_back(now(), words); }
 
   std::vector<Step> steps(const std::string& axis) const {
@@ -54,8 +55,8 @@ class MotionTrace {
     return 0.0;
   }
 
-  /// Writes it to NAME.csv where the environment names a folder in STEPDRIVER_TRACES:
-  /// `step,AXIS,TIME_NS,COUNT` for each step and `mark,,TIME_NS,WORDS`.
+  /// If the environment variable STEPDRIVER_TRACES names a folder, writes the trace to NAME.csv
+  /// there: `step,AXIS,TIME_NS,COUNT` for each step and `mark,,TIME_NS,WORDS`.
   void keep(const std::string& name) const {
     const char* const folder = std::getenv("STEPDRIVER_TRACES");
     if (folder == nullptr) return;

@@ -11,11 +11,11 @@
 
 namespace stepdriver::test {
 
-/// A line that another program holds, as far as the kernel and whoever asks it can tell.
+/// A line that another program holds, as the kernel reports it.
 class OtherProgram {
  public:
-  /// @param chip its name, as `gpiochip0`.
-  /// @param consumer what the program calls itself.
+  /// @param chip its name, such as `gpiochip0`.
+  /// @param consumer the name that the program gives itself.
   OtherProgram(const std::string& chip, unsigned offset, const std::string& consumer) {
     const int file = open(("/dev/" + chip).c_str(), O_RDWR | O_CLOEXEC);
     gpiohandle_request request{};

@@ -10,7 +10,7 @@
 
 namespace stepdriver::test {
 
-/// Passes everything on to other lines, for tests that change one call of them.
+/// Passes everything on to other lines, for tests that change one of their calls.
 class PassingLines : public gpio::Lines {
  public:
   explicit PassingLines(std::unique_ptr<gpio::Lines> lines) : lines_(std::move(lines)) {}

@@ -12,8 +12,8 @@
 
 namespace stepdriver::motion {
 
-/// Checks a profile against the state that it begins with and the limits that it was planned for,
-/// from nothing but its pieces.
+/// Checks a profile, from its pieces alone, against its first state and the limits that it was
+/// planned for.
 class ProfileCheck {
  public:
   ProfileCheck(const Profile& profile, const MotionState& from, const MotionLimits& limits)
@@ -27,7 +27,7 @@ class ProfileCheck {
     first_a_ = limits.jerk > 0.0 ? std::abs(a) : 0.0;
   }
 
-  /// No jump but what is allowed, nothing beyond the limits, no sliver.
+  /// No jumps except allowed ones, nothing beyond the limits, no sliver.
   void expectWithinLimits() {
     MotionState end{from_.position, from_.velocity, may_rest_ ? 0.0 : from_.acceleration};
     double time = 0.0;
@@ -47,7 +47,7 @@ class ProfileCheck {
   /// After expectWithinLimits().
   void expectRestOn(std::int64_t target) const {
     const double off = (profile_.endPosition() - fromInteger(target)).hi;
-    // 1e-15 s is the shortest piece that there is.
+    // 1e-15 s is the shortest piece that exists.
     EXPECT_LE(std::abs(off), 1e-12 + 1e-28 * way_ + 2e-15 * fastest_) << "ends beside the target";
     EXPECT_LE(std::abs(end_.velocity), start_ + speedDoubt());
     if (limits_.jerk > 0.0) {
@@ -55,7 +55,7 @@ class ProfileCheck {
     }
   }
 
-  /// It goes beyond the target as far as it says; after expectWithinLimits().
+  /// It overshoots the target by the stated distance. Call after expectWithinLimits().
   void expectOvershoot(std::int64_t target, double overshoot) const {
     const double way = (fromInteger(target) - from_.position).hi;
     double farthest = 0.0;
@@ -72,7 +72,7 @@ class ProfileCheck {
     EXPECT_NEAR(farthest, overshoot, 2.0 * positionDoubt());
   }
 
-  /// The steps lead from the one count to the other, none closer than the peak speed allows.
+  /// The steps lead from one count to the other, and none is closer than the peak speed allows.
   void expectSteps(std::int64_t target) const {
     const std::int64_t begin = split(from_.position).whole;
     StepFinder finder(profile_, begin);
@@ -90,10 +90,11 @@ class ProfileCheck {
     EXPECT_EQ(finder.count(), target);
   }
 
-  /// All ways there and back [microsteps], after expectWithinLimits().
+  /// The total distance in both directions [microsteps]. Call after expectWithinLimits().
   double way() const { return way_; }
 
-  /// A stop is never faster than it was, or than what the axis reaches within a microstep.
+  /// A stop is never faster than the initial speed, or than the speed that the axis reaches within
+  /// a microstep.
   double fastestStop() const {
     const double a = limits_.acceleration;
     const double d = limits_.deceleration;
@@ -101,8 +102,8 @@ class ProfileCheck {
         {std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)), start_});
   }
 
-  /// What the rounding of a state to doubles makes of the position. Just above the start speed it
-  /// makes the most of it: a speed of dv more takes the time sqrt(dv/j).
+  /// The error of the position from rounding a state to doubles. It is largest just above the start
+  /// speed: an additional speed of dv takes the time sqrt(dv/j).
   double positionDoubt() const {
     const double way = 1e-9 + 1e-14 * (way_ + stopping());
     if (start_ == 0.0 || limits_.jerk == 0.0) return way;
@@ -128,8 +129,7 @@ class ProfileCheck {
 
   void expectContinuous(const MotionState& end, const MotionState& begin) const {
     EXPECT_LE(std::abs((end.position - begin.position).hi), positionDoubt()) << "a jump";
-    // Up to the start speed it may rest and start again, and whatever acceleration there was is
-    // over.
+    // Up to the start speed the axis may stop and start again; any acceleration ends then.
     const double slow = start_ + speedDoubt();
     const bool at_start_speed = std::abs(end.velocity) <= slow && std::abs(begin.velocity) <= slow;
     if (start_ > 0.0 && at_start_speed) return;

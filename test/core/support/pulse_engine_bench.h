@@ -20,7 +20,7 @@ constexpr int kLinesPerChannel = 2;  // STEP and DIR
 using test::Edge;
 using test::RecordingLines;
 
-/// An engine on a virtual clock, with lines that remember.
+/// An engine on a virtual clock, with lines that remember what was written.
 class PulseEngineTest : public testing::Test {
  protected:
   static ChannelConfig config(int channel) {
@@ -47,7 +47,7 @@ class PulseEngineTest : public testing::Test {
     return serial;
   }
 
-  // The last so many of `follows` in one order.
+  // Puts the last elements of `follows`, this many, into one order.
   void postFollows(std::size_t count) {
     Command command;
     command.follows = &follows[follows.size() - count];
@@ -55,7 +55,7 @@ class PulseEngineTest : public testing::Test {
     EXPECT_TRUE(engine->post(command));
   }
 
-  // Serves until nothing is left to do, each time `late` after it is due.
+  // Serves until nothing is left to do, each time `late` after the due time.
   void runOut(Nanoseconds late = 0) {
     for (Nanoseconds due = engine->serve(); due != kNever; due = engine->serve()) {
       while (clock.now() < due + late) clock.waitUntil(due + late);
@@ -69,7 +69,7 @@ class PulseEngineTest : public testing::Test {
     while (clock.now() < time) clock.waitUntil(time);
   }
 
-  // Holds the edges of the first channel against what the chip wants.
+  // Compares the edges of the first channel with the chip's times.
   void expectTimes(const ChannelConfig& channel) {
     std::optional<Nanoseconds> rose;
     std::optional<Nanoseconds> turned;

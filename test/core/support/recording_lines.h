@@ -19,7 +19,7 @@ struct Edge {
   std::size_t write;  ///< number of the call that made it
 };
 
-/// Lines that remember, and may fail.
+/// Lines that remember what was written, and may fail.
 class RecordingLines : public gpio::Lines {
  public:
   explicit RecordingLines(pulse::VirtualClock& clock) : clock_(clock) {}
@@ -36,7 +36,7 @@ class RecordingLines : public gpio::Lines {
       level = writes[i].level;
     }
     if (write_cost > 0) {
-      // The edges are at its beginning: as near to the ones before them as they can be.
+      // The edges of a call are at its beginning: as close to the previous ones as they can be.
       clock_.waitUntil(clock_.now() + write_cost);
     }
     return 0;
@@ -65,9 +65,9 @@ class RecordingLines : public gpio::Lines {
   std::map<int, bool> levels;
   std::map<int, int> inputs;
   std::size_t calls = 0;
-  int fail_after = -1;  ///< so many writes are good, and the one after them fails
+  int fail_after = -1;  ///< after this many successful writes, one fails
   pulse::Nanoseconds write_cost = 0;
-  int broken = -1;  ///< a write gets as far as this output, and fails
+  int broken = -1;  ///< a write gets as far as this output, then fails
 
  private:
   pulse::VirtualClock& clock_;

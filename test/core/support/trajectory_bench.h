@@ -15,7 +15,7 @@
 
 namespace stepdriver::test {
 
-/// 1000 steps/m, 2 m/s, 10 m/s^2, from -5 m on, without a min endstop.
+/// 1000 steps/m, 2 m/s, 10 m/s^2, from -5 m, without a min endstop.
 inline config::AxisConfig trajectoryAxis(const std::string& name) {
   config::AxisConfig config = linearAxis(name, 1000.0, 2.0, 10.0);
   config.endstop_min.reset();
@@ -52,11 +52,12 @@ class TrajectoryBench : public testing::Test {
     }
     return found;
   }
-  /// What the steps of an axis prove, of more than `apart` [s] of each other.
+  /// What the steps of an axis prove, from steps that are at least `apart` [s] from each other.
   Differences differences(const std::string& name, double apart) {
     return differencesOf(crossings(name), apart);
   }
-  /// At rest: the chips saw nothing wrong, and the positions are the pulses, but for backlash.
+  /// Once at rest: the chips saw no violation, and the positions are the pulses, except for
+  /// backlash.
   void expectClean() {
     for (const std::string name : {"x", "y"}) {
       EXPECT_EQ(violationsOf(bench->report(name)), "") << name;

@@ -20,22 +20,22 @@
 
 namespace stepdriver::test {
 
-/// What one thread does that a real-time thread must not, as counted from watchThisThread() on.
-/// Allocations and locks are counted by the functions that a test program puts in front of the
-/// library's; see pulse_thread_calls_test.cpp.
+/// Counts what one thread does that a real-time thread must not do, from watchThisThread() on.
+/// Functions that a test program puts in front of the library's count allocations and locks; see
+/// pulse_thread_calls_test.cpp.
 struct ThreadCalls {
   std::atomic<std::uint64_t> allocations{0};
   std::atomic<std::uint64_t> locks{0};
-  std::atomic<std::uint64_t> system_calls{0};  ///< other than the allowed ones
+  std::atomic<std::uint64_t> system_calls{0};  ///< other than allowed ones
   std::atomic<int> last_system_call{-1};
   std::atomic<int> filter_error{-1};  ///< errno of the request for the filter; 0: it is there
-  std::atomic<std::int64_t> page_faults{0};  ///< as far as notePageFaults() was called
+  std::atomic<std::int64_t> page_faults{0};  ///< until the last call of notePageFaults()
   std::atomic<std::int64_t> page_faults_before{0};
   std::atomic<pid_t> thread{0};
   std::atomic<int> memory_error{-1};  ///< errno of the request to lock the memory
 };
 
-/// Where the process counts; set before a thread is watched.
+/// The counts of the process; set before a thread is watched.
 inline ThreadCalls* thread_calls = nullptr;
 inline thread_local bool is_watched = false;
 
@@ -44,8 +44,7 @@ inline void noteSystemCall(int /*signal*/, siginfo_t* info, void* /*context*/) {
   thread_calls->last_system_call = info->si_syscall;
 }
 
-/// Counts the page faults of the watched thread since watchThisThread(). For another thread to
-/// call.
+/// Counts the page faults of the watched thread since watchThisThread(). Called by another thread.
 inline void notePageFaults() {
   std::ifstream stat("/proc/self/task/" + std::to_string(thread_calls->thread) + "/stat");
   stat.ignore(std::numeric_limits<std::streamsize>::max(), ')');  // the name may have blanks
@@ -58,12 +57,12 @@ inline void notePageFaults() {
   thread_calls->page_faults = stat ? minor + major - thread_calls->page_faults_before : -1;
 }
 
-/// From here on the calling thread has no system calls but ioctl(), waiting for a futex as a clock
-/// does (a contended lock does it otherwise), and the end of the process. Others are counted, and
-/// don't happen. clock_gettime() is allowed: where the kernel gives programs no clock to read (no
-/// vDSO), it is the clock read itself.
+/// From now on the calling thread has no system calls except ioctl(), waiting for a futex as a
+/// clock does (a contended lock does so in another way), and the end of the process. Others are
+/// counted, and not executed. clock_gettime() is allowed: if the kernel gives programs no clock to
+/// read (no vDSO), it is the read of the clock.
 ///
-/// There is no way back: for threads that live as long as their process.
+/// This can't be undone: it is for threads that live as long as their process.
 inline void watchThisThread() {
   thread_calls->thread = gettid();
   rusage usage{};
