@@ -39,7 +39,7 @@ std::function<void(NodeUnderTest&)> erasing(const std::string& key) {
   return [key](NodeUnderTest& node) { node.erase(key); };
 }
 
-/// The line of the output with this parameter; empty: there is none.
+/// The line of the output with this parameter; empty if there is none.
 std::string lineWith(const std::string& output, const std::string& parameter) {
   std::istringstream lines(output);
   for (std::string line; std::getline(lines, line);) {
@@ -194,7 +194,7 @@ const std::vector<BadBringUp> kBadBringUps = {
      {"\"x\"", "map"}},
     {"AxisNameThatRosDoesNotTake",
      [](NodeUnderTest& node) {
-       // The way of a YAML file, which may name anything.
+       // The path through a YAML file, which may give a parameter any name.
        XmlRpc::XmlRpcValue axes;
        axes["x-axis"]["driver"] = "a4988";
        node.set("axes", axes);

@@ -45,7 +45,7 @@ bool comes(std::promise<void>& promise) {
   return promise.get_future().wait_for(kBound) == std::future_status::ready;
 }
 
-/// Calls wait at it until it is opened.
+/// Calls wait at it until the test opens it.
 class Gate {
  public:
   ~Gate() { open(); }
@@ -146,7 +146,7 @@ TEST(CallPool, UsesItsThreadsAgain) {
     ASSERT_TRUE(comes(called));
   }
   pool.stop();
-  // The next call may come before the threads of the last ones are free again.
+  // The next call may come before the threads of the previous ones are free again.
   EXPECT_LE(threads.size(), 4U);
 }
 

@@ -35,7 +35,7 @@ class ConsoleTest : public testing::Test {
     node.set("axes/x/homing/max_travel_mm", 250.0);
   }
 
-  /// Starts it as a user does, and keeps how the terminal was before and after.
+  /// Starts the console as a user does, and keeps the terminal's settings before and after.
   void open() {
     terminal.type("stty -a >" + before.path() + "; sh -c 'echo $$ >" + process.path() + "; exec " +
                   kConsole + " --driver " + node.name() + "'; echo ended $?; stty -a >" +
@@ -52,7 +52,7 @@ class ConsoleTest : public testing::Test {
   }
   void signalConsole(int number) const { kill(std::stoi(process.text()), number); }
 
-  /// Holds a key until something has happened.
+  /// Holds a key until a condition is true.
   bool holdUntil(const std::string& key, const std::function<bool()>& happened) const {
     return waitUntil([&] {
       terminal.press(key);
@@ -60,7 +60,7 @@ class ConsoleTest : public testing::Test {
     });
   }
 
-  /// Waits for a state that is read from now on, with the axis at rest.
+  /// Waits for a state, received from now on, in which the axis is at rest.
   static bool rests(const Recorder<AxisStates>& states) {
     const std::size_t before = states.count();
     return waitUntil([&] {
@@ -100,7 +100,7 @@ TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
   EXPECT_TRUE(holdUntil("Right", [this] { return node.pulses() > 500; }));
   EXPECT_TRUE(rests(states)) << "without repeats it comes to rest";
   EXPECT_TRUE(holdUntil("<", [this] { return node.rig().pulses_backward.at(0) > 100; }));
-  terminal.press("s");  // comes after all keys that are on their way
+  terminal.press("s");  // comes after all keys that are still on their way
   EXPECT_TRUE(terminal.waitFor("all axes stop"));
   EXPECT_TRUE(rests(states));
 

@@ -6,7 +6,7 @@
 #include "node/diagnostics/engine_diagnostics.h"
 #include "support/says.h"
 
-// Each level is reached by one thing alone, and left when that is over.
+// Tests that one cause alone is enough for each level, and that the level ends with the cause.
 
 namespace stepdriver::ros_node {
 namespace {

@@ -26,7 +26,7 @@ class DiagnosticsTest : public testing::Test {
   /// The node's name without its slash, as in diagnostics.
   std::string nameOf(const std::string& what) const { return node.name().substr(1) + ": " + what; }
 
-  /// Waits until the newest status of this name has that level and begins with that.
+  /// Waits until the newest status of this name has this level and begins with this text.
   bool waitFor(const std::string& what, int level, const std::string& words) {
     const bool came = diagnostics.waitForLatest([&](const DiagnosticArray& array) {
       for (const DiagnosticStatus& status : array.status) {
@@ -59,7 +59,7 @@ class DiagnosticsTest : public testing::Test {
 TEST_F(DiagnosticsTest, HaveATaskForEachAxisAndOneForTheEngine) {
   addSecondAxis(node);
   node.start();
-  // At its start the updater says of each task alone that the node starts.
+  // At first the updater reports each task alone, with the message that the node is starting.
   ASSERT_TRUE(diagnostics.waitForLatest(
       [](const DiagnosticArray& array) { return array.status.size() == 3; }));
   const DiagnosticArray array = diagnostics.messages().back();
@@ -84,7 +84,7 @@ TEST_F(DiagnosticsTest, ComeOnceASecond) {
     }
     return times.size() >= 4;
   }));
-  // Late ones come nearer to the next.
+  // Late edges come closer to the next ones.
   EXPECT_GT((times[3] - times[0]).toSec(), 2.0);
 }
 

@@ -19,7 +19,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-// [s] After which roslaunch sends SIGTERM or SIGKILL.
+// [s] Then roslaunch sends SIGTERM or SIGKILL.
 constexpr double kPatience = 15.0;
 
 void end(NodeUnderTest& node, const std::string& how) {
@@ -60,7 +60,7 @@ TEST_P(Ending, DuringAMoveDeceleratesDisablesAndAnswersTheWaitingClient) {
   EXPECT_EQ(steps, std::llround(answer.position * 80000.0));
   EXPECT_GT(steps, 4000);
   EXPECT_LT(steps, 16000);
-  // Decelerated: the last two steps of a ramp of 40,000 steps/s^2 are milliseconds apart.
+  // It decelerated: the last two steps of a ramp of 40,000 steps/s^2 are milliseconds apart.
   const auto& edges = pins["x/step"].edges;
   EXPECT_GT(edges[edges.size() - 2].time_ns - edges[edges.size() - 4].time_ns, 1'000'000);
   EXPECT_GE(pins["x/enable"].lastEdgeTime(), pins["x/step"].lastEdgeTime());
@@ -103,7 +103,7 @@ TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
   EXPECT_TRUE(node.moveTo(0.2, false).success);
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > 4000; }));
   node.process().signal(SIGTERM);
-  // A stop shows in the target, which moves to where the axis comes to rest.
+  // A stop is visible in the target, which becomes the position at which the axis will be at rest.
   ASSERT_TRUE(states.waitFor(
       [](const AxisStates& s) { return s.moving.at(0) != 0 && s.target.at(0) < 0.199; }));
   MoveTo::Request request;

@@ -22,7 +22,7 @@
 #include "support/temporary_file.h"
 #include "support/wait.h"
 
-// Each example does here what the system was for whose place it takes.
+// Each example does what the system does that it replaces.
 
 namespace stepdriver::node_test {
 namespace {
@@ -68,8 +68,8 @@ void enable(const std::string& axis) {
   EXPECT_TRUE(answer.success) << answer.message;
 }
 
-// Distances and rounds in steps, a ramp between two speeds, and switches that block their own way
-// only. The rig's max switch is at 60 mm.
+// Distances and revolutions in steps, a ramp between two speeds, and switches that block only their
+// own direction. The rig's max switch is at 60 mm.
 TEST(Examples, ArduinoCarriageMovesBetweenItsSwitches) {
   const std::string node = "/arduino/stepdriver";
   const std::string x = node + "/x";
@@ -99,7 +99,7 @@ TEST(Examples, ArduinoCarriageMovesBetweenItsSwitches) {
   EXPECT_TRUE(changed.success) << changed.message;
 }
 
-// Each stick turns its own motor, both at once, faster the farther it is out; in the middle the
+// Each stick turns its own motor, both at once, faster if it is tilted farther; in the middle the
 // motor is off.
 TEST(Examples, Esp32SticksTurnTwoMotorsAtTheSameTime) {
   const std::string node = "/esp32/stepdriver";
@@ -137,7 +137,7 @@ TEST(Examples, Esp32SticksTurnTwoMotorsAtTheSameTime) {
   EXPECT_GT(report.pulses_backward.at(1), 0);
 }
 
-// 1600 pulses a turn, a short move as exact, and 20,000 pulses/s.
+// 1600 pulses per revolution, a short move that is just as exact, and 20,000 pulses/s.
 TEST(Examples, NanoMotorTurnsExactly) {
   const std::string node = "/nano/stepdriver";
   const std::string motor = node + "/motor";
@@ -147,7 +147,8 @@ TEST(Examples, NanoMotorTurnsExactly) {
   EXPECT_EQ(rigOf(node).pulses_forward, Counts{1607});
   const auto fast = turn(motor, -10.0);
   EXPECT_TRUE(fast.success) << fast.message;
-  // 12.5 rounds/s and 25 rounds/s^2: the way at full speed, and the ramps half of it.
+  // 12.5 revolutions/s and 25 revolutions/s^2: the distance at full speed, and half of it for the
+  // ramps.
   EXPECT_NEAR(fast.duration, 10.0 / 12.5 + 12.5 / 25.0, 1e-3);
   EXPECT_EQ(rigOf(node).pulses_backward, Counts{16000});
 }
@@ -173,7 +174,7 @@ TEST(Examples, PsocSketchDrawsAndThenSleeps) {
   EXPECT_EQ(rigOf(node).pulses_forward, (Counts{800, 600}));
 }
 
-// Wired common-anode, with a deceleration of its own; 20 turns, a single step, and a new move at
+// Wired common-anode, with its own deceleration; 20 revolutions, a single step, and a new move at
 // any time.
 TEST(Examples, Stm32WheelRollsTwentyTurns) {
   const std::string node = "/stm32/stepdriver";

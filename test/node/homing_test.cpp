@@ -25,8 +25,8 @@ namespace {
 
 constexpr double kHalfStep = 0.5 / 80000.0;  // [m]
 
-/// A node whose axis x has its trigger point at the min switch of the rig, at -2 mm, and stands at
-/// 2 mm when it is homed.
+/// A node whose axis x has its trigger point at the min switch of the rig, at -2 mm. It is at 2 mm
+/// when its homing begins.
 class Homing : public testing::Test {
  protected:
   Homing() {

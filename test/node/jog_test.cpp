@@ -37,7 +37,7 @@ class JogTest : public testing::Test {
     publisher.publish(message);
   }
 
-  /// Publishes it again and again until it has happened.
+  /// Publishes the message again and again until a condition is true.
   bool jogUntil(double velocity, const std::function<bool()>& happened) {
     return waitUntil([&] {
       jog({"x"}, {velocity});

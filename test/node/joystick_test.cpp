@@ -77,7 +77,7 @@ class JoystickTest : public testing::Test {
     publisher.publish(message);
   }
 
-  /// Holds the stick until something has happened.
+  /// Holds the stick until a condition is true.
   bool holdUntil(double stick, const std::function<bool()>& happened,
                  const std::vector<std::int32_t>& buttons = {}) {
     return waitUntil([&] {
@@ -199,7 +199,7 @@ TEST_F(JoystickTest, DisablesInTheDeadBandAndEnablesBeforeItJogs) {
 }
 
 TEST_F(JoystickTest, JogsOtherAxesWhileAServiceWaits) {
-  // The test is the driver.
+  // The test takes the place of the driver.
   set("driver", "other");
   set("axes/slow/joystick_axis", 0);
   set("axes/slow/max_speed_mm_s", 10.0);

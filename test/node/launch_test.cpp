@@ -21,7 +21,7 @@ namespace {
 
 using sensor_msgs::JointState;
 
-/// Enables an axis, moves it, and looks whether its pins agree.
+/// Enables an axis, moves it, and checks that its pins agree.
 void expectMoves(const std::string& node, const std::string& axis, double position,
                  std::int64_t pulses, std::size_t index = 0) {
   std_srvs::SetBool::Request on;

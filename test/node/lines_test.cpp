@@ -59,7 +59,7 @@ TEST_F(LinesTest, EndsTogetherAtTheTargets) {
   ASSERT_EQ(answer.position.size(), 2U);
   EXPECT_NEAR(answer.position[0], 0.08, kHalfStep);
   EXPECT_NEAR(answer.position[1], -0.02, kHalfStep);
-  // x has all of its speed and acceleration: 0.08 / 0.1 + 0.1 / 0.5
+  // x may use all of its speed and acceleration: 0.08 / 0.1 + 0.1 / 0.5
   EXPECT_NEAR(answer.duration, 1.0, 0.01);
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{6400, 0}));
@@ -68,7 +68,7 @@ TEST_F(LinesTest, EndsTogetherAtTheTargets) {
   node.process().signal(SIGTERM);
   EXPECT_EQ(node.process().waitForExit(kBound), 0);
   const auto waves = readVcd(trace);
-  // The last step of y is half a step of its own from the end, so x has two more at most.
+  // The last step of y is half a step of y from the end, so x has at most two more.
   const double apart = std::abs(
       static_cast<double>(waves.at("x/step").lastEdgeTime() - waves.at("y/step").lastEdgeTime()));
   EXPECT_LT(apart * 1e-9, std::sqrt(2.0 * 4.0 / 80000.0 / 0.5)) << "of x's last four steps";

@@ -14,7 +14,7 @@
 #include "support/node_under_test.h"
 #include "support/wait.h"
 
-// What the node writes to its log: what happens, and nothing at a steady rate.
+// The node logs events, and nothing periodic.
 
 namespace stepdriver::node_test {
 namespace {
@@ -35,14 +35,14 @@ class LogTest : public testing::Test {
     for (std::string line; std::getline(output, line);) lines.push_back(line);
     return lines;
   }
-  /// Lines with these words.
+  /// The number of lines with these words.
   int count(const std::string& words) {
     int found = 0;
     for (const std::string& line : lines()) found += line.find(words) != std::string::npos ? 1 : 0;
     return found;
   }
 
-  /// Jogs 50 times a second, for 3 s at least.
+  /// Jogs 50 times a second, for at least 3 s.
   void jogFor3s(double velocity) {
     Jog jog;
     jog.name = {"x"};
@@ -53,7 +53,7 @@ class LogTest : public testing::Test {
     }
   }
 
-  /// Ends the node, which says so in one line.
+  /// Ends the node, which logs that in one line.
   void end() {
     node.process().signal(SIGTERM);
     EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);

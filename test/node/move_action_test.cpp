@@ -55,7 +55,7 @@ class MoveActionTest : public testing::Test {
     client->sendGoal(goal);
     return await(*client);
   }
-  /// Sends a goal and returns on its way there.
+  /// Sends a goal, and returns while the axis is on its way.
   void setOut(const MoveGoal& goal, std::int64_t pulses = 2000) {
     client->sendGoal(goal);
     ASSERT_TRUE(waitUntil([&] { return node.pulses() > pulses; }));
@@ -99,7 +99,7 @@ TEST_F(MoveActionTest, ReachesItsTargetAndTellsHowFarItIs) {
     EXPECT_GE(now.progress, progress);
     EXPECT_LE(now.time_left, time_left);
     EXPECT_GE(now.time_left, 0.0);
-    // What is left of the way takes at least as long as at full speed, and one ramp more at most.
+    // The rest of the distance takes at least as long as at full speed, and at most one ramp more.
     const double left = (0.1 - now.position) / 0.1;
     EXPECT_GE(now.time_left, left - 0.001);
     EXPECT_LE(now.time_left, left + 0.201);

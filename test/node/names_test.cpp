@@ -29,7 +29,8 @@ bool isPublished(const std::string& topic) {
                      [&topic](const auto& info) { return info.name == topic; });
 }
 
-/// Starts another node of the configuration of one, with the arguments that a user would give.
+/// Starts another node with the configuration of an existing one, and with the arguments that a
+/// user would give.
 std::unique_ptr<NodeProcess> startAs(const NodeUnderTest& like, const std::string& name,
                                      const std::vector<std::string>& arguments) {
   XmlRpc::XmlRpcValue parameters;

@@ -11,7 +11,7 @@
 #include "node/topics/trajectory_message.h"
 #include "support/says.h"
 
-// What the node makes of a trajectory's messages, without a node.
+// Tests how the node reads the messages of a trajectory, without a node.
 
 namespace stepdriver::node_test {
 namespace {
@@ -179,7 +179,7 @@ TEST(ReadingTrajectories, SaysWhichJointIsTooFarOff) {
             "shoulder is at 2.25, 0.25 from 2; the tolerance is 0.1");
 }
 
-// The figures are those that clients of control_msgs 1.5 send (MoveIt, rosserial's libraries).
+// The figures are those of clients of control_msgs 1.5 (MoveIt, rosserial's libraries).
 TEST(FollowJointTrajectory, HasTheMd5sumsOfControlMsgs) {
   using ros::message_traits::md5sum;
   namespace msgs = ros_node::action_msgs;

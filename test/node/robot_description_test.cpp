@@ -22,7 +22,7 @@ std::string robot(const std::string& type, const std::string& limit) {
 const char* const kTighter = R"(<limit lower="0.02" upper="0.05" velocity="0.05" effort="1"/>)";
 const char* const kLooser = R"(<limit lower="-9" upper="9" velocity="9" effort="1"/>)";
 
-/// An axis in degrees in place of the linear one.
+/// An axis in degrees instead of the linear one.
 void makeRotary(NodeUnderTest& node) {
   node.erase("axes/x");
   node.set("axes/x/driver", "drv8825");

@@ -30,7 +30,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-// Below the node's namespace; on others there is nothing to be heard in this test.
+// Topics below the node's namespace; the others have no messages in this test.
 constexpr std::array<const char*, 8> kPublished = {"/joint_states",
                                                    "/stepdriver/axis_states",
                                                    "/stepdriver/endstops",
@@ -51,7 +51,7 @@ std::set<std::string> topicsBelow(const std::string& name_space) {
   return names;
 }
 
-/// Topics that a node publishes to rosbag's recorder, over a connection that is there.
+/// Topics that a node publishes to rosbag's recorder over an existing connection.
 std::set<std::string> topicsToTheRecorder(const std::string& node) {
   XmlRpc::XmlRpcValue request;
   XmlRpc::XmlRpcValue response;

@@ -1,4 +1,4 @@
-// Launch files as a newcomer starts them, one after the other, while the master lives on.
+// Tests launch files as a newcomer starts them, one after another, while the master keeps running.
 #include "support/roslaunch.h"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ axes:
   return text;
 }
 
-/// A configuration of the user's own.
+/// A file with a user's own configuration.
 class Configuration : public TemporaryFile {
  public:
   explicit Configuration(const std::string& text) : TemporaryFile(".yaml") { write(text); }
@@ -81,7 +81,7 @@ TEST(RoslaunchAgain, TakesTheUsersFileAfterTheDefaultOne) {
     Roslaunch launch("axis.launch", {});
     ASSERT_TRUE(launch.isReady());
   }
-  const Configuration file(axisX());  // its STEP is at the line of the other's endstop
+  const Configuration file(axisX());  // its STEP is on the line of the other axis's endstop
   Roslaunch launch("axis.launch", {file.argument()});
   EXPECT_TRUE(launch.isReady());
 }

@@ -15,7 +15,7 @@
 #include "support/says.h"
 #include "support/wait.h"
 
-// Positions that outlast the node.
+// Tests positions that survive the node.
 
 namespace stepdriver::node_test {
 namespace {
@@ -45,7 +45,7 @@ class StateFile : public testing::Test {
     EXPECT_TRUE(node_.call<SetPosition>("x/set_position", here).success);
     EXPECT_TRUE(node_.moveTo(position, true).success);
   }
-  // At the start, before anything has moved.
+  // The file at the start, before anything has moved.
   AxisStates first() {
     const Recorder<AxisStates> states(node_.full("axis_states"));
     EXPECT_TRUE(states.waitFor([](const AxisStates&) { return true; }));

@@ -25,7 +25,7 @@ namespace {
 
 const std::vector<std::string> kStops{"stop", "hold", "x/stop", "emergency_stop"};
 
-/// What rosservice prints.
+/// The output of rosservice.
 std::string rosservice(const std::vector<std::string>& arguments) {
   std::vector<std::string> all{"rosservice"};
   all.insert(all.end(), arguments.begin(), arguments.end());
@@ -47,8 +47,8 @@ TEST(StopServices, ComeInApartFromAllOtherMessages) {
   EXPECT_EQ(serviceUri(node.full("x/stop")), stops);
 }
 
-/// Holds still those threads of a process that have its name: main's and roscpp's own, which have
-/// none of theirs.
+/// Stops the threads of a process that have the process's own name: main's and roscpp's, which
+/// don't set a name.
 class NamelessThreadsStopped {
  public:
   explicit NamelessThreadsStopped(pid_t process) {
@@ -92,7 +92,7 @@ TEST(StopServices, AreAnsweredWhileRoscppIsBusy) {
     ASSERT_TRUE(clients.back()->introduce(node.full(service), true));
   }
   const NamelessThreadsStopped stopped(process);
-  // main's, and those that read the connections and answer the calls of other nodes.
+  // main's thread, and those that read the connections and answer the calls of other nodes.
   if (stopped.count() < 3) GTEST_SKIP() << "no thread of another process can be stopped here";
   for (std::size_t i = 0; i < kStops.size(); ++i) {
     ASSERT_TRUE(clients[i]->call()) << kStops[i] << " over a kept connection";
@@ -114,7 +114,7 @@ TEST(StopServices, ServeClientsOfRoscpp) {
       EXPECT_TRUE(call.response.success) << call.response.message;
     }
     EXPECT_TRUE(kept.isValid()) << service;
-    // The server leaves it to the client to close the connection, so roscpp misses no answer.
+    // The server lets the client close the connection, so roscpp never misses an answer.
     for (int i = 0; i < 10; ++i) {
       ASSERT_TRUE(ros::service::call(node.full(service), call)) << service << ", call " << i;
       EXPECT_TRUE(call.response.success) << call.response.message;

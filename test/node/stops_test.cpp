@@ -196,7 +196,7 @@ TEST(Endstop, ThatIsActiveAtStartIsKnown) {
   const auto answer = node.moveTo(0.01, true);
   EXPECT_TRUE(answer.success) << answer.message;
   const auto back = node.moveTo(0.0, true);
-  // The switch is pressed at 0: reached and pressed in the same step.
+  // The switch is pressed at 0: the target is reached and the switch pressed in the same step.
   EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
   EXPECT_NEAR(back.position, 0.0, kMetresPerStep);
 }
@@ -228,7 +228,7 @@ TEST(Fault, OfALineThatFailsEndsTheMoveAndIsShown) {
   EXPECT_EQ(node.pulses(), pulses);
 }
 
-// The rig's clock shows it as real lines would: the next pulse is late.
+// On the rig's clock it looks the same as with real lines: the next pulse is late.
 TEST(SuspendedNode, EndsItsMoveByAFault) {
   NodeUnderTest node;
   node.set("simulation/speed", 1.0);

@@ -143,7 +143,7 @@ TEST(WaitingClients, HoldUpNoOtherCall) {
   node.start();
   auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(0.2, true); });
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > 100; }));
-  // Each of these has its answer long before the move ends, at 2.2 s.
+  // Each of these calls is answered long before the move ends, at 2.2 s.
   for (int i = 0; i < 10; ++i) {
     EXPECT_FALSE(node.moveTo(0.3, true).success);
     Microstep::Request request;

@@ -17,7 +17,7 @@
 #include "support/two_axes.h"
 #include "support/wait.h"
 
-// The client here is one that was built with control_msgs, as MoveIt is.
+// The client here was built with control_msgs, like MoveIt.
 
 namespace stepdriver::node_test {
 namespace {
@@ -49,14 +49,14 @@ Goal goalOf(const std::vector<Point>& points) {
   return goal;
 }
 
-/// Of one joint alone, to rest there.
+/// A trajectory of one joint alone, which ends at rest.
 Goal ofOne(const std::string& joint, double position, double duration) {
   Goal goal = goalOf({{duration, {position}, {0.0}}});
   goal.trajectory.joint_names = {joint};
   return goal;
 }
 
-/// From rest at 0 to rest there, with x at twice the speed of y.
+/// From rest at 0 to rest at the target, with x at twice the speed of y.
 Goal there(double x, double duration) {
   return goalOf({{0.0, {0.0, 0.0}, {0.0, 0.0}}, {duration, {x, 0.5 * x}, {0.0, 0.0}}});
 }
@@ -347,7 +347,7 @@ TEST_F(TrajectoryActionTest, AStopEndsATrajectoryThatWaitsForItsStart) {
   goal.trajectory.header.stamp = ros::Time::now() + ros::Duration(1000.0);
   send(goal);
   ASSERT_TRUE(states.waitFor([](const AxisStates& s) { return s.moving.at(0) != 0; }));
-  // Its axes wait, so that another start can't be put before it.
+  // Its axes wait, so that no other start can come before it.
   TrajectoryClient other(node.full("follow_joint_trajectory"), false);
   ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
   EXPECT_EQ(other.sendGoalAndWait(goal), State::REJECTED);

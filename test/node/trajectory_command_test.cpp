@@ -20,7 +20,7 @@ namespace {
 
 using trajectory_msgs::JointTrajectory;
 
-/// Both axes, to these positions at rest.
+/// A trajectory of both axes, to rest at these positions.
 JointTrajectory to(double x, double y, double duration) {
   JointTrajectory message;
   message.joint_names = {"x_joint", "y_joint"};

@@ -11,7 +11,7 @@
 #include "support/says.h"
 #include "support/wait.h"
 
-// What a node does at its end with a goal under way, where its threads serve nothing any more.
+// Tests the end of a node with an active goal, when its threads no longer serve anything.
 
 namespace stepdriver::node_test {
 namespace {

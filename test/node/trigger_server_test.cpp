@@ -30,7 +30,7 @@ using node_test::waitUntil;
 
 const std::string kService = "/trigger_server/act";
 
-/// A server with a service that counts its calls, and lets them wait.
+/// A server with a service that counts its calls, and can make them wait.
 class TriggerServerTest : public testing::Test {
  public:
   ~TriggerServerTest() override { hold(false); }
@@ -59,7 +59,7 @@ class TriggerServerTest : public testing::Test {
     std::unique_lock<std::mutex> lock(mutex_);
     return changed_.wait_for(lock, kBound, [&] { return calls_ >= calls; });
   }
-  /// What anyone who behaves gets, whatever others do.
+  /// What every correct client gets, whatever others do.
   static void expectService() {
     const TcprosClient client(kService);
     EXPECT_TRUE(client.introduce(kService, false)) << "no answer to the header";
@@ -108,7 +108,7 @@ TEST_F(TriggerServerTest, AnswersWhatIsSentInOneGoOneByOne) {
   for (int i = 0; i < 50; ++i) bytes += lengthBytes(0);
   ASSERT_TRUE(client.send(bytes));
   EXPECT_EQ(client.receiveHeader().count("error"), 0U);
-  // Each answer: ok, its length, success, and the message with its length.
+  // Parts of each answer: ok, its length, success, and the message with its length.
   const std::size_t size = 1 + 4 + 1 + 4 + std::string("done").size();
   EXPECT_EQ(client.receive(50 * size).size(), 50 * size);
   EXPECT_EQ(calls_, 50);
@@ -175,7 +175,7 @@ TEST_F(TriggerServerTest, DropsWhatIsBegunAndNotEndedAndKeepsIdleClients) {
   ASSERT_TRUE(half_request.introduce(kService, true));
   half_request.send(lengthBytes(0).substr(0, 2));
   expectService();
-  // Each waits for kBound, which is longer than the server's patience.
+  // Each call waits for kBound, which is longer than the server's patience.
   for (const TcprosClient* client : {&silent, &half_header, &half_request}) {
     EXPECT_TRUE(client->isClosed());
   }
@@ -189,7 +189,7 @@ TEST_F(TriggerServerTest, IsNotHeldUpByAClientThatReadsNoAnswers) {
   ASSERT_TRUE(other.introduce(kService, true));
   std::string requests;
   for (int i = 0; i < 10000; ++i) requests += lengthBytes(0);
-  // Until it accepts nothing more: its answers have filled all that lies between.
+  // Sends until the server accepts nothing more: its answers have filled all buffers in between.
   bool full = false;
   for (int i = 0; i < 100000 && !full; ++i) {
     full = deaf.sendAtOnce(requests) == 0;
@@ -215,13 +215,13 @@ TEST_F(TriggerServerTest, ClosesTheLongestSilentOfTooMany) {
   EXPECT_TRUE(others.back()->call());
 }
 
-/// Leaves this process no more descriptors than it has open.
+/// Leaves this process no descriptors except those that are open.
 class NoDescriptors {
  public:
   NoDescriptors() {
     getrlimit(RLIMIT_NOFILE, &before_);
     rlimit none = before_;
-    // The lowest free number is what the next one would get.
+    // The next descriptor would get the lowest free number.
     const int next = dup(0);
     close(next);
     none.rlim_cur = static_cast<rlim_t>(next);
@@ -241,8 +241,8 @@ TEST_F(TriggerServerTest, LetsClientsInWhenTheProcessHasNoDescriptorLeft) {
   hold(true);
   ASSERT_TRUE(busy.send(lengthBytes(0)));
   ASSERT_TRUE(awaitCalls(1));
-  // These wait to be accepted: there is a descriptor in reserve for one of them, and the other one
-  // gets that of the longest silent client.
+  // Two clients wait to be accepted: one gets the descriptor in reserve, the other one that of the
+  // client that has been silent longest.
   const TcprosClient first(kService);
   const TcprosClient second(kService);
   {

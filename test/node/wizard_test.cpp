@@ -22,8 +22,9 @@ namespace {
 
 const std::string kConsole = std::string(STEPDRIVER_PROGRAMS) + "/console";
 
-/// `console --wizard` at a machine that isn't what its configuration says: it goes the wrong way,
-/// has 100 steps/mm, its switches are swapped, and the one at the max end reads the wrong way.
+/// `console --wizard` with a machine that differs from its configuration: its direction is
+/// inverted, it has 100 steps/mm, its switches are swapped, and the one at the max end has the
+/// wrong polarity.
 class WizardTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -70,7 +71,7 @@ class WizardTest : public testing::Test {
   }
   double carriage() { return node.rig().carriage.at(0); }
 
-  /// Refuses the small move, and lets it go 90 mm; it is on its way then.
+  /// Answers that the small move was wrong. The next one is 90 mm, and is under way afterwards.
   void beginALongMove() {
     ASSERT_NO_FATAL_FAILURE(skipSwitches());
     terminal.type("y");
@@ -106,7 +107,7 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
 
   ASSERT_NO_FATAL_FAILURE(answer("Give its motor current?", "y"));
   ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", "50"));
-  // min reads active, and the driver doesn't move towards it.
+  // min reads active, so the driver doesn't move towards it.
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
   ASSERT_NO_FATAL_FAILURE(answer("Did it go towards plus", "n"));
   EXPECT_NEAR(carriage(), 0.1 - 0.0016, 1e-9);
@@ -127,7 +128,7 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
   ASSERT_NO_FATAL_FAILURE(answer("Write it to", ""));
   ASSERT_TRUE(terminal.waitFor("ended 0"));
 
-  // The driver takes it, and the machine is what it says.
+  // The driver accepts the configuration, and the machine behaves accordingly.
   node.process().signal(SIGTERM);
   ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
   ros::param::del(node.name());
@@ -170,7 +171,7 @@ TEST_F(WizardTest, StopsAMoveByEnterAndEndsByControlC) {
 TEST_F(WizardTest, ASwitchThatChangesStopsAMove) {
   ASSERT_NO_FATAL_FAILURE(open());
   ASSERT_NO_FATAL_FAILURE(beginALongMove());
-  // Configured as it is the driver doesn't take this one for the switch ahead.
+  // With its present configuration, the driver doesn't treat this switch as the one ahead.
   press("max", true);
   EXPECT_TRUE(terminal.waitFor("Stopped: a switch has changed"));
   EXPECT_LT(node.pulses(), 7360);
@@ -188,7 +189,7 @@ TEST_F(WizardTest, ReplacesNoFileWithoutBeingTold) {
   EXPECT_TRUE(terminal.waitFor("ended 1"));
   EXPECT_EQ(file.text(), "mine\n");
 
-  // Without a terminal, by lines from a pipe.
+  // Without a terminal, with lines from a pipe.
   terminal.type("clear; printf '\\n\\nn\\n\\n' | " + kConsole + " --wizard --driver " +
                 node.name() + " --overwrite --output " + file.path() + "; echo ended $?");
   EXPECT_TRUE(terminal.waitFor("ended 0"));

@@ -9,7 +9,8 @@
 
 namespace stepdriver::node_test {
 
-/// A HardwareNode that isn't launched yet, its two chips, and what the kernel does to their lines.
+/// A HardwareNode that isn't started yet, its two chips, and a record of what the kernel does to
+/// their lines.
 class BoardAndExpander : public NeedsGpioSim {
  protected:
   void SetUp() override {

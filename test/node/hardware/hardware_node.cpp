@@ -17,11 +17,11 @@ HardwareNode::HardwareNode() {
   setAxis("x", "a4988", "board", kX);
   setAxis("y", "a4988", "board", kY);
   setAxis("z", "drv8825", "expander", kZ);
-  set("axes/y/max_speed_mm_s", 1.9);  // other than x: now and then both step at one instant
+  set("axes/y/max_speed_mm_s", 1.9);  // unlike x: now and then both step at the same time
   set("axes/y/endstops/max/pin", "expander:" + std::to_string(kY.max));
   set("axes/z/pins/fault", "expander:" + std::to_string(kZFault));
   set("axes/z/fault_bias", "pull_up");
-  set("axes/z/timing/reset_low_ms", 300.0);  // long enough for a test to see it
+  set("axes/z/timing/reset_low_ms", 300.0);  // long enough for a test to see the pulse
 }
 
 void HardwareNode::setAxis(const std::string& axis, const std::string& driver,

@@ -9,15 +9,15 @@
 
 namespace stepdriver::node_test {
 
-/// A NodeUnderTest on GPIO lines. Its axes x and y, A4988s, are on the chip "board", z, a DRV8825
-/// with its fault line, on the chip "expander", and so is the switch of y: 80 steps/mm, at most 2
-/// mm/s (y 1.9) and 500 mm/s^2, enabled on start: a virtual machine of one CPU holds that with time
-/// left for the node.
+/// A NodeUnderTest on GPIO lines. Its axes x and y, with A4988s, are on the chip "board"; z, with a
+/// DRV8825 and its fault line, is on the chip "expander", and so is the switch of y. 80 steps/mm,
+/// at most 2 mm/s (y 1.9) and 500 mm/s^2, enabled on start: a virtual machine with one CPU can
+/// sustain that, with time left for the node.
 class HardwareNode : public NodeUnderTest {
  public:
   HardwareNode();
 
-  /// Offsets on their chip.
+  /// Offsets of the lines on their chip.
   struct Axis {
     unsigned step, dir, enable, sleep, reset, max;
   };
@@ -27,7 +27,7 @@ class HardwareNode : public NodeUnderTest {
   static constexpr unsigned kZFault = 6;
   static constexpr unsigned kLinesOfChip = 16;
 
-  /// [microsteps] of any axis in a position [m].
+  /// [microsteps] The count of any axis at a position [m].
   static std::int64_t stepsOf(double position);
 
   MoveTo::Response move(const std::string& axis, double position, bool wait);

@@ -25,14 +25,14 @@
 #include "support/wait.h"
 
 // The shipped launch file with the shipped configuration, on a chip with the line names of a
-// Raspberry Pi. The tests continue one another, as a user's first hour does.
+// Raspberry Pi. The tests build on one another, like a user's first hour.
 
 namespace stepdriver::node_test {
 namespace {
 
 const std::string kNode = "/pi/stepdriver";
 constexpr double kStepsPerMetre = 80000.0;
-// [m/s] A virtual machine of one CPU holds its 160 steps/s with time left for the node.
+// [m/s] A virtual machine with one CPU can sustain its 160 steps/s, with time left for the node.
 constexpr double kVelocity = 0.002;
 
 // The lines that config/a4988.yaml names, by their offsets.
@@ -84,7 +84,7 @@ class LaunchedNode : public NeedsGpioSim {
     return answer;
   }
 
-  /// What the kernel has done is what the node says.
+  /// The kernel's record agrees with the node's answers.
   void expectPulses(double position) const {
     EXPECT_EQ(pulsesIn(LineRecord::sinceBoot(), lines), std::llround(position * kStepsPerMetre));
   }

@@ -77,7 +77,7 @@ bool lastSet(const kernel::KernelTrace& trace, unsigned line) {
 
 int changesTogether(const kernel::KernelTrace& trace, unsigned one, unsigned other) {
   int together = 0;
-  std::set<unsigned> named;  // in the write that is looked at
+  std::set<unsigned> named;  // in the write under examination
   std::array<bool, 2> levels{};
   std::array<bool, 2> changed{};
   for (const kernel::LineEvent& event : trace.events()) {

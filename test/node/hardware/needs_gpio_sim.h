@@ -7,7 +7,7 @@
 
 namespace stepdriver::node_test {
 
-/// Skipped if there is no gpio-sim.
+/// Skips the test if there is no gpio-sim.
 class NeedsGpioSim : public testing::Test {
  protected:
   void SetUp() override {

@@ -9,7 +9,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-/// A node whose axis x asks for a million steps/s, which no machine holds.
+/// A node whose axis x is configured for a million steps/s, which no machine can sustain.
 class TooFast : public BoardAndExpander {
  protected:
   void SetUp() override {

@@ -21,7 +21,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-// As arrays of the messages have them.
+// Arrays as messages contain them.
 constexpr std::size_t kX = 0;
 constexpr std::size_t kZ = 2;
 
@@ -40,14 +40,15 @@ class TwoChips : public BoardAndExpander {
                       [this, axis, position] { return node->move(axis, position, true); });
   }
 
-  /// Waits until this axis is well under way.
+  /// Waits until this axis is well on its way.
   static void awaitMotion(const Recorder<AxisStates>& states, std::size_t axis) {
     ASSERT_TRUE(states.waitForLatest([axis](const AxisStates& s) {
       return s.moving.at(axis) != 0 && s.position.at(axis) > 0.001;
     })) << "it doesn't move";
   }
 
-  /// Sends SIGTERM. @return the exit code; none if it still runs.
+  /// Sends SIGTERM.
+  /// @return the exit code; no value if the node is still running.
   std::optional<int> end() const {
     node->process().signal(SIGTERM);
     return node->process().waitForExit(kBound);
@@ -125,7 +126,7 @@ TEST_F(TwoChips, StopAnAxisWhoseDriverReportsAFaultAndResetItToRecover) {
   EXPECT_FALSE(still.success);
   expectSays(still.message, "still reports a fault");
 
-  // The chip lets go of the line when it is reset.
+  // The chip releases the line when it is reset.
   std::atomic<bool> ended{false};
   std::thread chip([&] {
     while (!ended) {

@@ -118,7 +118,7 @@ void DriverTopics::jog(int client, std::size_t axis, double velocity) {
   jog.name = {kAxisNames.at(axis)};
   jog.velocity = {velocity};
   JogMessage message;
-  // The order of messages in the log is that on the topic.
+  // The messages in the log have the same order as on the topic.
   const std::lock_guard<std::mutex> lock(mutex_);
   JogMessage& last = jogs_[axis];
   message.at = steadyNow();
@@ -180,7 +180,7 @@ bool DriverCalls::call(Request request, const std::string& service, Service& cal
   if (!client.isValid()) {
     client = ros::NodeHandle(node_).serviceClient<Service>(service, true);
   }
-  // A node that has died gives no answer.
+  // A node that has died doesn't answer.
   if (!client.call(call)) return false;
   const bool success = call.response.success != 0;
   log_.end(index, success, call.response.message,
@@ -259,7 +259,7 @@ bool DriverCalls::microstep(std::size_t axis, int microsteps) {
   Microstep service;
   service.request.microsteps = microsteps;
   const std::string name = kAxisNames.at(axis) + "/microstep";
-  // It may move to a position that both modes have, and answers after that.
+  // It may move to a position that both modes have; it answers after that move.
   return call(requestOf(Kind::kMotion, 1U << axis, name + " " + std::to_string(microsteps), true),
               name, service);
 }

@@ -13,12 +13,12 @@
 
 namespace stepdriver::storm {
 
-/// The topics of the driver that clients send to, shared by all of them. Safe from any thread.
+/// The topics of the driver that clients publish to, shared by all clients. Thread-safe.
 class DriverTopics {
  public:
   DriverTopics(const std::string& node, RequestLog& log);
 
-  /// A message of a jog. Only one that may begin a jog, after a pause or a 0, is a request.
+  /// A message of a jog. It counts as a request only if it may begin a jog: after a pause or a 0.
   void jog(int client, std::size_t axis, double velocity);
   void command(int client, const std::vector<std::size_t>& axes,
                const std::vector<double>& positions, double duration);
@@ -28,7 +28,7 @@ class DriverTopics {
   void moveByAction(int client, std::size_t axis, double position, bool relative);
   void cancelMove(std::size_t axis);
 
-  /// Whether the node listens to all of them.
+  /// Whether the node subscribes to all of them.
   bool connected() const;
 
  private:
@@ -48,8 +48,8 @@ class DriverTopics {
   std::map<std::size_t, JogMessage> jogs_;  // the last message of each axis
 };
 
-/// The driver's services, as one client thread calls them: over connections that it keeps. Each
-/// call goes to the log.
+/// The driver's services, called by one client thread over connections that stay open. Each call is
+/// logged.
 class DriverCalls {
  public:
   DriverCalls(std::string node, int client, RequestLog& log)
@@ -65,13 +65,13 @@ class DriverCalls {
   bool setLimits(std::size_t axis, double max_speed, double acceleration, double jerk);
   bool setPosition(std::size_t axis, double position);
   bool speedOverride(double factor);
-  /// Those of std_srvs/SetBool below an axis: enable, sleep; press_min and press_max of the rig.
+  /// Calls of std_srvs/SetBool for an axis: enable, sleep; press_min and press_max of the rig.
   bool set(Kind kind, std::size_t axis, const std::string& service, bool data);
-  /// Those of std_srvs/Trigger.
+  /// Calls of std_srvs/Trigger.
   bool trigger(Kind kind, AxisSet axes, const std::string& service);
 
  private:
-  /// @param arrivals says of an answer where the axes are that were to be somewhere.
+  /// @param arrivals reads from an answer the positions of axes that had a target.
   template <typename Service, typename Arrivals>
   bool call(Request request, const std::string& service, Service& call, const Arrivals& arrivals);
   template <typename Service>

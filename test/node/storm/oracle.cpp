@@ -13,22 +13,22 @@ namespace {
 
 constexpr std::int64_t kForever = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kMillisecond = 1'000'000;
-/// Of two requests that are sent so far apart the first one arrives first.
+/// If two requests are sent this far apart, the first one arrives first.
 constexpr std::int64_t kArrival = 250 * kMillisecond;
-/// How far the rig's clock falls behind at most while the computer doesn't stall.
+/// The largest delay of the rig's clock while the computer doesn't stall.
 constexpr std::int64_t kLag = 200 * kMillisecond;
-/// Stalls so far from a request count for when its motion may begin.
+/// Stalls this close to a request matter for the beginning of its motion.
 constexpr std::int64_t kStallReach = 10 * kLag;
-/// How long before its request at most a motion seems to begin on the rig's clock.
+/// A motion seems to begin at most this long before its request on the rig's clock.
 constexpr std::int64_t kEarliest = kLag + 2 * kStallReach;
-/// For the offset of the clocks, which is measured by calls.
+/// Uncertainty of the offset of the clocks, which is measured by calls.
 constexpr std::int64_t kOffsetError = 2 * kMillisecond;
 constexpr double kStopMargin = 1.1;
-/// A trajectory keeps to half of the limits here, so that its path leaves as much for a stop.
+/// A trajectory keeps half of the limits here, so that its path leaves the other half for a stop.
 constexpr double kTrajectoryStops = 2.0;
 constexpr std::int64_t kLongestTrajectory = 20'000 * kMillisecond;
 constexpr double kPositionError = 0.05;  // [1/16 steps]
-/// Half a step of the coarsest mode in use, and a bit.
+/// Half a step of the coarsest mode in use, and a margin.
 constexpr double kArrivalError = 1.05;  // [1/16 steps]
 
 double inSeconds(std::int64_t time) { return static_cast<double>(time) * 1e-9; }
@@ -39,13 +39,13 @@ std::string formatted(const char* format, double number) {
   return text;
 }
 
-/// From when on a motion may put out pulses, and until when, in CLOCK_MONOTONIC.
+/// The time in which a motion may send pulses, in CLOCK_MONOTONIC.
 struct Span {
   std::int64_t begin;
   std::int64_t end;
 };
 
-/// The stalls of the computer, and how long they took in all up to any time.
+/// The stalls of the computer, and their total duration up to any time.
 class Stalls {
  public:
   explicit Stalls(const std::vector<Stall>& stalls) : stalls_(stalls) {
@@ -72,17 +72,17 @@ class Stalls {
   }
 
   const std::vector<Stall>& stalls_;
-  std::vector<std::int64_t> before_;  // the sum of those before each
+  std::vector<std::int64_t> before_;  // the sum of the stalls before each
 };
 
-/// What an axis was asked, as far as a lookup by time needs it.
+/// The requests to an axis, as far as a lookup by time needs them.
 struct AxisRequests {
-  std::vector<std::int64_t> trajectories;  // when each was sent
-  std::vector<const Request*> renamings;   // what may change what its position is counted from
+  std::vector<std::int64_t> trajectories;  // times at which trajectories were sent
+  std::vector<const Request*> renamings;   // requests that may change the origin of its positions
 };
 
-/// Requests are in the order in which they were sent, and each lookup takes only those near the
-/// time that it is about: so judging takes time in proportion to the length of the storm.
+/// Requests are in the order in which they were sent. Each lookup uses only requests near the time
+/// in question, so the time for judging is proportional to the length of the storm.
 class Judge {
  public:
   explicit Judge(const Observation& observation)
@@ -127,7 +127,7 @@ class Judge {
     return (request.axes >> axis & 1U) != 0;
   }
 
-  /// Whether the node may have handled it after the other one.
+  /// Whether the node may have handled this request after the other one.
   bool mayFollow(const Request& request, const Request& other) const {
     if (&request == &other) return false;
     if (request.answered && *request.answered < other.sent) return false;
@@ -139,19 +139,19 @@ class Judge {
     return other.sent - request.sent - stalls_.between(request.sent, other.sent) < kArrival;
   }
 
-  /// The first request that may arrive after this one; all that were sent later may, too.
+  /// The first request that may arrive after this one; all requests that were sent later may, too.
   std::vector<Request>::const_iterator firstAfter(const Request& other) const {
     return std::partition_point(
         seen_.requests.begin(), seen_.requests.end(),
         [&](const Request& request) { return !mayArriveAfter(request, other); });
   }
 
-  /// Whether this allows motions again that the ending forbids.
+  /// Whether this request allows motions again after the ending forbade them.
   bool allowsAgain(const Request& request, const Request& ending, std::size_t axis) const {
     if (!isOf(request, axis) || wasRefused(request) || !mayFollow(request, ending)) return false;
     switch (ending.kind) {
       case Kind::kHold:
-        // The stop of a single axis doesn't end the hold of the machine.
+        // A stop of a single axis doesn't end the hold of the machine.
         return request.kind == Kind::kResume ||
                (request.kind == Kind::kStop && request.axes == ending.axes);
       case Kind::kDisable:
@@ -165,11 +165,11 @@ class Judge {
     }
   }
 
-  /// When this motion may put out pulses, on the rig's clock; it can't have begun before
+  /// The time in which this motion may send pulses, on the rig's clock; it can't have begun before
   /// `earliest`.
   Span spanOf(const Request& motion, std::int64_t earliest, std::size_t axis) const {
     const std::int64_t begin = std::max(motion.sent, earliest);
-    // A line that didn't begin may have moved its axes to take up backlash.
+    // A line that didn't begin may have moved its axes to take up their backlash.
     if (motion.answered && (motion.waits || !motion.success)) {
       const std::int64_t end = *motion.answered + longestStop(motion, axis);
       return {mayBegin(begin), end - seen_.clock_offset + kOffsetError};
@@ -177,13 +177,13 @@ class Judge {
     return {mayBegin(begin), kForever};
   }
 
-  /// The rig's clock may be behind when a motion begins.
+  /// The rig's clock may be late when a motion begins.
   std::int64_t mayBegin(std::int64_t asked) const {
     return asked - seen_.clock_offset - kLag -
            stalls_.between(asked - kStallReach, asked + kStallReach);
   }
 
-  /// What explains pulses after an ending: all that come after `end`, and those in `passing`.
+  /// The explained pulses after an ending: all pulses after `end`, and those in `passing`.
   struct Explained {
     std::int64_t end = kForever;
     std::vector<Span> passing;
@@ -197,7 +197,7 @@ class Judge {
     }
   };
 
-  /// Whether nothing that is asked from this request on explains a pulse before the end.
+  /// Whether no request from this one on can explain a pulse before `explained.end`.
   bool isBeyond(const Request& request, const Explained& explained) const {
     return explained.end != kForever &&
            request.sent - seen_.clock_offset - kEarliest > explained.end;
@@ -229,7 +229,7 @@ class Judge {
 
   std::int64_t longestStop(const Request& ending, std::size_t axis) const {
     double seconds = 0.0;
-    // Axes that move as one stop as the slowest of them does.
+    // Axes that move together stop as slowly as the slowest of them.
     for (const AxisFacts& facts : seen_.axes) seconds = std::max(seconds, facts.longest_stop);
     const auto& trajectories = of_axis_[axis].trajectories;
     const auto recent = std::lower_bound(trajectories.begin(), trajectories.end(),
@@ -283,7 +283,7 @@ class Judge {
     }
   }
 
-  /// Whether what the position is counted from may have changed between two times.
+  /// Whether the origin of the position may have changed between two times.
   bool mayBeRenamed(std::size_t axis, std::int64_t begin, std::int64_t end) const {
     const auto& renamings = of_axis_[axis].renamings;
     return std::any_of(renamings.begin(), renamings.end(), [&](const Request* request) {

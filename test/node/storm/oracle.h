@@ -8,7 +8,7 @@
 
 namespace stepdriver::storm {
 
-/// What the oracle knows of an axis.
+/// The oracle's data about an axis.
 struct AxisFacts {
   std::string name;
   double longest_stop = 0.0;     ///< [s] from its maximum speed and its maximum acceleration
@@ -45,22 +45,23 @@ struct Observation {
   std::int64_t clock_offset = 0;
 };
 
-/// Holds an observation against what the node promises:
+/// Compares an observation with the node's promises:
 ///
-/// - no pulse after the answer of an emergency stop, a disable or a sleep, and none after that of a
-///   stop or a hold beyond the longest deceleration and 10 %, until a newer motion can have begun:
-///   one that was asked later and that nothing forbids any more;
-/// - what an answer says to have been reached was reached;
-/// - the reported position is the count of the pulses.
+/// - After the answer of an emergency stop, a disable or a sleep there are no pulses; after the
+///   answer of a stop or a hold there are none later than the longest deceleration and 10 %. This
+///   ends when a newer motion can have begun: one that was requested later and that nothing forbids
+///   any longer.
+/// - If an answer says that a position was reached, it was reached.
+/// - The reported position is the count of the pulses.
 ///
-/// Requests that were under way at the same time may have been handled in either order, and so
-/// neither is held against the other.
+/// Requests that were under way at the same time may have been handled in either order, so neither
+/// is compared with the other.
 ///
 /// @return each broken promise in words.
 std::vector<std::string> brokenPromises(const Observation& observation);
 
-/// The last requests that were sent between two times, a line for each, with times from `origin`
-/// on.
+/// The last requests that were sent between two times, one per line, with times relative to
+/// `origin`.
 std::string requestsText(const std::vector<Request>& requests, std::int64_t begin, std::int64_t end,
                          std::int64_t origin);
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-// Each promise of the oracle's, kept and broken. Times are in milliseconds; the rig's clock began
-// at 1000.
+// Each promise of the oracle, kept and broken. Times are in milliseconds; the rig's clock began at
+// 1000.
 
 namespace stepdriver::storm {
 namespace {
@@ -97,7 +97,7 @@ TEST(Oracle, HoldsBothOrdersOfRequestsAtOneTimeForPossible) {
 
 TEST(Oracle, KnowsThatALineThatCameLongBeforeAStopIsOlder) {
   OneAxis axis = endedBy(Kind::kStop, 2200);
-  axis.ask(requestOf(Kind::kMotion, 2600, 3100));  // it waited for its axes to rest
+  axis.ask(requestOf(Kind::kMotion, 2600, 3100));  // it waited until its axes were at rest
   axis.move(2500, 2600);
   EXPECT_EQ(axis.broken(), 1U);
 }

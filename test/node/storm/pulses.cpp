@@ -6,7 +6,7 @@
 namespace stepdriver::storm {
 namespace {
 
-/// The level of a waveform at times that never fall.
+/// The level of a waveform at times that never decrease.
 class Level {
  public:
   explicit Level(const node_test::Waveform& waveform) : edges_(waveform.edges) {}
@@ -21,7 +21,7 @@ class Level {
   std::size_t next_ = 0;
 };
 
-/// How many 1/16 steps a pulse makes, by the levels of MS1 to MS3: the table of the A4988's
+/// The number of 1/16 steps of a pulse, by the levels of MS1 to MS3: the table of the A4988's
 /// datasheet.
 int sixteenths(bool ms1, bool ms2, bool ms3) {
   switch ((ms1 ? 1 : 0) + (ms2 ? 2 : 0) + (ms3 ? 4 : 0)) {

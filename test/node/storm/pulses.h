@@ -9,7 +9,7 @@
 
 namespace stepdriver::storm {
 
-/// The pulses of an A4988 with microstep pins, as in its trace.
+/// The pulses of an A4988 with microstep pins, from its trace.
 std::vector<Pulse> pulsesOf(const std::map<std::string, node_test::Waveform>& trace,
                             const std::string& axis);
 

@@ -9,10 +9,10 @@
 
 namespace stepdriver::storm {
 
-/// What a request may do to an axis, as far as the oracle needs to know it.
+/// What a request may do to an axis, as far as the oracle needs it.
 enum class Kind {
   kMotion,  ///< begins a motion of its axes
-  kHoming,  ///< the same, and it changes what their positions are counted from
+  kHoming,  ///< begins a motion, and changes the origin of the positions
   kJog,     ///< the first message of a jog, after a pause or a 0
   kStop,
   kHold,
@@ -30,14 +30,14 @@ enum class Kind {
 /// Bit i stands for axis i.
 using AxisSet = unsigned;
 
-/// Where an answer says that an axis is, and where it was sent.
+/// The position of an axis according to an answer, and its target.
 struct Arrival {
   std::size_t axis = 0;
   double wanted = 0.0;  ///< [m]
   double told = 0.0;    ///< [m]
 };
 
-/// A request and what became of it. Times are in nanoseconds of CLOCK_MONOTONIC.
+/// A request and its result. Times are in nanoseconds of CLOCK_MONOTONIC.
 struct Request {
   int client = 0;
   Kind kind = Kind::kOther;
@@ -55,10 +55,10 @@ struct Request {
 
 std::int64_t steadyNow();
 
-/// All requests in the order in which they were sent. Safe from any thread.
+/// All requests in the order in which they were sent. Thread-safe.
 class RequestLog {
  public:
-  /// @return what end() takes.
+  /// @return the number to pass to end().
   std::size_t begin(Request request);
   void end(std::size_t index, bool success, std::string message, std::vector<Arrival> arrivals);
 

@@ -9,8 +9,8 @@
 
 namespace stepdriver::storm {
 
-/// Notes when this computer doesn't run what is ready to run, by how late a thread's short sleeps
-/// end.
+/// Notes when this computer doesn't run a thread that is ready to run, from the lateness of a
+/// thread's short sleeps.
 class StallWatch {
  public:
   StallWatch()

@@ -93,7 +93,7 @@ void StormClient::sendMotion() {
       },
       [&] { jog(); },
       [&] {
-        // A homing takes its time.
+        // A homing takes a long time.
         if (!chance(0.2)) return;
         chance(0.5) ? calls_.home(0, wait) : calls_.homeAll(wait);
       },
@@ -160,7 +160,7 @@ void StormClient::sendEnding() {
   }
 }
 
-// A stream that runs on through a calm is no new jog.
+// A stream that continues through a calm isn't a new jog.
 void StormClient::jog() {
   const std::size_t axis = anyAxis();
   const double velocity = between(-0.04, 0.04);

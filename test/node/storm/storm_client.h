@@ -12,24 +12,24 @@
 
 namespace stepdriver::storm {
 
-/// What the clients of a storm do now.
+/// The phases of a storm, as its clients see them.
 enum class Weather {
   kStorm,  ///< they send random requests
   kCalm,   ///< they send nothing that could begin a motion, and wait for their answers
   kOver,   ///< they end
 };
 
-/// A client that sends random requests of every kind, one after the other. The same seed makes the
-/// same requests, but what they meet depends on the other clients and on the computer.
+/// A client that sends random requests of every kind, one after another. The same seed makes the
+/// same requests, but their effects depend on the other clients and on the computer.
 class StormClient {
  public:
   StormClient(const std::string& node, int number, std::uint64_t seed, DriverTopics& topics,
               RequestLog& log, const std::atomic<Weather>& weather);
 
-  /// Until the weather is over.
+  /// Sends requests until the storm is over.
   void run();
 
-  /// Whether no request of it is under way.
+  /// Whether this client has no request under way.
   bool isIdle() const { return idle_; }
 
  private:

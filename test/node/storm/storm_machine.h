@@ -8,15 +8,15 @@
 
 namespace stepdriver::storm {
 
-/// The time-out of the machine's jogs, in seconds.
+/// The timeout of the machine's jogs, in seconds.
 constexpr double kJogTimeout = 0.2;
 
-/// Gives a node three linear axes of 20 steps/mm: x, with a homing, switches, microstep pins, sleep
+/// Gives a node three linear axes of 20 steps/mm: x, with homing, switches, microstep pins, sleep
 /// and reset, and a stop that is slower than its speed suggests; y, with 8 mm of backlash, which
-/// shares the ENABLE line of x; z, with S-curves and an idle time-out. Positions run from -50 mm to
+/// shares the ENABLE line of x; z, with S-curves and an idle timeout. Positions are from -50 mm to
 /// 150 mm.
 ///
-/// @return what the oracle must know of them.
+/// @return the oracle's data about them.
 std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node);
 
 }  // namespace stepdriver::storm

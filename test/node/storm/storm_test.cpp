@@ -31,9 +31,9 @@
 #include "support/vcd_reader.h"
 #include "support/wait.h"
 
-// Four clients call everything at once for `~seconds`, from `~seed`. Each few seconds there is a
-// calm: nobody asks for a motion any more, then a request ends what still moves, and nothing else
-// explains the pulses that come after it.
+// Four clients call everything at once for `~seconds`, from `~seed`. Every few seconds there is a
+// calm: all clients stop asking for motions, then a request ends the motions that remain, and
+// nothing else explains the pulses that come after it.
 
 namespace stepdriver::storm {
 namespace {
@@ -77,7 +77,7 @@ class LatestStates {
     const std::lock_guard<std::mutex> lock(mutex_);
     return count_;
   }
-  /// Whether no axis moved, and nothing was held, when they were published.
+  /// Whether no axis moved, and no motion was held, when the states were published.
   bool atRest() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto none = [](const auto& flags) {
@@ -120,7 +120,7 @@ class Storm : public testing::Test {
 
   void resetForOffset();
   void storm();
-  /// Ends all motions and lets every call have its answer.
+  /// Ends all motions, and waits until every call has its answer.
   void calm();
   void endMotions();
   void stopAll();
@@ -152,13 +152,13 @@ class Storm : public testing::Test {
   std::atomic<Weather> weather_{Weather::kCalm};
   std::deque<StormClient> clients_;
   std::deque<std::thread> threads_;
-  std::vector<std::int64_t> resets_;  // when x was asked to reset, to compare the clocks
+  std::vector<std::int64_t> resets_;  // times at which x was asked to reset, to compare the clocks
   std::vector<double> memory_;        // [MB] of the node at each calm
   Observation seen_;
   bool failed_ = false;
 };
 
-/// The rig stamps the first edge of RESET at a time after this one.
+/// The rig's time of the first edge of RESET is after this time.
 void Storm::resetForOffset() {
   resets_.push_back(steadyNow());
   ASSERT_TRUE(ender_->trigger(Kind::kOther, 1, "x/reset"));
@@ -206,7 +206,7 @@ void Storm::calm() {
   endMotions();
   double longest = 0.0;
   for (const AxisFacts& axis : seen_.axes) longest = std::max(longest, axis.longest_stop);
-  // Longer than a stop may take, and than a forgotten stream of jogs that begins again.
+  // Longer than a stop may take, and longer than a forgotten stream of jogs that begins again.
   sleepFor(2.0 * longest + 0.5);
   if (!isAlive()) return;
   stopAll();
@@ -229,8 +229,8 @@ void Storm::noteRest() {
     fail("the axes don't come to rest after a stop");
     return;
   }
-  // States that are read from here on are those of rest. The rest is noted with the time of its
-  // first state: the offset of the rig's clock is only known to within the latency of a call, and
+  // States that are received from now on are states of rest. The rest is noted with the time of its
+  // first state: the offset of the rig's clock is known only to within the latency of a call, and
   // the next motion may begin right after the last state.
   const int before = states_->count();
   const std::int64_t at_rest = steadyNow();

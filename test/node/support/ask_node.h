@@ -6,10 +6,10 @@
 
 namespace stepdriver::node_test {
 
-/// Calls a method of a node's own interface, in addition to its services: `getPid`, `shutdown`. The
-/// test fails if no answer comes.
+/// Calls a method of a node's own interface, which isn't a service: `getPid`, `shutdown`. The test
+/// fails if no answer comes.
 ///
-/// @param why what `shutdown` is told; others take no notice of it.
+/// @param why the reason for `shutdown`; other methods ignore it.
 /// @return the answer's value.
 XmlRpc::XmlRpcValue askNode(const std::string& node, const std::string& method,
                             const std::string& why = {});

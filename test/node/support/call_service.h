@@ -10,9 +10,9 @@
 
 namespace stepdriver::node_test {
 
-/// Calls a service over a persistent connection, as a C++ client of any node should: roscpp's other
-/// kind is closed by the server right after the answer, and now and then the client takes that for
-/// a failed call before it reads the answer (ros_comm issue 1976).
+/// Calls a service over a persistent connection, as every C++ client of a node should. The server
+/// closes roscpp's other kind of connection right after the answer, and now and then the client
+/// takes that for a failed call before it reads the answer (ros_comm issue 1976).
 ///
 /// @return false if no answer came.
 template <typename Service>

@@ -23,15 +23,15 @@ namespace action_msgs = control_msgs;
 namespace action_msgs = stepdriver;
 #endif
 
-/// A message as a program that was built with control_msgs knows it: with that package's name for
-/// its type.
+/// A message as a program that was built with control_msgs sees it: with that package's name in its
+/// type.
 template <typename Message>
 struct OfControlMsgs : Message {
   using Ptr = boost::shared_ptr<OfControlMsgs>;
   using ConstPtr = boost::shared_ptr<const OfControlMsgs>;
 };
 
-/// FollowJointTrajectory as in MoveIt's clients.
+/// FollowJointTrajectory as MoveIt's clients use it.
 struct ControlMsgsAction {
   using _action_goal_type = OfControlMsgs<action_msgs::FollowJointTrajectoryActionGoal>;
   using _action_result_type = OfControlMsgs<action_msgs::FollowJointTrajectoryActionResult>;

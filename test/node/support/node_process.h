@@ -13,11 +13,11 @@
 namespace stepdriver::node_test {
 
 // The package's nodes, by the full names of their files. The environment variable STEPDRIVER_NODE
-// names another build of the node, as one with a sanitizer.
+// names another build of the node, for example one with a sanitizer.
 extern const char* const kStepdriverNode;
 extern const char* const kStepdriverJoystick;
 
-/// A running node, and all that it prints. Killed at the end if it still runs.
+/// A running node, and everything that it prints. If it is still running at the end, it is killed.
 class NodeProcess {
  public:
   explicit NodeProcess(const std::vector<std::string>& arguments,
@@ -28,11 +28,12 @@ class NodeProcess {
 
   void signal(int number) const;
 
-  /// @return the exit code, 128 + the signal's number if a signal ended it; none if it still runs
-  ///   after this time.
+  /// @return the exit code, or 128 + the signal's number if a signal ended it; no value if it is
+  ///   still running after this time.
   std::optional<int> waitForExit(std::chrono::duration<double> bound);
 
-  /// A size in its /proc/PID/status, as `VmRSS` [kB]. @throw std::runtime_error if it has none.
+  /// A size from its /proc/PID/status, such as `VmRSS` [kB].
+  /// @throw std::runtime_error if it has none.
   std::size_t kilobytes(const std::string& field) const;
 
   /// Both of its streams; complete after waitForExit().

@@ -15,11 +15,11 @@
 
 namespace stepdriver::node_test {
 
-/// A stepdriver_node of a test's own, in a namespace with the test's name, on the simulated rig.
+/// A stepdriver_node for one test, in a namespace with the test's name, on the simulated rig.
 ///
-/// Its parameters are at first those of one linear axis x: an A4988 at 1/16 with every pin wired,
-/// 80 steps/mm, 3200 steps a round, at most 100 mm/s and 500 mm/s^2, soft limits at 0 and 200 mm,
-/// both endstops, enabled on start; the rig runs 20 times as fast as the wall clock.
+/// Its parameters are initially those of one linear axis x: an A4988 at 1/16 with every pin wired,
+/// 80 steps/mm, 3200 steps per revolution, at most 100 mm/s and 500 mm/s^2, soft limits at 0 and
+/// 200 mm, both endstops, enabled on start. The rig runs 20 times as fast as the wall clock.
 class NodeUnderTest {
  public:
   NodeUnderTest();
@@ -30,22 +30,23 @@ class NodeUnderTest {
   /// Full name of the node.
   const std::string& name() const { return name_; }
   std::string full(const std::string& relative) const { return name_ + "/" + relative; }
-  /// Full name of what is in the node's namespace.
+  /// Full name of a resource in the node's namespace.
   std::string beside(const std::string& relative) const { return space_ + "/" + relative; }
 
-  // Before the start.
+  // Call before the start.
   template <typename Value>
   void set(const std::string& key, const Value& value) {
     ros::param::set(full(key), value);
   }
   void erase(const std::string& key);
   void describe(const std::string& urdf) { ros::param::set(beside("robot_description"), urdf); }
-  /// Lets the rig write its trace. @return the file, which is there as long as this is.
+  /// Makes the rig write its trace.
+  /// @return the file, which exists as long as this object.
   std::string traced();
 
-  /// Starts the node and doesn't wait for it.
+  /// Starts the node, and doesn't wait for it.
   NodeProcess& launch();
-  /// Starts the node and waits until it is ready.
+  /// Starts the node, and waits until it is ready.
   NodeProcess& start();
   NodeProcess& process() { return *process_; }
 
@@ -68,7 +69,7 @@ class NodeUnderTest {
  private:
   std::string space_;
   std::string name_;
-  std::unique_ptr<TemporaryFile> trace_;  // the node writes it to its end
+  std::unique_ptr<TemporaryFile> trace_;  // the node writes it until it ends
   std::unique_ptr<NodeProcess> process_;
 };
 

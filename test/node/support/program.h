@@ -15,10 +15,10 @@ struct ProgramEnd {
   std::string output;  ///< of both streams
 };
 
-/// Runs one of the package's programs, as `rosrun stepdriver NAME` does, to its end.
+/// Runs one of the package's programs to its end, as `rosrun stepdriver NAME` does.
 inline ProgramEnd runProgram(const std::string& name, const std::vector<std::string>& arguments) {
   NodeProcess process(arguments, std::string(STEPDRIVER_PROGRAMS) + "/" + name);
-  // Python, matplotlib and a font cache in the making, on a machine that does other things.
+  // Time for Python, matplotlib and a new font cache, on a busy machine.
   const auto code = process.waitForExit(10 * kBound);
   EXPECT_TRUE(code) << name << " doesn't end";
   return {code.value_or(-1), process.output()};

@@ -12,7 +12,7 @@
 
 namespace stepdriver::node_test {
 
-/// Keeps every message of a topic from its making on.
+/// Keeps every message of a topic from now on.
 template <typename Message>
 class Recorder {
  public:
@@ -26,7 +26,7 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Whether anyone publishes what it keeps.
+  /// Whether the topic has a publisher.
   bool connected() const { return subscriber_.getNumPublishers() > 0; }
 
   std::vector<Message> messages() const {
@@ -39,7 +39,7 @@ class Recorder {
     return messages_.size();
   }
 
-  /// Waits for a message that is as wanted; those that are there already count.
+  /// Waits for a message that meets a condition; messages that have already arrived count.
   bool waitFor(const std::function<bool(const Message&)>& wanted) const {
     return waitUntil([&] {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -50,7 +50,7 @@ class Recorder {
     });
   }
 
-  /// Waits until the newest message is as wanted.
+  /// Waits until the newest message meets a condition.
   bool waitForLatest(const std::function<bool(const Message&)>& wanted) const {
     return waitUntil([&] {
       const std::lock_guard<std::mutex> lock(mutex_);

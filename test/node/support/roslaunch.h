@@ -13,8 +13,8 @@
 
 namespace stepdriver::node_test {
 
-/// A launch file of the package as a user starts it, on the test's own master, which outlives it.
-/// Everything is in a namespace with the test's name.
+/// A launch file of the package, started as a user starts it, on the test's own master, which
+/// outlives it. Everything is in a namespace with the test's name.
 class Roslaunch {
  public:
   Roslaunch(const std::string& file, std::vector<std::string> arguments) {
@@ -32,19 +32,20 @@ class Roslaunch {
   static std::string space() {
     return std::string("/") + testing::UnitTest::GetInstance()->current_test_info()->name();
   }
-  /// Full name of what the node has.
+  /// Full name of a resource of the node.
   static std::string full(const std::string& relative) {
     return space() + "/stepdriver/" + relative;
   }
 
-  /// @return whether the node says that it is ready, before roslaunch ends.
+  /// @return whether the node reports that it is ready before roslaunch ends.
   bool isReady() {
     const auto says = [this] { return process_->output().find("Ready") != std::string::npos; };
     waitUntil([&] { return says() || process_->waitForExit(std::chrono::seconds(0)); });
     return says();
   }
 
-  /// As Ctrl-C does. @return the exit code.
+  /// Ends it as Ctrl-C does.
+  /// @return the exit code.
   int end() {
     process_->signal(SIGINT);
     return process_->waitForExit(kBound).value_or(-1);

@@ -7,36 +7,39 @@
 
 namespace stepdriver::node_test {
 
-/// Where a service is, as the master knows it. The test fails if it knows none.
+/// The address of a service, according to the master. The test fails if the master has none.
 std::string serviceUri(const std::string& service);
 
-/// A client of services that sends whatever it likes. Each of its waits is bounded.
+/// A client of services that can send arbitrary bytes. Each of its waits is bounded.
 class TcprosClient {
  public:
   using Header = std::map<std::string, std::string>;
 
-  /// Connects to where the service is.
+  /// Connects to the address of the service.
   ///
-  /// @param receive_buffer of the socket, in bytes; 0: as the system likes.
+  /// @param receive_buffer of the socket, in bytes; 0: the system's default.
   explicit TcprosClient(const std::string& service, int receive_buffer = 0);
   ~TcprosClient();
   TcprosClient(const TcprosClient&) = delete;
   TcprosClient& operator=(const TcprosClient&) = delete;
 
-  /// @return whether all of it went out.
+  /// @return whether all of it was sent.
   bool send(const std::string& bytes) const;
-  /// Sends as much as goes out without waiting. @return how many bytes that is.
+  /// Sends as much as possible without waiting.
+  /// @return the number of bytes that were sent.
   std::size_t sendAtOnce(const std::string& bytes) const;
-  /// @return so many bytes; fewer if the connection is closed or nothing more comes.
+  /// @return this many bytes; fewer if the connection is closed or no more come.
   std::string receive(std::size_t bytes) const;
-  /// @return the fields of a header; none if none comes.
+  /// @return the fields of a header; no value if none comes.
   Header receiveHeader() const;
-  /// Waits for the server to close the connection; what it still sends is skipped.
+  /// Waits until the server closes the connection; skips whatever it still sends.
   bool isClosed() const;
 
-  /// Introduces itself. @return whether the server did so too, without an error.
+  /// Sends the client's header.
+  /// @return whether the server's header comes, without an error.
   bool introduce(const std::string& service, bool persistent) const;
-  /// Sends a request without fields. @return whether a Trigger's answer comes, that says true.
+  /// Sends a request without fields.
+  /// @return whether the answer of a Trigger comes, with success true.
   bool call() const;
 
  private:
@@ -45,9 +48,9 @@ class TcprosClient {
 
 /// 4 bytes, the lowest first.
 std::string lengthBytes(std::uint32_t length);
-/// With the length of the whole.
+/// The text, preceded by its length.
 std::string headerBytes(const TcprosClient::Header& header);
-/// What a roscpp client sends first.
+/// The first bytes that a roscpp client sends.
 std::string introduction(const std::string& service, bool persistent);
 
 }  // namespace stepdriver::node_test

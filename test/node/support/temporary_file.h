@@ -11,7 +11,7 @@
 
 namespace stepdriver::node_test {
 
-/// A file of a test's own, which is removed before and after it.
+/// A file for one test. It is removed before and after the test.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& ending)
@@ -31,7 +31,7 @@ class TemporaryFile {
   }
 
  private:
-  /// Without the slash before the parameter of one that has any.
+  /// A test's name; if the test has a parameter, without the slash in front of it.
   static std::string testName() {
     std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
     std::replace(name.begin(), name.end(), '/', '_');

@@ -28,7 +28,7 @@ bool Tmux::possible() {
   return there;
 }
 
-// tmux starts in a UTF-8 locale only. The shell ends by itself if a crashed test can't end it.
+// tmux starts in a UTF-8 locale only. The shell ends by itself in case a crashed test can't end it.
 Tmux::Tmux(int columns, int rows)
     : command_("LC_ALL=C.UTF-8 tmux -L stepdriver_" + std::to_string(getpid()) + " -f /dev/null ") {
   if (!there_) return;  // the test is skipped

@@ -6,7 +6,7 @@
 
 namespace stepdriver::node_test {
 
-/// A shell in a terminal of its own, by a tmux server of its own; both end with this object.
+/// A shell in its own terminal, on its own tmux server; both end with this object.
 class Tmux {
  public:
   Tmux(int columns, int rows);
@@ -14,19 +14,19 @@ class Tmux {
   Tmux(const Tmux&) = delete;
   Tmux& operator=(const Tmux&) = delete;
 
-  /// Whether this machine has terminals: a root without /dev/pts has none.
+  /// Whether this machine has terminals: a chroot without /dev/pts doesn't.
   static bool possible();
 
-  /// @param key a character, or what tmux calls a key: `Space`, `Enter`, `S-Right`.
+  /// @param key a character, or tmux's name of a key: `Space`, `Enter`, `S-Right`.
   void press(const std::string& key) const;
   /// Types a line, with Enter at its end.
   void type(const std::string& line) const;
   void resize(int columns, int rows) const;
-  /// What it shows.
+  /// The text on the terminal.
   std::string screen() const;
 
   bool shows(const std::string& words) const { return screen().find(words) != std::string::npos; }
-  /// Waits until it shows these words; if it doesn't, the test fails with what it shows.
+  /// Waits until the terminal shows these words; otherwise the test fails with the terminal's text.
   bool waitFor(const std::string& words) const;
   bool waitUntilGone(const std::string& words) const;
 

@@ -6,7 +6,7 @@
 
 namespace stepdriver::node_test {
 
-/// Adds an axis y to a node's x, of the same kind but with half the speed and no endstops.
+/// Adds an axis y, like the node's axis x but with half the speed and no endstops.
 inline void addSecondAxis(NodeUnderTest& node) {
   node.set("axes/y/driver", "a4988");
   node.set("axes/y/joint", "y_joint");

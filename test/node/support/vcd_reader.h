@@ -7,21 +7,22 @@
 
 namespace stepdriver::node_test {
 
-/// What a VCD file says of one variable.
+/// The changes of one variable in a VCD file.
 struct Waveform {
   struct Edge {
     std::int64_t time_ns;
     bool level;
   };
-  std::vector<Edge> edges;  ///< the first is the level at the begin
+  std::vector<Edge> edges;  ///< the first is the initial level
 
   bool last() const { return edges.back().level; }
   std::int64_t lastEdgeTime() const { return edges.back().time_ns; }
-  /// How often it went to this level.
+  /// The number of changes to this level.
   std::int64_t changesTo(bool level) const;
 };
 
-/// Reads a pin trace as far as these tests need it. @return `axis/variable` -> its waveform.
+/// Reads a pin trace as far as these tests need it.
+/// @return the waveforms, by `axis/variable`.
 std::map<std::string, Waveform> readVcd(const std::string& path);
 
 }  // namespace stepdriver::node_test

@@ -5,7 +5,7 @@
 
 namespace stepdriver::node_test {
 
-/// Longer than anything takes that doesn't fail, on a machine that stalls now and then.
+/// Longer than any successful step takes on a machine that stalls now and then.
 constexpr std::chrono::seconds kBound{20};
 
 /// Waits for a condition. @return whether it came true within the bound.
