@@ -15,7 +15,7 @@ constexpr double kStepsPerSecond = 16'000.0;
 constexpr std::int64_t kSteps = 40'000'000'000;  // more than any run makes
 constexpr pulse::Nanoseconds kStart = 1'000'000;
 
-/// How the steps of several axes lie to each other.
+/// How the steps of several axes coincide.
 enum class Steps { kApart, kTogether };
 
 pulse::ChannelConfig channelConfig(int channel) {
@@ -28,7 +28,7 @@ pulse::ChannelConfig channelConfig(int channel) {
   return config;
 }
 
-/// The engine with lines and a clock that cost nothing, all axes in motion.
+/// The engine with free lines and a free clock, all axes in motion.
 class EngineUnderLoad {
  public:
   EngineUnderLoad(int axes, Steps steps) {
@@ -37,7 +37,7 @@ class EngineUnderLoad {
     for (int i = 0; i < axes; ++i) channels.push_back(channelConfig(i));
     engine_ = std::make_unique<pulse::PulseEngine>(lines, clock_, channels, 1'000'000'000);
     for (int i = 0; i < axes; ++i) {
-      // Speeds that have no common measure: the edges of two axes hardly ever fall together.
+      // Speeds without a common measure: the edges of two axes hardly ever coincide.
       const double speed = kStepsPerSecond * (steps == Steps::kTogether ? 1.0 : 1.0 - 0.00731 * i);
       profiles_.push_back(std::make_unique<motion::Profile>(
           motion::planMove(kStart, {motion::fromInteger(0), 0.0, 0.0}, kSteps,
@@ -49,7 +49,7 @@ class EngineUnderLoad {
     command.follows = follows_.data();
     command.follow_count = follows_.size();
     engine_->post(command);
-    while (clock_.now() < 1'000'000'000) serve();  // past the ramps
+    while (clock_.now() < 1'000'000'000) serve();  // until the ramps are over
   }
 
   void serve() { clock_.waitUntil(engine_->serve()); }

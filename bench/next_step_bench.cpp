@@ -12,8 +12,8 @@
 #include "support/plan_from_rest.h"
 #include "support/reference_steps.h"
 
-// What the next step costs, and how far its time is from the exact one. The times are per step
-// (items_per_second); the errors in ns.
+// Measures how long finding the next step takes, and how far its time is from the exact one. The
+// times are per step (items_per_second); the errors in ns.
 
 namespace stepdriver::bench {
 namespace {
@@ -30,7 +30,7 @@ void report(benchmark::State& state, std::int64_t steps, const StepErrors& error
   state.counters["rms_error_ns"] = errors.rms;
 }
 
-/// @param exact of the axis, whose steps are half-step lines.
+/// @param exact curve of the axis, whose steps are half-step lines.
 StepErrors errorsOf(const Profile& profile, ExactMotion exact) {
   ErrorMeter meter;
   StepFinder finder(profile, 0);
@@ -168,7 +168,7 @@ void stepsOfLine(benchmark::State& state) {
 }
 BENCHMARK(stepsOfLine)->Name("NextStep/line")->Arg(1)->Arg(2)->Arg(3)->Arg(6);
 
-// ---- the others
+// ---- other methods
 
 /// Their convention: step n comes when the curve is at n, and down it is the mirror image.
 template <typename Steps>
@@ -195,7 +195,7 @@ BENCHMARK_CAPTURE(reference, float, Avr446Float(kTriangle))->Name("NextStep/avr4
 BENCHMARK_CAPTURE(reference, slow, Avr446Integer(kTriangle, 1e6))->Name("NextStep/avr446_1_mhz");
 BENCHMARK_CAPTURE(reference, fast, Avr446Integer(kTriangle, 16e6))->Name("NextStep/avr446_16_mhz");
 
-/// Nothing but the root and the division of each step.
+/// The minimum of any method: the root and the division for each step.
 void bareSqrt(benchmark::State& state) {
   for (auto round : state) {
     double sum = 0.0;

@@ -9,7 +9,7 @@
 
 #include "support/paced_run.h"
 
-// The engine against the steady clock, on lines that cost nothing: how late its edges are.
+// Runs the engine against the steady clock, on free lines, and measures how late its edges are.
 
 namespace stepdriver::bench {
 namespace {

@@ -6,7 +6,7 @@
 #include "motion/step_finder.h"
 #include "support/allocations.h"
 
-// What planning a move costs, in time and in memory.
+// Measures the time and memory that planning a move takes.
 
 namespace stepdriver::bench {
 namespace {
@@ -34,10 +34,10 @@ BENCHMARK_CAPTURE(plan, tm, kMoving, kTrapezoid)->Name("Plan/trapezoid_moving");
 BENCHMARK_CAPTURE(plan, sm, kMoving, kSCurve)->Name("Plan/s_curve_moving");
 BENCHMARK_CAPTURE(plan, sl, kLeaving, kSCurve)->Name("Plan/s_curve_turning");
 
-/// What a plan leaves behind: its pieces, and nothing for each step.
+/// The memory that a plan takes: its pieces, and nothing for each step.
 struct Memory {
   Allocations plan;
-  Allocations steps;  ///< of finding the first steps
+  Allocations steps;  ///< finding the first steps
 };
 
 Memory memoryOf(std::int64_t target, const MotionLimits& limits) {
@@ -55,7 +55,7 @@ Memory memoryOf(std::int64_t target, const MotionLimits& limits) {
 
 void moveMemory(benchmark::State& state, const MotionLimits& limits) {
   const std::int64_t target = state.range(0);
-  // The same phases as a move of 10 steps, whatever the length: the motion never reaches a limit.
+  // The same phases as a move of 10 steps, at any length: the motion never reaches a limit.
   const Memory shortest = memoryOf(10, limits);
   Memory memory;
   for (auto round : state) memory = memoryOf(target, limits);

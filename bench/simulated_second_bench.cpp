@@ -6,8 +6,8 @@
 
 #include "support/bench.h"
 
-// The whole way of a move, from the request to the simulated carriage, on the virtual clock: how
-// much faster than the wall's time goes.
+// The whole way of a move, from the request to the simulated carriage, on the virtual clock:
+// measures how much faster than real time it runs.
 
 namespace stepdriver::bench {
 namespace {
@@ -26,7 +26,7 @@ config::AxisConfig fastAxis(std::int64_t index) {
   return config;
 }
 
-/// Each axis goes there and back; items are simulated seconds.
+/// Each axis moves forward and back; items are simulated seconds.
 void simulatedSeconds(benchmark::State& state) {
   std::vector<config::AxisConfig> axes;
   for (std::int64_t i = 0; i < state.range(0); ++i) axes.push_back(fastAxis(i));

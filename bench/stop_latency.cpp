@@ -14,8 +14,8 @@
 
 #include "support/bench.h"
 
-// How long a stop takes while two others prepare long trajectories: from the call of the machine to
-// its return, which is all that the node's handler does.
+// Measures how long a stop takes while two clients prepare long trajectories: from the call of the
+// machine to its return, which is all that the node's handler does.
 
 namespace stepdriver::bench {
 namespace {
@@ -105,7 +105,7 @@ class Preparing {
           try {
             machine.followTrajectory(request);
           } catch (const std::exception& error) {
-            // It was stopped, or the machine is at fault just now.
+            // It was stopped, or the machine is at fault at the moment.
             std::this_thread::yield();
           }
           ++prepared_;
@@ -128,7 +128,8 @@ class Preparing {
   std::vector<std::thread> threads_{2};
 };
 
-/// @param call what is measured. @param after is called after each, and not measured.
+/// @param call the measured call.
+/// @param after is called after each measurement, and isn't measured.
 Latency measure(const Options& options, const std::function<void(machine::Machine&)>& call,
                 const std::function<void(machine::Machine&)>& after) {
   const auto axes = threeAxes();
@@ -141,7 +142,7 @@ Latency measure(const Options& options, const std::function<void(machine::Machin
   const Preparing preparing(machine, request);
   const auto begin = SteadyTime::now();
   for (int i = 0; i < options.calls && (i == 0 || secondsSince(begin) < options.seconds); ++i) {
-    // Somewhere in a preparation.
+    // At a random time of a preparation.
     std::this_thread::sleep_for(std::chrono::milliseconds(5 + i % 7));
     const auto called = SteadyTime::now();
     call(machine);

@@ -9,8 +9,8 @@
 #include "machine/disposer.h"
 #include "support/allocations.h"
 
-// What a long trajectory costs: to prepare, in the thread of the one who wants it; and to join, to
-// hold, to resume and to run at another speed, while the machine waits for that.
+// Measures long trajectories: preparing one, in the client's thread; and joining, holding, resuming
+// and running one at another speed, while the machine waits for that.
 
 namespace stepdriver::bench {
 namespace {
@@ -45,8 +45,8 @@ std::vector<PathAxis> axesOf(std::size_t count, double backlash) {
   return axes;
 }
 
-/// Each axis swings, as the third power of a sine, which begins and ends at rest; the second and
-/// the third one more slowly.
+/// Each axis swings like the third power of a sine, which begins and ends at rest; the second and
+/// third axes are slower.
 std::vector<TrajectoryPoint> pointsFor(std::size_t axes, int count) {
   const double pi = std::acos(-1.0);
   const double duration = kPointEvery * count;
@@ -107,7 +107,7 @@ class UnderWay {
   std::shared_ptr<const SharedPath> join() const {
     return PreparedTrajectory::join(trajectory_, starts_);
   }
-  /// All three axes along a path that continues at rate 1 from somewhere.
+  /// All three axes along a path that continues at rate 1 from a given place.
   template <typename Plan>
   void plan(benchmark::State& state, double rate, const Plan& plan) const {
     constexpr double kPlaces[] = {1234.5671, 1235.1113, 1236.0071, 1500.9};
@@ -157,7 +157,7 @@ BENCHMARK(speedOverride)->Name("Trajectory/override");
 BENCHMARK(hold)->Name("Trajectory/hold");
 BENCHMARK(resume)->Name("Trajectory/resume");
 
-/// What is still in use after the last user of a trajectory is done with it.
+/// Memory that is still in use after the last user of a trajectory has released it.
 void memory(benchmark::State& state) {
   const std::int64_t before = allocatedNow();
   std::int64_t used = 0;

@@ -11,13 +11,14 @@
 #include <string>
 #include <vector>
 
-// When joint_states of several nodes are heard first, and how often they come then.
-// scripts/two_hosts.sh calls it:
+// Measures when the joint_states of several nodes are first heard, and at what rate they come
+// afterwards. scripts/two_hosts.sh calls it:
 //
 //   node_listener SECONDS TOPIC...
 //
-// Says "listening"; then, when it has heard each for SECONDS, a line for each: the topic, the time
-// of the first message, ns since 1970, and the rate, Hz. Exit code 1 if one isn't heard.
+// Prints "listening". After it has heard each topic for SECONDS, it prints a line for each: the
+// topic, the time of its first message in ns since 1970, and its rate in Hz. Exit code 1 if a topic
+// isn't heard.
 
 namespace {
 

@@ -28,17 +28,18 @@ namespace trajectory_messages = control_msgs;
 namespace trajectory_messages = stepdriver;
 #endif
 
-// What the node costs: how long its start and a service call take, and what it uses at rest.
-// scripts/node_bench.sh starts a master, sets the node's parameters and calls it:
+// Measures how long the node's start and a service call take, and what the node uses at rest.
+// scripts/node_bench.sh starts a master, sets the node's parameters and calls this program:
 //
 //   node_bench stepdriver_node AXES OUT.JSON
-//   node_bench --serve AXES                    a node of roscpp's that does nothing else: an empty
-//                                              service, and joint_states of as many axes at 50 Hz
 //   node_bench --preparing stepdriver_node OUT.JSON [SECONDS POINTS]
-//                                              how long a stop and an emergency stop take of a node
-//                                              with three axes while it prepares trajectories
-//   node_bench --send NUMBER POINTS            a client that sends it trajectories, one after
-//   another
+//
+// The second form measures how long a stop and an emergency stop take while a node with three axes
+// prepares trajectories. The program starts itself in two other forms:
+//
+//   node_bench --serve AXES           a plain roscpp node for comparison: an empty service, and
+//                                     joint_states of that many axes at 50 Hz
+//   node_bench --send NUMBER POINTS   a client that sends trajectories, one after another
 
 namespace {
 
@@ -48,7 +49,7 @@ double secondsSince(SteadyTime::time_point begin) {
   return std::chrono::duration<double>(SteadyTime::now() - begin).count();
 }
 
-/// A program that is killed with this.
+/// A program that is killed together with this one.
 class Child {
  public:
   explicit Child(std::vector<std::string> arguments) : id_(fork()) {
@@ -76,7 +77,7 @@ class Child {
   pid_t id_;
 };
 
-/// [s] of a processor that a process has used.
+/// [s] Processor time that a process has used.
 double processorTime(pid_t process) {
   clockid_t clock{};
   timespec time{};
@@ -86,7 +87,7 @@ double processorTime(pid_t process) {
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) * 1e-9;
 }
 
-/// [MB] that a process has in memory.
+/// [MB] Memory of a process.
 double residentMemory(pid_t process) {
   std::ifstream file("/proc/" + std::to_string(process) + "/status");
   std::string word;
@@ -107,7 +108,8 @@ double callTime(ros::ServiceClient& client, double position) {
   return secondsSince(begin) * 1e6;
 }
 
-/// Takes the calls without an answer out. @return how many they were.
+/// Removes the calls without an answer.
+/// @return how many there were.
 int removeUnanswered(std::vector<double>& samples) {
   const auto answered =
       std::remove_if(samples.begin(), samples.end(), [](double t) { return t < 0.0; });
@@ -130,8 +132,8 @@ struct CallTimes {
   int empty_unanswered = 0;
 };
 
-/// Calls take turns, so that noise meets both. The target is a new one each time, so that each call
-/// plans a motion, from the middle of the last one.
+/// Calls take turns, so that noise affects both services. Each call has a new target, so it plans a
+/// motion, from the middle of the previous one.
 CallTimes measureCalls(ros::NodeHandle& handle, bool persistent, double way) {
   constexpr int kCalls = 800;
   auto node = handle.serviceClient<stepdriver::MoveTo>("/stepdriver/a0/move_to", persistent);
@@ -140,7 +142,7 @@ CallTimes measureCalls(ros::NodeHandle& handle, bool persistent, double way) {
   std::vector<double> empty_times;
   for (int i = 0; i < kCalls; ++i) {
     const double position = i % 2 == 0 ? way : 0.0;
-    // One that got no answer has lost its connection.
+    // A call without an answer has lost its connection.
     if (persistent && !node.isValid()) {
       node = handle.serviceClient<stepdriver::MoveTo>("/stepdriver/a0/move_to", true);
     }
@@ -185,7 +187,7 @@ struct Idle {
   double rate = 0.0;  ///< [Hz] of the node's joint_states
 };
 
-/// Both at once, so that noise meets both.
+/// Both processes at once, so that noise affects both.
 Idle measureIdle(pid_t node, pid_t empty, const std::atomic<int>& states) {
   constexpr double kIdle = 10.0;
   ros::WallDuration(3.0).sleep();
@@ -199,7 +201,7 @@ Idle measureIdle(pid_t node, pid_t empty, const std::atomic<int>& states) {
           100.0 * (processorTime(empty) - empty_before) / idle, (states - states_before) / idle};
 }
 
-/// A slow wave of three axes, a point each 10 ms, that begins and ends at rest.
+/// A slow wave of three axes, with a point every 10 ms, that begins and ends at rest.
 trajectory_messages::FollowJointTrajectoryActionGoal longGoal(int points) {
   constexpr double kPeriod = 0.01;     // [s]
   constexpr double kAmplitude = 0.01;  // [m]
@@ -224,7 +226,7 @@ trajectory_messages::FollowJointTrajectoryActionGoal longGoal(int points) {
   return goal;
 }
 
-/// The next goal goes out when the last one has its result.
+/// The next goal is sent when the last one has its result.
 int sendTrajectories(int argc, char** argv, const std::string& number, int points) {
   ros::init(argc, argv, "sender_" + number);
   ros::NodeHandle handle("/stepdriver/follow_joint_trajectory");
@@ -249,7 +251,7 @@ int sendTrajectories(int argc, char** argv, const std::string& number, int point
   return 0;
 }
 
-/// [ms] Of calls of a service with no request, for as long as it takes to make enough of them.
+/// [ms] Calls of a service without a request, until there are enough of them.
 std::vector<double> triggerTimes(ros::NodeHandle& handle, const std::string& service,
                                  const std::string& after, double seconds) {
   constexpr std::size_t kCalls = 1000;
@@ -290,7 +292,7 @@ int measurePreparing(const std::string& self, const std::string& program, const 
   spinner.start();
   const Child first({self, "--send", "1", points});
   const Child second({self, "--send", "2", points});
-  // One of them is under way when a stop ends it.
+  // When a stop ends the goals, one of them is under way.
   const auto begin = SteadyTime::now();
   auto stop = handle.serviceClient<std_srvs::Trigger>("/stepdriver/stop", true);
   for (std_srvs::Trigger call; results == 0; ros::WallDuration(0.1).sleep()) {
@@ -335,8 +337,8 @@ int measure(const std::string& self, const std::string& program, int axes, const
     throw std::runtime_error("the empty service doesn't come up");
   }
   const Idle idle = measureIdle(node.id(), empty.id(), states);
-  // A step there and back leaves the processor to the calls; a long way, with 8000 steps/s on the
-  // simulated rig, doesn't.
+  // A step forward and back leaves the processor to the calls; a long move, with 8000 steps/s on
+  // the simulated rig, doesn't.
   constexpr double kStep = 12.5e-6;
   constexpr double kLong = 0.1;
   const CallTimes calls = measureCalls(handle, false, kStep);

@@ -4,7 +4,8 @@
 
 namespace stepdriver::bench {
 
-/// What this program has taken from the heap so far. A program that asks counts every operator new.
+/// The memory that this program has allocated so far. A program that calls this counts every
+/// operator new.
 struct Allocations {
   std::int64_t count = 0;
   std::int64_t bytes = 0;
@@ -12,7 +13,7 @@ struct Allocations {
 
 Allocations allocations();
 
-/// [bytes] That are in use.
+/// [bytes] Memory in use.
 std::int64_t allocatedNow();
 
 inline Allocations operator-(const Allocations& a, const Allocations& b) {

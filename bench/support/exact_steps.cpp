@@ -31,7 +31,7 @@ long double ExactMotion::crossing(long double line) {
     return phase.positionAt(phase.duration) > wanted;
   });
   const Phase& phase = *after;
-  // Halving alone, to the last bit: slow and beyond doubt.
+  // Only bisection, to the last bit: slow, but beyond doubt.
   long double low = 0.0L;
   long double high = phase.duration;
   while (true) {

@@ -5,24 +5,25 @@
 
 namespace stepdriver::bench {
 
-/// A motion in textbook form, in long doubles, made without any code of the core: phases of a
-/// constant jerk, one after the other.
+/// A motion in textbook form, in long doubles, independent of all code of the core: phases of
+/// constant jerk, one after another.
 class ExactMotion {
  public:
   explicit ExactMotion(long double scale = 1.0L) : scale_(scale) {}
 
-  /// Goes on from where the last phase ended.
+  /// Appends a phase, which begins where the last phase ended.
   void add(long double duration, long double acceleration, long double jerk);
-  /// Before the first add().
+  /// Call before the first add().
   void startAt(long double velocity) { end_.velocity = velocity; }
 
-  /// When the curve crosses `line` going up [s]; the speed is not negative before that.
+  /// The time at which the curve crosses `line` going up [s]; the speed is not negative before
+  /// that.
   long double crossing(long double line);
 
-  /// From rest to rest with separate ramps; the cruise is long enough to be there, or 0 long.
+  /// From rest to rest with separate ramps; the cruise is long enough to exist, or has length 0.
   static ExactMotion trapezoid(long double way, long double speed, long double acceleration,
                                long double deceleration);
-  /// The same with a jerk limit, with acceleration and deceleration alike, all seven phases there.
+  /// The same with a jerk limit, with equal acceleration and deceleration, and all seven phases.
   static ExactMotion sCurve(long double way, long double speed, long double acceleration,
                             long double jerk);
   /// Scales positions: the share of one axis in a line.
@@ -46,13 +47,13 @@ class ExactMotion {
   long double scale_;
 };
 
-/// How far step times are from the exact ones [ns].
+/// Differences of step times from the exact ones [ns].
 struct StepErrors {
   double worst = 0.0;
   double rms = 0.0;
 };
 
-/// Collects them.
+/// Adds a difference.
 class ErrorMeter {
  public:
   void add(std::int64_t time_ns, long double exact_s);

@@ -10,7 +10,7 @@
 
 namespace stepdriver::bench {
 
-/// Lines that cost nothing: they count what is written, and inputs read low.
+/// Lines that take no time: they count what is written, and inputs read low.
 class FreeLines : public gpio::Lines {
  public:
   int write(const gpio::LineWrite* /*writes*/, std::size_t count) noexcept override {
@@ -34,7 +34,7 @@ class FreeLines : public gpio::Lines {
   const std::string name_ = "a line that costs nothing";
 };
 
-/// A clock that costs nothing: a wait is over at once, at its exact time.
+/// A clock that takes no time: each wait ends at once, at its exact time.
 class FreeClock : public pulse::Clock {
  public:
   pulse::Nanoseconds now() override { return now_; }

@@ -29,7 +29,7 @@ using pulse::Nanoseconds;
 
 constexpr Nanoseconds kStepTime = 1000;               // an A4988's, high and low
 constexpr Nanoseconds kBegin = 20'000'000;            // from now
-constexpr Nanoseconds kMaxLateness = 60'000'000'000;  // a late edge is a figure here, not a fault
+constexpr Nanoseconds kMaxLateness = 60'000'000'000;  // a late edge is a result here, not a fault
 
 // A write of a STEP line: when, and what the timeline was slid by then.
 struct Edge {
@@ -38,8 +38,8 @@ struct Edge {
   bool level;
 };
 
-/// Remembers the edges of the STEP lines; costs nothing but the reading of the clock. STEP of axis
-/// i is output 2 i, DIR the one after it.
+/// Remembers the edges of the STEP lines; takes only the time for reading the clock. STEP of axis i
+/// is output 2 i, DIR the one after it.
 class PacedLines : public FreeLines {
  public:
   PacedLines(int axes, std::size_t edges_of_each) : edges_of_(static_cast<std::size_t>(axes)) {
@@ -51,7 +51,7 @@ class PacedLines : public FreeLines {
     for (std::size_t i = 0; i < count; ++i) {
       if (lines[i].output % 2 != 0) continue;
       auto& kept = edges_of_[static_cast<std::size_t>(lines[i].output / 2)];
-      // Never more than was reserved: the pulse thread doesn't allocate.
+      // Never more than was reserved, because the pulse thread must not allocate memory.
       if (kept.size() < kept.capacity()) {
         kept.push_back({now, engine_->state().slipped, lines[i].level});
       }
@@ -102,7 +102,8 @@ Plan planned(Nanoseconds begin, int axes, double rate, double seconds) {
   return plan;
 }
 
-// If the machine stalls for so long that the engine has the order too late, it is made again.
+// If the machine stalls so long that the order reaches the engine too late, the order is made
+// again.
 Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rate, double seconds) {
   Nanoseconds ahead = kBegin;
   for (std::uint64_t serial = 1;; ++serial, ahead *= 2) {
@@ -117,7 +118,7 @@ Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rat
     command.follows = follows.data();
     command.follow_count = follows.size();
     while (!engine.post(command)) std::this_thread::yield();
-    // Of the channels of an order the first one is told last.
+    // The channel of an order that is reported last.
     while (engine.channel(0).taken != serial) {
       std::this_thread::sleep_for(std::chrono::microseconds(100));
     }
@@ -125,7 +126,7 @@ Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rat
   }
 }
 
-// Of one axis: each edge against the plan and against the edge before it.
+// For one axis: compares each edge with the plan, and with the edge before it.
 void take(PacedFigures& figures, const std::vector<Edge>& edges, const motion::Profile& profile) {
   motion::StepFinder finder(profile, 0);
   motion::Step step;

@@ -8,13 +8,14 @@
 
 namespace stepdriver::bench {
 
-/// What edges against the steady clock were like.
+/// The result of a run against the steady clock.
 struct PacedFigures {
-  std::size_t edges = 0;                     ///< active STEP edges, or wake-ups
-  std::vector<pulse::Nanoseconds> lateness;  ///< of each, against the timeline of then; sorted
-  std::uint64_t slips = 0;                   ///< times that the timeline was slid
-  pulse::Nanoseconds slipped = 0;            ///< by how much altogether
-  std::size_t too_short = 0;                 ///< pulses and pauses shorter than the chip's time
+  std::size_t edges = 0;  ///< active STEP edges, or wake-ups
+  std::vector<pulse::Nanoseconds>
+      lateness;                    ///< of each edge, against the timeline at that time; sorted
+  std::uint64_t slips = 0;         ///< number of times that the timeline slid
+  pulse::Nanoseconds slipped = 0;  ///< total time by which it slid
+  std::size_t too_short = 0;       ///< pulses and pauses shorter than the chip's time
   std::size_t too_close = 0;  ///< steps closer than pulse::PulseEngine::kClosest of their interval
   double cpu = 0.0;           ///< of one core, of the whole process
   int scheduler_error = -1;   ///< from pulse::RealtimeRights
@@ -22,8 +23,8 @@ struct PacedFigures {
   pulse::Nanoseconds percentile(double part) const;
 };
 
-/// Drives axes on lines that cost nothing, each at a rate of its own, a hundredth below that of the
-/// axis before it, so that their steps come together now and then and apart else.
+/// Drives axes on free lines. The rate of each axis is a hundredth below that of the axis before
+/// it, so their steps coincide only now and then.
 ///
 /// @param rate of the first axis [steps/s]
 PacedFigures runPaced(int axes, double rate, double seconds);
@@ -32,7 +33,8 @@ PacedFigures runPaced(int axes, double rate, double seconds);
 /// else in it.
 PacedFigures runNanosleep(double rate, double seconds);
 
-/// Keeps all cores busy for as long as it lives, with a process of ordinary priority for each.
+/// Keeps all cores busy for as long as this object exists, with one process of ordinary priority
+/// per core.
 class Load {
  public:
   Load();

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstdint>
 
-/// How others find the time of the next step of a ramp from rest: to measure the step finder
-/// against them in one run. Each gives the times of the steps of a triangle, half of them up and
-/// half of them down, and has the face that StepFinder has.
+/// Other methods for the time of the next step of a ramp from rest, to compare the step finder with
+/// them in one run. Each gives the times of the steps of a triangle, half of them up and half of
+/// them down, with the interface of StepFinder.
 namespace stepdriver::bench {
 
 struct Triangle {
@@ -74,8 +74,8 @@ class Avr446Float {
   double time_ = 0.0;  // ns
 };
 
-/// Torricelli's law for each interval: the speed after i steps is sqrt(2 a i), its reciprocal the
-/// interval, as simple sketches do it.
+/// Torricelli's law for each interval: the speed after i steps is sqrt(2 a i), and its reciprocal
+/// is the interval, as in simple sketches.
 class PlainSqrt {
  public:
   explicit PlainSqrt(const Triangle& triangle)

@@ -42,7 +42,7 @@ TEST_F(Configuration, ReadsEveryFileThatIsShipped) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(STEPDRIVER_CONFIGS)) {
     if (entry.path().extension() != ".yaml") continue;
-    if (entry.path().filename() == "joystick.yaml") continue;  // of another node
+    if (entry.path().filename() == "joystick.yaml") continue;  // for another node
     SCOPED_TRACE(entry.path());
     const auto config = readConfiguration(entry.path().string(), BackendChoice::kAsInTheFile);
     EXPECT_FALSE(config.axes.empty());

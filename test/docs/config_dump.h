@@ -7,7 +7,7 @@
 
 namespace stepdriver::docs {
 
-/// All that a configuration says, for comparison.
+/// Every value of a configuration, for comparison.
 std::string dump(const ros_node::NodeConfig& config);
 std::string dump(const joystick::JoystickConfig& config);
 

@@ -1,4 +1,4 @@
-// docs/parameters.md against the readers of configurations, in both directions.
+// Compares docs/parameters.md with the readers of configurations, in both directions.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -24,7 +24,7 @@ struct Reading {
   std::vector<ConfigIssue> issues;
 };
 
-/// A node whose parameters are on the page, with a configuration that has all of its maps.
+/// A node whose parameters are on the page, with a configuration that contains all of its maps.
 struct Node {
   const char* name;  ///< for messages
   bool rotary;
@@ -57,7 +57,7 @@ bool isOfLinearAxes(const std::string& key) {
          key.find("wheel_diameter_mm") != std::string::npos;
 }
 
-/// What a key of a linear axis is called on a rotary one.
+/// The name of a linear axis's key on a rotary axis.
 std::string rotaryKey(const std::string& key) {
   if (isOfLinearAxes(key)) return key;
   return replaced(replaced(key, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
@@ -93,7 +93,7 @@ Node joystickNode() {
           yaml::parse("axes: {x: {joystick_axis: 0, max_speed_mm_s: 9.0}}", "base")};
 }
 
-/// A copy with a value at a path; none takes what is there away.
+/// A copy with a value at a path; without a value, the entry at the path is removed.
 ConfigValue with(const ConfigValue& tree, const std::string& path, const ConfigValue* value) {
   ConfigValue::Map map =
       tree.as<ConfigValue::Map>() ? *tree.as<ConfigValue::Map>() : ConfigValue::Map{};
@@ -160,7 +160,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   return all;
 }
 
-/// What an issue with this key says; none if there is none.
+/// The issue with this key; empty if there is none.
 std::optional<std::string> issueWith(const Reading& reading, const std::string& key) {
   for (const ConfigIssue& issue : reading.issues) {
     if (issue.key == "/" + key) return issue.message;
@@ -168,7 +168,7 @@ std::optional<std::string> issueWith(const Reading& reading, const std::string& 
   return {};
 }
 
-/// The keys that a map takes, as the message about an unknown one has them.
+/// The keys that a map may have, from the message about an unknown key.
 std::set<std::string> knownIn(const Node& node, const std::string& map) {
   const std::string unknown = map + (map.empty() ? "" : "/") + "qqqqqqqqqqqqqqqqqqqq";
   const ConfigValue value(1);
@@ -185,7 +185,7 @@ std::set<std::string> knownIn(const Node& node, const std::string& map) {
   return known;
 }
 
-/// The keys of each map that the page has, and the maps.
+/// The keys of each map on the page, and the maps.
 std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>& parameters) {
   std::map<std::string, std::set<std::string>> maps;
   for (const Parameter& parameter : parameters) {
@@ -199,7 +199,7 @@ std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>
   return maps;
 }
 
-/// What a reader says that a value must be.
+/// The requirement that a reader states for a value.
 std::string wantedWords(const Parameter& parameter) {
   if (parameter.type == "line") return "a line";
   if (parameter.type == "boolean") return "true or false";
@@ -214,14 +214,15 @@ std::string wantedWords(const Parameter& parameter) {
   return noun + (is_adverb ? " " : " of ") + range;
 }
 
-/// In the bases: those have a map of each kind, and their axes are scaled by the first of the ways.
+/// Whether the bases have the key: they have a map of each kind, and their axes are scaled in the
+/// first of the ways.
 bool isRequired(const Parameter& parameter) {
   static const std::set<std::string> words = {"required",  "required with it", "no homing",
                                               "no switch", "no button",        "by the mechanics"};
   return words.count(parameter.fallback) > 0;
 }
 
-/// The default as a value; none if the page has it in words.
+/// The default as a value; no value if the page gives it in words.
 std::optional<ConfigValue> literal(const Parameter& parameter) {
   static const std::set<std::string> words = {"none", "as configured", "host, chips, lines",
                                               "the axis's name"};
@@ -242,7 +243,8 @@ TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
   const std::vector<Parameter> parameters = parametersOf(GetParam());
   for (auto& [map, on_page] : mapsOf(parameters)) {
     std::set<std::string> expected = on_page;
-    if (map == "axes/x") {  // it can be of either kind, and says so if it is given keys of both
+    // An axis can be of either kind, and the message about keys of both kinds says so.
+    if (map == "axes/x") {
       for (const std::string& key : on_page) expected.insert(rotaryKey(key));
       for (const Cells& row : tableRows("docs/parameters.md", "An axis")) {
         if (!GetParam().rotary) break;

@@ -1,4 +1,4 @@
-// The tables of docs/wiring.md against the shipped configurations and the chips' data.
+// Compares the tables of docs/wiring.md with the shipped configurations and the chips' data.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 using config::ConfigValue;
 
-/// A table's column by the first cell of each row, from the rows that have so many.
+/// A column of a table, by the first cell of each row, from the rows with this many cells.
 std::map<std::string, std::string> column(const std::string& heading, std::size_t index,
                                           std::size_t cells) {
   std::map<std::string, std::string> column;
@@ -60,7 +60,7 @@ TEST(WiringPage, HasTheLinesOfTheShippedConfigurations) {
   EXPECT_GE(compared, 25);
 }
 
-/// The first time in a cell [ns]; 0 if it has none.
+/// The first time in a cell [ns]; 0 if it contains none.
 std::int64_t firstTime(const std::string& cell) {
   char* unit = nullptr;
   const double number = std::strtod(cell.c_str(), &unit);

@@ -16,7 +16,7 @@ void expectOrders(const JogOrders& orders, std::optional<double> velocity,
   EXPECT_EQ(orders.enable, enable);
 }
 
-/// One that jogs at 0.1, and was enabled for that at 0.1 s.
+/// A sequence that jogs at 0.1, and was enabled for that at 0.1 s.
 JogSequence jogging(double disable_after) {
   JogSequence sequence = JogSequence::disabling(disable_after);
   sequence.orders(0.1, 0.0);

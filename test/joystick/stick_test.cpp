@@ -9,7 +9,7 @@
 namespace stepdriver::joystick {
 namespace {
 
-constexpr double kRounding = 1e-8;  // of the dead band to a float
+constexpr double kRounding = 1e-8;  // from rounding the dead band to a float
 
 Stick stick() {
   Stick stick;
@@ -24,7 +24,7 @@ TEST(Stick, GivesNothingInTheDeadBand) {
   }
   for (const float dead_band : {0.05F, 0.1F, 0.15F, 0.2F, 0.3F}) {
     Stick shape = stick();
-    shape.dead_band = std::stod(std::to_string(dead_band));  // as in a file
+    shape.dead_band = std::stod(std::to_string(dead_band));  // as in a configuration file
     EXPECT_EQ(velocityOf(shape, dead_band), 0.0) << dead_band << ", as a joystick says it";
   }
 }

@@ -33,7 +33,7 @@ constexpr const char kUsage[] =
     "Exit status: 0 where all is right; 1 for any violation and for another position; 2 where it\n"
     "couldn't be checked.\n";
 
-/// An axis from the arguments.
+/// Reads an axis from the arguments.
 struct Asked {
   std::string name;
   std::string driver;

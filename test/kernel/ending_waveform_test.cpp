@@ -9,7 +9,7 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/pulse/clock.h"
 
-// Moves that end on their way, by a stop, at an endstop, in an emergency.
+// Tests moves that end on their way: by a stop, at an endstop, by an emergency stop.
 
 namespace stepdriver::kernel {
 namespace {
@@ -44,7 +44,7 @@ TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
   EXPECT_LT(seen.position(), kFar);
   EXPECT_EQ(seen.backward(), 0);
   expectAsPlanned(seen.pulses, 0, plannedSteps(0, kFar, limits), cruised);
-  // The ramp down is one of the deceleration or a slower one.
+  // The ramp has the configured deceleration or a lower one.
   const auto ramp =
       static_cast<std::size_t>(limits.max_speed * limits.max_speed / (2.0 * limits.deceleration));
   ASSERT_GE(seen.pulses.size(), cruised + ramp);
@@ -78,7 +78,7 @@ TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
   expectAsPlanned(seen.pulses, 0, plannedSteps(0, kFar, limitsOf(config)), last);
   EXPECT_LE(last, pulsesBefore(seen, pressed_ns) + 1) << "one may have been on its way";
 
-  // Each step was preceded by a read of the switch of its own, which wasn't active.
+  // Before each step its switch was read, and wasn't active.
   const unsigned endstop = trace->line("board-1:3");
   std::size_t next = 0;
   bool free = false;
@@ -94,7 +94,7 @@ TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
 
 TEST_F(Ending, ByAnEmergencyStopFinishesThePulse) {
   auto config_x = axisAt("x", driver::Model::kTb6600, placeAt("board-0", 0, true));
-  config_x.timing.step_high_ns = 300'000;  // so long that most stops come while a pulse is out
+  config_x.timing.step_high_ns = 300'000;  // so long that most stops come during a pulse
   const std::vector<config::AxisConfig> axes = {
       config_x, axisAt("y", driver::Model::kA4988, placeAt("board-1", 0))};
   KernelBench bench(axes);

@@ -1,12 +1,14 @@
-// The first process of the test kernel; run.sh boots it. It mounts what programs expect to find,
-// runs the three steps that run.sh left in a folder, and turns the machine off:
+// The first process of the test kernel; run.sh boots it. It mounts what programs expect, runs the
+// three steps that run.sh left in a folder, and turns the machine off. The folder has these files:
 //
-//   before bash script: makes the chips. If it fails, nothing else runs command the arguments of
-//   the command, each ended by a zero byte after bash script: runs after the command, whatever
-//   became of it environment variables for all three, each ended by a zero byte directory the
-//   working directory for all three
+// - `before`: a bash script that makes the chips. If it fails, nothing else runs.
+// - `command`: the arguments of the command, each ended by a zero byte.
+// - `after`: a bash script that runs after the command, whatever its result.
+// - `environment`: variables for all three, each ended by a zero byte.
+// - `directory`: the working directory for all three.
 //
-// The verdict goes to the file `status` there: "exit N", as a shell counts, or "error TEXT".
+// The result goes to the file `status` in that folder: "exit N", as a shell counts, or "error
+// TEXT".
 #include <fcntl.h>
 #include <linux/random.h>
 #include <net/if.h>
@@ -79,15 +81,15 @@ void mountAll() {
     mkdir(mount.where, 0755);
     if (::mount(mount.type, mount.where, mount.type, 0, mount.options) != 0) fail(mount.where);
   }
-  // Bash's process substitution and many a script use these; udev makes them elsewhere.
+  // Bash's process substitution and many scripts use these; normally udev makes them.
   for (const auto& [target, name] :
        {std::pair{"/proc/self/fd", "/dev/fd"}, std::pair{"/proc/self/fd/0", "/dev/stdin"},
         std::pair{"/proc/self/fd/1", "/dev/stdout"}, std::pair{"/proc/self/fd/2", "/dev/stderr"}})
     if (symlink(target, name) != 0) fail(name);
 }
 
-// This kernel finds no randomness by itself, and getrandom() would block for ever. The same bytes
-// every time: nothing here is secret, and one run is like the next.
+// This kernel has no source of randomness, so getrandom() would block for ever. The bytes are
+// always the same: nothing here is secret, and all runs are alike.
 void feedEntropy() {
   constexpr int kBytes = 256;
   alignas(rand_pool_info) std::array<char, sizeof(rand_pool_info) + kBytes> space{};
@@ -111,7 +113,7 @@ void bringLoopbackUp() {
 }
 
 /// Copies what is written to its pipe to a terminal that is a pipe on the host. Programs see a
-/// pipe, so they write as they do in any script: no colours, no carriage returns.
+/// pipe, so they write as in any script: no colours, no carriage returns.
 class Output {
  public:
   explicit Output(const char* terminal) {
@@ -128,7 +130,7 @@ class Output {
   Output(const Output&) = delete;
   Output& operator=(const Output&) = delete;
 
-  /// Returns when all has arrived. Nobody else may hold the pipe then.
+  /// Returns when everything has arrived. At that time no other process may have the pipe open.
   ~Output() {
     close(write_end_);
     copier_.join();
@@ -165,8 +167,8 @@ class Steps {
         output_(output),
         errors_(errors) {}
 
-  /// @return the exit status, 128 more than the signal that ended it, 126 or 127 if the program
-  ///   can't be run or doesn't exist.
+  /// @return the exit status; 128 + the signal's number if a signal ended it; 126 or 127 if the
+  ///   program can't be run or doesn't exist.
   int run(std::vector<std::string> words) {
     const std::vector<char*> arguments = pointersTo(words);
     const std::vector<char*> variables = pointersTo(environment_);
@@ -176,7 +178,7 @@ class Steps {
       become(arguments, variables);
       _exit(errno == ENOENT ? 127 : 126);
     }
-    // Also collects the orphans that end meanwhile.
+    // Also collects orphans that end meanwhile.
     for (;;) {
       int status = 0;
       const pid_t ended = waitpid(-1, &status, 0);
@@ -223,7 +225,7 @@ std::string runSteps(const std::string& work) {
   } catch (const std::exception& error) {
     verdict = std::string("error ") + error.what();
   }
-  // What the command left running ends here, and lets go of the pipes.
+  // Ends the processes that the command left running; this releases the pipes.
   kill(-1, SIGKILL);
   while (waitpid(-1, nullptr, 0) > 0) {
   }

@@ -16,23 +16,24 @@
 #include "support/gpio_sim.h"
 #include "waveform.h"
 
-/// What tests of whole machines on the test kernel share.
+/// Shared by the tests of whole machines on the test kernel.
 namespace stepdriver::kernel {
 
 /// Whether this kernel's time is virtual: `run.sh --time-travel`.
 bool timeTravels();
 
-/// Records the kernel's gpio tracepoints from its making on; there can be one at a time.
+/// Records the kernel's gpio tracepoints from now on. Only one recording is possible at a time.
 class Recording {
  public:
   Recording();
 
-  /// Ends it. If the environment names a folder in STEPDRIVER_TRACES, it is kept there.
-  /// @param name of its file there.
+  /// Ends the recording. If the environment variable STEPDRIVER_TRACES names a folder, the trace is
+  /// kept there.
+  /// @param name of the file in that folder.
   KernelTrace stop(const std::string& name);
 };
 
-/// Where an axis is: lines as label:offset, whose level the wiring may invert.
+/// The wiring of an axis: lines as label:offset, which may invert the level.
 struct Place {
   config::Pin step, dir, enable;
 };
@@ -41,8 +42,8 @@ struct Place {
 /// start, and without switches.
 config::AxisConfig axisAt(const std::string& name, driver::Model model, const Place& place);
 
-/// A machine with a thread for its pulses, on the lines of two chips of the kernel's gpio-sim,
-/// board-0 and board-1. A pulse that is late, on a machine that stalls, is never a fault.
+/// A machine with a pulse thread on the lines of two chips of the kernel's gpio-sim, board-0 and
+/// board-1. A late pulse is never a fault here, because the machine may stall.
 class KernelBench {
  public:
   /// @param guard of the clock (pulse::SteadyClock).
@@ -55,10 +56,10 @@ class KernelBench {
   /// The position that the axis reports [microsteps].
   std::int64_t count(const std::string& name);
 
-  /// Starts a move by a number of microsteps.
+  /// Starts a relative move, in microsteps.
   axis::Move start(const std::string& name, std::int64_t steps);
 
-  /// Returns when the axis stands so many microsteps from 0, in either direction, or at rest.
+  /// Returns when the axis is this many microsteps from 0, in either direction, or at rest.
   void awaitCount(const std::string& name, std::int64_t steps);
 
   /// @return whether the line gets this level within ten seconds.
@@ -69,7 +70,7 @@ class KernelBench {
   machine::EngineFigures figures() const { return machine_->figures(); }
 
   /// Shuts the machine down and releases its lines.
-  /// @return what the kernel did to them since they were requested.
+  /// @return what the kernel did to the lines since they were requested.
   KernelTrace finish(const std::string& name);
 
  private:
@@ -80,7 +81,7 @@ class KernelBench {
   std::unique_ptr<machine::Machine> machine_;
 };
 
-/// What axisAt() is planned with, in microsteps.
+/// The limits of axisAt(), in microsteps.
 motion::MotionLimits limitsOf(const config::AxisConfig& config);
 
 /// The steps of a move, in nanoseconds after its start.

@@ -21,7 +21,7 @@ std::optional<Number> numberOf(const std::string& text) {
   return number;
 }
 
-// "12.345678" or "12.345678901", with the colon that follows taken off.
+// Reads "12.345678" or "12.345678901", without the colon that follows.
 std::optional<std::int64_t> nanosecondsOf(const std::string& text) {
   const std::size_t point = text.find('.');
   if (point == std::string::npos) return std::nullopt;
@@ -61,7 +61,7 @@ KernelTrace KernelTrace::fromFile(const std::string& path) {
 }
 
 void KernelTrace::readChip(const std::string& text) {
-  // A label may have blanks in it, the two numbers after it haven't.
+  // A label may contain blanks, but the two numbers after it don't.
   const std::string words = text.substr(std::string("# chip ").size());
   const std::size_t last = words.rfind(' ');
   const std::size_t middle = last == 0 ? std::string::npos : words.rfind(' ', last - 1);
@@ -73,8 +73,8 @@ void KernelTrace::readChip(const std::string& text) {
   chips_[words.substr(0, middle)] = {*base, *lines};
 }
 
-// "  program-37  [000] .....  1.717255808: gpio_value: 497 set 1": the program's name may have
-// blanks in it, so it is read from the event's name on, and back.
+// In "  program-37  [000] .....  1.717255808: gpio_value: 497 set 1" the program's name may contain
+// blanks. So the event's name is found first, and the rest is read on both sides of it.
 void KernelTrace::readEvent(const std::string& text) {
   constexpr std::string_view kEvent = ": gpio_value: ";
   const std::size_t event = text.rfind(kEvent);

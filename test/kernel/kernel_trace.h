@@ -11,27 +11,27 @@
 
 namespace stepdriver::kernel {
 
-/// What the kernel did to a line, or read from it: one event gpio_value.
+/// One event gpio_value: the kernel set a line, or read it.
 struct LineEvent {
-  std::int64_t time_ns;  ///< CLOCK_MONOTONIC, just before the chip's own driver is called
+  std::int64_t time_ns;  ///< CLOCK_MONOTONIC, just before the call of the chip's driver
   unsigned line;         ///< base of its chip plus the offset
-  bool level;            ///< physical, also where the line is requested as active low
-  bool read;             ///< an input was read; else an output was written
+  bool level;            ///< physical, even if the line was requested as active low
+  bool read;             ///< true: an input was read; false: an output was written
 };
 
-/// An output that is written the level that it has isn't in here.
+/// Writes that don't change the level of an output aren't in the trace.
 struct LineEdge {
   std::int64_t time_ns;
   bool level;
 };
 
-/// The GPIO events of the kernel's text trace, as gpio_trace.sh writes it, with its nanoseconds, or
-/// as the file `trace` itself is, in microseconds.
+/// The GPIO events of the kernel's text trace: either as gpio_trace.sh writes it, in nanoseconds,
+/// or as the file `trace` has it, in microseconds.
 class KernelTrace {
  public:
   /// @param name of the source, for messages.
-  /// @throw Error for a line that can't be read, for times that go back (another clock than
-  ///   `mono`), and if the kernel says that it dropped events.
+  /// @throw Error if a line can't be read, if the times decrease (another clock than `mono`), or if
+  ///   the kernel says that it dropped events.
   explicit KernelTrace(std::istream& text, const std::string& name = "the trace");
 
   /// @throw Error as above, and if the file can't be read.
@@ -40,17 +40,17 @@ class KernelTrace {
   const std::vector<LineEvent>& events() const { return events_; }
 
   /// @param name a number, or chip:offset with the label of a chip.
-  /// @throw Error if it is neither, or there is no such chip or line.
+  /// @throw Error if it is neither, or if the chip or line doesn't exist.
   unsigned line(const std::string& name) const;
 
-  /// @return the level in the line's first event: for an output the one that it was requested with.
-  ///   None if the line has no event.
+  /// @return the level in the line's first event, which for an output is its initial level; no
+  ///   value if the line has no event.
   std::optional<bool> firstLevel(unsigned line) const;
 
-  /// Changes of the line's level; its first event isn't one.
+  /// Changes of the line's level. Its first event doesn't count as a change.
   std::vector<LineEdge> edges(unsigned line) const;
 
-  /// Times at which the line took this level.
+  /// Times at which the line changed to this level.
   std::vector<std::int64_t> times(unsigned line, bool level) const;
 
  private:
@@ -66,16 +66,16 @@ class KernelTrace {
   std::vector<LineEvent> events_;
 };
 
-/// A pin and the line that it is on.
+/// A pin and its line.
 struct TracedPin {
   sim::TracePin pin;
   unsigned line;
 };
 
-/// Hands the edges of these lines to another trace: sim::VcdTrace writes them to a file,
-/// sim::MemoryTrace keeps them for a test. It begins with the first event of any of the lines; a
-/// line that has none until later has the level of its first event until then.
-/// @throw Error for a line without any event: it is a wrong number, or nothing drove it.
+/// Passes the edges of these lines to another trace: sim::VcdTrace writes them to a file,
+/// sim::MemoryTrace keeps them for a test. It begins with the first event of any of the lines;
+/// until a line's first event, it has the level of that event.
+/// @throw Error if a line has no event: its number is wrong, or nothing drove it.
 void copyTo(sim::PinTrace& trace, const KernelTrace& from, const std::vector<TracedPin>& pins);
 
 }  // namespace stepdriver::kernel

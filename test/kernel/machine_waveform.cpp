@@ -9,7 +9,7 @@
 namespace stepdriver::kernel {
 namespace {
 
-/// What all tests have read.
+/// Summary of everything that the tests have read.
 struct Totals {
   std::size_t edges = 0;
   std::size_t pulses = 0;
@@ -91,7 +91,7 @@ void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
                      const std::vector<motion::Step>& steps, std::size_t count) {
   ASSERT_LE(count, steps.size());
   ASSERT_LE(first + count, pulses.size());
-  std::int64_t timeline = 0;  // the earliest that the plan's time 0 can be, as seen so far
+  std::int64_t timeline = 0;  // the earliest possible time 0 of the plan, as seen so far
   for (std::size_t k = 0; k < count; ++k) {
     const Pulse& pulse = pulses[first + k];
     ASSERT_EQ(pulse.forward, steps[k].direction > 0) << "step " << k;

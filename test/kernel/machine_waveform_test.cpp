@@ -9,7 +9,7 @@
 
 #include "stepdriver_core/axis/axis.h"
 
-// Moves from rest to rest: every pulse goes out, in its direction and in its time.
+// Tests moves from rest to rest: every pulse goes out, in its direction and at its time.
 
 namespace stepdriver::kernel {
 namespace {
@@ -22,10 +22,10 @@ struct Wiring {
   const char* name;
   driver::Model driver;
   Place place;
-  std::optional<driver::Timing> timing = {};  // none: the driver's own
+  std::optional<driver::Timing> timing = {};  // no value: the driver's own
 };
 
-/// So slow that every time that it needs is longer than what comes by itself.
+/// So slow that each required time is longer than the time that passes anyway.
 driver::Timing slowOptos() {
   driver::Timing timing = driver::driverChipOf(driver::Model::kTb6600).timing;
   timing.step_high_ns = 150'000;

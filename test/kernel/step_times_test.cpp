@@ -13,25 +13,27 @@
 #include "support/test_board.h"
 #include "waveform.h"
 
-// The times of steps that go through the real libgpiod to a real kernel's lines, on that kernel's
-// virtual time (`run.sh --time-travel`): there a sleep is exact, calculations take no time, and
-// only reading the clock does. Held against the closed form of the motion, not against the planner.
+// Tests the times of steps that go through the real libgpiod to a real kernel's lines, in that
+// kernel's virtual time (`run.sh --time-travel`). There a sleep is exact and calculations take no
+// time; only reading the clock does. The times are compared with the closed form of the motion, not
+// with the planner.
 
 namespace stepdriver::kernel {
 namespace {
 
-/// What a read of the clock takes there; the kernel reads it for each event of a trace, too.
+/// The duration of a read of the clock on that kernel, which also reads it for each event of a
+/// trace.
 constexpr std::int64_t kClockRead = 256;
 
-/// A pulse may have to wait for one write of another axis before it, with all reads of the clock
-/// around it and an event for each line of its chip.
+/// A pulse may have to wait for one write of another axis. That includes reads of the clock before
+/// and after the write, and an event for each line of its chip.
 constexpr std::int64_t kOtherWrites = 12 * kClockRead;
 
-/// A sleep is exact there, and each read of the clock while spinning is a system call.
+/// On that kernel a sleep is exact, and each read of the clock while spinning is a system call.
 constexpr pulse::Nanoseconds kGuard = 2'000;
 
-/// When step k of a move of n steps from rest to rest is due, in nanoseconds after the start: where
-/// the motion crosses k - 1/2, with the ramps as far as the speed or half of the way.
+/// The time at which step k of a move of n steps from rest to rest is due, in nanoseconds after the
+/// start: the motion crosses k - 1/2 then. The ramps end at full speed, or halfway.
 double dueTime(std::int64_t k, std::int64_t n, double speed, double acceleration) {
   const double way = static_cast<double>(n);
   const double ramp = std::min(speed * speed / (2.0 * acceleration), way / 2.0);
@@ -63,14 +65,16 @@ config::AxisConfig configOf(const std::string& name, const Place& place, const S
   return config;
 }
 
-/// Expects the pulses of these moves. @return how far the worst one was from its time [ns].
+/// Compares the pulses of these moves.
+/// @return the largest difference of a pulse from its time [ns].
 double worstOf(const Waveform& seen, const Moves& moves, const Speed& speed) {
   std::size_t first = 0;
   double worst = 0.0;
   for (const std::int64_t move : moves) {
     const std::int64_t n = std::abs(move);
     if (seen.pulses.size() < first + static_cast<std::size_t>(n)) break;
-    // The start can't be seen from outside: it is the one with which no step comes before its time.
+    // The start time isn't visible from outside. It is the one with which no step comes before its
+    // time.
     double earliest = 1e18;
     double latest = 0.0;
     for (std::int64_t k = 1; k <= n; ++k) {

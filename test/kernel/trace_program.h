@@ -10,16 +10,18 @@
 
 namespace stepdriver::kernel {
 
-/// A program whose first argument is the file of a kernel's trace, and which wants two more at
-/// least.
+/// A program whose first argument is the file of a kernel's trace, and which needs at least two
+/// more arguments.
 struct TraceProgram {
   const char* name;
   const char* usage;
-  /// What it does with all its arguments. @return whether all was right.
+  /// Handles all arguments.
+  /// @return whether all is right.
   std::function<bool(const std::vector<std::string>& arguments, const KernelTrace& trace)> act;
 };
 
-/// Its main(). @return 0 if all was right, 1 if not, 2 if it couldn't be done.
+/// The program's main().
+/// @return 0 if all is right, 1 if not, 2 if the check wasn't possible.
 inline int runTraceProgram(const TraceProgram& program, int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   if (arguments.size() == 1 && (arguments[0] == "--help" || arguments[0] == "-h")) {

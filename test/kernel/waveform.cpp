@@ -13,7 +13,7 @@ void keepShortest(std::optional<std::int64_t>& shortest, std::int64_t time) {
   shortest = std::min(shortest.value_or(time), time);
 }
 
-/// Follows the lines of one axis from event to event.
+/// Follows the lines of one axis, event by event.
 class Reader {
  public:
   explicit Reader(const WiredAxis& axis) : axis_(axis), chip_(driver::driverChipOf(axis.driver)) {}
@@ -36,7 +36,7 @@ class Reader {
   }
 
  private:
-  using Time = std::optional<std::int64_t>;  // none: not yet
+  using Time = std::optional<std::int64_t>;  // no value: not yet
 
   static bool chipLevel(const WiredPin& pin, const LineEvent& event) {
     return event.level != pin.inverted;
@@ -120,13 +120,13 @@ class Reader {
   const WiredAxis& axis_;
   const driver::DriverChip& chip_;
   Waveform waveform_;
-  // Levels are none before the line was requested.
+  // Levels have no value before the line is requested.
   std::optional<bool> active_;
   std::optional<bool> forward_;
   std::optional<bool> enabled_;
   Time rose_;
   Time fell_;
-  Time turned_;  // changed, where dir_set_ is also the request
+  Time turned_;  // time of its last change, without the request, which dir_set_ includes
   Time dir_set_;
   Time enable_set_;
 };

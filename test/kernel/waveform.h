@@ -11,20 +11,20 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/driver/driver_chip.h"
 
-/// The waveform of an axis as the kernel put it out, compared with the requirements of the driver
+/// The waveform of an axis as the kernel sent it, compared with the requirements of the driver
 /// chip.
 ///
 /// The chip needs its times from the end of one write to the beginning of the next. The kernel
-/// stamps a write within it, so what lies between two stamps is never shorter than what was kept:
-/// limits are held to the nanosecond.
+/// takes the time of a write during the write, so the time between two writes is never shorter than
+/// the engine's own: limits are exact to the nanosecond.
 namespace stepdriver::kernel {
 
 struct WiredPin {
-  unsigned line = 0;      ///< as from KernelTrace::line()
-  bool inverted = false;  ///< the wiring inverts the level on its way to the chip
+  unsigned line = 0;      ///< from KernelTrace::line()
+  bool inverted = false;  ///< the wiring inverts the level between line and chip
 };
 
-/// An axis as it is wired, and what it must keep.
+/// The wiring of an axis, and its required times.
 struct WiredAxis {
   driver::Model driver = driver::Model::kA4988;
   driver::Timing timing{};
@@ -33,15 +33,15 @@ struct WiredAxis {
   std::optional<WiredPin> enable;  ///< none: not wired, the motor is always energized
   /// Shortest time from one active STEP edge to the next, as it was planned; 0: any.
   std::int64_t shortest_interval_ns = 0;
-  /// Changes of STEP and DIR whose stamps are this close were made by one write: the kernel stamps
-  /// the lines of a write one after the other. On the test kernel a line takes 256 ns of virtual
-  /// time, or mostly less of real time, and two writes are further apart than this. 0: only those
-  /// with one stamp.
+  /// Changes of STEP and DIR that are this close were made by one write: the kernel takes a time
+  /// for each line of a write, one after another. On the test kernel a line takes 256 ns of virtual
+  /// time, or usually less real time, and two writes are further apart than this. 0: only changes
+  /// at the same time.
   std::int64_t one_write_ns = 1'000;
 };
 
-/// The wiring that an axis is configured with.
-/// @throw Error if the trace doesn't know a line's chip: its pins must be named label:offset.
+/// The wiring of an axis according to its configuration.
+/// @throw Error if the trace doesn't know a line's chip: pins must be named label:offset.
 WiredAxis wiredAxis(const config::AxisConfig& config, const KernelTrace& trace);
 
 enum class Rule {
@@ -49,21 +49,22 @@ enum class Rule {
   kStepLow,
   kDirSetup,
   kDirHold,
-  kOneWrite,    ///< STEP and DIR don't change in one write: its lines may change in any order
-  kEnabled,     ///< no step without ENABLE, or before ENABLE is driven at all
+  kOneWrite,    ///< STEP and DIR don't change in one write, because the lines of a write may change
+                ///< in any order
+  kEnabled,     ///< no step without ENABLE, or before ENABLE is first driven
   kEnableTime,  ///< from ENABLE to the first step
   kInterval,
   kRest,  ///< STEP is inactive when it is requested, and at the end
 };
 
-/// In words, as in reports: `STEP high time`.
+/// The name of the rule in reports, such as `STEP high time`.
 const char* nameOf(Rule rule);
 
 struct Violation {
   Rule rule;
-  std::int64_t time_ns;  ///< of the edge that broke it
+  std::int64_t time_ns;  ///< of the edge that broke the rule
   std::int64_t seen_ns;
-  std::int64_t least_ns;  ///< what would have been right; 0 if the rule has no time
+  std::int64_t least_ns;  ///< the least allowed time; 0 if the rule has no time
 };
 
 /// An active STEP edge.
@@ -72,7 +73,7 @@ struct Pulse {
   bool forward;
 };
 
-/// The shortest times that occurred; none if there weren't two such edges.
+/// The shortest times that occurred; no value if there were no two such edges.
 struct ShortestTimes {
   std::optional<std::int64_t> high;
   std::optional<std::int64_t> low;
@@ -90,16 +91,16 @@ struct Waveform {
 
   std::int64_t forward() const;
   std::int64_t backward() const;
-  /// The sum of the pulses, where the axis stands if it began at 0.
+  /// The sum of the pulses, which is the final position if the axis began at 0.
   std::int64_t position() const { return forward() - backward(); }
   std::map<Rule, std::size_t> violationsByRule() const;
 };
 
-/// @throw Error if one of the lines has no event: it is a wrong number, or nothing drove it.
+/// @throw Error if one of the lines has no event: its number is wrong, or nothing drove it.
 Waveform waveformOf(const KernelTrace& trace, const WiredAxis& axis);
 
-/// The figures of a waveform in a few lines, each indented, and each rule that was broken with the
-/// first place where it was.
+/// The figures of a waveform in a few indented lines, and each broken rule with the first place
+/// where it was broken.
 std::string reportOf(const Waveform& waveform);
 
 }  // namespace stepdriver::kernel

@@ -9,7 +9,7 @@
 
 #include "stepdriver_core/error.h"
 
-// What the checker of waveforms sees in traces that are written by hand.
+// Tests the checker of waveforms with traces that are written by hand.
 
 namespace stepdriver::kernel {
 namespace {
@@ -20,7 +20,7 @@ constexpr unsigned kEnable = 499;
 
 using Broken = std::map<Rule, std::size_t>;
 
-/// A trace, event by event. Times are nanoseconds after a second.
+/// A trace that is made event by event. Times are nanoseconds after a second.
 class Hand {
  public:
   Hand& at(std::int64_t time_ns, unsigned line, bool level, const char* what = "set") {
@@ -49,8 +49,8 @@ class Hand {
   std::string text_;
 };
 
-/// A DRV8825: 1.9 us high and low, DIR 650 ns before and after, 650 ns from ENABLE;
-/// 600 ns from one write to the next.
+/// A DRV8825: 1.9 us high and low, DIR 650 ns before and after, 650 ns after ENABLE; 600 ns from
+/// one write to the next.
 WiredAxis wired() {
   WiredAxis axis;
   axis.driver = driver::Model::kDrv8825;

@@ -13,13 +13,15 @@
 #include "stepdriver_core/pulse/clock.h"
 #include "support/gpio_sim.h"
 
-// What one write of lines costs on the test kernel, compared with a system call that does nothing.
+// Measures the duration of a write of lines on the test kernel, compared with a system call that
+// does nothing.
 
 namespace {
 
 using namespace stepdriver;
 
-/// @return the fastest of some batches [us]: others on the machine only ever add to it.
+/// @return the fastest of several batches [us]: other work on the machine only ever adds to the
+///   time.
 double costOf(const std::function<void()>& action) {
   constexpr int kBatches = 100;
   constexpr int kBatch = 100;

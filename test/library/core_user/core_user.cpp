@@ -4,7 +4,7 @@
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 #include "stepdriver_core/machine/machine.h"
 
-// Takes in what links libgpiod and threads. No line is touched.
+// Uses code that needs libgpiod and threads. No line is touched.
 int main() {
   try {
     const auto backend = stepdriver::gpio::makeLibgpiodBackend();
