@@ -23,7 +23,7 @@ std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes,
   return starts;
 }
 
-// ---- from whatever the axes do ----
+// ---- from any state of the axes ----
 
 namespace {
 

@@ -41,7 +41,7 @@ namespace {
 using axis::HomingEnd;
 using axis::HomingPhase;
 
-// A switch that has not come to rest after so many debounce times is broken.
+// A switch that has not come to rest after this many debounce times is broken.
 constexpr int kMostDebounces = 50;
 // The polling period while a switch settles.
 constexpr pulse::Nanoseconds kSamplePeriod = 1'000'000;

@@ -286,7 +286,7 @@ void Manoeuvre::replan(const Ack& call) {
   change(Mode::kRun, call);
 }
 
-// ---- what the engine has made of it ----
+// ---- news from the engine ----
 
 bool Manoeuvre::isOpen() const {
   for (std::size_t i = 0; i < orders_.size(); ++i) {

@@ -8,7 +8,7 @@
 namespace stepdriver::config {
 namespace {
 
-constexpr double kLargest = 1e9;  // digits after the point say nothing there
+constexpr double kLargest = 1e9;  // decimals mean nothing above this
 
 std::string roundedTo(int decimals, double number) {
   std::string text = fmt::format("{:.{}f}", number, decimals);
@@ -23,7 +23,7 @@ std::string roundedTo(int decimals, double number) {
 std::string placeText(double position, Kind kind, double steps_per_unit) {
   const char* const unit = kind == Kind::kLinear ? "m" : "rad";
   if (!(std::abs(position) < kLargest)) return fmt::format("{:.9g} {}", position, unit);
-  // There is no place between two microsteps: half of one, with what rounding adds, is none.
+  // There is no position between two microsteps: up to half a microstep, plus rounding, is 0.
   if (std::abs(position) * steps_per_unit <= 0.5 + 1e-6) position = 0.0;
   const int decimals = std::max(0, static_cast<int>(std::ceil(std::log10(steps_per_unit))));
   return fmt::format("{} {}", roundedTo(decimals, position), unit);

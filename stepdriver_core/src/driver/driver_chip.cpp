@@ -53,7 +53,7 @@ DriverChip drv8825() {
   chip.name = "drv8825";
   chip.title = "DRV8825";
   chip.timing.step_high_ns = 1'900;
-  // 1.9 us by itself, but 4 us at least from step to step: 250 kHz.
+  // 1.9 us alone, but at least 4 us from step to step: 250 kHz.
   chip.timing.step_low_ns = 2'100;
   chip.timing.dir_setup_ns = 650;
   chip.timing.dir_hold_ns = 650;
@@ -83,13 +83,13 @@ DriverChip tb6600() {
   chip.model = Model::kTb6600;
   chip.name = "tb6600";
   chip.title = "TB6600";
-  // The IC itself takes 2.2 us; the optocouplers of the modules, and their clones most, need more.
+  // The IC itself needs 2.2 us. The optocouplers of modules need more, and those of clones most.
   chip.timing.step_high_ns = 5 * kMicrosecond;
   chip.timing.step_low_ns = 5 * kMicrosecond;
   chip.timing.dir_setup_ns = 5 * kMicrosecond;
   chip.timing.dir_hold_ns = 5 * kMicrosecond;
   chip.timing.enable_ns = 200 * kMillisecond;
-  // The IC does 1 to 16; the DIP switches of the common modules go to 32.
+  // The IC has the modes 1 to 16; the DIP switches of the common modules go to 32.
   chip.microsteps = {1, 2, 4, 8, 16, 32};
   chip.has_sleep = false;
   chip.has_reset = false;

@@ -74,7 +74,8 @@ void LineWriters::write(std::uint64_t id, const LineWrite& write) {
     chip->thread = std::thread([shared = shared_, chip] { run(shared, chip); });
   }
   const std::lock_guard<std::mutex> lock(shared_->mutex);
-  // The time also counts behind a write that hangs: its caller is told in time.
+  // The timeout also counts while a write waits behind one that hangs, so its caller is told in
+  // time.
   chip->jobs.push_back({id, write, steadyNow() + timeout_ns_});
   chip->changed.notify_all();
 }

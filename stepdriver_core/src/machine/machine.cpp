@@ -170,7 +170,7 @@ class Machine::Impl {
       if (!own) return std::nullopt;
       result.positions.push_back(own->position);
       result.duration = std::max(result.duration, own->duration);
-      // The reason for the first of them says more than that it ended the others too.
+      // An axis's own reason says more than that it was ended together with another one.
       const int weight = own->end == axis::MoveEnd::kReached     ? 0
                          : own->end == axis::MoveEnd::kCompanion ? 1
                                                                  : 2;

@@ -184,7 +184,7 @@ void Shell::answer(activity::CallId call, activity::Reply reply) {
   answered_.notify_all();
 }
 
-// ---- what happens ----
+// ---- events ----
 
 // A virtual clock stands still until the news has been handled.
 void Shell::onNews() noexcept {
@@ -262,7 +262,7 @@ void Shell::run() {
     while (turn()) {
     }
     if (!clock_.realtime()) pulse_thread_->setAlarm(alarm());
-    // Until the engine has accepted the orders, and the lines are written.
+    // Time stands still until the engine has accepted the orders and the lines are written.
     if (!ordersAreOpen() && writers_.idle()) {
       clock_.release();
       holding = false;

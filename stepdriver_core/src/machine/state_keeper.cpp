@@ -51,13 +51,13 @@ void StateKeeper::run() {
     lock.unlock();
     const bool written = keep();
     lock.lock();
-    // Whatever the axes do, the disk has this long between two writings.
+    // The disk has at least this long between two writes, whatever the axes do.
     if (written) wake_.wait_for(lock, kPeriod, [this] { return ended_; });
   }
 }
 
-// Not under the mutex, which is held while the disk writes. A call that the thread misses for that
-// is seen after the period.
+// Without the mutex, which is held while the disk writes. If the thread misses a call because of
+// that, it sees the change after the period.
 void StateKeeper::noteMotion() noexcept {
   motion_begins_ = true;
   wake_.notify_all();

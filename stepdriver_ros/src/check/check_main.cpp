@@ -42,7 +42,7 @@ void section(const std::string& title, const std::string& text) {
   print(fmt::format("{}\n{}\n", title, text));
 }
 
-/// The program, section by section. It remembers the worst that it found.
+/// The sections of the program. It remembers the worst result.
 class Check {
  public:
   Check(Options options, ros_node::NodeConfig config)

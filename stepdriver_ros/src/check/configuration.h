@@ -9,10 +9,10 @@ namespace stepdriver::check {
 
 using setup::BackendChoice;
 
-/// Reads a file like the node reads its parameters. If the file names no backend, which the launch
+/// Reads a file as the node reads its parameters. If the file names no backend, which the launch
 /// files set, libgpiod is assumed.
-///
-/// @throw Error if it isn't YAML. @throw ConfigError listing every mistake.
+/// @throw Error if it isn't YAML.
+/// @throw ConfigError listing every mistake.
 ros_node::NodeConfig readConfiguration(const std::string& path, BackendChoice choice);
 
 /// The axes with their top speeds.

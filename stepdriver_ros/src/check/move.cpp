@@ -38,7 +38,8 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   const axis::MoveResult forth = axis.wait(axis.moveTo(stroke, true));
   say(fmt::format("  {}: forth: {}", config.name, forth.message));
   bool reached = forth.end == axis::MoveEnd::kReached;
-  // Away from an endstop that it met is the way back; after any other end it must not move.
+  // The way back leads away from an endstop that the axis met; after any other end it must not
+  // move.
   if (reached || forth.end == axis::MoveEnd::kEndstopMin ||
       forth.end == axis::MoveEnd::kEndstopMax) {
     const axis::MoveResult back = axis.wait(axis.moveTo(start));

@@ -25,11 +25,11 @@ struct MoveOrder {
 /// the stroke stays within the soft limits; 0 if that is possible.
 double startFor(const config::AxisConfig& axis, double stroke);
 
-/// Drives axes forth and back at their top speeds; each is disabled again afterwards.
+/// Drives axes back and forth at their top speeds; each is disabled again afterwards.
 ///
 /// @param say receives each line of text immediately.
-/// @return whether each is back where it was. An interrupt (see InterruptWatch, whose signals
-///   are blocked in this thread) decelerates, disables, and makes it false.
+/// @return whether each is back where it was. An interrupt (see InterruptWatch, whose signals are
+///   blocked in this thread) decelerates, disables, and makes it false.
 /// @throw GpioError if a line can't be requested.
 bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clock& clock,
                       const std::function<void(const std::string&)>& say);

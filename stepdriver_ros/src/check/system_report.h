@@ -33,7 +33,7 @@ struct SystemFacts {
 
 SystemFacts systemFacts();
 
-/// Who may use the GPIO chips.
+/// The users that may use the GPIO chips.
 std::string permissionsText(const SystemFacts& facts);
 
 /// @param rights as granted on request.

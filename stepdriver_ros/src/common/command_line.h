@@ -12,7 +12,7 @@ namespace stepdriver {
 /// Reads the arguments of a program: long options with their full names, short options, and nothing
 /// else. Fills in the variables of the descriptions.
 ///
-/// @param meant the option that a word without one was probably for.
+/// @param meant the option to suggest for a word without an option.
 /// @throw Error if they can't be understood.
 boost::program_options::variables_map readCommandLine(
     const boost::program_options::options_description& known,

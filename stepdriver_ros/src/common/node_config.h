@@ -23,9 +23,9 @@ struct NodeConfig : setup::MachineConfig {
 /// @code{.yaml}
 /// joint_state_rate: 50.0         # [Hz] from 1 to 1000
 /// jog_timeout: 0.5               # [s] from 0.02 to 60
-/// urdf_limits: true              # those of robot_description hold too
-/// publish_clock: false           # true: the time of the simulated rig on /clock, for use_sim_time
-/// hardware_id: ""                # of diagnostics; empty: the host and the driver chips
+/// urdf_limits: true              # apply the limits of robot_description as well
+/// publish_clock: false           # true: publish the time of the simulated rig on /clock
+/// hardware_id: ""                # for diagnostics; empty: the host and the driver chips
 /// @endcode
 ///
 /// @param tree all of them, as one map.

@@ -85,7 +85,7 @@ void TrajectoryAction::stop(const Following& following) {
   }
 }
 
-// ---- what becomes of them ----
+// ---- current goals ----
 
 void TrajectoryAction::watch(Following& following, bool tell) {
   const Places places = placesOf(following);

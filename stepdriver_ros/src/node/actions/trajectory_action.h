@@ -56,7 +56,7 @@ class TrajectoryAction
   bool conclude(Following& following) override;
   void watch(Following& following, bool tell) override;
 
-  /// @return why it isn't a success, in words; empty: it is.
+  /// @return the reason why it isn't a success; empty if it is.
   std::string shortOfGoal(const Following& following,
                           const machine::CoordinatedResult& result) const;
   Places placesOf(const Following& following) const;

@@ -8,7 +8,7 @@ namespace {
 constexpr int kControlThreads = 2;
 constexpr int kTrajectoryThreads = 2;
 constexpr int kSpareLineThreads = 3;
-// Those that exist before anything waits.
+// Threads that exist before any call waits.
 constexpr int kFirstThreads = 2;
 constexpr std::chrono::milliseconds kPoll{5};
 

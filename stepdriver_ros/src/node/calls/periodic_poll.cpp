@@ -23,7 +23,7 @@ void PeriodicPoll::call() {
   }
   const bool more = poll_();
   const std::lock_guard<std::mutex> lock(mutex_);
-  // Something may have begun during the call that it didn't see.
+  // Something may have begun during the call, too late for the call to see it.
   if (!more && !begun_) timer_.stop();
 }
 

@@ -20,10 +20,10 @@ std::string lengthBytes(std::size_t length);
 /// The fields by which the two ends of a connection introduce themselves.
 using ConnectionHeader = std::map<std::string, std::string>;
 
-/// Believes no length, unlike ros::Header::parse().
+/// Unlike ros::Header::parse(), it doesn't trust the lengths in the data.
 ///
 /// @param bytes of a header, without its length.
-/// @return nothing if they are no header.
+/// @return no value if the bytes aren't a header.
 std::optional<ConnectionHeader> readHeader(std::string_view bytes);
 
 /// @return a header with its length.

@@ -26,7 +26,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-// How long no client is accepted after the system had no resources left for one.
+// No client is accepted for this long after the system lacked the resources for one.
 constexpr std::chrono::milliseconds kAcceptPause{100};
 constexpr auto kNever = std::chrono::steady_clock::time_point::max();
 // What is polled: the wake-up, the listening socket, and then those of the connections.
@@ -98,7 +98,7 @@ void tellMaster(const char* method, const std::string& service, const std::strin
   request[1] = service;
   request[2] = uri;
   if (node_uri) request[3] = *node_uri;
-  // A node that starts waits for a master that is gone; one that ends doesn't.
+  // A node that starts waits for a missing master; a node that ends doesn't.
   if (!ros::master::execute(method, request, response, payload, node_uri.has_value())) {
     ROS_WARN_NAMED("node", "The master didn't accept %s for %s", method, service.c_str());
   }
@@ -169,7 +169,7 @@ void TriggerServer::serveAll() {
     Clock::time_point due = nextDue();
     if (finishing) {
       listening_.close();
-      // What idle clients have sent by now is there at once.
+      // Whatever idle clients have sent by now can be read at once.
       due = anyUnderWay() ? std::min(due, finish_by) : Clock::now();
     }
     const int ready = poll(finishing, due);

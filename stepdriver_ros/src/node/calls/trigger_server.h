@@ -60,20 +60,22 @@ class TriggerServer {
     Connection(Descriptor its_socket, const TriggerServices& services)
         : socket(std::move(its_socket)), session(services) {}
 
-    /// Receives and sends what can be now. @return false: close it.
+    /// Receives and sends as much as possible now.
+    /// @return false if the connection must be closed.
     bool serve();
     bool receive();
     bool send();
 
     Descriptor socket;
     TriggerSession session;
-    Clock::time_point since = Clock::now();  ///< the client last began or concluded something
+    Clock::time_point since = Clock::now();  ///< last beginning or end of something by the client
   };
 
   void serveAll();
-  /// Waits until there is something to do for one of polled_. @return for how many there is.
+  /// Waits until at least one of polled_ is ready.
+  /// @return how many are ready.
   int poll(bool finishing, Clock::time_point until);
-  /// When something is due if nothing comes.
+  /// When something is due even if nothing arrives.
   Clock::time_point nextDue() const;
   bool anyUnderWay() const;
   void serveConnections(Clock::time_point now);
@@ -90,7 +92,7 @@ class TriggerServer {
   std::atomic<Clock::time_point> finish_by_{Clock::time_point::max()};
   std::thread thread_;
 
-  // Of the thread alone.
+  // Used only by the thread.
   std::list<Connection> connections_;
   std::vector<pollfd> polled_;
   Clock::time_point accept_from_;

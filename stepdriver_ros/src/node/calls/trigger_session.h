@@ -10,31 +10,31 @@
 
 namespace stepdriver::ros_node {
 
-/// What carries out the calls of a service of the type std_srvs/Trigger, as roscpp calls it. It
-/// must not throw.
+/// Carries out the calls of a service of the type std_srvs/Trigger, with the arguments of roscpp.
+/// Must not throw.
 using TriggerHandler =
     std::function<bool(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response)>;
 /// By the full names of the services.
 using TriggerServices = std::map<std::string, TriggerHandler>;
 
 /// The conversation with one client of Trigger services by TCPROS: a header from each side, then
-/// requests and answers in turn. It takes and gives bytes, and knows nothing of sockets.
+/// requests and answers in turn. It takes and gives bytes, and uses no socket.
 ///
-/// What the client sends before it is its turn again is left in the socket, so a session never
-/// keeps more than a part of one message.
+/// What the client sends before its turn stays in the socket, so a session never keeps more than a
+/// part of one message.
 class TriggerSession {
  public:
   /// @param services outlive the session.
   explicit TriggerSession(const TriggerServices& services) : services_(services) {}
 
-  /// How many bytes of the client it can take now. 0: it is not the client's turn.
+  /// The number of bytes of the client that it can take now; 0: it isn't the client's turn.
   std::size_t wanted() const;
-  /// Takes bytes, no more than it wants. Carries out what they complete.
+  /// Takes at most that many bytes, and carries out the requests that they complete.
   void receive(std::string_view bytes);
 
-  /// What is still to be sent to the client.
+  /// The bytes that still have to be sent to the client.
   std::string_view output() const { return std::string_view(output_).substr(sent_); }
-  /// So many bytes of the output have been sent.
+  /// This many bytes of the output have been sent.
   void sent(std::size_t bytes) { sent_ += bytes; }
 
   /// The client may take any time until its next request.

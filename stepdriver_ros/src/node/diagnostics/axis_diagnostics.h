@@ -12,7 +12,7 @@ struct AxisReading {
   axis::AxisState state;
   axis::AxisLimits limits;
   axis::EndstopState endstops;
-  std::string endstop_error;  ///< why they couldn't be read; empty: they were read
+  std::string endstop_error;  ///< why they couldn't be read; empty if they were read
 };
 
 /// Near a soft limit means within this part of the distance between the two; if there is only one,

@@ -11,7 +11,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-// Relative, of a number with six digits.
+// The relative error of a number with six digits.
 constexpr double kRounding = 1e-5;
 
 using config::AxisConfig;

@@ -72,7 +72,7 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
 using Trigger = std_srvs::Trigger;
 using TriggerFunction = boost::function<bool(Trigger::Request&, Trigger::Response&)>;
 
-/// @param done what the answer says then.
+/// @param done the message of a successful answer.
 TriggerFunction triggerHandler(const std::string& done, const std::function<void()>& action) {
   return [done, action](Trigger::Request& /*request*/, Trigger::Response& response) {
     return respond(response, [&] {

@@ -199,7 +199,7 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
   axis_state_publisher_.publish(message);
 }
 
-// Before publishAxisStates(), which then keeps the states as those that are known.
+// Call before publishAxisStates(), which then makes these states the known ones.
 void StatePublisher::publishStateOfEachAxis(bool due) {
   const bool first = published_states_.empty();
   for (std::size_t i = 0; i < states_.size(); ++i) {
