@@ -38,7 +38,7 @@ trap 'exit 130' INT
 trap 'exit 143' TERM
 
 # Ends a background job that was started under `set -m`: asks its leader (a roslaunch then ends
-# its nodes in order), and kills what is left of its process group after SECONDS.
+# its nodes in order), and kills the rest of its process group after SECONDS.
 end_group() {
   local leader=$1 seconds=$2 i
   kill -TERM "$leader" 2>/dev/null || true

@@ -78,16 +78,26 @@ def without_blocks(text):
 # Strings come first in the patterns: what they contain isn't a comment.
 _CPP = r'''R"\((?:.|\n)*?\)"|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])'|(//[^\n]*(?:\n\s*//[^\n]*)*)'''
 _HASH = r"""'[^'\n]*'|"[^"\n]*"|((?<!\S)#[^\n]*(?:\n\s*#[^\n]*)*)"""
+_PYTHON = r"""'[^'\n]*'|"(?!"")[^"\n]*"|("{3}(?:.|\n)*?"{3}|(?<!\S)#[^\n]*(?:\n\s*#[^\n]*)*)"""
 _XML = r"""((?<=doc=")[^"]*|<!--(?:.|\n)*?-->)"""
 _COMMENTS = {
     "cpp": _CPP, "h": _CPP, "launch": _XML, "xacro": _XML, "urdf": _XML,
-    "action": _HASH, "msg": _HASH, "srv": _HASH, "yaml": _HASH,
+    "action": _HASH, "msg": _HASH, "srv": _HASH, "yaml": _HASH, "sh": _HASH, "py": _PYTHON,
 }
 
 
+def _language(name):
+    """The ending of a file's name. Programs without an ending say in their first line what they are in."""
+    ending = pathlib.Path(name).suffix[1:]
+    if ending or not (ROOT / name).stat().st_mode & 0o100:
+        return ending
+    return "py" if "python" in text_of(name).partition("\n")[0] else "sh"
+
+
 def comments(name):
-    """Yields the number of the first line of each comment in a source file, and its text as one line."""
-    pattern = _COMMENTS.get(name.rpartition(".")[2])
+    """Yields the number of the first line of each comment or docstring in a source file, and its text as
+    one line."""
+    pattern = _COMMENTS.get(_language(name))
     if not pattern:
         return
     text = text_of(name)

@@ -25,8 +25,8 @@ struct LineEdge {
   bool level;
 };
 
-/// The GPIO events of the kernel's text trace: either as gpio_trace.sh writes it, in nanoseconds,
-/// or as the file `trace` has it, in microseconds.
+/// The GPIO events of the kernel's text trace: in nanoseconds, as gpio_trace.sh writes it, or in
+/// microseconds, as in the file `trace`.
 class KernelTrace {
  public:
   /// @param name of the source, for messages.

@@ -73,7 +73,7 @@ class Machine::Impl {
   ~Impl() {
     try {
       shutdown();
-    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): told to whoever calls shutdown()
+    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the caller of shutdown() learns it
     }
     shell_->stop();
   }

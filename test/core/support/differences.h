@@ -20,11 +20,11 @@ struct Differences {
 };
 
 /// By divided differences of the crossings: n! times the n-th divided difference is the n-th
-/// derivative somewhere between the times (the mean value theorem), so that none of them is above
-/// the motion's own limit, but for what the rounding of the times to nanoseconds makes of it.
+/// derivative somewhere between the times (the mean value theorem). Each of them is therefore at
+/// most the motion's own limit, apart from the effect of rounding the times to nanoseconds.
 ///
-/// @param apart [s] The points of one difference are at least so far from each other: rounding
-///   adds at most 2, 4 and 8 (speed 1 ns) over apart, its square and its cube.
+/// @param apart [s] The points of one difference are at least this far apart: rounding adds at most
+///   2, 4 and 8 (speed 1 ns) over apart, its square and its cube.
 inline Differences differencesOf(const std::vector<Crossing>& crossings, double apart) {
   const auto slope = [](double low, double high, const Crossing& a, const Crossing& b) {
     return (high - low) / (static_cast<double>(b.time_ns - a.time_ns) * 1e-9);
