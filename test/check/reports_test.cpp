@@ -166,9 +166,9 @@ TEST(RatesText, TellsAskedAndHeldRatesAndTheReason) {
   rates.axes.push_back({"x", 8000.0, 20'000.9, 10'000.0, "because"});
   rates.axes.push_back({"y", 1e6, 20'000.0, 10'000.0, "so"});
   EXPECT_EQ(ratesText(rates),
-            "  axis  asks for  held alone  held with all  [steps/s]\n"
-            "  x     8000      20000       10000          ok\n"
-            "  y     1000000   20000       10000          TOO FAST\n"
+            "  axis  needs    sustained alone  sustained with all  [steps/s]\n"
+            "  x     8000     20000            10000               ok\n"
+            "  y     1000000  20000            10000               TOO FAST\n"
             "  What limits the rate with all axes moving:\n"
             "  x: because\n"
             "  y: so\n");

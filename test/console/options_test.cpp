@@ -45,8 +45,7 @@ std::string complaintOf(const std::vector<std::string>& arguments) {
 
 TEST(Options, AComplaintNamesWhatIsWrong) {
   EXPECT_EQ(complaintOf({"--slow=0"}), "--slow 0: it must be a number above 0, and 100 at most");
-  EXPECT_EQ(complaintOf({"--driver", "a", "x"}),
-            "x stands without an option; did you mean --driver x?");
+  EXPECT_EQ(complaintOf({"--driver", "a", "x"}), "x isn't an option; did you mean --driver x?");
   EXPECT_EQ(complaintOf({"--hlep"}), "unrecognised option '--hlep'");
   EXPECT_EQ(complaintOf({"--slow"}), "the required argument for option '--slow' is missing");
 }

@@ -160,10 +160,10 @@ TEST(DriverAxes, MustHaveWhatTheJoystickJogs) {
   drop(axes, "r/max_speed_deg_s");
   put(axes, "r/max_speed_mm_s", 100);
   EXPECT_EQ(misfits(axes),
-            Lines{"/joystick/axes/r/max_speed_deg_s: must be max_speed_mm_s, as there is a "
+            Lines{"/joystick/axes/r/max_speed_deg_s: must be max_speed_mm_s, because there is a "
                   "/stepdriver/axes/r/max_speed_mm_s"});
   drop(axes, "r");
-  EXPECT_EQ(misfits(axes), Lines{"/joystick/axes/r: is no axis of /stepdriver, which has x, z"});
+  EXPECT_EQ(misfits(axes), Lines{"/joystick/axes/r: isn't an axis of /stepdriver, which has x, z"});
 }
 
 }  // namespace

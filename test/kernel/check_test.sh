@@ -134,7 +134,7 @@ says_who_holds_a_line_and_measures_the_wake_ups() {
   ends 2 bash "$this" --inside held "$stepdriver_check" --config "$scratch/axis.yaml"
   says 'x/dir +X_DIR +gpiochip[0-9]+:2 +held by "gpioset"'
   says 'Stop that program'
-  says 'wake-up late by'
+  says 'lateness of a wake-up'
   says '^NOT GOOD: 1 line '
 }
 
@@ -163,7 +163,7 @@ lists_what_is_wrong_in_the_configuration() {
 moves_nothing_on_the_simulated_rig() {
   configuration 10.0 'gpio: {backend: simulated}'
   checks 4 --move
-  says 'asks for the simulated rig'
+  says 'selects the simulated rig'
   [[ $(edges 1 1) == 'never driven' ]] || fail "lines were driven"
 }
 

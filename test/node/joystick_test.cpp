@@ -146,7 +146,7 @@ TEST_F(JoystickTest, EndsTheJogWhenTheJoystickFallsSilent) {
   start();
   ASSERT_TRUE(holdUntil(0.5, [&] { return moving(); }));
   EXPECT_TRUE(waitUntil([&] { return !moving() && zeros() == 1; }));
-  EXPECT_TRUE(says("x: no message from the joystick for 0.3 s, the jog ends"));
+  EXPECT_TRUE(says("x: no message from the joystick for 0.3 s, so the jog ends"));
 }
 
 TEST_F(JoystickTest, JogsOnlyWhileTheDeadmanButtonIsHeld) {
@@ -250,7 +250,7 @@ TEST_F(JoystickTest, WarnsOfARateThatTheDriverTakesForSilence) {
   node.set("jog_timeout", 0.1);
   set("rate", 20.0);
   start();
-  EXPECT_TRUE(says("Take 30 Hz or more")) << joystick->output();
+  EXPECT_TRUE(says("Use 30 Hz or more")) << joystick->output();
 }
 
 TEST_F(JoystickTest, DoesNotStartWithParametersThatAreWrong) {
@@ -276,7 +276,7 @@ TEST_F(JoystickTest, DoesNotStartForAxesThatTheDriverDoesNotHave) {
   expectSays(joystick->output(), node.beside("joystick/axes/x/max_speed_mm_s") +
                                      " is 100.1, but must be at most " +
                                      node.full("axes/x/max_speed_mm_s") + ", which is 100.0");
-  expectSays(joystick->output(), "is no axis of " + node.name() + ", which has x");
+  expectSays(joystick->output(), "isn't an axis of " + node.name() + ", which has x");
   joystick.reset();
 }
 

@@ -78,9 +78,9 @@ class Check {
     if (!real_) {
       section(
           title,
-          "  The configuration asks for the simulated rig (gpio/backend: simulated), so that no\n"
-          "  line is looked at; --backend libgpiod looks at them.\n");
-      verdict_ = "the configuration is right; on the simulated rig every step rate can be held.";
+          "  The configuration selects the simulated rig (gpio/backend: simulated), so no line is\n"
+          "  checked. To check the lines, add --backend libgpiod.\n");
+      verdict_ = "the configuration is right, and the simulated rig can sustain every step rate.";
       return;
     }
     const std::vector<gpio::ChipInfo> chips = gpio::gpioChips();
@@ -88,8 +88,9 @@ class Check {
     section(title, chipsText(chips) + "\n" + report.text);
     if (report.missing == 0) return;
     note(kExitLines,
-         fmt::format("{} {} can't be had, see above; the calls and step rates weren't measured.",
-                     report.missing, report.missing == 1 ? "line" : "lines"));
+         fmt::format(
+             "{} {} not available (see above), so the calls and step rates weren't measured.",
+             report.missing, report.missing == 1 ? "line is" : "lines are"));
   }
 
   void measure() {
@@ -109,13 +110,14 @@ class Check {
   void reportRates() {
     if (capability_.channels.empty()) return;
     const machine::StepRates rates = machine::stepRates(config_.axes, capability_);
-    section("Step rates, with about one step in a hundred late, or fewer", ratesText(rates));
+    section("Step rates at which about one step in a hundred is late, or fewer", ratesText(rates));
     if (!rates.holds()) {
-      note(kExitRates,
-           fmt::format(
-               "this machine doesn't hold the top speed of {}. Lower it or the microsteps, allow "
-               "real-time rights, run a PREEMPT_RT kernel, or take load off this machine.",
-               tooFast(rates)));
+      note(
+          kExitRates,
+          fmt::format(
+              "this machine can't sustain the top speed of {}. Lower that or the microsteps, allow "
+              "real-time scheduling, use a PREEMPT_RT kernel, or reduce this machine's load.",
+              tooFast(rates)));
     } else if (config_.enforce_realtime) {
       const std::string why = machine::whyNotInRealtime(config_.axes, capability_);
       if (!why.empty()) note(kExitRates, "the node won't start (realtime: enforce): " + why + ".");
@@ -130,8 +132,8 @@ class Check {
       return;
     }
     print(
-        fmt::format("Moving, in {} s: keep clear. Nothing here knows where the axes stand. Ctrl-C "
-                    "stops them.\n",
+        fmt::format("Moving in {} s: keep clear. The program doesn't know the positions of the "
+                    "axes. Ctrl-C stops them.\n",
                     kWarning.count()));
     InterruptWatch::block();
     bool back = false;
@@ -147,7 +149,7 @@ class Check {
       print(std::string("  ") + error.what() + "\n");
     }
     print("\n");
-    if (!back) note(kExitMove, "not every axis went forth and back, see above.");
+    if (!back) note(kExitMove, "not every axis moved back and forth, see above.");
   }
 
   const Options options_;
@@ -156,7 +158,7 @@ class Check {
   pulse::SteadyClock clock_;
   pulse::Capability capability_;
   int exit_code_ = kExitGood;
-  std::string verdict_ = "every line can be had, and every axis's top speed can be held.";
+  std::string verdict_ = "every line is available, and every axis's top speed can be sustained.";
 };
 
 bool hasAxis(const std::vector<config::AxisConfig>& axes, const std::string& name) {

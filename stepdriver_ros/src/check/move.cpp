@@ -36,7 +36,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   if (config.pins.enable.wired()) axis.enable(true);
   const double start = axis.state().position;
   const axis::MoveResult forth = axis.wait(axis.moveTo(stroke, true));
-  say(fmt::format("  {}: forth: {}", config.name, forth.message));
+  say(fmt::format("  {}: out: {}", config.name, forth.message));
   bool reached = forth.end == axis::MoveEnd::kReached;
   // The way back leads away from an endstop that the axis met; after any other end it must not
   // move.

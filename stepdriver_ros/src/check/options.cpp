@@ -23,15 +23,16 @@ const char* const kUsage =
     R"(usage: stepdriver_check --config FILE [--backend NAME]
                         [--move [--axis NAME] [--distance D]]
 
-Checks whether this computer can drive the axes of a configuration. It shows the GPIO lines and who
-holds them, permissions and real-time limits, the cost of a write and the lateness of the pulse
-thread, and the step rates that follow from them. It requests the lines at their safe levels,
-measures for about half a second and releases them: no edge goes out, ENABLE is never asserted, and
-nothing moves without --move. It needs no ROS master. Stop a node that holds the lines first.
+Checks whether this computer can drive the axes of a configuration. It shows the GPIO lines and the
+programs that hold them, permissions and real-time limits, the duration of a write and the lateness
+of the pulse thread, and the step rates that follow from them. It requests the lines at their safe
+levels, measures for about half a second and releases them: no edge goes out, ENABLE is never
+asserted, and nothing moves without --move. It needs no ROS master. If a node holds the lines, stop
+it first.
 
   --config FILE    YAML file with the node's parameters, see config/. Limits of a URDF are ignored
   --backend NAME   libgpiod or simulated, overriding gpio/backend
-  --move           drives each axis forth and back at its top speed; endstops stop it
+  --move           drives each axis back and forth at its top speed; endstops stop it
   --axis NAME      only this axis
   --distance D     [mm|deg] default: 1 mm or 10 degrees; if negative, the axis moves back first
 
@@ -57,10 +58,10 @@ Options parseOptions(const std::vector<std::string>& arguments) {
   }
   options.distance = findNumber(
       values, "distance", [](double number) { return std::isfinite(number) && number != 0.0; },
-      "a number, and not 0");
+      "a number other than 0");
   if (options.config.empty()) throw Error("--config FILE is missing");
   if (!options.move && (!options.axis.empty() || options.distance)) {
-    throw Error("--axis and --distance go with --move");
+    throw Error("--axis and --distance need --move");
   }
   return options;
 }

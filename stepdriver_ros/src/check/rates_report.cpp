@@ -39,14 +39,14 @@ std::string measurementsText(const std::vector<config::AxisConfig>& axes,
     const pulse::Spread& read = capability.channels[i].read;
     if (read.count > 0) rows.push_back(rowOf("read of an endstop of " + axes[i].name, read));
   }
-  rows.push_back(rowOf("wake-up late by, with spinning", capability.lateness));
-  rows.push_back(rowOf("wake-up late by, without", capability.sleep_lateness));
+  rows.push_back(rowOf("lateness of a wake-up, with spinning", capability.lateness));
+  rows.push_back(rowOf("lateness of a wake-up, without", capability.sleep_lateness));
   return table(rows);
 }
 
 std::string ratesText(const machine::StepRates& rates) {
   std::vector<std::vector<std::string>> rows = {
-      {"axis", "asks for", "held alone", "held with all", "[steps/s]"}};
+      {"axis", "needs", "sustained alone", "sustained with all", "[steps/s]"}};
   std::string reasons;
   for (const machine::StepRate& rate : rates.axes) {
     rows.push_back({rate.axis, roundedText(rate.asked), rateText(rate.alone), rateText(rate.held),

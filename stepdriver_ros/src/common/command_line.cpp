@@ -26,8 +26,7 @@ po::variables_map readCommandLine(const po::options_description& known,
     for (const po::option& option : parsed.options) {
       if (!option.string_key.empty()) continue;
       const std::string& word = option.value.front();
-      throw Error(
-          fmt::format("{} stands without an option; did you mean --{} {}?", word, meant, word));
+      throw Error(fmt::format("{} isn't an option; did you mean --{} {}?", word, meant, word));
     }
     po::store(parsed, options);
     po::notify(options);

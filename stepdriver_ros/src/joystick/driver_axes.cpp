@@ -35,7 +35,7 @@ void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
     const auto found = axes->find(axis.name);
     if (found == axes->end()) {
       issues.push_back(
-          {key, fmt::format("is no axis of {}, which has {}", driver, namesOf(*axes)), true});
+          {key, fmt::format("isn't an axis of {}, which has {}", driver, namesOf(*axes)), true});
       continue;
     }
     const auto* own = found->second.as<ConfigValue::Map>();
@@ -46,8 +46,8 @@ void checkDriverAxes(const JoystickConfig& joystick, const std::string& name,
     const std::string theirs = fmt::format("{}/axes/{}/", driver, axis.name);
     const auto most = numberAt(*own, wanted);
     if (!most && numberAt(*own, other)) {
-      issues.push_back(
-          {key + "/" + wanted, fmt::format("must be {0}, as there is a {1}{0}", other, theirs)});
+      issues.push_back({key + "/" + wanted,
+                        fmt::format("must be {0}, because there is a {1}{0}", other, theirs)});
     } else if (most && axis.max_speed > *most) {
       issues.push_back(
           {key + "/" + wanted, fmt::format("is {}, but must be at most {}{}, which is {}",

@@ -99,7 +99,7 @@ void Joystick::endWithoutMessages() {
   heard_ = ros::SteadyTime();
   for (Jogged& axis : axes_) {
     if (axis.velocity == 0.0) continue;
-    ROS_WARN_NAMED("joystick", "%s: no message from the joystick for %g s, the jog ends",
+    ROS_WARN_NAMED("joystick", "%s: no message from the joystick for %g s, so the jog ends",
                    axis.config.name.c_str(), config_.joy_timeout);
     axis.velocity = 0.0;
   }

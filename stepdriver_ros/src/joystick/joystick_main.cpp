@@ -71,15 +71,15 @@ void warnOfTooLowRate(const std::string& driver, double rate) {
   if (rate * timeout >= kMessagesInTimeout) return;
   ROS_WARN_NAMED(
       "joystick",
-      "~rate is %g Hz, and %s/jog_timeout %g s: the driver ends a jog when a message is late. "
-      "Take %g Hz or more",
+      "~rate is %g Hz and %s/jog_timeout is %g s, so the driver ends a jog if a message is late. "
+      "Use %g Hz or more",
       rate, driver.c_str(), timeout, kMessagesInTimeout / timeout);
 }
 
 int run(EndRequests& end_requests) {
   std::optional<ros::NodeHandle> node;  // with it roscpp and its console end
   try {
-    // Before the handle registers this node, which ends a running one of its name.
+    // Before the handle registers this node, which ends a running node with the same name.
     std::string driver;
     const JoystickConfig config = readParameters(driver);
     node.emplace();
