@@ -136,7 +136,7 @@ TEST(JoystickConfig, RefusesNamesThatNoAxisHas) {
       {{"axes", mapOf({{"x-axis", mapOf({{"joystick_axis", 1}, {"max_speed_mm_s", 50.0}})}})}});
   EXPECT_EQ(issuesOf(tree),
             Lines{"/joystick/axes/x-axis: has the name \"x-axis\", but an axis's name must begin "
-                  "with a letter and go on with letters, digits and _ only"});
+                  "with a letter and continue with letters, digits and _ only"});
 }
 
 TEST(DriverAxes, MustHaveWhatTheJoystickJogs) {

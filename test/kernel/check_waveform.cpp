@@ -19,21 +19,22 @@ namespace kernel = stepdriver::kernel;
 constexpr const char kUsage[] =
     "usage: check_waveform TRACE AXIS...\n"
     "\n"
-    "Holds what the kernel did to the lines of each axis (TRACE: what `run.sh --trace` or\n"
-    "gpio_trace.sh recorded) against what its driver chip needs, and prints what it found.\n"
+    "Compares what the kernel did to the lines of each axis (TRACE: a recording of `run.sh "
+    "--trace`\n"
+    "or gpio_trace.sh) with the requirements of its driver chip, and prints the result.\n"
     "\n"
     "AXIS is --axis NAME, and after it\n"
     "  --driver NAME             a4988, drv8825 or tb6600\n"
     "  --step LINE, --dir LINE   chip:offset, with the chip's label, or the kernel's number\n"
-    "  --enable LINE             where it is wired\n"
+    "  --enable LINE             only if it is wired\n"
     "  --inverted PIN,...        of step, dir and enable: those whose level the wiring inverts\n"
-    "  --shortest-interval NS    that was planned from one step to the next\n"
-    "  --expect-position N       what pulses forward less pulses backward must be\n"
+    "  --shortest-interval NS    the shortest planned time from one step to the next\n"
+    "  --expect-position N       the expected pulses forward minus pulses backward\n"
     "\n"
-    "Exit status: 0 where all is right; 1 for any violation and for another position; 2 where it\n"
+    "Exit status: 0 if all is right; 1 after a violation or with another position; 2 if the trace\n"
     "couldn't be checked.\n";
 
-/// Reads an axis from the arguments.
+/// An axis, as the arguments describe it.
 struct Asked {
   std::string name;
   std::string driver;

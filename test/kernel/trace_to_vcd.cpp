@@ -11,16 +11,16 @@ namespace {
 constexpr const char kUsage[] =
     "usage: trace_to_vcd TRACE VCD AXIS.PIN=LINE...\n"
     "\n"
-    "Writes what the kernel did to its GPIO lines (TRACE: what `run.sh --trace` or gpio_trace.sh\n"
-    "recorded) to a VCD file, in the form of the simulated rig's trace.\n"
+    "Writes what the kernel did to its GPIO lines (TRACE: a recording of `run.sh --trace` or\n"
+    "gpio_trace.sh) to a VCD file, in the form of the simulated rig's trace.\n"
     "\n"
     "AXIS.PIN  scope and variable in the VCD file: x.step\n"
-    "LINE      chip:offset, with the chip's label, or the number that the kernel has for the line\n"
+    "LINE      chip:offset, with the chip's label, or the kernel's number of the line\n"
     "\n"
     "Time 0 is the first event of any of these lines. Times are those at which the kernel called\n"
     "the chip's driver, in nanoseconds.\n"
     "\n"
-    "Exit status: 0; 2 where it couldn't be done.\n";
+    "Exit status: 0; 2 if the file couldn't be written.\n";
 
 stepdriver::kernel::TracedPin tracedPin(const std::string& text,
                                         const stepdriver::kernel::KernelTrace& trace) {

@@ -39,7 +39,7 @@ TEST(Limits, SaysWhatItHasChangedAndTheNextMoveKeepsToIt) {
   EXPECT_EQ(lower.deceleration, 0.25);
   EXPECT_EQ(lower.jerk, 2.0);
   EXPECT_GT(node.moveTo(0.1, true).duration, 2.0) << "1.2 s as configured";
-  EXPECT_EQ(setLimits(node, 0.05, 0.0, 0.25, 2.0).message, "x: all limits are as they were");
+  EXPECT_EQ(setLimits(node, 0.05, 0.0, 0.25, 2.0).message, "x: no limit has changed");
 
   const auto back = setLimits(node, 0.0);
   EXPECT_EQ(back.jerk, 0.0);

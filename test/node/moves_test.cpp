@@ -188,7 +188,8 @@ TEST(Moves, SaysWhereItPassesItsTargetFirst) {
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > 2400; }));
   const auto nearer = node.moveTo(0.08, false);
   EXPECT_TRUE(nearer.success) << nearer.message;
-  expectSays(nearer.message, "beyond, and comes back");
+  expectSays(nearer.message, "it can't stop before that, overshoots by ");
+  expectSays(nearer.message, ", and comes back");
 }
 
 TEST(Moves, RefusesABadTargetWhileMovingAndKeepsTheOneItHas) {

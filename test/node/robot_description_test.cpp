@@ -160,7 +160,7 @@ const std::vector<BadDescription> kBadDescriptions = {
      robot("prismatic", R"(<limit lower="0.1" upper="0.05" velocity="1" effort="1"/>)"),
      "lower=0.1 and upper=0.05"},
     {"NoBounds", false, robot("prismatic", R"(<limit velocity="1" effort="1"/>)"),
-     "where one is missing it is 0"},
+     "a missing one is 0"},
     {"NoVelocity", false,
      robot("prismatic", R"(<limit lower="0" upper="0.1" velocity="0" effort="1"/>)"),
      "velocity limit 0"},
@@ -169,7 +169,7 @@ const std::vector<BadDescription> kBadDescriptions = {
      "which is 0.001 steps/s"},
     {"ElsewhereThanTheAxis", false,
      robot("prismatic", R"(<limit lower="1" upper="2" velocity="1" effort="1"/>)"),
-     "leaves nothing of the axis's own range"},
+     "doesn't overlap the axis's own range"},
 };
 
 INSTANTIATE_TEST_SUITE_P(That, BadRobotDescription, testing::ValuesIn(kBadDescriptions),

@@ -58,7 +58,7 @@ class StateFile : public testing::Test {
 
 TEST_F(StateFile, BringsThePositionBackAfterAShutdown) {
   node_.start();
-  expectSays(first().position_note.at(0), "wasn't there yet");
+  expectSays(first().position_note.at(0), "didn't exist yet");
   standAt(0.008);
   end(SIGTERM);
   node_.start();

@@ -155,9 +155,10 @@ Steps Recover::resetIfFaulty() {
 void Recover::clearFault() {
   axis::AxisModel& axis = *axes().front();
   if (isFaulty()) {
-    axis.refuse(
-        std::string("the driver chip still reports a fault on nFAULT") +
-        (axis.motor.pins().hasReset() ? "" : "; RESET isn't wired, so only its power ends that"));
+    axis.refuse(std::string("the driver chip still reports a fault on nFAULT") +
+                (axis.motor.pins().hasReset()
+                     ? ""
+                     : "; RESET isn't wired, so only switching its power off clears it"));
   }
   if (context().stops_asked != context().stops_cleared) {
     axis.refuse("an emergency stop has come meanwhile");

@@ -159,7 +159,9 @@ void AxisModel::refuseWhileHeld() const {
 
 void AxisModel::refuseUnlessHomed() const {
   if (!config.require_homing || position.isHomed()) return;
-  refuse("it isn't homed, and require_homing allows absolute positions only then; home it first");
+  refuse(
+      "it isn't homed, and require_homing allows absolute positions only after a homing; home it "
+      "first");
 }
 
 void AxisModel::refuseUnlessReady() const {
@@ -277,7 +279,7 @@ std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean) const {
     return "the motor had no current in between, and holds_position_unpowered isn't set";
   }
   if (!kept.at_home) {
-    return "the chip began anew in between, from where its motor isn't: up to two full steps off";
+    return "the chip was reset in between, which may have turned the motor by up to two full steps";
   }
   return "";
 }

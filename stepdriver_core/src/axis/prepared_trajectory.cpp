@@ -76,7 +76,7 @@ void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin
 
 [[noreturn]] void refuseTurn(const PathAxis& axis, double time_s) {
   axis.refuse(
-      fmt::format("the trajectory turns {}, and goes on so close to the axis's limits that its "
+      fmt::format("the trajectory turns {}, and continues so close to the axis's limits that its "
                   "backlash of {} can't be taken up meanwhile",
                   at(time_s), axis.show(axis.configured_backlash)));
 }

@@ -55,8 +55,8 @@ std::string exponentHint(const ConfigValue& value) {
   if (text == nullptr || !std::regex_match(*text, parts, number)) return "";
   const std::string fraction = parts[2].length() > 1 ? parts[2].str() : ".0";
   const std::string sign = parts[3].length() > 0 ? parts[3].str() : "+";
-  return fmt::format("; write {}{}e{}{}, as YAML takes {} for text", parts[1].str(), fraction, sign,
-                     parts[4].str(), *text);
+  return fmt::format("; write {}{}e{}{}, because YAML reads {} as text", parts[1].str(), fraction,
+                     sign, parts[4].str(), *text);
 }
 
 const ConfigValue::Map* mapOrIssue(const ConfigValue& value, const std::string& name,

@@ -145,7 +145,7 @@ class AxesReader {
 void checkAxisName(const std::string& name, ConfigReader& axis) {
   if (isAxisName(name)) return;
   axis.issue("", fmt::format("has the name \"{}\", but an axis's name must begin with a letter and "
-                             "go on with letters, digits and _ only",
+                             "continue with letters, digits and _ only",
                              name));
 }
 

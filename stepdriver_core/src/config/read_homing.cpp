@@ -145,7 +145,7 @@ void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config
   if (axis.has("homing")) {
     if (kind) config.homing = HomingReader(axis, motionKeys(*kind), config).read();
   } else if (config.require_homing) {
-    axis.contradiction("require_homing", "is true, but must be false where there is no homing");
+    axis.contradiction("require_homing", "is true, but must be false if there is no homing");
   }
 }
 

@@ -35,8 +35,8 @@ std::optional<Kind> readKind(ConfigReader& axis) {
   const std::string rotary = firstGiven(axis, motionKeys(Kind::kRotary));
   if (!linear.empty() && !rotary.empty()) {
     axis.contradiction(
-        "", fmt::format("has {} and {}, but must be either linear, with all of it in mm, or "
-                        "rotary, with all of it in degrees",
+        "", fmt::format("has {} and {}, but must be either linear, with all keys in mm, or "
+                        "rotary, with all keys in degrees",
                         linear, rotary));
     return {};
   }
@@ -45,8 +45,8 @@ std::optional<Kind> readKind(ConfigReader& axis) {
   if (axis.isMap()) {
     axis.issue("",
                "has no key with a unit; it must have steps_per_mm, max_speed_mm_s and "
-               "acceleration_mm_s2 where it is linear, or steps_per_degree, max_speed_deg_s and "
-               "acceleration_deg_s2 where it is rotary");
+               "acceleration_mm_s2 if it is linear, or steps_per_degree, max_speed_deg_s and "
+               "acceleration_deg_s2 if it is rotary");
   }
   return {};
 }
@@ -130,7 +130,7 @@ class MotionReader {
     if (stop && slowest && *stop < *slowest) {
       const std::string& key = down ? keys_.deceleration : keys_.acceleration;
       contradicts(keys_.stop_deceleration,
-                  fmt::format("at least {}, which is {}: a stop must not end beyond what it stops",
+                  fmt::format("at least {}, which is {}: a stop must not end beyond the target",
                               key, axis_.shown(key)));
     }
     config.acceleration = si(up.value_or(0.0));

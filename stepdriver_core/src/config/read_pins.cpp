@@ -183,7 +183,7 @@ class PinsReader {
     if (named.empty() || missing.empty()) return;
     reader_.contradiction(
         missing.front(),
-        fmt::format("is missing; wire all three microstep pins, or none where the board "
+        fmt::format("is missing; wire all three microstep pins, or none if the board "
                     "is strapped to `microsteps` (wired: {})",
                     listText(named, "and")));
   }
@@ -232,7 +232,7 @@ class PinsReader {
     if (common_anode && (name.pin == &Pins::step || name.pin == &Pins::enable)) {
       invert.contradiction(
           key, fmt::format("is {}, but common_anode inverts it already; with common_anode "
-                           "only dir may be named here, to turn the direction round",
+                           "only dir may be named here, to reverse the direction",
                            invert.shown(key)));
       return;
     }

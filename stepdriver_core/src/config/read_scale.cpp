@@ -81,11 +81,10 @@ class ScaleReader {
     const auto diameter =
         axis_.findNumber(keys_.wheel_diameter, Range::positive(), Presence::kOptional);
     if (by_wheel && by_travel) {
-      axis_.contradiction(
-          keys_.wheel_diameter,
-          fmt::format("is {}, but {} must not be given with it: a round travels either "
-                      "that or pi times the diameter",
-                      axis_.shown(keys_.wheel_diameter), keys_.per_round));
+      axis_.contradiction(keys_.wheel_diameter,
+                          fmt::format("is {}, but {} must not be given with it: a revolution "
+                                      "travels either that or pi times the diameter",
+                                      axis_.shown(keys_.wheel_diameter), keys_.per_round));
       return {};
     }
     if (diameter) return kPi * static_cast<long double>(*diameter);

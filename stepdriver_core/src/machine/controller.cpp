@@ -32,7 +32,8 @@ constexpr const char* kChipFault =
 constexpr const char* kChipRemedy =
     "let it cool down, check the motor's wiring and the current that is set, then call recover";
 constexpr const char* kLateRemedy =
-    "lower the axis's speed or the machine's load (stepdriver_check tells what it holds), call "
+    "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
+    "call "
     "recover, and home it or set its position";
 
 /// For a line whose axes may still have to come to rest, for any direction.
@@ -45,9 +46,9 @@ void refuseTooFast(const std::vector<const axis::AxisModel*>& axes, double veloc
   }
   const double most = std::sqrt(std::max(linear, rotary));
   if (velocity <= most * (1.0 + 1e-12)) return;
-  axes.front()->refuse(
-      fmt::format("the velocity {} of the line is above {}, what its axes reach together",
-                  numberText(velocity), numberText(most)));
+  axes.front()->refuse(fmt::format(
+      "the velocity {} of the line is above {}, the highest that its axes reach together",
+      numberText(velocity), numberText(most)));
 }
 
 void refuseBadNumber(const axis::AxisModel& axis, const std::string& what, double value) {
@@ -133,7 +134,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     if (state.end == pulse::EndReason::kEmergencyStop) axis.fault.latchEmergencyStop(false);
     if (state.end == pulse::EndReason::kTooLate) {
       axis.fault.latch(
-          fmt::format("a pulse was {} late, more than the motor can go on from at this speed",
+          fmt::format("a pulse was {} late, too much for the motor to continue at this speed",
                       millisecondsText(state.end_lateness)),
           kLateRemedy);
       axis.position.distrust();
@@ -269,7 +270,8 @@ void Controller::serve(const MoveRounds& wanted, const Ack& call) {
   const axis::AxisModel& moved = axis(wanted.axis);
   if (moved.config.steps_per_round <= 0.0) {
     moved.refuse(
-        "the steps of a round are not known: configure steps_per_round or full_steps_per_round");
+        "the steps per revolution are not known: configure steps_per_round or "
+        "full_steps_per_round");
   }
   if (!std::isfinite(wanted.rounds)) {
     moved.refuse(fmt::format("rounds is {}, but must be a finite number", wanted.rounds));
@@ -344,7 +346,7 @@ void Controller::serve(const MoveLine& wanted, const Ack& call) {
   refuseBadNumber(first, "velocity of the line", wanted.velocity);
   refuseBadNumber(first, "duration of the line", wanted.duration);
   if (wanted.velocity > 0.0 && wanted.duration > 0.0) {
-    first.refuse("the line has a velocity and a duration; give one of them");
+    first.refuse("the line has a velocity and a duration; give only one of them");
   }
   std::vector<const axis::AxisModel*> moved_axes;
   for (const AxisId id : wanted.axes) moved_axes.push_back(&axis(id));

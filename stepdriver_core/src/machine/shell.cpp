@@ -96,7 +96,7 @@ activity::Reply Shell::call(Request request) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     const char* why = ending_                             ? "the machine was shut down"
-                      : requests_.size() >= kMostRequests ? "too many requests wait already"
+                      : requests_.size() >= kMostRequests ? "too many requests are already waiting"
                                                           : nullptr;
     if (why != nullptr) return {activity::Failure{activity::Failure::Kind::kRefused, why}, {}};
     id = ++calls_;

@@ -117,8 +117,8 @@ std::optional<KeptState> StateFile::load() const {
     failed("read", path_);
   }
   const auto broken = [this](int line) {
-    return Error(fmt::format("the state file {} is broken in line {}; delete it, or put it right",
-                             path_, line));
+    return Error(
+        fmt::format("the state file {} is broken in line {}; delete or correct it", path_, line));
   };
   KeptState state;
   std::string line;

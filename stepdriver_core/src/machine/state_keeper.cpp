@@ -26,9 +26,9 @@ StateKeeper::Loaded StateKeeper::load() {
   try {
     if (auto kept = file_.load()) {
       loaded.state = *std::move(kept);
-      loaded.why_none = "the state file " + file_.path() + " doesn't know this axis";
+      loaded.why_none = "the state file " + file_.path() + " doesn't contain this axis";
     } else {
-      loaded.why_none = "the state file " + file_.path() + " wasn't there yet";
+      loaded.why_none = "the state file " + file_.path() + " didn't exist yet";
     }
   } catch (const Error& error) {
     loaded.why_none = error.what();

@@ -122,8 +122,8 @@ std::string reasonOf(const Interval& interval, const Load& load, const Others& o
       others.not_spinning < 1.0 ? "; the other axes take " + percentText(1.0 - others.not_spinning)
                                 : "";
   return fmt::format(
-      "before an edge the pulse thread spins for {}, which it may for {} of the time{}, and "
-      "without spinning wake-ups are later",
+      "before an edge the pulse thread spins for {}, which is allowed for {} of the time{}; "
+      "without spinning, wake-ups are later",
       inMicroseconds(static_cast<double>(guard)), percentText(pulse::HybridWait::kMostSpinning),
       of_others);
 }
@@ -195,8 +195,9 @@ std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
   }
   if (why.empty()) return "";
   return fmt::format(
-      "this machine can't do what is asked of it in real time: {}. Lower the top speed or the "
-      "microsteps, allow real-time rights, run a PREEMPT_RT kernel, or take load off this machine",
+      "this machine doesn't meet the real-time requirements: {}. Lower the top speed or the "
+      "microsteps, allow real-time scheduling, use a PREEMPT_RT kernel, or reduce this machine's "
+      "load",
       why);
 }
 

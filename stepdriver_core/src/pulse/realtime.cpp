@@ -29,7 +29,7 @@ std::string latencyText(int error) {
            " is closed to this user: config/udev/60-stepdriver-gpio.rules opens it to the "
            "group realtime";
   }
-  if (error == ENOENT) return text + " isn't there: this kernel or container hasn't got it";
+  if (error == ENOENT) return text + " doesn't exist in this kernel or container";
   return fmt::format("{} can't be held ({})", text, std::strerror(error));
 }
 

@@ -27,7 +27,8 @@ class Converter {
   explicit Converter(std::string name) : name_(std::move(name)) {}
 
   ConfigValue convert(const YAML::Node& node, int depth = 0) {
-    if (depth > kDeepest) fail(node.Mark(), "it is too deep, or it is an alias of what it is in");
+    if (depth > kDeepest)
+      fail(node.Mark(), "it is nested too deeply, or it is an alias for a node that contains it");
     switch (node.Type()) {
       case YAML::NodeType::Scalar:
         return scalar(node);
@@ -82,7 +83,7 @@ class Converter {
       if (key == "<<" && isPlain(entry.first)) {
         merge(entry.second, depth, merged);
       } else if (!result.emplace(key, convert(entry.second, depth + 1)).second) {
-        fail(entry.first.Mark(), "the key " + key + " is there twice");
+        fail(entry.first.Mark(), "the key " + key + " occurs twice");
       }
     }
     result.insert(merged.begin(), merged.end());
@@ -110,7 +111,7 @@ ConfigValue parse(const std::string& text, const std::string& name) {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.empty()) return ConfigValue::Map{};
     if (documents.size() > 1) {
-      converter.fail(documents[1].Mark(), "a second document begins here; there may be one only");
+      converter.fail(documents[1].Mark(), "a second document begins here; only one is allowed");
     }
     const ConfigValue value = converter.convert(documents.front());
     return value.isNothing() ? ConfigValue::Map{} : value;

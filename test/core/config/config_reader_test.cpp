@@ -221,7 +221,7 @@ TEST(ConfigReader, SaysHowYamlWantsAnExponent) {
     return key.lines().at(0);
   };
   const std::string is = "/n/key: is \"1e6\" (a string), but must be a number above 0; ";
-  EXPECT_EQ(hint("1e6"), is + "write 1.0e+6, as YAML takes 1e6 for text");
+  EXPECT_EQ(hint("1e6"), is + "write 1.0e+6, because YAML reads 1e6 as text");
   EXPECT_NE(hint("-2.5E3").find("write -2.5e+3,"), std::string::npos) << hint("-2.5E3");
   EXPECT_NE(hint("1.e-3").find("write 1.0e-3,"), std::string::npos) << hint("1.e-3");
   EXPECT_EQ(hint("fast"), "/n/key: is \"fast\" (a string), but must be a number above 0");

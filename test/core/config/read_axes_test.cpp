@@ -151,10 +151,9 @@ TEST(ReadAxes, NeedsAMapOfAtLeastOneAxis) {
 }
 
 TEST(ReadAxes, ChecksTheNamesOfAxes) {
-  EXPECT_EQ(
-      issuesOf(mapOf({{"2x", linearAxis()}})),
-      Lines{"/axes/2x: has the name \"2x\", but an axis's name must begin with a letter and go "
-            "on with letters, digits and _ only"});
+  EXPECT_EQ(issuesOf(mapOf({{"2x", linearAxis()}})),
+            Lines{"/axes/2x: has the name \"2x\", but an axis's name must begin with a letter and "
+                  "continue with letters, digits and _ only"});
   for (const std::string good : {"x", "X", "axis_2", "a__"}) {
     EXPECT_EQ(issuesOf(mapOf({{good, linearAxis()}})), Lines{}) << good;
   }

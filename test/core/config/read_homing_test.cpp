@@ -143,7 +143,7 @@ TEST(ReadHoming, NamesWhatIsMissing) {
   ConfigValue axis = linearAxis();
   put(axis, "require_homing", true);
   EXPECT_EQ(issuesOfX(axis),
-            lineOfX("require_homing", "is true, but must be false where there is no homing"));
+            lineOfX("require_homing", "is true, but must be false if there is no homing"));
 }
 
 }  // namespace

@@ -58,13 +58,13 @@ TEST(ReadMotion, ChecksTheJerkAndTheDecelerationOfAStop) {
         "1e+15 steps/s^3"},
        {"stop_deceleration_mm_s2", 500.0, ""},
        {"stop_deceleration_mm_s2", 499.0,
-        "is 499.0, but must be at least acceleration_mm_s2, which is 500.0: a stop must not "
-        "end beyond what it stops"}});
+        "is 499.0, but must be at least acceleration_mm_s2, which is 500.0: a stop must not end "
+        "beyond the target"}});
   ConfigValue axis = linearAxis();
   put(axis, "deceleration_mm_s2", 800.0);
   expectIssues(axis, {{"stop_deceleration_mm_s2", 700.0,
                        "is 700.0, but must be at least deceleration_mm_s2, which is 800.0: a stop "
-                       "must not end beyond what it stops"}});
+                       "must not end beyond the target"}});
 }
 
 TEST(ReadMotion, WantsTheLowerLimitBelowTheUpper) {
@@ -81,9 +81,8 @@ TEST(ReadMotion, RefusesTwoUnitsInOneAxis) {
   ConfigValue axis = linearAxis();
   put(axis, "start_speed_deg_s", 5.0);
   const std::string mixed =
-      "/axes/x: has steps_per_mm and start_speed_deg_s, but must be either linear, with all of it "
-      "in "
-      "mm, or rotary, with all of it in degrees";
+      "/axes/x: has steps_per_mm and start_speed_deg_s, but must be either linear, with all keys "
+      "in mm, or rotary, with all keys in degrees";
   EXPECT_EQ(issuesOfX(axis), Lines{mixed});
   put(axis, "start_speed_deg_s", -5.0);
   put(axis, "max_speed_mm_s", 0);
@@ -96,8 +95,8 @@ TEST(ReadMotion, SaysWhereAnAxisHasNoUnit) {
   for (const char* key : {"steps_per_mm", "max_speed_mm_s", "acceleration_mm_s2"}) drop(axis, key);
   EXPECT_EQ(issuesOfX(axis),
             Lines{"/axes/x: has no key with a unit; it must have steps_per_mm, max_speed_mm_s and "
-                  "acceleration_mm_s2 where it is linear, or steps_per_degree, max_speed_deg_s and "
-                  "acceleration_deg_s2 where it is rotary"});
+                  "acceleration_mm_s2 if it is linear, or steps_per_degree, max_speed_deg_s and "
+                  "acceleration_deg_s2 if it is rotary"});
 }
 
 TEST(ReadMotion, ScalesALinearAxisByTheRoundsOfItsMotor) {
@@ -156,13 +155,13 @@ TEST(ReadMotion, RefusesAWheelWithAnotherTravelOrInDegrees) {
   put(axis, "full_steps_per_round", 200);
   put(axis, "mm_per_round", 40);
   expectIssues(axis, {{"wheel_diameter_mm", 65.0,
-                       "is 65.0, but mm_per_round must not be given with it: a round travels "
+                       "is 65.0, but mm_per_round must not be given with it: a revolution travels "
                        "either that or pi times the diameter"}});
   ConfigValue rotary = rotaryAxis();
   put(rotary, "wheel_diameter_mm", 65.0);
   EXPECT_EQ(issuesOfX(rotary),
             Lines{"/axes/x: has wheel_diameter_mm and steps_per_degree, but must be either linear, "
-                  "with all of it in mm, or rotary, with all of it in degrees"});
+                  "with all keys in mm, or rotary, with all keys in degrees"});
 }
 
 TEST(ReadMotion, ScalesARotaryAxisByTheRoundsOfItsMotor) {

@@ -34,7 +34,7 @@ TEST(ReadPins, RefusesWhatIsNoLine) {
 
 TEST(ReadPins, WantsAllMicrostepPinsOrNone) {
   const std::string message =
-      "is missing; wire all three microstep pins, or none where the board is strapped to "
+      "is missing; wire all three microstep pins, or none if the board is strapped to "
       "`microsteps` (wired: ";
   ConfigValue axis = linearAxis();
   put(axis, "pins/ms1", "A");
@@ -109,8 +109,7 @@ TEST(ReadPins, TurnsOnlyTheDirectionOfACommonAnodeTb6600) {
   put(axis, "common_anode", true);
   const std::string message =
       ", but common_anode inverts it already; with common_anode only dir may be named here, to "
-      "turn "
-      "the direction round";
+      "reverse the direction";
   expectIssues(axis, {{"invert/step", false, "is false" + message},
                       {"invert/enable", true, "is true" + message},
                       {"invert/dir", true, ""},

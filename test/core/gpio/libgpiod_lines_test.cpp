@@ -181,10 +181,10 @@ TEST_F(LibgpiodOnGpioSim, RefuseMoreLinesThanTheKernelGives) {
   std::vector<OutputRequest> outputs;
   outputs.reserve(65);
   for (int i = 0; i < 65; ++i) outputs.push_back({"large:" + std::to_string(i), false, false});
-  EXPECT_EQ(textOf(outputs, {}),
-            large.name() +
-                ": 65 outputs are asked for, and the kernel gives at most 64 of a chip to "
-                "one request.");
+  EXPECT_EQ(
+      textOf(outputs, {}),
+      large.name() +
+          ": 65 outputs are requested, but the kernel allows at most 64 of a chip in one request.");
   outputs.pop_back();
   EXPECT_EQ(textOf(outputs, {}), "none");
 }

@@ -385,7 +385,7 @@ TEST_F(Line, RefusesWhatItCannotDoAndMovesNothing) {
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}, false, -1.0}),
             "x: the velocity of the line is -1, but must be 0 or above, and finite");
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}, false, 1.0, 1.0}),
-            "x: the line has a velocity and a duration; give one of them");
+            "x: the line has a velocity and a duration; give only one of them");
   bench->axis("y").enable(false);
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}}), "y: disabled; enable it first");
   advance(1.0);

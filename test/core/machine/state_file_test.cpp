@@ -84,7 +84,7 @@ class StateFileTest : public testing::Test {
 
 TEST_F(StateFileTest, BringsAPositionBackAfterACleanEnd) {
   start();
-  EXPECT_EQ(state().position_note, "the state file " + file_ + " wasn't there yet");
+  EXPECT_EQ(state().position_note, "the state file " + file_ + " didn't exist yet");
   EXPECT_FALSE(state().position_valid);
   standAt(0.008);
   EXPECT_EQ(state().position_note, "");
@@ -177,7 +177,8 @@ TEST_F(StateFileTest, DoesNotTrustAChipThatBeganElsewhere) {
   start();
   EXPECT_NEAR(state().position, 0.0081, 1e-12);
   EXPECT_FALSE(state().position_valid);
-  EXPECT_NE(state().position_note.find("up to two full steps off"), std::string::npos);
+  EXPECT_NE(state().position_note.find("turned the motor by up to two full steps"),
+            std::string::npos);
 }
 
 TEST_F(StateFileTest, IsNotForAnotherAxis) {
@@ -191,7 +192,7 @@ TEST_F(StateFileTest, IsNotForAnotherAxis) {
   config_.name = "z";
   start();
   EXPECT_EQ(bench_->axis("z").state().position_note,
-            "the state file " + file_ + " doesn't know this axis");
+            "the state file " + file_ + " doesn't contain this axis");
 }
 
 TEST_F(StateFileTest, KeepsWhatIsTakenUpOfABacklash) {

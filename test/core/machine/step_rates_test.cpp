@@ -100,8 +100,8 @@ TEST(StepRates, AreLimitedByWhatMayBeSpun) {
   const StepRate rate = rateOf({1000, 1'000'000, 1000, 0, 59'000});
   EXPECT_DOUBLE_EQ(rate.held, 1e9 / (60'000.0 / 0.8)) << "the guard, and the high time of 1 us";
   EXPECT_EQ(rate.limited,
-            "before an edge the pulse thread spins for 59.0 us, which it may for 80 % of the time, "
-            "and without spinning wake-ups are later");
+            "before an edge the pulse thread spins for 59.0 us, which is allowed for 80 % of the "
+            "time; without spinning, wake-ups are later");
 }
 
 TEST(StepRates, CountThatALateSleepIsSpunForShorter) {

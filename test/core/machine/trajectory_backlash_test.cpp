@@ -126,9 +126,10 @@ TEST_F(TrajectoryWithBacklash, TakesNothingUpForATurnThatMovesNothing) {
 }
 
 TEST_F(TrajectoryWithBacklash, RefusesATurnThatLeavesNoRoom) {
-  EXPECT_REFUSED(follow({{"x"}, {{0.6, {0.6}, {0.0}, {}}}}),
-                 "x: the trajectory turns 0 s after its start, and goes on so close to the axis's "
-                 "limits that its backlash of 0.03 m can't be taken up meanwhile");
+  EXPECT_REFUSED(
+      follow({{"x"}, {{0.6, {0.6}, {0.0}, {}}}}),
+      "x: the trajectory turns 0 s after its start, and continues so close to the axis's "
+      "limits that its backlash of 0.03 m can't be taken up meanwhile");
   advance(1.0);
   EXPECT_EQ(bench->pulses("x"), 0);
 }

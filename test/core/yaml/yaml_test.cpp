@@ -118,7 +118,7 @@ TEST(Yaml, ResolvesAliasesAndMergeKeys) {
 
 TEST(Yaml, SaysWhereItIsWrong) {
   EXPECT_EQ(errorOf("a: 1\nb: [1, 2\n").rfind("axis.yaml:3:1: ", 0), 0U) << errorOf("b: [1, 2\n");
-  EXPECT_EQ(errorOf("a: 1\na: 2\n"), "axis.yaml:2:1: the key a is there twice");
+  EXPECT_EQ(errorOf("a: 1\na: 2\n"), "axis.yaml:2:1: the key a occurs twice");
   EXPECT_EQ(errorOf("a:\n  b: 4294967296\n"),
             "axis.yaml:2:6: 4294967296 is beyond the integers of ROS parameters, -2147483648 to "
             "2147483647");
@@ -133,7 +133,7 @@ TEST(Yaml, SaysWhereItIsWrong) {
   EXPECT_EQ(errorOf("7: x\n").rfind("axis.yaml:1:1: the key 7 is read as 7", 0), 0U);
   EXPECT_EQ(errorOf("'on': x\n'7': y\n"), "none");
   EXPECT_EQ(errorOf("a: 1\n---\nb: 2\n").rfind("axis.yaml:3:1: a second document", 0), 0U);
-  EXPECT_NE(errorOf("a: &a [*a]\n").find("alias of what it is in"), std::string::npos);
+  EXPECT_NE(errorOf("a: &a [*a]\n").find("alias for a node that contains it"), std::string::npos);
 }
 
 TEST(Yaml, SaysWhichFileCannotBeRead) {

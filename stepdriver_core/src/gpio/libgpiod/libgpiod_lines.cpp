@@ -43,7 +43,7 @@ class Requester {
     for (const auto& [chip, members] : found) {
       if (members.size() <= gpiod::kMostLines) continue;
       throw GpioError(fmt::format(
-          "{}: {} {} are asked for, and the kernel gives at most {} of a chip to one request.",
+          "{}: {} {} are requested, but the kernel allows at most {} of a chip in one request.",
           open_.table[chip].name, members.size(), kind, gpiod::kMostLines));
     }
     return found;
@@ -54,7 +54,7 @@ class Requester {
       if (input.bias == Bias::kAsIs || gpiod::canBias()) continue;
       throw GpioError(
           fmt::format("Line {}: libgpiod {} can't set a bias; 1.5 and later can. Fit a pull "
-                      "resistor and ask for no bias.",
+                      "resistor, and configure no bias.",
                       input.line, gpiod::version()));
     }
   }
@@ -127,7 +127,7 @@ class Requester {
           throw GpioError(refusal(k, culprit.code().value()));
         }
       }
-      throw GpioError(fmt::format("{}: its {} can't be had together: {}: {}.",
+      throw GpioError(fmt::format("{}: its {} can't be requested together: {}: {}.",
                                   open_.table[chip].name, kind, error.what(),
                                   errorText(error.code().value())));
     }
@@ -140,9 +140,10 @@ class Requester {
     std::string reason;
     if (error == EINVAL && input.bias != Bias::kAsIs) {
       reason =
-          " The kernel takes a bias from Linux 5.5 on: fit a pull resistor and ask for no bias.";
+          " The kernel supports a bias since Linux 5.5: fit a pull resistor, and configure no "
+          "bias.";
     } else if (input.edges && (error == ENXIO || error == EINVAL || error == EIO)) {
-      reason = " It may be that this chip can't tell edges: use a line of another chip.";
+      reason = " Perhaps this chip can't report edges: use a line of another chip.";
     }
     return refusal("input", input.line, addressOfInput(i), error, reason);
   }
@@ -150,7 +151,7 @@ class Requester {
   std::string outputRefusal(std::size_t i, int error) {
     std::string reason;
     if (error == EIO || error == EINVAL) {
-      reason = " It may be that this line can only be read: use another one.";
+      reason = " Perhaps this line can only be read: use another one.";
     }
     return refusal("output", outputs_[i].line, addresses_[i], error, reason);
   }
@@ -167,7 +168,7 @@ class Requester {
       }
       return described + busyText(holder);
     }
-    return fmt::format("{} can't be had as an {}: {}.{}{}", described, kind, errorText(error),
+    return fmt::format("{} can't be requested as an {}: {}.{}{}", described, kind, errorText(error),
                        reason, remedyFor(error));
   }
 

@@ -6,8 +6,8 @@ namespace {
 
 [[noreturn]] void refuse() {
   throw GpioError(
-      "stepdriver was built without libgpiod, and so there are only simulated lines. Install "
-      "libgpiod-dev and build again; with -DSTEPDRIVER_GPIOD=1 or =2 CMake says what it misses.");
+      "stepdriver was built without libgpiod, so only simulated lines are available. Install "
+      "libgpiod-dev and build again; with -DSTEPDRIVER_GPIOD=1 or =2 CMake says what is missing.");
 }
 
 }  // namespace

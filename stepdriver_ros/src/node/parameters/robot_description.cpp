@@ -99,7 +99,7 @@ class JointFitter {
     }
     if (limited && !(limits.lower < limits.upper)) {
       issueOfJoint(fmt::format(
-          "has lower={} and upper={}, but lower must be below upper (where one is missing it is 0)",
+          "has lower={} and upper={}, but lower must be below upper (a missing one is 0)",
           roundedText(limits.lower), roundedText(limits.upper)));
       right = false;
     }
@@ -132,7 +132,7 @@ class JointFitter {
       axis_.max_position_source = LimitSource::kRobotDescription;
     }
     if (*axis_.min_position < *axis_.max_position) return;
-    issueOfJoint(fmt::format("goes from {} to {} {}, which leaves nothing of the axis's own range",
+    issueOfJoint(fmt::format("goes from {} to {} {}, which doesn't overlap the axis's own range",
                              roundedText(limits.lower), roundedText(limits.upper),
                              unitOf(axis_.kind)));
   }
@@ -150,8 +150,9 @@ std::string positionText(const std::optional<double>& position, Kind kind, Limit
 std::string continuousJointText(const AxisConfig& axis) {
   return fmt::format(
       "axis {} has soft limits, but its joint {} is continuous in the robot description: the "
-      "limits hold, and whoever plans by the description will ask for positions that are refused. "
-      "Make the joint revolute, or take the limits away",
+      "limits apply, and a planner that uses the description will ask for positions that are "
+      "refused. "
+      "Make the joint revolute, or remove the limits",
       axis.name, axis.joint);
 }
 
@@ -165,7 +166,7 @@ std::vector<std::string> applyRobotDescription(const std::string& urdf, const st
   if (!model) {
     issues.push_back(
         {name,
-         "can't be read as a URDF; what the parser says stands above. A common reason: a prismatic "
+         "can't be read as a URDF; the parser's messages are above. A common reason: a prismatic "
          "or revolute joint without <limit effort=... velocity=...>"});
     return warnings;
   }

@@ -24,7 +24,7 @@ std::string changesText(const axis::AxisLimits& before, const axis::AxisLimits& 
   compare("acceleration", before.acceleration, now.acceleration, "/s^2");
   compare("deceleration", before.deceleration, now.deceleration, "/s^2");
   compare("jerk", before.jerk, now.jerk, "/s^3");
-  return text.empty() ? "all limits are as they were" : text;
+  return text.empty() ? "no limit has changed" : text;
 }
 
 }  // namespace
@@ -110,7 +110,7 @@ std::string AxisServices::wayText(const axis::Move& move) const {
   std::string text = fmt::format("to {} in {} s", target, roundedText(move.duration));
   if (rest != target) text += fmt::format("; it comes to rest at {}, the nearest microstep", rest);
   if (move.overshoot > 0.0) {
-    text += fmt::format("; it can't stop before that, goes {} {} beyond, and comes back",
+    text += fmt::format("; it can't stop before that, overshoots by {} {}, and comes back",
                         roundedText(move.overshoot), unitOf(axis_.config().kind));
   }
   return text;

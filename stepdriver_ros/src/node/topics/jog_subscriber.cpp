@@ -100,7 +100,7 @@ bool JogSubscriber::endWhatIsOver() {
   const ros::SteadyTime now = ros::SteadyTime::now();
   for (std::size_t axis = 0; axis < heard_.size(); ++axis) {
     if (heard_[axis].isZero() || now - heard_[axis] < timeout_) continue;
-    ROS_INFO_NAMED("jog", "%s: no jog for %g s, it comes to rest",
+    ROS_INFO_NAMED("jog", "%s: no jog for %g s, so it comes to rest",
                    machine_.axes()[axis]->config().name.c_str(), timeout_.toSec());
     end(axis);
   }
