@@ -1,5 +1,5 @@
-# How test programs are compiled, those of the core and those of the node: with all warnings, and as
-# fast as they still run well. What they test is compiled as it is installed.
+# The options of all test programs, of the core and of the node: all warnings, and little optimization, for
+# a fast build. The code under test is compiled as it is installed.
 function(stepdriver_test_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
   set_target_properties(${target} PROPERTIES CXX_STANDARD 17 CXX_EXTENSIONS OFF)

@@ -1,4 +1,4 @@
-# Finds libgpiod, for the build of the core and for whoever links what was built. Sets
+# Finds libgpiod, for the build of the core and for projects that link the core. Sets
 #   libgpiod_FOUND
 #   libgpiod_MAJOR         1 or 2
 #   libgpiod_INCLUDE_DIRS, libgpiod_LIBRARIES
@@ -21,7 +21,7 @@ find_library(libgpiod_library gpiod ${libgpiod_places}
   PATH_SUFFIXES lib lib/${CMAKE_LIBRARY_ARCHITECTURE})
 mark_as_advanced(libgpiod_include libgpiod_library)
 
-# gpiod.h doesn't tell its version otherwise.
+# gpiod.h doesn't give its version in any other way.
 unset(libgpiod_MAJOR)
 if(libgpiod_include AND libgpiod_library)
   file(STRINGS ${libgpiod_include}/gpiod.h libgpiod_version_call

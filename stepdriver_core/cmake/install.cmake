@@ -1,5 +1,4 @@
-# What `cmake --install` puts down, so that others find the core: by find_package(stepdriver_core) or by
-# pkg-config. The paths follow CMAKE_INSTALL_LIBDIR and CMAKE_INSTALL_INCLUDEDIR, which a project that
+# Installs the core so that other projects find it by find_package(stepdriver_core) or by pkg-config. The paths follow CMAKE_INSTALL_LIBDIR and CMAKE_INSTALL_INCLUDEDIR, which a project that
 # adds this folder may set.
 include(CMakePackageConfigHelpers)
 
@@ -13,7 +12,7 @@ install(EXPORT stepdriver_core NAMESPACE stepdriver_core:: FILE stepdriver_coreT
   DESTINATION ${package_folder})
 set(left_out "")
 if(TARGET stepdriver_core_yaml)
-  # Apart from the core's: whoever links only the core needs no yaml-cpp.
+  # Separate from the core's targets: projects that link only the core don't need yaml-cpp.
   install(TARGETS stepdriver_core_yaml EXPORT stepdriver_core_yaml
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -34,8 +33,8 @@ install(FILES ${made_folder}/stepdriver_coreConfig.cmake
   ${made_folder}/stepdriver_coreConfigVersion.cmake cmake/Findlibgpiod.cmake
   DESTINATION ${package_folder})
 
-# A static library carries no list of the libraries that it needs: then plain `pkg-config --libs` names
-# them too. A path from the file itself keeps the installed folder movable.
+# A static library contains no list of the libraries that it needs, so plain `pkg-config --libs` names
+# them too. Paths are relative to the file itself, so that the installed folder can be moved.
 file(RELATIVE_PATH pc_to_prefix /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
 set(pc_requires fmt)
 if(gpiod_major EQUAL 1)

@@ -1,4 +1,4 @@
-# Which libgpiod the lines go through. Sets
+# Chooses the libgpiod that the core uses. Sets
 #   gpiod_sources  the sources that are compiled for it
 #   gpiod_major    1, 2, or 0 for none
 #   libgpiod_INCLUDE_DIRS, libgpiod_LIBRARIES and the target libgpiod::libgpiod, as Findlibgpiod.cmake
@@ -37,7 +37,7 @@ if(STEPDRIVER_GPIOD MATCHES "^[12]$" AND NOT STEPDRIVER_GPIOD EQUAL gpiod_major)
 endif()
 
 get_filename_component(gpiod_folder ${CMAKE_CURRENT_LIST_DIR}/../src/gpio/libgpiod ABSOLUTE)
-# It calls no libgpiod itself, and so its test runs everywhere.
+# It doesn't call libgpiod itself, so its test runs everywhere.
 set(gpiod_sources ${gpiod_folder}/held_lines.cpp)
 if(gpiod_major)
   foreach(name libgpiod_lines open_chips gpiod${gpiod_major})

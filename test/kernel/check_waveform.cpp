@@ -19,9 +19,8 @@ namespace kernel = stepdriver::kernel;
 constexpr const char kUsage[] =
     "usage: check_waveform TRACE AXIS...\n"
     "\n"
-    "Compares what the kernel did to the lines of each axis (TRACE: a recording of `run.sh "
-    "--trace`\n"
-    "or gpio_trace.sh) with the requirements of its driver chip, and prints the result.\n"
+    "Compares what the kernel did to the lines of each axis with the requirements of its driver\n"
+    "chip, and prints the result. TRACE is a recording of `run.sh --trace` or gpio_trace.sh.\n"
     "\n"
     "AXIS is --axis NAME, and after it\n"
     "  --driver NAME             a4988, drv8825 or tb6600\n"
