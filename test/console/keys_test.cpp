@@ -35,6 +35,13 @@ TEST(Keys, JogInTheirDirectionAtTheirSpeed) {
   }
 }
 
+TEST(Keys, HoldResumeAndChangeTheSpeed) {
+  EXPECT_EQ(commandOf('p')->action, Action::kHold);
+  EXPECT_EQ(commandOf('c')->action, Action::kResume);
+  EXPECT_EQ(commandOf('[')->action, Action::kSlower);
+  EXPECT_EQ(commandOf(']')->action, Action::kFaster);
+}
+
 TEST(Keys, ChooseAnAxisByItsNumberFromOne) {
   EXPECT_EQ(commandOf('1')->index, 0);
   EXPECT_EQ(commandOf('9')->index, 8);

@@ -136,6 +136,96 @@ TEST(Screen, ShowsFaultsAndRefusalsInTheirWords) {
   EXPECT_TRUE(shows(screen, "x: enable REFUSED: x: at fault: a pulse was 7 ms late"));
 }
 
+std::vector<AxisView> nineAxesWithLongNames() {
+  std::vector<AxisView> axes;
+  for (int i = 1; i <= 9; ++i) {
+    axes.push_back(axisView("gantry_carriage_drive_number_" + std::to_string(i)));
+    axes.back().position = -1234.5678;
+    axes.back().velocity = -100.0;
+    axes.back().moving = true;
+  }
+  return axes;
+}
+
+TEST(Screen, NineAxesWithLongNamesFitIntoNarrowWindows) {
+  for (const int columns : {80, 60}) {
+    Session session = sessionWith(nineAxesWithLongNames());
+    session.press({'9', 'g', '1', '2'}, 0.0);
+    session.logged(
+        "gantry_carriage_drive_number_9: the position 1.25 m is above the soft limit "
+        "max_position 0.2 m, from the configuration");
+    const std::vector<Row> screen = draw(session, 36, columns, 0.0);
+    ASSERT_EQ(screen.size(), 36U);
+    for (const Row& row : screen) EXPECT_LE(static_cast<int>(row.text.size()), columns) << row.text;
+    const std::string text = screenText(session, 36, columns);
+    for (const char* words :
+         {"> gantry~ber_9", "  gantry~ber_1", "-1234.5678 mm", "moving",
+          "Move gantry~ber_9 to [mm]: 12_", "max_position 200.0000 mm", "SPACE EMERGENCY STOP"}) {
+      EXPECT_TRUE(shows(text, words)) << columns;
+    }
+  }
+}
+
+TEST(Screen, ANameIsShownWholeIfThereIsRoom) {
+  const Session session = sessionWith({axisView("gantry_carriage")});
+  EXPECT_TRUE(shows(screenText(session, 24, 100), "> gantry_carriage "));
+  EXPECT_TRUE(shows(screenText(session, 24, 60), "> gantry~riage "));
+}
+
+TEST(Screen, AHelpThatDoesNotFitIsCutAndSaysSo) {
+  Session session = sessionWith(sixAxes());
+  session.press({'?'}, 0.0);
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "r ends faults"));
+  EXPECT_FALSE(shows(screenText(session, 24, 80), "more keys in a larger window"));
+  const std::string small = screenText(session, 20, 60);
+  EXPECT_TRUE(shows(small, "up down 1-9"));
+  EXPECT_TRUE(shows(small, "more keys in a larger window"));
+}
+
+TEST(Screen, ShowsTheStepSizeTheOverrideAndWhatIsTyped) {
+  Session session = sessionWith({axisView("x")});
+  EXPECT_TRUE(shows(screenText(session, 24, 80),
+                    "- + steps: one motor step    speed override: not set here"));
+  session.press({'i'}, 0.0);
+  session.answered(session.press({'['}, 0.0).calls.at(0), true, "");
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "- + steps: 0.1 mm    speed override: 90 %"));
+  session.press({'g', '-', '7'}, 0.0);
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "Move x to [mm]: -7_"));
+  EXPECT_TRUE(shows(screenText(session, 6, 40), "Move x to [mm]: -7_")) << "also in a small window";
+}
+
+TEST(Screen, TheHelpListsEveryKey) {
+  Session session = sessionWith({axisView("x")});
+  session.press({'?'}, 0.0);
+  const std::string screen = screenText(session, 40, 80);
+  for (const char* words : {"up down 1-9",
+                            "e enable x",
+                            "d disable x",
+                            "left right",
+                            "shift+left",
+                            "< >",
+                            "- +",
+                            "i step size",
+                            "g go to a position",
+                            "z set zero",
+                            "h home x",
+                            "a home all",
+                            "p hold",
+                            "c resume",
+                            "[ ] speed",
+                            "r recover",
+                            ", . jog slowly too",
+                            "k j tab",
+                            "= one step",
+                            "SPACE EMERGENCY STOP",
+                            "s stop all axes",
+                            "Esc",
+                            "q quit",
+                            "? all keys"}) {
+    EXPECT_TRUE(shows(screen, words));
+  }
+}
+
 TEST(Screen, ARotaryAxisIsInDegrees) {
   Session session = sessionWith({axisView("x")});
   config::AxisConfig config = axisConfig("x");

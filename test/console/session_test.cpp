@@ -148,6 +148,227 @@ TEST(Session, AStepIsOneMicrostepInTheModeOfNow) {
   EXPECT_NEAR(orders.calls[0].distance, -0.001 / 40.0, 1e-15) << "80 steps/mm at 16, 40 at 8";
 }
 
+TEST(Session, TheStepSizeGoesRound) {
+  Session session = sessionWith({axisView("x")});
+  const auto stepped = [&](double now) {
+    const Orders orders = session.press({'+'}, now);
+    if (orders.calls.size() != 1) return -1.0;
+    session.answered(orders.calls[0], true, "");
+    return orders.calls[0].distance * 1e3;
+  };
+  for (const double wanted : {0.0125, 0.1, 1.0, 10.0, 0.0125}) {
+    EXPECT_NEAR(stepped(0.0), wanted, 1e-12);
+    session.press({'i'}, 0.0);
+  }
+}
+
+TEST(Session, StepsOfARotaryAxisAreDegrees) {
+  config::AxisConfig config = axisConfig("r");
+  config.kind = config::Kind::kRotary;
+  Session session = sessionWith({axisView("r")}, {config});
+  const Orders orders = session.press({'i', 'i', '-'}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_NEAR(orders.calls[0].distance, -3.14159265358979 / 180.0, 1e-12);
+}
+
+/// An axis with soft limits at 0 and 200 mm.
+config::AxisConfig limitedConfig() {
+  config::AxisConfig config = axisConfig("x");
+  config.min_position = 0.0;
+  config.max_position = 0.2;
+  return config;
+}
+
+std::vector<Key> keysOf(const std::string& text) { return {text.begin(), text.end()}; }
+
+TEST(Session, GoesToATypedPositionInMm) {
+  Session session = sessionWith({axisView("x")}, {limitedConfig()});
+  EXPECT_TRUE(session.press(keysOf("g1"), 0.0).calls.empty());
+  ASSERT_NE(session.prompt(), nullptr);
+  EXPECT_TRUE(session.press(keysOf("29"), 0.1).calls.empty()) << "the second axis isn't chosen";
+  EXPECT_TRUE(session.press({kKeyBackspace, '.', '5'}, 0.2).calls.empty());
+  EXPECT_EQ(session.prompt()->text(), "12.5");
+  const Orders orders = session.press({kKeyEnter}, 0.3);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_EQ(orders.calls[0].what, Call::What::kGoTo);
+  EXPECT_EQ(orders.calls[0].axis, "x");
+  EXPECT_NEAR(orders.calls[0].position, 0.0125, 1e-15);
+  EXPECT_EQ(session.prompt(), nullptr);
+}
+
+TEST(Session, ARotaryAxisGoesToDegrees) {
+  config::AxisConfig config = axisConfig("r");
+  config.kind = config::Kind::kRotary;
+  Session session = sessionWith({axisView("r")}, {config});
+  const Orders orders = session.press(keysOf("g-180\n"), 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_NEAR(orders.calls[0].position, -3.14159265358979, 1e-12);
+}
+
+TEST(Session, APositionThatCannotBeReachedIsRefusedAndNotSent) {
+  config::AxisConfig open = limitedConfig();
+  open.max_position.reset();
+  struct Wanted {
+    std::string typed;
+    std::string said;
+    config::AxisConfig config;
+  };
+  for (const Wanted& wanted : {
+           Wanted{"250",
+                  "x isn't moved: 250.0000 mm is outside its limits, 0.0000 mm to 200.0000 mm",
+                  limitedConfig()},
+           {"-0.1", "x isn't moved: -0.1000 mm is outside its limits, 0.0000 mm to 200.0000 mm",
+            limitedConfig()},
+           {"-1", "x isn't moved: -1.0000 mm is outside its limits, 0.0000 mm and above", open},
+           {"1.2.3", "x isn't moved: \"1.2.3\" isn't a number in mm, from 0.0000 mm to 200.0000 mm",
+            limitedConfig()},
+           {"", "x isn't moved: \"\" isn't a number in mm", axisConfig("x")},
+           {"--5", "x isn't moved: \"--5\" isn't a number in mm", axisConfig("x")},
+       }) {
+    Session session = sessionWith({axisView("x")}, {wanted.config});
+    EXPECT_TRUE(session.press(keysOf("g" + wanted.typed + "\n"), 0.0).calls.empty());
+    EXPECT_TRUE(said(session, wanted.said)) << session.messages().all().back().text;
+  }
+  Session session = sessionWith({axisView("x")}, {limitedConfig()});
+  EXPECT_EQ(session.press(keysOf("g200\n"), 0.0).calls.size(), 1U) << "a limit can be reached";
+}
+
+TEST(Session, APositionIsTypedOnlyForAnAxisThatMayMove) {
+  AxisView disabled = axisView("x");
+  disabled.enabled = false;
+  Session session = sessionWith({disabled});
+  EXPECT_TRUE(session.press(keysOf("g10\n"), 0.0).calls.empty());
+  EXPECT_TRUE(said(session, "x isn't moved: it isn't enabled"));
+
+  Session later = sessionWith({axisView("x")});
+  later.press(keysOf("g10"), 0.0);
+  EXPECT_TRUE(later.press({kKeyEnter}, 2.0).calls.empty()) << "the state is old by now";
+  later.update({axisView("x")}, 3.0);
+  later.press(keysOf("g10"), 3.0);
+  later.update({disabled}, 3.1);
+  EXPECT_TRUE(later.press({kKeyEnter}, 3.2).calls.empty()) << "it was disabled meanwhile";
+}
+
+TEST(Session, EscapeCancelsTypingAndSendsNothing) {
+  Session session = sessionWith({axisView("x")});
+  const Orders orders = session.press({'g', '1', kKeyEscape}, 0.0);
+  EXPECT_TRUE(orders.calls.empty());
+  EXPECT_EQ(session.prompt(), nullptr);
+  EXPECT_EQ(session.press({kKeyEscape}, 0.1).calls.size(), 1U) << "now it stops";
+}
+
+TEST(Session, StopsWorkWhileAPositionIsTyped) {
+  Session session = sessionWith({axisView("x")});
+  session.press(keysOf("g1"), 0.0);
+  EXPECT_TRUE(session.press({'0', ' ', kKeyEnter}, 0.1).emergency_stop);
+  EXPECT_EQ(session.prompt(), nullptr) << "nothing is left to be entered by mistake";
+  session.press(keysOf("g1"), 0.2);
+  const Orders orders = session.press(keysOf("s"), 0.3);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_EQ(orders.calls[0].what, Call::What::kStop);
+  EXPECT_EQ(session.prompt(), nullptr);
+  session.press(keysOf("g1"), 0.4);
+  session.press({kKeyCtrlC}, 0.5);
+  EXPECT_TRUE(session.ended());
+}
+
+TEST(Session, LettersThatAreTypedIntoAPositionDoNothingElse) {
+  Session session = sessionWith({axisView("x"), axisView("y")});
+  session.press({'g'}, 0.0);
+  const Orders orders = session.press({'e', 'd', 'h', 'a', 'q', '2', kKeyDown}, 0.1);
+  EXPECT_TRUE(orders.calls.empty());
+  EXPECT_FALSE(session.ended());
+  EXPECT_EQ(session.chosen(), "x");
+  ASSERT_NE(session.prompt(), nullptr);
+  EXPECT_EQ(session.prompt()->text(), "2");
+}
+
+TEST(Session, SetsZeroOnlyAtRest) {
+  AxisView axis = axisView("x");
+  axis.enabled = false;
+  Session session = sessionWith({axis});
+  Orders orders = session.press({'z'}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U) << "nothing moves, so it needn't be enabled";
+  EXPECT_EQ(orders.calls[0].what, Call::What::kSetZero);
+  session.answered(orders.calls[0], true, "");
+  axis.moving = true;
+  session.update({axis}, 0.1);
+  EXPECT_TRUE(session.press({'z'}, 0.1).calls.empty());
+  EXPECT_TRUE(said(session, "x: the position isn't set because the axis is moving"));
+  axis.moving = false;
+  session.update({axis}, 0.2);
+  EXPECT_TRUE(session.press({'z'}, 3.0).calls.empty()) << "it isn't known whether it is at rest";
+}
+
+TEST(Session, HoldsInAnyStateAndResumesOnlyALiveOne) {
+  Session session("/stepdriver", {});
+  Orders orders = session.press({'p', 'c'}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_EQ(orders.calls[0].what, Call::What::kHold);
+  EXPECT_TRUE(said(session, "nothing is resumed: the driver's state isn't live"));
+  AxisView held = axisView("x");
+  held.held = true;
+  Session live = sessionWith({held});
+  orders = live.press({'c', '+', 'h', 'g'}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_EQ(orders.calls[0].what, Call::What::kResume);
+  EXPECT_TRUE(said(live, "x isn't moved: it is on hold; c resumes, s stops"));
+}
+
+/// The factor that a key sends; 0: none.
+double sentFactor(Session& session, Key key, double now) {
+  const Orders orders = session.press({key}, now);
+  if (orders.calls.size() != 1) return 0.0;
+  session.answered(orders.calls[0], true, "");
+  return orders.calls[0].what == Call::What::kSpeedOverride ? orders.calls[0].factor : 0.0;
+}
+
+TEST(Session, ChangesTheOverrideInStepsOfTenPercent) {
+  Session session = sessionWith({axisView("x")});
+  EXPECT_FALSE(session.speedOverride());
+  EXPECT_NEAR(sentFactor(session, '[', 0.0), 0.9, 1e-12);
+  EXPECT_NEAR(*session.speedOverride(), 0.9, 1e-12);
+  EXPECT_NEAR(sentFactor(session, ']', 0.0), 1.0, 1e-12);
+  for (int percent = 90; percent >= 10; percent -= 10) {
+    EXPECT_NEAR(sentFactor(session, '[', 0.0), percent / 100.0, 1e-12);
+  }
+  EXPECT_EQ(sentFactor(session, '[', 0.0), 0.0);
+  EXPECT_TRUE(said(session, "the override stays at 10 %: it can be 10 to 200 %"));
+  for (int percent = 20; percent <= 200; percent += 10) {
+    EXPECT_NEAR(sentFactor(session, ']', 0.0), percent / 100.0, 1e-12);
+  }
+  EXPECT_EQ(sentFactor(session, ']', 0.0), 0.0);
+}
+
+TEST(Session, AnOverrideThatItDoesNotKnowIsNotRaisedAboveTheCommandedSpeed) {
+  Session session = sessionWith({axisView("x")});
+  EXPECT_NEAR(sentFactor(session, ']', 0.0), 1.0, 1e-12);
+  EXPECT_NEAR(sentFactor(session, ']', 0.0), 1.1, 1e-12);
+  session.tick(2.0);
+  EXPECT_FALSE(session.speedOverride()) << "the driver may have been restarted";
+  EXPECT_EQ(sentFactor(session, ']', 2.0), 0.0) << "nothing becomes faster unseen";
+  EXPECT_NEAR(sentFactor(session, '[', 2.0), 0.9, 1e-12);
+}
+
+TEST(Session, ARefusedOverrideIsNotShown) {
+  Session session = sessionWith({axisView("x")});
+  const Orders orders = session.press({'['}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  session.answered(orders.calls[0], false, "nobody answers");
+  EXPECT_FALSE(session.speedOverride());
+}
+
+TEST(Session, TellsWhatTheDriverSaysInMm) {
+  AxisView faulty = axisView("x");
+  faulty.fault = "it stopped at 0.02 m";
+  Session session = sessionWith({faulty});
+  session.answered({Call::What::kGoTo, "x"}, false, "x: the position 0.3 m is above 0.2 m");
+  EXPECT_TRUE(said(session, "x: go to REFUSED: x: the position 300.0000 mm is above 200.0000 mm"));
+  session.logged("x: it stands at the soft limit 0.2 m");
+  EXPECT_TRUE(said(session, "x: it stands at the soft limit 200.0000 mm"));
+  EXPECT_EQ(session.driver().axis("x")->fault, "it stopped at 20.0000 mm");
+}
+
 TEST(Session, SendsACallOnceWhileItIsUnderWay) {
   Session session = sessionWith({axisView("x")});
   EXPECT_EQ(session.press({'h'}, 0.0).calls.size(), 1U);

@@ -105,6 +105,7 @@ TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
   EXPECT_TRUE(rests(states));
 
   terminal.press("h");
+  EXPECT_TRUE(terminal.waitFor("x is homed and stands at 2.00"));
   EXPECT_TRUE(terminal.waitFor("rest homed"));
   EXPECT_TRUE(node.moveTo(0.01, true).success);
   EXPECT_TRUE(terminal.waitFor("10.00")) << "what others do is shown too";
@@ -113,6 +114,105 @@ TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
   EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
   terminal.press("q");
   expectTerminalGivenBack();
+}
+
+TEST_F(ConsoleTest, GoesToPositionsInMmAndSetsZero) {
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  terminal.press("g");
+  EXPECT_TRUE(terminal.waitFor("Move x to [mm]: _"));
+  terminal.type("20");
+  EXPECT_TRUE(terminal.waitFor("x moves to 20.0000 mm in"));
+  EXPECT_TRUE(terminal.waitFor(" 20.0000 mm      0.00 mm/s"));
+  EXPECT_NEAR(node.rig().carriage.at(0), 0.02, 1e-9);
+
+  const std::int64_t pulses = node.pulses();
+  terminal.type("g250");
+  EXPECT_TRUE(terminal.waitFor(
+      "x isn't moved: 250.0000 mm is outside its limits, 0.0000 mm to 200.0000 mm"));
+  terminal.type("g1.2.3");
+  EXPECT_TRUE(terminal.waitFor("\"1.2.3\" isn't a number in mm"));
+  EXPECT_EQ(node.pulses(), pulses);
+
+  terminal.press("z");
+  EXPECT_TRUE(terminal.waitFor("x: this position is 0.0000 mm from now on"));
+  EXPECT_TRUE(terminal.waitFor(" 0.0000 mm      0.00 mm/s"));
+  for (const char* size : {"0.1 mm", "1 mm", "10 mm"}) {
+    terminal.press("i");
+    EXPECT_TRUE(terminal.waitFor(std::string("- + steps: ") + size));
+  }
+  terminal.press("+");
+  EXPECT_TRUE(terminal.waitFor(" 10.0000 mm      0.00 mm/s"));
+  EXPECT_NEAR(node.rig().carriage.at(0), 0.03, 1e-9);
+  terminal.press("-");
+  EXPECT_TRUE(terminal.waitFor(" 0.0000 mm      0.00 mm/s"));
+  terminal.press("-");
+  EXPECT_TRUE(terminal.waitFor("x: step REFUSED: x: the position -10.0000 mm is below the soft"));
+}
+
+TEST_F(ConsoleTest, HoldsResumesAndSlowsDown) {
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  ASSERT_NO_FATAL_FAILURE(open());
+  for (const char* factor : {"90 %", "80 %", "70 %"}) {
+    terminal.press("[");
+    EXPECT_TRUE(terminal.waitFor(std::string("speed override: ") + factor));
+  }
+  terminal.press("]");
+  EXPECT_TRUE(terminal.waitFor("all axes move at 80 % of the commanded speed"));
+  ASSERT_TRUE(node.moveTo(0.19, false, 0.05).success);
+  EXPECT_TRUE(terminal.waitFor(" 40.00 mm/s"));
+  terminal.press("p");
+  EXPECT_TRUE(terminal.waitFor("HELD"));
+  EXPECT_TRUE(rests(states));
+  const std::int64_t pulses = node.pulses();
+  EXPECT_LT(pulses, 15200);
+  terminal.press("+");
+  EXPECT_TRUE(terminal.waitFor("x isn't moved: it is on hold; c resumes, s stops"));
+  EXPECT_EQ(node.pulses(), pulses);
+  terminal.press("c");
+  EXPECT_TRUE(terminal.waitFor(" 190.0000 mm"));
+  EXPECT_EQ(node.pulses(), 15200);
+}
+
+TEST_F(ConsoleTest, SpaceStopsWhileAPositionIsTyped) {
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  ASSERT_TRUE(node.moveTo(0.19, false, 0.005).success);
+  terminal.press("g");
+  terminal.press("5");
+  EXPECT_TRUE(terminal.waitFor("Move x to [mm]: 5_"));
+  terminal.press("Space");
+  EXPECT_TRUE(terminal.waitFor("*** EMERGENCY STOP: the driver has stopped every axis ***"));
+  EXPECT_TRUE(terminal.waitUntilGone("Move x to"));
+  EXPECT_TRUE(terminal.waitUntilGone("moving"));
+  terminal.press("Enter");
+  terminal.press("r");
+  EXPECT_TRUE(terminal.waitUntilGone("FAULT"));
+  EXPECT_LT(node.pulses(), 15200) << "nothing goes to a position that was typed before the stop";
+}
+
+TEST_F(ConsoleTest, ShowsNineAxesInNarrowWindows) {
+  for (int i = 1; i <= 8; ++i) {
+    const std::string axis = "axes/carriage_with_a_long_name_" + std::to_string(i) + "/";
+    node.set(axis + "driver", "tb6600");
+    node.set(axis + "microsteps", 8);
+    node.set(axis + "pins/step", "step" + std::to_string(i));
+    node.set(axis + "pins/dir", "dir" + std::to_string(i));
+    node.set(axis + "steps_per_mm", 80.0);
+    node.set(axis + "max_speed_mm_s", 50.0);
+    node.set(axis + "acceleration_mm_s2", 500.0);
+  }
+  node.start();
+  ASSERT_NO_FATAL_FAILURE(open());
+  for (const int columns : {80, 60}) {
+    terminal.resize(columns, 30);
+    EXPECT_TRUE(terminal.waitFor("  carria~ame_8"));
+    const std::string screen = terminal.screen();
+    EXPECT_NE(screen.find("> carria~ame_1"), std::string::npos) << screen;
+    EXPECT_NE(screen.find("  x "), std::string::npos) << screen;
+    EXPECT_NE(screen.find("SPACE EMERGENCY STOP"), std::string::npos) << screen;
+  }
 }
 
 TEST_F(ConsoleTest, SpaceStopsEverythingWhileACallIsUnderWay) {

@@ -176,7 +176,7 @@ TEST_F(WizardTest, ASwitchThatChangesStopsAMove) {
   EXPECT_TRUE(terminal.waitFor("Stopped: a switch has changed"));
   EXPECT_LT(node.pulses(), 7360);
   node.process().signal(SIGKILL);
-  EXPECT_TRUE(terminal.waitFor("comes any more"));
+  EXPECT_TRUE(terminal.waitFor("arrives any more"));
   EXPECT_TRUE(terminal.waitFor("ended 1"));
 }
 

@@ -21,6 +21,23 @@ Answer ask(ros::ServiceClient& client, const typename Service::Request& request 
   return {call.response.success != 0, call.response.message};
 }
 
+/// The whole answer, over a connection for this one call. If nobody answers, `success` is false,
+/// and `message` says so.
+///
+/// @param service its full name.
+template <typename Service>
+typename Service::Response respondedBy(const std::string& service,
+                                       const typename Service::Request& request) {
+  ros::ServiceClient client = ros::NodeHandle().serviceClient<Service>(service, true);
+  Service call;
+  call.request = request;
+  if (!client.call(call)) {
+    call.response.success = 0;
+    call.response.message = kNobodyAnswers;
+  }
+  return call.response;
+}
+
 /// The same, with a connection for this one call.
 ///
 /// @param service its full name.

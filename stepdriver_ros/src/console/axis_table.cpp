@@ -4,10 +4,13 @@
 
 #include <algorithm>
 
+#include "table_units.h"
+
 namespace stepdriver::console {
 namespace {
 
 constexpr std::size_t kGap = 1;
+constexpr std::size_t kMark = 2;  // before the name: whether the axis is chosen
 
 struct Column {
   std::string title;
@@ -53,7 +56,7 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
     const bool chosen = axis.name == session.chosen();
     const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
     const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,
-                                            old(fmt::format("{:.4f} {}", axis.position, unit)),
+                                            old(positionText(axis.position, unit)),
                                             old(fmt::format("{:.2f} {}/s", axis.velocity, unit)),
                                             old(switchText(config != nullptr && config->endstop_min,
                                                            axis.switches_known, axis.min_active)),
@@ -73,6 +76,18 @@ std::size_t widthOf(const std::vector<Column>& columns) {
   std::size_t width = 0;
   for (const Column& column : columns) width += (width == 0 ? 0 : kGap) + column.width;
   return width;
+}
+
+/// Shortens the names, which come first, as far as that helps.
+void shortenNames(std::vector<Column>& columns, std::size_t width) {
+  Column& names = columns.front();
+  const std::size_t others = widthOf(columns) - names.width;
+  const std::size_t room = width > others ? width - others : 0;
+  const std::size_t wanted = std::min(names.width, std::max(room, kMark + kShortName));
+  for (std::string& cell : names.cells) {
+    cell = cell.substr(0, kMark) + shortName(cell.substr(kMark), wanted - kMark);
+  }
+  names.width = wanted;
 }
 
 /// Removes the least important column. @return its title.
@@ -98,9 +113,16 @@ std::string rowText(const std::vector<Column>& columns, int index) {
 
 }  // namespace
 
+std::string shortName(const std::string& name, std::size_t width) {
+  if (name.size() <= width || width < 3) return name.substr(0, width);
+  const std::size_t end = (width - 1) / 2;
+  return name.substr(0, width - 1 - end) + "~" + name.substr(name.size() - end);
+}
+
 AxisTable axisTable(const Session& session, int columns, double now) {
   std::vector<Column> shown = columnsOf(session, session.driver().live(now));
   AxisTable table;
+  shortenNames(shown, static_cast<std::size_t>(columns));
   while (shown.size() > 1 && widthOf(shown) > static_cast<std::size_t>(columns)) {
     table.hidden.push_back(dropOne(shown));
   }

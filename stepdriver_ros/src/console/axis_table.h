@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,12 @@ struct AxisTable {
   int chosen = 0;                   ///< index of the chosen axis's row
   std::vector<std::string> hidden;  ///< titles of the columns that didn't fit
 };
+
+/// The width of a name in lines that have no room for more.
+constexpr std::size_t kShortName = 12;
+
+/// The name if it fits, and otherwise its beginning and its end: `gantry~left`.
+std::string shortName(const std::string& name, std::size_t width);
 
 AxisTable axisTable(const Session& session, int columns, double now);
 

@@ -1,5 +1,6 @@
 #include "driver_client.h"
 
+#include <fmt/format.h>
 #include <ros/transport_hints.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
@@ -7,6 +8,8 @@
 #include <stepdriver/HomeAxes.h>
 #include <stepdriver/Jog.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/SetPosition.h>
+#include <stepdriver/SpeedOverride.h>
 
 #include <algorithm>
 #include <chrono>
@@ -22,7 +25,22 @@ constexpr std::uint32_t kQueued = 10;
 constexpr double kMessagesInTimeout = 3.0;
 constexpr double kLongestJogPeriod = 0.04;  // [s]
 
-client::Answer carryOutCall(const std::string& driver, const Call& call) {
+/// @param shown of a success, made from the numbers of the response.
+template <typename Response>
+client::Answer answerOf(const Response& response, const std::string& shown) {
+  if (response.success == 0) return {false, response.message};
+  return {true, shown};
+}
+
+client::Answer move(const std::string& service, const MoveTo::Request& request, const Call& call,
+                    const TableUnits& units) {
+  const MoveTo::Response response = client::respondedBy<MoveTo>(service, request);
+  return answerOf(
+      response, moveText(call.axis, units, response.target, response.position, response.duration));
+}
+
+/// @param units of the call's axis.
+client::Answer carryOutCall(const std::string& driver, const Call& call, const TableUnits& units) {
   const std::string axis = driver + "/" + call.axis + "/";
   switch (call.what) {
     case Call::What::kEnable:
@@ -35,17 +53,41 @@ client::Answer carryOutCall(const std::string& driver, const Call& call) {
       MoveTo::Request request;
       request.position = call.distance;
       request.relative = true;
-      return client::askService<MoveTo>(axis + "move_to", request);
+      return move(axis + "move_to", request, call, units);
+    }
+    case Call::What::kGoTo: {
+      MoveTo::Request request;
+      request.position = call.position;
+      return move(axis + "move_to", request, call, units);
+    }
+    case Call::What::kSetZero: {
+      const auto response =
+          client::respondedBy<SetPosition>(axis + "set_position", SetPosition::Request());
+      return answerOf(response, fmt::format("{}: this position is {} from now on", call.axis,
+                                            units.place(response.position)));
     }
     case Call::What::kHome: {
       Home::Request request;
       request.wait = true;
-      return client::askService<Home>(axis + "home", request);
+      const auto response = client::respondedBy<Home>(axis + "home", request);
+      return answerOf(response, fmt::format("{} is homed and stands at {}", call.axis,
+                                            units.place(response.position)));
     }
     case Call::What::kHomeAll: {
       HomeAxes::Request request;
       request.wait = true;
       return client::askService<HomeAxes>(driver + "/home", request);
+    }
+    case Call::What::kHold:
+      return client::askService<std_srvs::Trigger>(driver + "/hold");
+    case Call::What::kResume:
+      return client::askService<std_srvs::Trigger>(driver + "/resume");
+    case Call::What::kSpeedOverride: {
+      SpeedOverride::Request request;
+      request.factor = call.factor;
+      const auto response = client::respondedBy<SpeedOverride>(driver + "/speed_override", request);
+      return answerOf(response, fmt::format("all axes move at {:.0f} % of the commanded speed",
+                                            call.factor * 100.0));
     }
     case Call::What::kStop:
       return client::askService<std_srvs::Trigger>(driver + "/stop");
@@ -97,7 +139,9 @@ void DriverClient::start(const Call& call) {
   auto& lane = lanes_[call.name()];
   if (!lane) lane = std::make_unique<Lane>();
   lane->call = call;
-  lane->background.start([driver = driver_, call] { return carryOutCall(driver, call); });
+  lane->background.start([driver = driver_, call, units = tableUnitsOf(call.axis)] {
+    return carryOutCall(driver, call, units);
+  });
 }
 
 void DriverClient::poll() {
@@ -118,7 +162,7 @@ void DriverClient::noticeTheDriver() {
   was_live_ = live;
   if (!live) {
     session_.driver().forgetEndstops();
-    session_.messages().say("no state of " + driver_ + " comes any more");
+    session_.messages().say("no state of " + driver_ + " arrives any more");
     return;
   }
   // It may be another driver by now, or have been started with other parameters.
@@ -133,7 +177,7 @@ void DriverClient::takeParameters() {
   try {
     configure(parameters_.get());
   } catch (const std::exception& error) {
-    session_.messages().say(std::string("the driver's parameters: ") + error.what());
+    session_.messages().say(std::string("the driver's parameters can't be read: ") + error.what());
   }
 }
 
@@ -146,6 +190,12 @@ void DriverClient::configure(const DriverParameters& parameters) {
 double DriverClient::unitsOf(const std::string& axis) const {
   const config::AxisConfig* config = session_.driver().config(axis);
   return config == nullptr ? 1.0 : config::configUnitsPerUnit(config->kind);
+}
+
+TableUnits DriverClient::tableUnitsOf(const std::string& axis) const {
+  const config::AxisConfig* config = session_.driver().config(axis);
+  if (config == nullptr) return {};
+  return {config::configUnitsPerUnit(config->kind), unitOf(config->kind)};
 }
 
 void DriverClient::take(const AxisStates& states) {
@@ -178,7 +228,7 @@ void DriverClient::take(const Endstops& endstops) {
 // Jogs have no answer: only the driver's log says why one was refused.
 void DriverClient::take(const rosgraph_msgs::Log& log) {
   if (log.name != driver_ || log.level < rosgraph_msgs::Log::WARN) return;
-  session_.messages().say(log.msg);
+  session_.logged(log.msg);
 }
 
 double steadyNow() {

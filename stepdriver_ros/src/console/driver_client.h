@@ -17,6 +17,7 @@
 #include "driver_parameters.h"
 #include "emergency_stop_client.h"
 #include "session.h"
+#include "table_units.h"
 
 namespace stepdriver::console {
 
@@ -52,6 +53,7 @@ class DriverClient {
   void start(const Call& call);
   void publish(const std::vector<HeldJog::Order>& jogs);
   double unitsOf(const std::string& axis) const;
+  TableUnits tableUnitsOf(const std::string& axis) const;
 
   Session& session_;
   const std::string driver_;

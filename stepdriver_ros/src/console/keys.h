@@ -13,7 +13,9 @@ constexpr Key kKeyRight = 0x110004;
 constexpr Key kKeyShiftLeft = 0x110005;
 constexpr Key kKeyShiftRight = 0x110006;
 constexpr Key kKeyCtrlC = 3;
+constexpr Key kKeyEnter = '\n';
 constexpr Key kKeyEscape = 27;
+constexpr Key kKeyBackspace = 127;
 
 enum class Action {
   kEmergencyStop,
@@ -24,6 +26,13 @@ enum class Action {
   kChooseAxis,
   kJog,
   kStep,
+  kStepSize,
+  kGoTo,
+  kSetZero,
+  kHold,
+  kResume,
+  kSlower,
+  kFaster,
   kEnable,
   kDisable,
   kHome,

@@ -31,9 +31,14 @@ restores the terminal when it ends. Nothing moves when it starts, and a disabled
   s, Esc            stop of all axes: they decelerate
   up, down, 1 to 9  choose an axis
   left, right       jog slowly; with shift, or by < and >, fast
-  - +               one step of the motor
+  - +               one step
+  i                 step size: one step of the motor, 0.1, 1 or 10 mm (or degrees)
+  g                 go to a position: type it, then press Enter
+  z                 set zero at this position
   e, d              enable, disable
   h, a              home the axis, home all
+  p, c              hold all axes, resume
+  [ ]               slow down, speed up all motions by 10 %
   r                 recover from faults and an emergency stop; this moves nothing
   ?, q              all keys; quit
 

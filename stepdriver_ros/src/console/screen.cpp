@@ -58,7 +58,7 @@ std::vector<Row> emergencyRows(const Session& session, int columns, double now) 
   std::vector<Row> rows =
       rowsOf("*** EMERGENCY STOP: the driver has stopped every axis ***", columns, true);
   append(rows,
-         rowsOf("    Motors keep their current. All safe? r recovers, and nothing moves by that.",
+         rowsOf("    Motors keep their current. When all is safe, r recovers; that moves nothing.",
                 columns, true));
   return rows;
 }
@@ -130,21 +130,77 @@ std::vector<Row> pendingRows(const Session& session, int columns, double now) {
   return rows;
 }
 
-std::vector<Row> helpRows(const Session& session, int columns) {
-  const std::string axis = session.chosen().empty() ? "the axis" : session.chosen();
-  std::vector<std::string> lines = {
-      fmt::format("up down 1-9 choose an axis    e enable {0}    d disable {0}", axis),
-      "left right  jog slowly while held    shift+left shift+right, < >  fast",
-      fmt::format("- +  one step    h home {}    a home all    r recover from faults", axis)};
-  if (session.showsHelp()) {
-    lines.insert(lines.end(),
-                 {", .  jog slowly too    k j tab  choose an axis too    = one step too",
-                  "A jog ends 0.2 s after the last key; keys held repeat by themselves.",
-                  "- is towards min, + towards max. s and Esc decelerate, SPACE doesn't."});
-  }
+/// What the next keys will do: the step size and the override.
+std::vector<Row> settingRows(const Session& session, int columns) {
+  const auto factor = session.speedOverride();
+  const config::AxisConfig* config = session.driver().config(session.chosen());
+  const std::string unit = config == nullptr ? "mm" : unitOf(config->kind);
+  return rowsOf(fmt::format("- + steps: {}    speed override: {}", session.stepSize().text(unit),
+                            factor ? fmt::format("{:.0f} %", *factor * 100.0) : "not set here"),
+                columns);
+}
+
+std::vector<Row> promptRows(const Session& session, int columns) {
+  const PositionPrompt* const prompt = session.prompt();
+  if (prompt == nullptr) return {};
+  const config::AxisConfig* config = session.driver().config(prompt->axis());
+  return rowsOf(fmt::format("Move {} to [{}]: {}_    (Enter moves it, Esc cancels, s stops)",
+                            shortName(prompt->axis(), kShortName),
+                            config == nullptr ? "?" : unitOf(config->kind), prompt->text()),
+                columns, true);
+}
+
+/// As many of the texts in each row as fit.
+std::vector<Row> packed(const std::vector<std::string>& texts, int columns) {
+  const std::string gap(4, ' ');
   std::vector<Row> rows;
-  for (const std::string& line : lines) append(rows, rowsOf(line, columns));
+  std::string line;
+  for (const std::string& text : texts) {
+    if (line.size() + gap.size() + text.size() > static_cast<std::size_t>(columns)) {
+      if (!line.empty()) append(rows, rowsOf(line, columns));
+      line.clear();
+    }
+    line += (line.empty() ? "" : gap) + text;
+  }
+  append(rows, rowsOf(line, columns));
   return rows;
+}
+
+std::vector<Row> helpRows(const Session& session, int columns) {
+  const std::string axis =
+      session.chosen().empty() ? "the axis" : shortName(session.chosen(), kShortName);
+  std::vector<Row> rows =
+      packed({"up down 1-9 choose an axis", "e enable " + axis, "d disable " + axis,
+              "left right jog slowly while held", "shift+left shift+right < > jog fast",
+              "- + one step", "i step size", "g go to a position", "z set zero", "h home " + axis,
+              "a home all", "p hold all", "c resume", "[ ] speed", "r recover"},
+             columns);
+  if (!session.showsHelp()) return rows;
+  append(rows,
+         packed({", . jog slowly too", "k j tab choose an axis too", "= one step too"}, columns));
+  for (const char* line : {"A jog ends 0.2 s after the last key; keys held repeat by themselves.",
+                           "- is towards min, + towards max. s and Esc decelerate, SPACE doesn't.",
+                           "i: one motor step, 0.1, 1 or 10 mm or deg. z: this position becomes 0.",
+                           "p pauses all motions until c. [ ] slow down or speed up all by 10 %.",
+                           "r ends faults and an emergency stop, and moves nothing."}) {
+    append(rows, rowsOf(line, columns));
+  }
+  return rows;
+}
+
+/// The help leaves room for messages; the whole one, which was asked for, for a single one only. It
+/// is cut if it doesn't fit.
+std::vector<Row> takeHelp(const Session& session, int columns, Body& body) {
+  constexpr int kLines = 2;  // of '-', above the messages and above the help
+  std::vector<Row> rows = helpRows(session, columns);
+  if (!session.showsHelp()) return body.takeWhole(std::move(rows), kFewestMessages + kLines);
+  const int room = body.left() - kLines - 1;
+  if (room < 1) return {};
+  if (static_cast<int>(rows.size()) > room) {
+    rows.resize(room);
+    rows.back() = Row{std::string("...more keys in a larger window").substr(0, columns), false};
+  }
+  return body.take(std::move(rows));
 }
 
 std::vector<Row> messageRows(const Session& session, int columns, int room) {
@@ -185,11 +241,13 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
   append(screen, body.take({titleRow(session, columns, now)}));
   const AxisTable table = axisTable(session, columns, now);
   const std::vector<Row> axes = axisRows(table, body);
+  const std::vector<Row> prompt = body.take(promptRows(session, columns));
   const std::vector<Row> faults = body.take(faultRows(session, columns));
   const std::vector<Row> hidden = body.take(hiddenRows(table, columns));
   const std::vector<Row> titles = body.take({table.titles});
   const std::vector<Row> pending = body.take(pendingRows(session, columns, now));
-  std::vector<Row> help = body.takeWhole(helpRows(session, columns), kFewestMessages + 2);
+  const std::vector<Row> settings = body.takeWhole(settingRows(session, columns), 1);
+  std::vector<Row> help = takeHelp(session, columns, body);
   if (!help.empty()) {
     help.insert(help.begin(), Row{std::string(columns, '-'), false});
     body.take({Row{}});
@@ -201,6 +259,8 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
   append(screen, axes);
   append(screen, hidden);
   append(screen, faults);
+  append(screen, settings);
+  append(screen, prompt);
   append(screen, messages);
   append(screen, pending);
   // The keys stay at the bottom, regardless of the messages.

@@ -3,9 +3,45 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
+#include "common/text.h"
+#include "table_units.h"
+
 namespace stepdriver::console {
+namespace {
+
+// [mm|deg] 0: one step of the motor, the smallest one.
+constexpr std::array<double, 4> kStepSizes{0.0, 0.1, 1.0, 10.0};
+
+// [%] The driver allows 1 to 200.
+constexpr int kOverrideStep = 10;
+constexpr int kSlowest = 10;
+constexpr int kFastest = 200;
+
+/// The positions that the limits of the axis allow: "0.0000 mm to 200.0000 mm"; empty: any.
+std::string rangeText(const config::AxisConfig& config) {
+  const double units = config::configUnitsPerUnit(config.kind);
+  const auto shown = [&](double limit) { return positionText(limit * units, unitOf(config.kind)); };
+  const auto& min = config.min_position;
+  const auto& max = config.max_position;
+  if (min && max) return shown(*min) + " to " + shown(*max);
+  if (min) return shown(*min) + " and above";
+  if (max) return shown(*max) + " and below";
+  return {};
+}
+
+/// @param position [m|rad]
+bool isWithinLimits(const config::AxisConfig& config, double position) {
+  // The driver rounds to a step, too.
+  const double half_step = 0.5 / config.steps_per_unit;
+  return position >= config.min_position.value_or(position) - half_step &&
+         position <= config.max_position.value_or(position) + half_step;
+}
+
+}  // namespace
 
 std::string Call::name() const {
   const auto word = [this] {
@@ -16,9 +52,19 @@ std::string Call::name() const {
         return "disable";
       case What::kStep:
         return "step";
+      case What::kGoTo:
+        return "go to";
+      case What::kSetZero:
+        return "set zero";
       case What::kHome:
       case What::kHomeAll:
         return "home";
+      case What::kHold:
+        return "hold";
+      case What::kResume:
+        return "resume";
+      case What::kSpeedOverride:
+        return "speed override";
       case What::kStop:
         return "stop";
       case What::kRecover:
@@ -27,6 +73,18 @@ std::string Call::name() const {
     return "recover";
   };
   return (axis.empty() ? "all axes" : axis) + ": " + word();
+}
+
+void StepSize::next() { index_ = (index_ + 1) % static_cast<int>(kStepSizes.size()); }
+
+std::optional<double> StepSize::distance() const {
+  if (kStepSizes[index_] == 0.0) return {};
+  return kStepSizes[index_];
+}
+
+std::string StepSize::text(const std::string& unit) const {
+  const auto size = distance();
+  return size ? fmt::format("{} {}", ros_node::roundedText(*size), unit) : "one motor step";
 }
 
 Orders Session::press(const std::vector<Key>& keys, double now) {
@@ -40,15 +98,20 @@ Orders Session::press(const std::vector<Key>& keys, double now) {
     return orders;
   }
   for (const Key key : keys) {
-    if (const auto command = commandOf(key)) obey(*command, now, orders);
+    if (prompt_) {
+      typeInto(key, now, orders);
+    } else if (const auto command = commandOf(key)) {
+      obey(*command, now, orders);
+    }
   }
   return orders;
 }
 
 Orders Session::tick(double now) {
   Orders orders;
+  if (!driver_.live(now)) override_.reset();  // it may be another driver afterwards
   if (jog_.active() && !driver_.live(now)) {
-    messages_.say(jog_.axis() + ": the jog ends: the driver's state isn't live");
+    messages_.say(jog_.axis() + ": the jog ends because the driver's state isn't live");
     endJog(orders);
   }
   if (const auto order = jog_.due(now)) orders.jogs.push_back(*order);
@@ -69,6 +132,7 @@ void Session::obey(const Command& command, double now, Orders& orders) {
       emergency_ = Emergency::kSent;
       emergency_since_ = now;
       emergency_seen_ = false;
+      prompt_.reset();
       break;
     case Action::kStop:
       call({Call::What::kStop, {}}, now, orders);
@@ -93,6 +157,25 @@ void Session::obey(const Command& command, double now, Orders& orders) {
     case Action::kStep:
       stepBy(command.direction, now, orders);
       break;
+    case Action::kStepSize:
+      step_size_.next();
+      break;
+    case Action::kGoTo:
+      openPrompt(now);
+      break;
+    case Action::kSetZero:
+      setZero(now, orders);
+      break;
+    case Action::kHold:
+      call({Call::What::kHold, {}}, now, orders);
+      break;
+    case Action::kResume:
+      resume(now, orders);
+      break;
+    case Action::kSlower:
+    case Action::kFaster:
+      changeOverride(command.action == Action::kSlower ? -1 : 1, now, orders);
+      break;
     case Action::kEnable:
       if (!chosen_.empty()) call({Call::What::kEnable, chosen_}, now, orders);
       break;
@@ -100,18 +183,9 @@ void Session::obey(const Command& command, double now, Orders& orders) {
       if (!chosen_.empty()) call({Call::What::kDisable, chosen_}, now, orders);
       break;
     case Action::kHome:
-    case Action::kHomeAll: {
-      const bool all = command.action == Action::kHomeAll;
-      const std::string why = hindrance(now);
-      if (!all && !why.empty()) {
-        messages_.say(why);
-      } else if (!driver_.live(now)) {
-        messages_.say("not homed: the driver's state isn't live");
-      } else {
-        call({all ? Call::What::kHomeAll : Call::What::kHome, all ? "" : chosen_}, now, orders);
-      }
+    case Action::kHomeAll:
+      home(command.action == Action::kHomeAll, now, orders);
       break;
-    }
     case Action::kHelp:
       help_ = !help_;
       break;
@@ -131,22 +205,129 @@ void Session::choose(int step) {
   chosen_ = axes[(now + step + count) % count].name;
 }
 
-std::string Session::hindrance(double now) const {
-  if (chosen_.empty()) return "no axis is known yet";
-  const AxisView* axis = driver_.axis(chosen_);
+std::string Session::hindrance(const std::string& name, double now) const {
+  if (name.empty()) return "nothing is moved: the driver has not sent its axes yet";
+  const AxisView* axis = driver_.axis(name);
   if (!driver_.live(now) || axis == nullptr) {
-    return chosen_ + " isn't moved: the driver's state isn't live";
+    return name + " isn't moved: the driver's state isn't live";
   }
-  if (driver_.config(chosen_) == nullptr) {
-    return chosen_ + " isn't moved: its configuration isn't known";
+  if (driver_.config(name) == nullptr) {
+    return name + " isn't moved: the console has not read its configuration";
   }
-  if (!axis->fault.empty()) return chosen_ + " isn't moved: it has a fault; r recovers";
-  if (!axis->enabled) return chosen_ + " isn't moved: it isn't enabled; e enables it";
+  if (!axis->fault.empty()) return name + " isn't moved: it has a fault; r recovers";
+  if (!axis->enabled) return name + " isn't moved: it isn't enabled; e enables it";
+  if (axis->held) return name + " isn't moved: it is on hold; c resumes, s stops";
   return {};
 }
 
+void Session::home(bool all, double now, Orders& orders) {
+  const std::string why = hindrance(chosen_, now);
+  if (!all && !why.empty()) {
+    messages_.say(why);
+  } else if (!driver_.live(now)) {
+    messages_.say("no axis is homed: the driver's state isn't live");
+  } else {
+    call({all ? Call::What::kHomeAll : Call::What::kHome, all ? "" : chosen_}, now, orders);
+  }
+}
+
+void Session::openPrompt(double now) {
+  const std::string why = hindrance(chosen_, now);
+  if (why.empty()) {
+    prompt_.emplace(chosen_);
+  } else {
+    messages_.say(why);
+  }
+}
+
+void Session::typeInto(Key key, double now, Orders& orders) {
+  const auto command = commandOf(key);
+  const bool stops = command && command->action == Action::kStop && key != kKeyEscape;
+  if (stops || (command && command->action == Action::kQuit && key == kKeyCtrlC)) {
+    prompt_.reset();
+    obey(*command, now, orders);
+    return;
+  }
+  switch (prompt_->press(key)) {
+    case PositionPrompt::Outcome::kOpen:
+      break;
+    case PositionPrompt::Outcome::kCancelled:
+      prompt_.reset();
+      break;
+    case PositionPrompt::Outcome::kEntered:
+      goToTyped(now, orders);
+      break;
+  }
+}
+
+void Session::goToTyped(double now, Orders& orders) {
+  const PositionPrompt typed = *prompt_;
+  prompt_.reset();
+  const std::string why = hindrance(typed.axis(), now);
+  if (!why.empty()) {
+    messages_.say(why);
+    return;
+  }
+  const config::AxisConfig& config = *driver_.config(typed.axis());
+  const std::string unit = unitOf(config.kind);
+  const std::string range = rangeText(config);
+  const auto number = typed.number();
+  if (!number) {
+    messages_.say(fmt::format("{} isn't moved: \"{}\" isn't a number in {}{}", typed.axis(),
+                              typed.text(), unit, range.empty() ? "" : ", from " + range));
+    return;
+  }
+  const double position = *number / config::configUnitsPerUnit(config.kind);
+  if (!isWithinLimits(config, position)) {
+    messages_.say(fmt::format("{} isn't moved: {} is outside its limits, {}", typed.axis(),
+                              positionText(*number, unit), range));
+    return;
+  }
+  Call go{Call::What::kGoTo, typed.axis()};
+  go.position = position;
+  call(std::move(go), now, orders);
+}
+
+void Session::setZero(double now, Orders& orders) {
+  const AxisView* axis = driver_.axis(chosen_);
+  if (!driver_.live(now) || axis == nullptr || driver_.config(chosen_) == nullptr) {
+    messages_.say("no position is set: the driver's state isn't live");
+  } else if (axis->moving) {
+    messages_.say(chosen_ + ": the position isn't set because the axis is moving; s stops it");
+  } else {
+    call({Call::What::kSetZero, chosen_}, now, orders);
+  }
+}
+
+void Session::resume(double now, Orders& orders) {
+  if (driver_.live(now)) {
+    call({Call::What::kResume, {}}, now, orders);
+  } else {
+    messages_.say("nothing is resumed: the driver's state isn't live");
+  }
+}
+
+void Session::changeOverride(int direction, double now, Orders& orders) {
+  if (direction > 0 && !driver_.live(now)) {
+    messages_.say("the override isn't raised: the driver's state isn't live");
+    return;
+  }
+  // An unknown one is not raised above what is commanded.
+  const int before = override_ ? static_cast<int>(std::lround(*override_ * 100.0))
+                               : 100 - (direction > 0 ? kOverrideStep : 0);
+  const int wanted = before + direction * kOverrideStep;
+  if (wanted < kSlowest || wanted > kFastest) {
+    messages_.say(fmt::format("the override stays at {} %: it can be {} to {} %", before, kSlowest,
+                              kFastest));
+    return;
+  }
+  Call change{Call::What::kSpeedOverride, {}};
+  change.factor = wanted / 100.0;
+  call(std::move(change), now, orders);
+}
+
 void Session::jogBy(const Command& command, double now, Orders& orders) {
-  const std::string why = hindrance(now);
+  const std::string why = hindrance(chosen_, now);
   if (!why.empty()) {
     endJog(orders);
     messages_.say(why);
@@ -160,13 +341,13 @@ void Session::jogBy(const Command& command, double now, Orders& orders) {
 }
 
 void Session::stepBy(int direction, double now, Orders& orders) {
-  const std::string why = hindrance(now);
+  const std::string why = hindrance(chosen_, now);
   if (!why.empty()) {
     messages_.say(why);
     return;
   }
   const config::AxisConfig& config = *driver_.config(chosen_);
-  const double step = stepOf(config, *driver_.axis(chosen_));
+  const double step = step_size_.distance().value_or(stepOf(config, *driver_.axis(chosen_)));
   call({Call::What::kStep, chosen_, direction * step / config::configUnitsPerUnit(config.kind)},
        now, orders);
 }
@@ -179,7 +360,7 @@ void Session::call(Call call, double now, Orders& orders) {
   const std::string name = call.name();
   if (std::any_of(pending_.begin(), pending_.end(),
                   [&](const PendingCall& one) { return one.call.name() == name; })) {
-    messages_.say(name + ": not sent again, the one before it has no answer yet");
+    messages_.say(name + ": not sent again, because the driver has not answered the last one yet");
     return;
   }
   pending_.push_back({call, now});
@@ -191,11 +372,15 @@ void Session::answered(const Call& call, bool success, const std::string& messag
   pending_.erase(std::remove_if(pending_.begin(), pending_.end(),
                                 [&](const PendingCall& one) { return one.call.name() == name; }),
                  pending_.end());
-  messages_.say(success ? message : fmt::format("{} REFUSED: {}", name, message));
+  const std::string shown = inTableUnits(message);
+  messages_.say(success ? shown : fmt::format("{} REFUSED: {}", name, shown));
+  if (success && call.what == Call::What::kSpeedOverride) override_ = call.factor;
   if (success && call.what == Call::What::kRecover && emergency_ != Emergency::kSent) {
     emergency_ = Emergency::kNone;
   }
 }
+
+void Session::logged(const std::string& text) { messages_.say(inTableUnits(text)); }
 
 void Session::emergencyAnswered(bool success, const std::string& message) {
   emergency_ = success ? Emergency::kStopped : Emergency::kFailed;
@@ -203,6 +388,7 @@ void Session::emergencyAnswered(bool success, const std::string& message) {
 }
 
 void Session::update(std::vector<AxisView> axes, double now) {
+  for (AxisView& axis : axes) axis.fault = inTableUnits(axis.fault);
   driver_.update(std::move(axes), now);
   if (driver_.axis(chosen_) == nullptr) {
     chosen_ = driver_.axes().empty() ? std::string() : driver_.axes().front().name;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -7,16 +8,32 @@
 #include "held_jog.h"
 #include "keys.h"
 #include "messages.h"
+#include "position_prompt.h"
 
 namespace stepdriver::console {
 
 /// A call of one of the driver's services.
 struct Call {
-  enum class What { kEnable, kDisable, kStep, kHome, kHomeAll, kStop, kRecover };
+  enum class What {
+    kEnable,
+    kDisable,
+    kStep,
+    kGoTo,
+    kSetZero,
+    kHome,
+    kHomeAll,
+    kHold,
+    kResume,
+    kSpeedOverride,
+    kStop,
+    kRecover,
+  };
 
   What what = What::kStop;
   std::string axis;       ///< empty: all
   double distance = 0.0;  ///< [m|rad] of a step
+  double position = 0.0;  ///< [m|rad] to go to
+  double factor = 1.0;    ///< of a speed override
 
   /// The call in words: `x: home`. Only one call of a name is in progress at a time.
   std::string name() const;
@@ -35,11 +52,25 @@ struct JogSpeeds {
   double fast = 0.5;
 };
 
+/// The distances of `-` and `+`: one step of the motor, or a distance.
+class StepSize {
+ public:
+  /// Chooses the next larger one; after the largest one comes the smallest.
+  void next();
+  /// [mm|deg] empty: one step of the motor
+  std::optional<double> distance() const;
+  /// `0.1 mm`
+  std::string text(const std::string& unit) const;
+
+ private:
+  int index_ = 0;
+};
+
 /// What the user wants, and the results: the part of the console that is neither ROS nor a
 /// terminal. It has no clock: times are seconds on any clock that never goes back.
 ///
 /// Only a key moves an axis, and no key moves an axis that isn't enabled, or whose state isn't
-/// live. Stops and the emergency stop are sent in any state.
+/// live. Stops, holds and the emergency stop are sent in any state.
 class Session {
  public:
   enum class Emergency { kNone, kSent, kStopped, kFailed };
@@ -53,14 +84,18 @@ class Session {
   Session(std::string driver, JogSpeeds speeds) : name_(std::move(driver)), speeds_(speeds) {}
 
   /// All keys since the last call. An emergency stop among them comes first, and the other keys are
-  /// dropped.
+  /// dropped. While a position is being typed, the keys belong to it, except for those that stop or
+  /// quit; Escape cancels it.
   Orders press(const std::vector<Key>& keys, double now);
   /// Handles the passing of time. Call it often.
   Orders tick(double now);
   /// Ends the jog, if there is one.
   Orders rest();
 
+  /// @param message in the units of the driver or of the table.
   void answered(const Call& call, bool success, const std::string& message);
+  /// A line of the driver's log.
+  void logged(const std::string& text);
   void emergencyAnswered(bool success, const std::string& message);
   /// The states of the axes, see DriverView.
   void update(std::vector<AxisView> axes, double now);
@@ -74,6 +109,12 @@ class Session {
   const std::string& driverName() const { return name_; }
   /// The chosen axis, to which the keys apply; empty if there is none.
   const std::string& chosen() const { return chosen_; }
+  const StepSize& stepSize() const { return step_size_; }
+  /// The position that is being typed; nullptr: none.
+  const PositionPrompt* prompt() const { return prompt_ ? &*prompt_ : nullptr; }
+  /// The override that the driver has accepted from this console; empty: none since the state
+  /// became live. The driver doesn't publish it.
+  std::optional<double> speedOverride() const { return override_; }
   const std::vector<PendingCall>& pending() const { return pending_; }
   Emergency emergency() const { return emergency_; }
   double emergencySince() const { return emergency_since_; }
@@ -86,8 +127,15 @@ class Session {
   void choose(int step);
   void jogBy(const Command& command, double now, Orders& orders);
   void stepBy(int direction, double now, Orders& orders);
-  /// Why the chosen axis must not be moved; empty: it may be moved.
-  std::string hindrance(double now) const;
+  void home(bool all, double now, Orders& orders);
+  void openPrompt(double now);
+  void typeInto(Key key, double now, Orders& orders);
+  void goToTyped(double now, Orders& orders);
+  void setZero(double now, Orders& orders);
+  void resume(double now, Orders& orders);
+  void changeOverride(int direction, double now, Orders& orders);
+  /// Why the axis must not be moved; empty: it may be moved.
+  std::string hindrance(const std::string& name, double now) const;
   void endJog(Orders& orders);
   void call(Call call, double now, Orders& orders);
 
@@ -96,6 +144,9 @@ class Session {
   DriverView driver_;
   Messages messages_;
   HeldJog jog_;
+  StepSize step_size_;
+  std::optional<PositionPrompt> prompt_;
+  std::optional<double> override_;
   std::string chosen_;
   std::vector<PendingCall> pending_;
   Emergency emergency_ = Emergency::kNone;

@@ -24,6 +24,8 @@ Key keyOf(int code) {
   static const std::map<int, Key> keys = {
       {KEY_UP, kKeyUp},       {KEY_DOWN, kKeyDown},       {KEY_LEFT, kKeyLeft},
       {KEY_RIGHT, kKeyRight}, {KEY_SLEFT, kKeyShiftLeft}, {KEY_SRIGHT, kKeyShiftRight},
+      {KEY_ENTER, kKeyEnter}, {'\r', kKeyEnter},          {KEY_BACKSPACE, kKeyBackspace},
+      {'\b', kKeyBackspace},
   };
   const auto found = keys.find(code);
   return found == keys.end() ? code : found->second;

@@ -28,18 +28,24 @@ inline AxisView axisView(const std::string& name) {
   return view;
 }
 
-/// A session with such axes, whose states came at 0 s.
-inline Session sessionWith(const std::vector<AxisView>& axes) {
+/// A session with these axes, whose states came at 0 s.
+inline Session sessionWith(const std::vector<AxisView>& axes,
+                           const std::vector<config::AxisConfig>& configs) {
   Session session("/stepdriver", {});
-  std::vector<config::AxisConfig> configs;
-  configs.reserve(axes.size());
-  for (const AxisView& axis : axes) configs.push_back(axisConfig(axis.name));
   session.driver().configure(configs);
   session.update(axes, 0.0);
   for (const AxisView& axis : axes) {
     session.driver().updateEndstops(axis.name, axis.min_active, axis.max_active);
   }
   return session;
+}
+
+/// The same with the configuration above.
+inline Session sessionWith(const std::vector<AxisView>& axes) {
+  std::vector<config::AxisConfig> configs;
+  configs.reserve(axes.size());
+  for (const AxisView& axis : axes) configs.push_back(axisConfig(axis.name));
+  return sessionWith(axes, configs);
 }
 
 }  // namespace stepdriver::console

@@ -31,7 +31,7 @@ void DriverAtHand::poll() {
   ros::getGlobalCallbackQueue()->callAvailable();
   client_.poll();
   if (session_.driver().age(steadyNow()).value_or(0.0) > kGone) {
-    throw Error("no state of " + session_.driverName() + " comes any more");
+    throw Error("no state of " + session_.driverName() + " arrives any more");
   }
 }
 
@@ -45,7 +45,7 @@ void DriverAtHand::awaitState() {
   const double begin = steadyNow();
   while (!complete()) {
     if (steadyNow() - begin > kFirstState) {
-      throw Error("no state of " + session_.driverName() + " comes: is it running?");
+      throw Error("no state of " + session_.driverName() + " arrives: is it running?");
     }
     wait();
   }
