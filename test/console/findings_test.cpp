@@ -121,6 +121,34 @@ none: null
   EXPECT_EQ(*map.at("a").as<ConfigValue::Map>()->at("number").as<std::string>(), "017");
 }
 
+TEST(ConfigurationFile, TheDriversOwnHasTheSameAxes) {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("own_" + std::to_string(getpid()))).string();
+  std::ofstream(path) << "# mine\n" << kAxis;
+  EXPECT_EQ(readOwnFile(path, valueOf(kAxis), {"x", "y"}), std::string("# mine\n") + kAxis);
+  const auto complaint = [&](const std::string& parameters) -> std::string {
+    try {
+      readOwnFile(path, valueOf(parameters), {"y"});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(complaint("axes: {x: {driver: other}, y: {mm_per_round: 40.0}}"), "")
+      << "only the axes that are checked must be the same";
+  EXPECT_NE(complaint("axes: {y: {mm_per_round: 50.0}}")
+                .find("axes/y/mm_per_round is 40.0 in the file, but 50.0 in the driver"),
+            std::string::npos)
+      << complaint("axes: {y: {mm_per_round: 50.0}}");
+  EXPECT_NE(complaint("axes: {y: {mm_per_round: 40.0, microsteps: 8}}")
+                .find("axes/y/microsteps is missing in the file, but 8 in the driver"),
+            std::string::npos);
+  EXPECT_NE(complaint("axes: {x: {}}").find("axes/y is a map of 1 in the file, but missing"),
+            std::string::npos);
+  std::filesystem::remove(path);
+  EXPECT_THROW(readOwnFile(path, valueOf(kAxis), {"x"}), Error);
+}
+
 TEST(ConfigurationFile, NeverReplacesAnotherWithoutBeingTold) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("wizard_" + std::to_string(getpid()))).string();

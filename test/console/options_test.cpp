@@ -29,6 +29,7 @@ TEST(Options, WhatCannotBeUnderstoodIsRefused) {
                                                     {"--driver=a", "x"},
                                                     {"--axis", "x"},
                                                     {"--overwrite"},
+                                                    {"--config", "a.yaml"},
                                                     {"x"}}) {
     EXPECT_THROW(parseOptions(arguments), Error) << arguments[0];
   }

@@ -101,7 +101,7 @@ class Machine : public MachineAtHand {
 /// Presses a switch whenever the wizard asks for that end, and lets it go.
 void handle(Person& person, Machine& machine, bool AxisView::*minus, bool AxisView::*plus) {
   person.on_say = [&machine, minus, plus](const std::string& text) {
-    if (text.find("has changed; let it go") != std::string::npos) {
+    if (text.find("has changed; release it") != std::string::npos) {
       machine.view.min_active = machine.view.max_active = false;
     }
     for (const auto& [end, pressed] : {std::pair{"minus", minus}, std::pair{"plus", plus}}) {
@@ -148,7 +148,7 @@ TEST(WizardSwitches, FindsOneInverted) {
     const auto says = [&](const char* words) { return text.find(words) != std::string::npos; };
     if (says("the minus end by hand")) machine.on_wait = [&] { machine.view.min_active = true; };
     if (says("the plus end by hand")) machine.on_wait = [&] { machine.view.max_active = false; };
-    if (!says("has changed; let it go")) return;
+    if (!says("has changed; release it")) return;
     machine.on_wait = nullptr;
     machine.view.min_active = false;
     machine.view.max_active = true;
@@ -186,7 +186,7 @@ TEST(WizardMoves, NothingMovesWithoutAYes) {
 }
 
 TEST(WizardMoves, AreSmallAndSlow) {
-  Person person({"y", "y"});
+  Person person({"y", "+"});
   Machine machine;
   Findings findings;
   checkDirection(person, machine, axisConfig("x"), findings);
@@ -199,13 +199,13 @@ TEST(WizardMoves, AreSmallAndSlow) {
 
 TEST(WizardMoves, AWrongWayIsFoundWhicheverWayItWent) {
   Machine machine;
-  Person person({"y", "n"});
+  Person person({"y", "-", "y"});
   Findings findings;
   checkDirection(person, machine, axisConfig("x"), findings);
   EXPECT_TRUE(findings.wrong_way);
 
   machine.refusal = "x: the max endstop is active";
-  Person other({"y", "y", "y", "n"});
+  Person other({"y", "y", "y", "+", "y"});
   Findings back;
   other.on_say = [&](const std::string& text) {
     if (text.find("The driver refuses: x: the max endstop is active") != std::string::npos) {
@@ -215,6 +215,125 @@ TEST(WizardMoves, AWrongWayIsFoundWhicheverWayItWent) {
   checkDirection(other, machine, axisConfig("x"), back);
   EXPECT_EQ(machine.moves.back(), -2.0) << other.heard;
   EXPECT_TRUE(back.wrong_way) << other.heard;
+}
+
+TEST(WizardMoves, TheDirectionIsToldByTheEndThatTheUserSaw) {
+  struct Wanted {
+    bool plus_blocked;
+    std::deque<std::string> answers;
+    bool wrong_way;
+  };
+  for (const Wanted& wanted : {Wanted{false, {"y", "+"}, false},
+                               {false, {"y", "-", "y"}, true},
+                               {true, {"y", "-"}, false},
+                               {true, {"y", "+", "y"}, true},
+                               {false, {"y", "-", "n", "y", "+"}, false},
+                               {false, {"y", "a", "y", "plus"}, false},
+                               {false, {"y", "y", "", "minus", "y"}, true}}) {
+    Machine machine;
+    machine.view.switches_known = true;
+    machine.view.max_active = wanted.plus_blocked;
+    Person person(wanted.answers);
+    Findings findings;
+    checkDirection(person, machine, axisConfig("x"), findings);
+    EXPECT_EQ(findings.wrong_way, wanted.wrong_way) << person.heard;
+    EXPECT_EQ(machine.moves.front(), wanted.plus_blocked ? -2.0 : 2.0) << person.heard;
+    EXPECT_TRUE(person.heardOf("the end that you call plus, or the end that you call minus?"));
+    EXPECT_TRUE(person.heardOf(wanted.plus_blocked ? "- keeps the direction as it is configured, +"
+                                                     " inverts it"
+                                                   : "+ keeps the direction as it is configured, -"
+                                                     " inverts it"))
+        << person.heard;
+  }
+}
+
+TEST(WizardMoves, ARotaryAxisTurns) {
+  config::AxisConfig config = axisConfig("r");
+  config.kind = config::Kind::kRotary;
+  Machine machine;
+  Person person({"y", "+"});
+  Findings findings;
+  checkDirection(person, machine, config, findings);
+  EXPECT_TRUE(person.heardOf("Which way did r turn: the way that you call plus")) << person.heard;
+}
+
+TEST(WizardMoves, TheReasonsToRefuseAMoveAreKnown) {
+  config::AxisConfig config = axisConfig("x");
+  config.min_position = 0.0;
+  config.max_position = 0.2;
+  AxisView there = axisView("x");
+  there.switches_known = true;
+  there.position = 100.0;
+  EXPECT_EQ(knownRefusal(config, there, 2.0), "");
+  EXPECT_EQ(knownRefusal(config, there, 100.0), "") << "the limit itself can be reached";
+  EXPECT_EQ(knownRefusal(config, there, 101.0),
+            "it stands at 100.0000 mm, and would then be beyond its soft limit 200.0000 mm");
+  EXPECT_EQ(knownRefusal(config, there, -101.0),
+            "it stands at 100.0000 mm, and would then be beyond its soft limit 0.0000 mm");
+  const auto with = [&](auto change) {
+    AxisView view = there;
+    change(view);
+    return view;
+  };
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.min_active = true; }), -2.0),
+            "the min switch ahead of it reads pressed");
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.min_active = true; }), 2.0), "");
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.max_active = true; }), 2.0),
+            "the max switch ahead of it reads pressed");
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.enabled = false; }), 2.0),
+            "its motor is disabled");
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) {
+                           view.enabled = false;
+                           view.idle = true;
+                         }),
+                         2.0),
+            "")
+      << "a motion wakes it up";
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.asleep = true; }), 2.0),
+            "its driver chip is asleep");
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.held = true; }), 2.0),
+            "it is on hold");
+  EXPECT_EQ(knownRefusal(config, with([](AxisView& view) { view.fault = "hot"; }), 2.0),
+            "it has a fault: hot");
+}
+
+TEST(WizardMoves, AMoveThatWouldBeRefusedIsNotOffered) {
+  Machine machine;
+  machine.view.switches_known = true;
+  machine.view.min_active = machine.view.max_active = true;
+  Person person({});
+  Findings findings;
+  checkDirection(person, machine, axisConfig("x"), findings);
+  EXPECT_TRUE(machine.moves.empty()) << person.heard;
+  EXPECT_FALSE(person.heardOf("Move x now?")) << person.heard;
+  EXPECT_TRUE(person.heardOf("x can't move 2 mm towards plus: the max switch")) << person.heard;
+  EXPECT_TRUE(person.heardOf("towards minus either: the min switch")) << person.heard;
+  EXPECT_TRUE(person.heardOf("The direction isn't checked.")) << person.heard;
+
+  Person at_hand({"y"});
+  machine.view.fault = "emergency stop";
+  EXPECT_EQ(HandMove(at_hand, machine, axisConfig("x")).ask({2.0, 5.0}), 0.0);
+  EXPECT_TRUE(machine.moves.empty()) << at_hand.heard;
+}
+
+TEST(WizardDistance, OffersOnlyTheWayThatHasRoom) {
+  config::AxisConfig config = axisConfig("x");
+  config.min_position = 0.0;
+  config.max_position = 0.2;
+  Machine machine;
+  machine.view.position = 190.0;
+  Person person({"", "", "y", "", "y", "20"});
+  Findings findings;
+  checkDistance(person, machine, config, findings);
+  EXPECT_EQ(machine.moves, (std::vector<double>{-2.0, -20.0})) << person.heard;
+  EXPECT_TRUE(person.heardOf("x can't move 22 mm towards plus: it stands at 190.0000 mm"));
+  EXPECT_TRUE(person.heardOf("Is there room for 22 mm towards minus?")) << person.heard;
+
+  Person far({"300", "n"});
+  checkDistance(far, machine, config, findings);
+  EXPECT_EQ(machine.moves.size(), 2U) << far.heard;
+  EXPECT_TRUE(far.heardOf("x can't move 302 mm towards minus: it stands at 168.0000 mm"))
+      << far.heard;
 }
 
 TEST(WizardMoves, AreStoppedByEnterAndByASwitch) {
@@ -227,7 +346,7 @@ TEST(WizardMoves, AreStoppedByEnterAndByASwitch) {
   EXPECT_EQ(machine.stops, 1);
 
   Person person({"y"});
-  machine.on_wait = [&] { machine.view.min_active = machine.stops == 1; };
+  machine.on_wait = [&] { machine.view.min_active = machine.moves.size() == 2; };
   EXPECT_EQ(HandMove(person, machine, config).ask({2.0, 5.0}), 0.0);
   EXPECT_EQ(machine.stops, 2);
   EXPECT_TRUE(person.heardOf("Stopped: a switch has changed")) << person.heard;
@@ -236,7 +355,7 @@ TEST(WizardMoves, AreStoppedByEnterAndByASwitch) {
 TEST(WizardMoves, AStopIsSentWhereTheDialogueEndsOrTheDriverGoes) {
   Machine machine;
   machine.endless = true;
-  machine.on_wait = [&] { machine.gone = true; };
+  machine.on_wait = [&] { machine.gone = !machine.moves.empty(); };
   Person person({"y"});
   const config::AxisConfig config = axisConfig("x");
   EXPECT_THROW(HandMove(person, machine, config).ask({2.0, 5.0}), Error);
@@ -267,6 +386,9 @@ TEST(WizardDistance, IsTriedAgainWhereAMoveIsRefused) {
   EXPECT_EQ(machine.moves, (std::vector<double>{2.0, -2.0, -20.0})) << person.heard;
   EXPECT_TRUE(findings.scale) << person.heard;
   EXPECT_TRUE(person.heardOf("its plus is your minus")) << person.heard;
+  EXPECT_TRUE(
+      person.heardOf("Is there room for 22 mm towards plus, which is now what you call minus"))
+      << person.heard;
 }
 
 TEST(WizardDistance, KnowsTheMicrostepsByTheirFactor) {
@@ -276,7 +398,7 @@ TEST(WizardDistance, KnowsTheMicrostepsByTheirFactor) {
   checkDistance(person, machine, axisConfig("x"), findings);
   EXPECT_EQ(machine.moves, (std::vector<double>{-2.0, -30.0})) << person.heard;
   EXPECT_FALSE(findings.scale) << "it wasn't taken";
-  EXPECT_TRUE(person.heardOf("near a factor of 2: look at the microsteps")) << person.heard;
+  EXPECT_TRUE(person.heardOf("near a factor of 2: first compare the microsteps")) << person.heard;
 }
 
 TEST(WizardDistance, LeavesWhatIsAsGoodAsRight) {

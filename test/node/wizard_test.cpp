@@ -61,9 +61,9 @@ class WizardTest : public testing::Test {
   }
   void skipSwitches() {
     terminal.press("Enter");
-    ASSERT_TRUE(terminal.waitFor("Nothing was seen at the minus end"));
+    ASSERT_TRUE(terminal.waitFor("No switch has changed at the minus end"));
     terminal.press("Enter");
-    ASSERT_TRUE(terminal.waitFor("Give its motor current?"));
+    ASSERT_TRUE(terminal.waitFor("is disabled. Enable it?"));
   }
   void answer(const std::string& question, const std::string& line) {
     ASSERT_TRUE(terminal.waitFor(question));
@@ -75,15 +75,15 @@ class WizardTest : public testing::Test {
   void beginALongMove() {
     ASSERT_NO_FATAL_FAILURE(skipSwitches());
     terminal.type("y");
-    ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", ""));
+    ASSERT_NO_FATAL_FAILURE(answer("About which position is it?", ""));
     ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "n"));
-    ASSERT_NO_FATAL_FAILURE(answer("Try again, the other way?", "n"));
+    ASSERT_NO_FATAL_FAILURE(answer("Try again?", "n"));
     EXPECT_EQ(node.pulses(), 0);
-    ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", "90"));
+    ASSERT_NO_FATAL_FAILURE(answer("How far should x move", "90"));
     ASSERT_NO_FATAL_FAILURE(answer("Is there room", "y"));
     ASSERT_TRUE(terminal.waitFor("take up the play"));
     terminal.type("y");
-    ASSERT_NO_FATAL_FAILURE(answer("Mark where it stands", ""));
+    ASSERT_NO_FATAL_FAILURE(answer("Mark where x stands", ""));
     ASSERT_NO_FATAL_FAILURE(answer("will move 90 mm", "y"));
     ASSERT_TRUE(waitUntil([this] { return node.pulses() > 200; }));
   }
@@ -96,36 +96,38 @@ class WizardTest : public testing::Test {
 TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
   ASSERT_NO_FATAL_FAILURE(open());
   press("min", true);
-  ASSERT_TRUE(terminal.waitFor("max has changed; let it go"));
+  ASSERT_TRUE(terminal.waitFor("max has changed; release it"));
   press("min", false);
   ASSERT_TRUE(terminal.waitFor("switch at the plus end by hand"));
   press("max", true);
-  ASSERT_TRUE(terminal.waitFor("min has changed; let it go"));
+  ASSERT_TRUE(terminal.waitFor("min has changed; release it"));
   press("max", false);
-  ASSERT_TRUE(terminal.waitFor("the wrong way round"));
+  ASSERT_TRUE(terminal.waitFor("It is inverted"));
   EXPECT_EQ(node.pulses(), 0) << "nothing moves while the switches are looked at";
 
-  ASSERT_NO_FATAL_FAILURE(answer("Give its motor current?", "y"));
-  ASSERT_NO_FATAL_FAILURE(answer("it stand, about?", "50"));
-  // min reads active, so the driver doesn't move towards it.
+  ASSERT_NO_FATAL_FAILURE(answer("is disabled. Enable it?", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("About which position is it?", "50"));
+  // min reads active: the driver wouldn't move towards it, and the wizard doesn't ask it to.
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
-  ASSERT_NO_FATAL_FAILURE(answer("Did it go towards plus", "n"));
+  ASSERT_NO_FATAL_FAILURE(answer("Towards which end did the carriage of x move", "-"));
+  ASSERT_NO_FATAL_FAILURE(answer("Invert its direction?", ""));
   EXPECT_NEAR(carriage(), 0.1 - 0.0016, 1e-9);
-  ASSERT_NO_FATAL_FAILURE(answer("How far is it to go?", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("Is there room", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("How far should x move", ""));
+  ASSERT_TRUE(terminal.waitFor("x can't move 22 mm towards minus: the min switch ahead of it"));
+  ASSERT_NO_FATAL_FAILURE(answer("towards plus, which is now what you call minus?", ""));
   ASSERT_TRUE(terminal.waitFor("take up the play"));
   terminal.type("y");
-  ASSERT_TRUE(terminal.waitFor("Mark where it stands"));
+  ASSERT_TRUE(terminal.waitFor("Mark where x stands"));
   const double mark = carriage();
   terminal.press("Enter");
   ASSERT_NO_FATAL_FAILURE(answer("will move 20 mm", "y"));
-  ASSERT_TRUE(terminal.waitFor("How far did it really go?"));
+  ASSERT_TRUE(terminal.waitFor("How far did x really move?"));
   const double measured = 1e3 * std::abs(carriage() - mark);
   EXPECT_NEAR(measured, 16.0, 1e-6);
   terminal.type(std::to_string(measured));
   ASSERT_TRUE(terminal.waitFor("80 x 20 / 16 = 100 steps per mm"));
-  ASSERT_NO_FATAL_FAILURE(answer("Take that?", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("Write it to", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("Use the new value?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("Write all parameters to", ""));
   ASSERT_TRUE(terminal.waitFor("ended 0"));
 
   // The driver accepts the configuration, and the machine behaves accordingly.
@@ -151,6 +153,44 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
   press("max", true);
   EXPECT_TRUE(read(false, true));
   EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST_F(WizardTest, KeepsTheCommentsOfTheDriversFile) {
+  const TemporaryFile own{"_own.yaml"};
+  ASSERT_EQ(std::system(("rosparam dump " + own.path() + " " + node.name()).c_str()), 0);
+  std::string text = own.text();
+  const std::string scale = "steps_per_mm: 80.0";
+  ASSERT_NE(text.find(scale), std::string::npos) << text;
+  text.replace(text.find(scale), scale.size(), scale + "   # 20 teeth");
+  std::ofstream(own.path()) << "# The machine in the corner.\n" << text;
+  ASSERT_NO_FATAL_FAILURE(open(" --config " + own.path()));
+  ASSERT_NO_FATAL_FAILURE(skipSwitches());
+  terminal.type("y");
+  ASSERT_NO_FATAL_FAILURE(answer("About which position is it?", "50"));
+  ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("Towards which end did the carriage of x move", "+"));
+  ASSERT_NO_FATAL_FAILURE(answer("How far should x move", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("Is there room for 22 mm towards plus?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("take up the play", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("Mark where x stands", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("will move 20 mm", "y"));
+  ASSERT_NO_FATAL_FAILURE(answer("How far did x really move?", "25"));
+  ASSERT_NO_FATAL_FAILURE(answer("Use the new value?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("and its comments, to", ""));
+  ASSERT_TRUE(terminal.waitFor("ended 0"));
+  text.replace(text.find(scale), scale.size(), "steps_per_mm: 64.0");
+  EXPECT_EQ(file.text(), "# The machine in the corner.\n" + text);
+}
+
+TEST_F(WizardTest, RefusesAFileThatIsNotTheRunningDriversOne) {
+  const TemporaryFile own{"_own.yaml"};
+  std::ofstream(own.path()) << "axes: {x: {steps_per_mm: 100.0}}\n";
+  node.start();
+  const ProgramEnd end =
+      runProgram("console", {"--wizard", "--driver", node.name(), "--config", own.path()});
+  EXPECT_EQ(end.code, 1);
+  expectSays(end.output, "isn't the configuration of the running driver: axes/x/");
+  expectSays(end.output, "missing in the file");
 }
 
 TEST_F(WizardTest, StopsAMoveByEnterAndEndsByControlC) {
@@ -185,7 +225,7 @@ TEST_F(WizardTest, ReplacesNoFileWithoutBeingTold) {
   node.start();
   terminal.type(kConsole + " --wizard --driver " + node.name() + " --output " + file.path() +
                 "; echo ended $?");
-  EXPECT_TRUE(terminal.waitFor("is there already: --overwrite replaces it"));
+  EXPECT_TRUE(terminal.waitFor("exists already: --overwrite replaces it"));
   EXPECT_TRUE(terminal.waitFor("ended 1"));
   EXPECT_EQ(file.text(), "mine\n");
 
@@ -200,7 +240,7 @@ TEST_F(WizardTest, ReplacesNoFileWithoutBeingTold) {
   const ProgramEnd end = runProgram(
       "console", {"--wizard", "--driver", node.name(), "--axis", "z", "--output", "/tmp/none"});
   EXPECT_EQ(end.code, 1);
-  expectSays(end.output, "--axis z: there is no such axis, but x");
+  expectSays(end.output, "--axis z: there is no such axis; the driver has x");
 }
 
 }  // namespace

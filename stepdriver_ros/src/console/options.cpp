@@ -21,7 +21,8 @@ void readPart(const po::variables_map& values, const std::string& name, double& 
 
 const char* const kUsage =
     R"(usage: console [--driver NAME] [--slow PERCENT] [--fast PERCENT] [name:=value ...]
-       console --wizard [--driver NAME] [--axis NAME] [--output FILE] [--overwrite]
+       console --wizard [--driver NAME] [--axis NAME] [--config FILE] [--output FILE]
+                        [--overwrite]
 
 A screen for the person in front of the machine: it shows the axes of a stepdriver_node, live, and
 has keys to enable, jog, step and home them. It runs in any terminal, also over ssh (ssh -t), and
@@ -50,12 +51,14 @@ jog_timeout.
   --slow PERCENT    slow jog speed, in percent of an axis's highest speed; default: 5
   --fast PERCENT    fast jog speed; default: 50
 
-The wizard guides you through a first bring-up, line by line: do the switches read right, which way
-is plus, is the distance right? Each move comes after a question, is small and slow, and ends if you
-press Enter or any switch changes. The wizard writes a configuration with its findings; the running
-node isn't changed.
+The wizard guides you through a first bring-up, line by line: do the switches read correctly, which
+way is plus, is the distance right? Each move comes after a question, is small and slow, and ends if
+you press Enter or any switch changes. The wizard writes a configuration with its findings; the
+running node isn't changed.
 
   --axis NAME       only this axis
+  --config FILE     the YAML file that the driver was started with: the wizard writes its text with
+                    the changes, and keeps comments and order; default: it writes all parameters
   --output FILE     default: stepdriver_wizard.yaml
   --overwrite       replaces an existing file
 
@@ -74,15 +77,18 @@ Options parseOptions(const std::vector<std::string>& arguments) {
   add("fast", po::value<std::string>());
   add("wizard", po::bool_switch(&options.wizard));
   add("axis", po::value(&wizard.axis));
+  add("config", po::value(&wizard.config));
   add("output", po::value(&wizard.output));
   add("overwrite", po::bool_switch(&wizard.overwrite));
   const po::variables_map values = readCommandLine(known, arguments, "driver");
   if (options.help) return options;
   readPart(values, "slow", options.speeds.slow);
   readPart(values, "fast", options.speeds.fast);
-  const bool for_wizard = values.count("axis") + values.count("output") > 0 || wizard.overwrite;
+  const bool for_wizard =
+      values.count("axis") + values.count("config") + values.count("output") > 0 ||
+      wizard.overwrite;
   if (for_wizard && !options.wizard) {
-    throw Error("--axis, --output and --overwrite go with --wizard");
+    throw Error("--axis, --config, --output and --overwrite need --wizard");
   }
   return options;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "../table_units.h"
 #include "bring_up_checks.h"
 #include "common/text.h"
 
@@ -21,9 +22,10 @@ class Current {
   /// @return whether the motor is enabled.
   bool ask(Dialogue& dialogue) {
     if (machine_.state(axis_).enabled) return true;
-    if (!askYesNo(dialogue, axis_ + " isn't enabled. Give its motor current?", false)) return false;
+    const std::string question = "The motor of " + axis_ + " is disabled. Enable it?";
+    if (!askYesNo(dialogue, question, false)) return false;
     const client::Answer answer = machine_.enable(axis_, true);
-    if (!answer.success) dialogue.say("The driver refuses: " + answer.message);
+    if (!answer.success) dialogue.say("The driver refuses: " + inTableUnits(answer.message));
     given_ = answer.success;
     return given_;
   }
@@ -40,12 +42,12 @@ void askPosition(Dialogue& dialogue, MachineAtHand& machine, const config::AxisC
   if (machine.state(config.name).position_valid) return;
   const auto position = askNumber(
       dialogue,
-      "Its position isn't known, and soft limits count from where it was switched on. Where "
-      "does it stand, about? (Enter: leave it)",
+      "The driver doesn't know the position, and its soft limits count from the position at which "
+      "it was started. About which position is it? (Enter: leave it)",
       unitOf(config.kind));
   if (!position) return;
   const client::Answer answer = machine.setPosition(config.name, *position);
-  dialogue.say((answer.success ? "" : "The driver refuses: ") + answer.message);
+  dialogue.say((answer.success ? "" : "The driver refuses: ") + inTableUnits(answer.message));
 }
 
 }  // namespace
@@ -56,12 +58,12 @@ Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const config::AxisC
   const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
   dialogue.say(fmt::format("\n==== Axis {}: {} steps per {} at {} microsteps", config.name,
                            ros_node::roundedText(steps), unitOf(config.kind), config.microsteps));
-  dialogue.say("\n-- 1. Do the switches read right?");
+  dialogue.say("\n-- 1. Do the switches read correctly?");
   checkSwitches(dialogue, machine, config, findings);
   Current current(machine, config.name);
   dialogue.say("\n-- 2. Which way is plus?");
   if (!current.ask(dialogue)) {
-    dialogue.say("Without current neither the direction nor the distance is looked at.");
+    dialogue.say("The motor is disabled: neither the direction nor the distance is checked.");
     return findings;
   }
   askPosition(dialogue, machine, config);

@@ -24,8 +24,8 @@ std::string usualCause(double factor) {
   const double whole = std::round(power);
   if (whole == 0.0 || std::abs(power - whole) > kNearPower) return {};
   return fmt::format(
-      "That is near a factor of {}: look at the microsteps first, at straps and DIP switches "
-      "against `microsteps`.",
+      "That is near a factor of {}: first compare the microsteps that straps or DIP switches set "
+      "with `microsteps`.",
       roundedText(std::exp2(std::abs(whole))));
 }
 
@@ -34,23 +34,54 @@ struct Measured {
   double really = 0.0;     ///< [mm|deg]
 };
 
+/// Asks which way has room, and doesn't offer one that the driver would refuse.
+///
+/// @param distance [mm|deg] of all moves together, above 0.
+/// @param wrong_way the driver's plus is the user's minus.
+/// @return 1 for plus, -1 for minus; empty: there is no room.
+std::optional<double> askWay(Dialogue& dialogue, HandMove& hand_move,
+                             const config::AxisConfig& config, double distance, bool wrong_way) {
+  const auto possible = [&](double way) {
+    const std::string why = hand_move.refusalOf(way * distance);
+    if (!why.empty()) {
+      dialogue.say(fmt::format("{} can't move {}: {}.", config.name,
+                               distanceText(config, way * distance), why));
+    }
+    return why.empty();
+  };
+  const bool plus = possible(1.0);
+  const bool minus = possible(-1.0);
+  if (!plus && !minus) return {};
+  const double way = plus ? 1.0 : -1.0;
+  const std::string question = fmt::format(
+      "Is there room for {}{}?{}", distanceText(config, way * distance),
+      wrong_way ? fmt::format(", which is now what you call {}", plus ? "minus" : "plus") : "",
+      plus && minus ? " If you answer n, it moves towards minus." : "");
+  if (askYesNo(dialogue, question, true)) return way;
+  return plus && minus ? std::optional(-1.0) : std::nullopt;
+}
+
 /// @return empty if a move wasn't completed, or its length isn't known.
 std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
-                                const config::AxisConfig& config) {
+                                const config::AxisConfig& config, bool wrong_way) {
   const std::string unit = unitOf(config.kind);
   SmallMove move = measurableMove(config);
   SmallMove play = visibleMove(config);
-  move.distance = *askLength(dialogue, "How far is it to go?", unit, move.distance);
-  if (!askYesNo(dialogue, "Is there room for it towards plus, as it is configured?", true)) {
-    move.distance = -move.distance;
-    play.distance = -play.distance;
-  }
-  dialogue.say("First a little the same way, to take up the play.");
+  move.distance =
+      *askLength(dialogue, fmt::format("How far should {} move to be measured?", config.name), unit,
+                 move.distance);
+  const auto way = askWay(dialogue, hand_move, config, move.distance + play.distance, wrong_way);
+  if (!way) return {};
+  move.distance *= *way;
+  play.distance *= *way;
+  dialogue.say("First it makes a small move in the same direction, to take up the play.");
   if (hand_move.ask(play) == 0.0) return {};
-  dialogue.ask("Mark where it stands now, or set the dial to 0; then press Enter. ");
+  dialogue.ask(fmt::format("Mark where {} stands now, or set the dial to 0; then press Enter. ",
+                           config.name));
   const double moved = std::abs(hand_move.ask(move));
   if (moved == 0.0) return {};
-  const auto really = askLength(dialogue, "How far did it really go?", unit);
+  const auto really =
+      askLength(dialogue, fmt::format("How far did {} really move?", config.name), unit);
   if (!really) return {};
   return Measured{moved, *really};
 }
@@ -60,13 +91,14 @@ std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
 void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config,
                    Findings& findings) {
   if (findings.wrong_way) {
-    dialogue.say("Until the driver is started with the new configuration, its plus is your minus.");
+    dialogue.say(
+        "Until the driver is restarted with the new configuration, its plus is your minus.");
   }
   HandMove hand_move(dialogue, machine, config);
-  std::optional<Measured> measured = measure(dialogue, hand_move, config);
+  std::optional<Measured> measured = measure(dialogue, hand_move, config, findings.wrong_way);
   while (!measured) {
     if (!askYesNo(dialogue, "Nothing is measured. Try again?", false)) return;
-    measured = measure(dialogue, hand_move, config);
+    measured = measure(dialogue, hand_move, config, findings.wrong_way);
   }
   const double factor = measured->commanded / measured->really;
   const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
@@ -77,12 +109,12 @@ void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::Axi
       fmt::format("Commanded {0} {2}, measured {1} {2}: {3} x {0} / {1} = {4} steps per {2}.",
                   commanded, really, unit, roundedText(steps), roundedText(steps * factor)));
   if (std::abs(factor - 1.0) < kAsGoodAsRight) {
-    dialogue.say("That is as good as right; it stays.");
+    dialogue.say("That is accurate enough: the configuration stays as it is.");
     return;
   }
   const std::string cause = usualCause(factor);
   if (!cause.empty()) dialogue.say(cause);
-  if (askYesNo(dialogue, "Take that?", true)) findings.scale = factor;
+  if (askYesNo(dialogue, "Use the new value?", true)) findings.scale = factor;
 }
 
 }  // namespace stepdriver::console

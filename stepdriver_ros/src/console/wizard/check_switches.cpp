@@ -30,7 +30,7 @@ std::optional<Press> awaitPress(Dialogue& dialogue, MachineAtHand& machine,
     const bool max = now.max_active != rest.max_active;
     if (!press && (min || max)) {
       press = Press{max, max ? rest.max_active : rest.min_active};
-      dialogue.say("  " + nameOf(max) + " has changed; let it go");
+      dialogue.say("  " + nameOf(max) + " has changed; release it");
     }
     if (press && !min && !max) return press;
   }
@@ -39,24 +39,24 @@ std::optional<Press> awaitPress(Dialogue& dialogue, MachineAtHand& machine,
 std::optional<Press> checkEnd(Dialogue& dialogue, MachineAtHand& machine,
                               const config::AxisConfig& config, const std::string& end) {
   dialogue.say(
-      fmt::format("Press the switch at the {} end by hand, and let it go. (Enter: there is none, "
-                  "or nothing happens)",
+      fmt::format("Press the switch at the {} end by hand, then release it. (Enter: there is no "
+                  "switch, or nothing happens)",
                   end));
   const auto press = awaitPress(dialogue, machine, config.name);
   if (!press) {
-    dialogue.say("  Nothing was seen at the " + end + " end.");
+    dialogue.say("  No switch has changed at the " + end + " end.");
     return {};
   }
-  dialogue.say(fmt::format("  The switch at the {} end is the one that is configured as {}{}", end,
-                           nameOf(press->max),
-                           press->inverted ? ", and it reads the wrong way round." : "."));
+  dialogue.say(fmt::format(
+      "  The switch at the {} end is the one that is configured as {}{}", end, nameOf(press->max),
+      press->inverted ? ". It is inverted: it read pressed before you pressed it." : "."));
   return press;
 }
 
 void sayDead(Dialogue& dialogue, const std::string& name) {
   dialogue.say(
-      fmt::format("  ATTENTION: {} is configured, but was never seen to change. Check its wire, "
-                  "its line and its supply before you rely on it; the wizard can't mend that.",
+      fmt::format("  ATTENTION: {} is configured, but has never changed. Check its wire, its line "
+                  "and its supply before you rely on it; the wizard can't repair that.",
                   name));
 }
 
@@ -68,7 +68,9 @@ void checkSwitches(Dialogue& dialogue, MachineAtHand& machine, const config::Axi
     dialogue.say("No endstops are configured.");
     return;
   }
-  dialogue.say("Decide which way is to be plus. Nothing moves in this part.");
+  dialogue.say(
+      "Decide which end of the axis you call plus, and which one minus. Nothing moves in this "
+      "part.");
   const auto minus = checkEnd(dialogue, machine, config, "minus");
   const auto plus = checkEnd(dialogue, machine, config, "plus");
   bool min_seen = false;

@@ -15,6 +15,14 @@ namespace stepdriver::console {
 std::string configurationText(const config::ConfigValue& parameters,
                               const std::vector<std::string>& comment);
 
+/// The text of a file that the driver was started with.
+///
+/// @param parameters of the node. The named axes must be the same in the file: the wizard measures
+///   how the machine differs from them.
+/// @throw Error if the file can't be read, or differs.
+std::string readOwnFile(const std::string& path, const config::ConfigValue& parameters,
+                        const std::vector<std::string>& axes);
+
 /// @throw Error if the file exists and must not be replaced.
 void checkNewFile(const std::string& path, bool replace);
 

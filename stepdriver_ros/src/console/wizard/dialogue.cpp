@@ -32,7 +32,7 @@ bool askYesNo(Dialogue& dialogue, const std::string& question, bool yes_by_defau
     if (answer.empty()) return yes_by_default;
     if (answer == "y" || answer == "Y" || answer == "yes") return true;
     if (answer == "n" || answer == "N" || answer == "no") return false;
-    sayNotUnderstood(dialogue, answer, "y, n, or q to end all of it");
+    sayNotUnderstood(dialogue, answer, "type y or n, or q to quit");
   }
 }
 

@@ -69,7 +69,12 @@ client::Answer DriverAtHand::enable(const std::string& axis, bool on) {
 client::Answer DriverAtHand::setPosition(const std::string& axis, double position) {
   SetPosition::Request request;
   request.position = position / unitsOf(axis);
-  return client::askService<SetPosition>(service(axis, "set_position"), request);
+  const auto response = client::respondedBy<SetPosition>(service(axis, "set_position"), request);
+  if (response.success == 0) return {false, response.message};
+  const double units = unitsOf(axis);
+  const std::string unit = unitOf(session_.driver().config(axis)->kind);
+  return {true, fmt::format("{}: this position is {} from now on", axis,
+                            TableUnits{units, unit}.place(response.position))};
 }
 
 client::Answer DriverAtHand::move(const std::string& axis, double distance, double speed) {

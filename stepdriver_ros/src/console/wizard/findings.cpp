@@ -93,12 +93,15 @@ ConfigValue corrected(ConfigValue parameters, const Findings& findings) {
 std::vector<std::string> changesText(const Findings& findings, const config::AxisConfig& config) {
   std::vector<std::string> changes;
   const std::string& axis = findings.axis;
-  if (findings.wrong_way) changes.push_back(axis + ": invert/dir is changed: plus was minus");
+  if (findings.wrong_way)
+    changes.push_back(axis + ": invert/dir is changed, because its plus was your minus");
   if (findings.min_inverted) {
-    changes.push_back(axis + ": endstops/min/active_level is changed: it read the wrong way");
+    changes.push_back(axis +
+                      ": endstops/min/active_level is changed, because the switch was inverted");
   }
   if (findings.max_inverted) {
-    changes.push_back(axis + ": endstops/max/active_level is changed: it read the wrong way");
+    changes.push_back(axis +
+                      ": endstops/max/active_level is changed, because the switch was inverted");
   }
   if (findings.switches_swapped) {
     changes.push_back(axis + ": endstops/min and endstops/max are swapped");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../table_units.h"
 #include "common/text.h"
 
 namespace stepdriver::console {
@@ -31,17 +32,53 @@ SmallMove measurableMove(const config::AxisConfig& config) {
   return config.kind == Kind::kLinear ? slowly(config, 20.0, 10.0) : slowly(config, 90.0, 45.0);
 }
 
+std::string distanceText(const config::AxisConfig& config, double distance) {
+  return fmt::format("{} {} towards {}", roundedText(std::abs(distance)), unitOf(config.kind),
+                     distance < 0.0 ? "minus" : "plus");
+}
+
+std::string knownRefusal(const config::AxisConfig& config, const AxisView& state, double distance) {
+  // The first motion of an idle axis wakes it up.
+  if (!state.fault.empty()) return "it has a fault: " + state.fault;
+  if (!state.enabled && !state.idle) return "its motor is disabled";
+  if (state.asleep && !state.idle) return "its driver chip is asleep";
+  if (state.held) return "it is on hold";
+  if (state.switches_known && (distance < 0.0 ? state.min_active : state.max_active)) {
+    return fmt::format("the {} switch ahead of it reads pressed", distance < 0.0 ? "min" : "max");
+  }
+  const double units = config::configUnitsPerUnit(config.kind);
+  // The driver counts from the commanded position, up to half a step from this one.
+  const double doubt = units / config.steps_per_unit;
+  const double target = state.position + distance;
+  const bool below = config.min_position && target < *config.min_position * units - doubt;
+  const bool above = config.max_position && target > *config.max_position * units + doubt;
+  if (!below && !above) return {};
+  const std::string unit = unitOf(config.kind);
+  const double limit = below ? *config.min_position : *config.max_position;
+  return fmt::format("it stands at {}, and would then be beyond its soft limit {}",
+                     positionText(state.position, unit), positionText(limit * units, unit));
+}
+
+std::string HandMove::refusalOf(double distance) {
+  return knownRefusal(config_, freshState(), distance);
+}
+
 double HandMove::ask(const SmallMove& move) {
-  const std::string unit = unitOf(config_.kind);
+  const std::string way = distanceText(config_, move.distance);
+  const std::string why = refusalOf(move.distance);
+  if (!why.empty()) {
+    dialogue_.say(fmt::format("{} can't move {}: {}.", config_.name, way, why));
+    return 0.0;
+  }
   const std::string what = fmt::format(
-      "{0} will move {1} {2} towards {3}, as it is configured, at {4} {2}/s. Enter stops it. Move?",
-      config_.name, roundedText(std::abs(move.distance)), unit,
-      move.distance < 0.0 ? "minus" : "plus", roundedText(move.speed));
+      "{0} will move {1}, as the configuration defines it now, at {2} {3}/s. Enter stops it. Move "
+      "{0} now?",
+      config_.name, way, roundedText(move.speed), unitOf(config_.kind));
   if (!askYesNo(dialogue_, what, false)) return 0.0;
   const double start = machine_.state(config_.name).position;
   const client::Answer answer = machine_.move(config_.name, move.distance, move.speed);
   if (!answer.success) {
-    dialogue_.say("The driver refuses: " + answer.message);
+    dialogue_.say("The driver refuses: " + inTableUnits(answer.message));
     return 0.0;
   }
   try {

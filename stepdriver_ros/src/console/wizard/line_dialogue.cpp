@@ -1,8 +1,10 @@
 #include "line_dialogue.h"
 
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -13,8 +15,16 @@
 namespace stepdriver::console {
 namespace {
 
-constexpr int kPoll = 20;  // [ms]
-constexpr int kColumns = 79;
+constexpr int kPoll = 20;     // [ms]
+constexpr int kColumns = 79;  // if the window doesn't say
+constexpr int kFewestColumns = 20;
+
+/// One column less than the window has: a terminal may start a new line after the last one.
+int columns() {
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kColumns;
+  return std::max(size.ws_col - 1, kFewestColumns);
+}
 
 void print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
@@ -26,16 +36,18 @@ void print(const std::string& text) {
 void LineDialogue::say(const std::string& text) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
-    for (const std::string& row : wrapped(line, kColumns)) print(row + "\n");
+    for (const std::string& row : wrapped(line, columns())) print(row + "\n");
   }
 }
 
 std::string LineDialogue::ask(const std::string& question) {
+  // What follows the last word, usually a space, stays between the question and the answer.
+  const std::size_t words = question.find_last_not_of(' ') + 1;
   std::string rows;
-  for (const std::string& row : wrapped(question, kColumns)) {
+  for (const std::string& row : wrapped(question.substr(0, words), columns())) {
     rows += (rows.empty() ? "" : "\n") + row;
   }
-  print(rows);
+  print(rows + question.substr(words));
   for (;;) {
     if (auto answer = line()) return *answer;
     meanwhile_();

@@ -9,13 +9,15 @@
 namespace stepdriver::console {
 
 struct WizardOptions {
-  std::string axis;  ///< the only axis to check; empty: all, one after the other
+  std::string axis;    ///< the only axis to check; empty: all, one after the other
+  std::string config;  ///< the driver's file, whose comments are kept; empty: not known
   std::string output = "stepdriver_wizard.yaml";
   bool overwrite = false;
 };
 
 /// A guided first bring-up on standard input and output: checks switches, direction and distance of
-/// each axis, and writes a corrected configuration.
+/// each axis, and writes a corrected configuration. With the driver's own file, it writes the text
+/// of that file with the values changed; otherwise it writes all parameters of the node.
 ///
 /// @param driver full name of the node.
 /// @return whether the file was written.
