@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -155,6 +159,40 @@ TEST(CorrectedText, SaysWhatToWriteByHandIfTheTextCannotBeChanged) {
                                       "axes/y/endstops/max/active_level: low, "
                                       "axes/y/endstops/max/pin: a",
                                       "axes/y/invert/dir: true", "axes/y/steps_per_mm: 100.0"}));
+}
+
+TEST(CorrectedText, EveryShippedConfigurationKeepsItsComments) {
+  int files = 0;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(STEPDRIVER_SOURCES "/config")) {
+    if (entry.path().extension() != ".yaml") continue;
+    std::ifstream stream(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    const auto file = yaml::parse(text, entry.path().string());
+    const auto axes = file.as<config::ConfigValue::Map>()->find("axes");
+    if (axes == file.as<config::ConfigValue::Map>()->end()) continue;
+    std::vector<Findings> findings;
+    for (const auto& [name, axis] : *axes->second.as<config::ConfigValue::Map>()) {
+      if (axis.as<config::ConfigValue::Map>()->count("driver") == 0) continue;  // of the joystick
+      findings.push_back(of(name));
+      findings.back().wrong_way = true;
+      if (axis.as<config::ConfigValue::Map>()->count("endstops") > 0) {
+        findings.back().switches_swapped = findings.back().min_inverted = true;
+        findings.back().max_inverted = true;
+      }
+      findings.back().scale = 1.25;
+    }
+    if (findings.empty()) continue;
+    ++files;
+    const CorrectedText result = correctedText(text, findings);
+    EXPECT_TRUE(result.by_hand.empty()) << entry.path() << ": " << result.by_hand.at(0);
+    const auto comments = [](const std::string& all) {
+      return std::count(all.begin(), all.end(), '#');
+    };
+    EXPECT_EQ(comments(result.text), comments(text)) << entry.path();
+    EXPECT_TRUE(result.text != text) << entry.path();
+  }
+  EXPECT_GE(files, 3);
 }
 
 TEST(CorrectedText, AByteOrderMarkIsNoObstacle) {

@@ -220,6 +220,14 @@ TEST_F(WizardTest, ASwitchThatChangesStopsAMove) {
   EXPECT_TRUE(terminal.waitFor("ended 1"));
 }
 
+TEST_F(WizardTest, WrapsItsLinesInANarrowWindow) {
+  terminal.resize(60, 40);
+  ASSERT_NO_FATAL_FAILURE(open());
+  EXPECT_TRUE(
+      terminal.waitFor("Press the switch at the minus end by hand, then release it.\n"
+                       "  (Enter: there is no switch, or nothing happens)"));
+}
+
 TEST_F(WizardTest, ReplacesNoFileWithoutBeingTold) {
   std::ofstream(file.path()) << "mine\n";
   node.start();

@@ -84,8 +84,8 @@ int start(int argc, char** argv, EndRequests& end_requests) {
             ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
   if (!ros::master::check()) {
     complain(
-        fmt::format("there is no ROS master at {}: start the driver first, by roslaunch stepdriver "
-                    "axis.launch, say",
+        fmt::format("there is no ROS master at {}: start the driver first, for example with "
+                    "roslaunch stepdriver axis.launch",
                     ros::master::getURI()));
     return ros_node::kExitConfig;
   }

@@ -53,7 +53,7 @@ Terminal::Terminal() {
     }
     if (tty_ != nullptr) std::fclose(tty_);
     const char* const type = std::getenv("TERM");
-    throw Error(fmt::format("this terminal can't show a screen: TERM is {}; --wizard does without",
+    throw Error(fmt::format("this terminal can't show a screen: TERM is {}; --wizard needs none",
                             type == nullptr ? "not set" : type));
   }
   output_ = std::move(output);

@@ -36,8 +36,8 @@ class Current {
   bool given_ = false;
 };
 
-/// Until the position is known, soft limits count from where the axis was switched on: it might be
-/// unable to move at all.
+/// Until the position is known, soft limits count from the position at the start of the driver: the
+/// axis might be unable to move at all.
 void askPosition(Dialogue& dialogue, MachineAtHand& machine, const config::AxisConfig& config) {
   if (machine.state(config.name).position_valid) return;
   const auto position = askNumber(

@@ -9,7 +9,7 @@
 namespace stepdriver::console {
 namespace {
 
-/// Turns the move round if the driver would refuse it, and says so.
+/// Reverses the move if the driver would refuse it, and says so.
 ///
 /// @return false: the driver would refuse both ways.
 bool findPossibleWay(Dialogue& dialogue, HandMove& hand_move, const config::AxisConfig& config,
@@ -80,7 +80,7 @@ void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const config::Ax
       return;
     }
     const std::string question = fmt::format(
-        "{} moved towards your {}, but the driver moved it towards {}. Invert its direction?",
+        "{} moved towards what you call {}, but the driver commanded {}. Invert its direction?",
         config.name, *plus ? "plus" : "minus", commanded_plus ? "plus" : "minus");
     findings.wrong_way = askYesNo(dialogue, question, true);
     if (findings.wrong_way) return;
