@@ -32,8 +32,8 @@ client::Answer answerOf(const Response& response, const std::string& shown) {
   return {true, shown};
 }
 
-client::Answer move(const std::string& service, const MoveTo::Request& request, const Call& call,
-                    const TableUnits& units) {
+client::Answer moveTo(const std::string& service, const MoveTo::Request& request, const Call& call,
+                      const TableUnits& units) {
   const MoveTo::Response response = client::respondedBy<MoveTo>(service, request);
   return answerOf(
       response, moveText(call.axis, units, response.target, response.position, response.duration));
@@ -53,12 +53,12 @@ client::Answer carryOutCall(const std::string& driver, const Call& call, const T
       MoveTo::Request request;
       request.position = call.distance;
       request.relative = true;
-      return move(axis + "move_to", request, call, units);
+      return moveTo(axis + "move_to", request, call, units);
     }
     case Call::What::kGoTo: {
       MoveTo::Request request;
       request.position = call.position;
-      return move(axis + "move_to", request, call, units);
+      return moveTo(axis + "move_to", request, call, units);
     }
     case Call::What::kSetZero: {
       const auto response =

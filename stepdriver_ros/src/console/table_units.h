@@ -19,8 +19,7 @@ struct TableUnits {
   std::string place(double position) const { return positionText(position * per_unit, unit); }
 };
 
-/// "x moves to 20.0000 mm in 1.2 s"; says if the axis can only come to rest near its
-/// target.
+/// "x moves to 20.0000 mm in 1.2 s"; it names the nearest microstep if the target is none.
 ///
 /// @param target, rest [m|rad]
 /// @param duration [s]

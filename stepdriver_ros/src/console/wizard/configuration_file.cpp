@@ -53,8 +53,8 @@ std::string firstDifference(const config::ConfigValue* file, const config::Confi
   Map keys = *one;
   keys.insert(other->begin(), other->end());
   for (const auto& [name, unused] : keys) {
-    std::string found =
-        firstDifference(valueAt(*file, {name}), valueAt(*driver, {name}), key + "/" + name);
+    std::string found = firstDifference(valueAt(*file, {name}), valueAt(*driver, {name}),
+                                        fmt::format("{}/{}", key, name));
     if (!found.empty()) return found;
   }
   return {};

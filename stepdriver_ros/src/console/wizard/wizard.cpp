@@ -36,6 +36,7 @@ std::vector<config::AxisConfig> chosenAxes(const DriverParameters& parameters,
 
 std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& axes) {
   std::vector<std::string> names;
+  names.reserve(axes.size());
   for (const config::AxisConfig& axis : axes) names.push_back(axis.name);
   return names;
 }

@@ -1,5 +1,6 @@
 #include "yaml_text.h"
 
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -53,7 +54,7 @@ std::optional<Span> spanOf(const std::string& text, const YAML::Node& node) {
   if (!node.IsScalar()) return {};
   const std::size_t begin = offsetOf(text, node);
   for (const std::string quote : {"", "'", "\""}) {
-    const std::string written = quote + node.Scalar() + quote;
+    const std::string written = fmt::format("{0}{1}{0}", quote, node.Scalar());
     if (!written.empty() && begin < text.size() &&
         text.compare(begin, written.size(), written) == 0) {
       return Span{begin, written.size()};
