@@ -184,8 +184,8 @@ TEST(Screen, AHelpThatDoesNotFitIsCutAndSaysSo) {
 
 TEST(Screen, ShowsTheStepSizeTheOverrideAndWhatIsTyped) {
   Session session = sessionWith({axisView("x")});
-  EXPECT_TRUE(shows(screenText(session, 24, 80),
-                    "- + steps: one motor step    speed override: not set here"));
+  EXPECT_TRUE(
+      shows(screenText(session, 24, 80), "- + steps: one motor step    speed override: 100 %"));
   session.press({'i'}, 0.0);
   session.answered(session.press({'['}, 0.0).calls.at(0), true, "");
   EXPECT_TRUE(shows(screenText(session, 24, 80), "- + steps: 0.1 mm    speed override: 90 %"));

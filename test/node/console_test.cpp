@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <stepdriver/AxisStates.h>
+#include <stepdriver/SpeedOverride.h>
 
 #include <csignal>
 #include <cstdint>
@@ -158,6 +159,13 @@ TEST_F(ConsoleTest, HoldsResumesAndSlowsDown) {
     terminal.press("[");
     EXPECT_TRUE(terminal.waitFor(std::string("speed override: ") + factor));
   }
+  SpeedOverride::Request other;
+  other.factor = 0.3;
+  EXPECT_TRUE(node.call<SpeedOverride>("speed_override", other).success);
+  EXPECT_TRUE(terminal.waitFor("speed override: 30 %")) << "it was set by another client";
+  other.factor = 0.7;
+  EXPECT_TRUE(node.call<SpeedOverride>("speed_override", other).success);
+  EXPECT_TRUE(terminal.waitFor("speed override: 70 %"));
   terminal.press("]");
   EXPECT_TRUE(terminal.waitFor("all axes move at 80 % of the commanded speed"));
   ASSERT_TRUE(node.moveTo(0.19, false, 0.05).success);

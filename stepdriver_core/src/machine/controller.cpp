@@ -654,6 +654,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   if (owner != nullptr) state.homing = owner->homingPhase();
   state.position_valid = axis.position.isValid();
   state.microsteps = axis.motor.microsteps();
+  state.speed_override = context_.mode.speed_override;
   state.fault = axis.fault.what();
   state.remedy = axis.fault.remedy();
   state.stops = axis.stops;

@@ -213,6 +213,7 @@ void DriverClient::take(const AxisStates& states) {
     axis.microsteps = states.microsteps[i];
     axis.position = states.position[i] * unitsOf(axis.name);
     axis.velocity = states.velocity[i] * unitsOf(axis.name);
+    axis.speed_override = states.speed_override;
     axis.fault = states.fault[i];
     axis.position_note = states.position_note[i];
   }

@@ -136,7 +136,7 @@ std::vector<Row> settingRows(const Session& session, int columns) {
   const config::AxisConfig* config = session.driver().config(session.chosen());
   const std::string unit = config == nullptr ? "mm" : unitOf(config->kind);
   return rowsOf(fmt::format("- + steps: {}    speed override: {}", session.stepSize().text(unit),
-                            factor ? fmt::format("{:.0f} %", *factor * 100.0) : "not set here"),
+                            factor ? fmt::format("{:.0f} %", *factor * 100.0) : "unknown"),
                 columns);
 }
 

@@ -308,13 +308,11 @@ void Session::resume(double now, Orders& orders) {
 }
 
 void Session::changeOverride(int direction, double now, Orders& orders) {
-  if (direction > 0 && !driver_.live(now)) {
-    messages_.say("the override isn't raised: the driver's state isn't live");
+  if (!override_) {
+    messages_.say("the override isn't changed: the driver's state isn't live");
     return;
   }
-  // An unknown one is not raised above what is commanded.
-  const int before = override_ ? static_cast<int>(std::lround(*override_ * 100.0))
-                               : 100 - (direction > 0 ? kOverrideStep : 0);
+  const int before = static_cast<int>(std::lround(*override_ * 100.0));
   const int wanted = before + direction * kOverrideStep;
   if (wanted < kSlowest || wanted > kFastest) {
     messages_.say(fmt::format("the override stays at {} %: it can be {} to {} %", before, kSlowest,
@@ -389,6 +387,7 @@ void Session::emergencyAnswered(bool success, const std::string& message) {
 
 void Session::update(std::vector<AxisView> axes, double now) {
   for (AxisView& axis : axes) axis.fault = inTableUnits(axis.fault);
+  if (!axes.empty()) override_ = axes.front().speed_override;
   driver_.update(std::move(axes), now);
   if (driver_.axis(chosen_) == nullptr) {
     chosen_ = driver_.axes().empty() ? std::string() : driver_.axes().front().name;

@@ -112,8 +112,7 @@ class Session {
   const StepSize& stepSize() const { return step_size_; }
   /// The position that is being typed; nullptr: none.
   const PositionPrompt* prompt() const { return prompt_ ? &*prompt_ : nullptr; }
-  /// The override that the driver has accepted from this console; empty: none since the state
-  /// became live. The driver doesn't publish it.
+  /// The driver's, whoever set it; empty: unknown, because the driver's state isn't live.
   std::optional<double> speedOverride() const { return override_; }
   const std::vector<PendingCall>& pending() const { return pending_; }
   Emergency emergency() const { return emergency_; }

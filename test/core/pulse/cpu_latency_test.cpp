@@ -110,7 +110,7 @@ TEST(RealtimeRights, TellHowTheProcessorsAreKeptAwakeOrWhatToDo) {
   EXPECT_EQ(text(-1), "SCHED_FIFO 50; memory locked");
   EXPECT_EQ(text(0), "SCHED_FIFO 50; memory locked; processors kept awake");
   EXPECT_NE(text(EACCES).find("60-stepdriver-gpio.rules"), std::string::npos) << text(EACCES);
-  EXPECT_NE(text(ENOENT).find("/dev/cpu_dma_latency isn't there"), std::string::npos);
+  EXPECT_NE(text(ENOENT).find("/dev/cpu_dma_latency doesn't exist"), std::string::npos);
   EXPECT_NE(text(EIO).find("can't be held (Input/output error)"), std::string::npos) << text(EIO);
 }
 

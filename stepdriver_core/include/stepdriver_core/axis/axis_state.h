@@ -77,7 +77,8 @@ struct AxisState {
   HomingPhase homing = HomingPhase::kNone;  ///< the phase of a homing under way
   bool position_valid = false;              ///< the position can be trusted
   int microsteps = 1;
-  double position = 0.0;  ///< [unit] from the count of the edges that went out
+  double speed_override = 1.0;  ///< the factor of all velocities, see Machine::setSpeedOverride()
+  double position = 0.0;        ///< [unit] from the count of the edges that went out
   /// [unit] The planned position of the motion under way; the position at rest. The count and the
   /// clock can't be read at one instant: of the places that the plan passed meanwhile, this is the
   /// one that is nearest to the position.

@@ -32,8 +32,8 @@ bool differ(const axis::AxisState& one, const axis::AxisState& other) {
   return one.enabled != other.enabled || one.asleep != other.asleep || one.idle != other.idle ||
          one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
          one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
-         one.target != other.target || one.fault != other.fault ||
-         one.position_note != other.position_note;
+         one.target != other.target || one.speed_override != other.speed_override ||
+         one.fault != other.fault || one.position_note != other.position_note;
 }
 
 }  // namespace
@@ -179,6 +179,7 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
   published_states_ = states_;
   AxisStates message;
   message.header.stamp = states_read_;
+  message.speed_override = states_.front().speed_override;
   for (std::size_t i = 0; i < states_.size(); ++i) {
     const axis::AxisState& state = states_[i];
     message.name.push_back(machine_.axes()[i]->config().name);
@@ -218,6 +219,7 @@ void StatePublisher::publishStateOfEachAxis(bool due) {
     message.position = state.position;
     message.planned = state.planned;
     message.velocity = state.velocity;
+    message.speed_override = state.speed_override;
     message.target = state.target;
     message.time_left = state.time_left;
     message.fault = state.fault;
