@@ -22,7 +22,7 @@ struct AxisView {
   double position = 0.0;  ///< [mm|deg]
   double velocity = 0.0;  ///< [mm/s|deg/s]
   double speed_override = 1.0;
-  std::string fault;      ///< empty: none
+  std::string fault;  ///< empty: none
   std::string position_note;
   bool switches_known = false;  ///< false: the two below are meaningless
   bool min_active = false;
