@@ -47,6 +47,8 @@ struct Predecessor {
   std::string stopped_by;
   Ack call;                  ///< of its beginning, if the engine had not yet accepted it
   std::uint64_t serial = 0;  ///< of the order that would have begun it
+  /// Of an order that stops it, if the engine had not yet taken that; 0: there was none.
+  std::uint64_t stop_serial = 0;
 };
 
 }  // namespace stepdriver::activity

@@ -458,8 +458,11 @@ std::vector<Predecessor> Manoeuvre::handOver() {
   std::vector<Predecessor> left = std::exchange(predecessors_, {});
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Order& order = orders_[i];
+    const auto stop = std::find_if(open_.begin(), open_.end(),
+                                   [](const OpenOrder& open) { return open.mode == Mode::kStop; });
     left.push_back({order.axis, order.goal, accepted_mode_ == Mode::kStop, why_.text, call_,
-                    open_.empty() ? 0 : open_.front().serials[i]});
+                    open_.empty() ? 0 : open_.front().serials[i],
+                    stop == open_.end() ? 0 : stop->serials[i]});
   }
   over_ = true;
   call_.reset();
@@ -480,7 +483,10 @@ void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
   // Neither it nor its successor has begun.
   if (ended.call) ended.call->fail(neverBegun(ended));
   auto [end, why] = endOf(*ended.axis);
-  if (end == axis::MoveEnd::kReached && ended.slowed_down) {
+  const bool slowed_down =
+      ended.slowed_down ||
+      (ended.stop_serial != 0 && ended.stop_serial <= ended.axis->motor.state().accepted);
+  if (end == axis::MoveEnd::kReached && slowed_down) {
     end = axis::MoveEnd::kStopped;
     why = ended.stopped_by;
   }

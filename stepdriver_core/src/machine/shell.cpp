@@ -53,11 +53,11 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
       threaded_(options.threaded),
       on_motion_(options.on_motion),
       writers_(lines_, options.threaded, options.write_timeout_ns, [this] { wakeUp(); }),
+      told_levels_(inputs),
       snapshot_(controller.snapshot()),
-      levels_(inputs, 0),
       posted_(engine.channels()) {
   engine_.listen(*this);
-  reads_ = readInputs();
+  queue(readInputs());
   if (!threaded_) return;
   pulse_thread_.emplace(engine_, clock_, this, options.latency_device);
   thread_ = std::thread([this] { run(); });
@@ -90,8 +90,8 @@ pulse::RealtimeRights Shell::rights() const {
 // ---- clients ----
 
 activity::Reply Shell::call(Request request) {
-  std::vector<InputRead> reads;
-  if (asksForLevels(request)) reads = readInputs();
+  std::optional<InputReading> reading;
+  if (asksForLevels(request)) reading = readInputs();
   activity::CallId id = 0;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -104,7 +104,7 @@ activity::Reply Shell::call(Request request) {
       const std::lock_guard<std::mutex> answers_lock(answers_mutex_);
       answers_[id];
     }
-    reads_.insert(reads_.end(), reads.begin(), reads.end());
+    if (reading) queue(*reading);
     requests_.push_back({id, std::move(request)});
     woken_ = true;
   }
@@ -202,32 +202,34 @@ void Shell::wakeUp() {
   wake_.notify_one();
 }
 
-std::vector<InputRead> Shell::readInputs() const {
-  std::vector<InputRead> reads;
-  reads.reserve(static_cast<std::size_t>(inputs_));
-  for (int input = 0; input < inputs_; ++input) reads.push_back({input, lines_->read(input)});
-  return reads;
+InputReading Shell::readInputs() {
+  InputReading reading{++readings_, {}};
+  reading.levels.reserve(static_cast<std::size_t>(inputs_));
+  for (int input = 0; input < inputs_; ++input) reading.levels.push_back(lines_->read(input));
+  return reading;
+}
+
+bool Shell::queue(const InputReading& reading) {
+  const std::vector<InputRead> changed = told_levels_.differences(reading);
+  reads_.insert(reads_.end(), changed.begin(), changed.end());
+  return !changed.empty();
 }
 
 // An edge is only a wake-up: the levels are read. Periodic reading makes up for a lost edge, or one
 // that came while a chip was waking up.
 void Shell::watchInputs() {
   pthread_setname_np(pthread_self(), "inputs");
-  std::vector<InputRead> known;
   for (;;) {
     std::array<gpio::EdgeEvent, 16> events{};
     const int count = lines_->waitForEdges(kInputPeriodNs, events.data(), events.size());
     engine_.inputsChanged();
-    std::vector<InputRead> reads = readInputs();
-    const bool changed =
-        !std::equal(reads.begin(), reads.end(), known.begin(), known.end(),
-                    [](const InputRead& a, const InputRead& b) { return a.level == b.level; });
-    known = reads;
+    const InputReading reading = readInputs();
+    bool changed = false;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (ending_) return;
       for (int i = 0; i < count; ++i) edges_.push_back(events.at(static_cast<std::size_t>(i)));
-      if (changed) reads_.insert(reads_.end(), reads.begin(), reads.end());
+      changed = queue(reading);
     }
     if (changed || count > 0) wakeUp();
     // If waiting fails, reading will fail too, and report it.
@@ -296,14 +298,12 @@ void Shell::feedInputs() {
     count = lines_->waitForEdges(0, events.data(), events.size());
     for (int i = 0; i < count; ++i) handle(InputEdge{events.at(static_cast<std::size_t>(i))});
   }
-  take(readInputs());
-}
-
-void Shell::take(const std::vector<InputRead>& reads) {
-  for (const InputRead& read : reads) {
-    int& known = levels_[static_cast<std::size_t>(read.input)];
-    if (std::exchange(known, read.level) != read.level) handle(read);
+  const InputReading reading = readInputs();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    queue(reading);
   }
+  feedWhatIsWatched();
 }
 
 void Shell::feedWhatIsWatched() {
@@ -315,7 +315,7 @@ void Shell::feedWhatIsWatched() {
     edges.swap(edges_);
   }
   for (const gpio::EdgeEvent& edge : edges) handle(InputEdge{edge});
-  take(reads);
+  for (const InputRead& read : reads) handle(read);
 }
 
 // @return whether there was anything to do.

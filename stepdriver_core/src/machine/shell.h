@@ -21,6 +21,7 @@
 #include "snapshot.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "told_levels.h"
 
 namespace stepdriver::machine {
 
@@ -80,10 +81,12 @@ class Shell : public pulse::NewsListener {
 
   void run();
   void watchInputs();
-  std::vector<InputRead> readInputs() const;
+  InputReading readInputs();
+  /// Queues what the controller must be told of it. Call it with the mutex. @return whether that is
+  /// anything.
+  bool queue(const InputReading& reading);
   void feedInputs();
   void feedWhatIsWatched();
-  void take(const std::vector<InputRead>& reads);
   bool turn();
   bool takeNews();
   void handle(decltype(Input::what) what);
@@ -109,6 +112,8 @@ class Shell : public pulse::NewsListener {
   std::condition_variable wake_;
   std::deque<Item> requests_;
   std::vector<InputRead> reads_;
+  ToldLevels told_levels_;
+  std::atomic<std::uint64_t> readings_{0};  // that have begun
   std::vector<gpio::EdgeEvent> edges_;
   bool ending_ = false;
   bool woken_ = false;
@@ -126,7 +131,6 @@ class Shell : public pulse::NewsListener {
   std::atomic<bool> news_hold_{false};  // the clock is held for news that hasn't been handled yet
 
   // Of the thread that runs the controller.
-  std::vector<int> levels_;  // of the inputs, as reported to the controller
   std::deque<pulse::Command> outbox_;
   std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
   EngineNews news_seen_;

@@ -36,6 +36,19 @@ TEST(FoundSchedules, RecoverComesRightAfterAChipFault) {
               {}});
 }
 
+TEST(FoundSchedules, ATrajectoryWhoseAxisWasStoppedBeforeItBeganHasNotReachedItsEnd) {
+  expectGood({1,
+              {does(1, 60, "trajectory of x and y"), does(0, 4, "move y to -5 mm"),
+               does(1, 16, "move x to 8 mm")},
+              {{14, Who::kNews, 40}}});
+}
+
+TEST(FoundSchedules, AChipFaultThatComesWhileARecoverWaitsIsRecoveredFrom) {
+  expectGood({1,
+              {does(1, 200, "jog x"), does(1, 8, "chip fault of x"), does(1, 0, "recover")},
+              {{9, Who::kRequest, 200}}});
+}
+
 TEST(FoundSchedules, AnAxisThatMovesIsStoppedWhileATrajectoryWakesAnotherOne) {
   for (const char* stop : {"stop x", "stop", "hold", "disable x", "shut down"}) {
     expectGood({0,

@@ -59,6 +59,7 @@ class Oracle {
     open_.erase(std::remove(open_.begin(), open_.end(), call), open_.end());
     if (!success) {
       if (ended.meaning.recovers) recoveredInPart(ended.order, at_fault);
+      if (ended.meaning.moves) isSlowingDown(ended, now);
       return;
     }
     const Meaning& meaning = ended.meaning;
@@ -157,7 +158,7 @@ class Oracle {
   // A stop along a trajectory can't use the acceleration that the trajectory itself has there, and
   // first one axis may limit it and then the other.
   pulse::Nanoseconds slowingOf(std::size_t axis) const {
-    return on_curve_[axis] ? slowing_[axis] * 3 / 2 : slowing_[axis];
+    return on_curve_[axis] ? 2 * slowing_[axis] : slowing_[axis];
   }
 
   // Axes that share a path take as long as the slowest of them.
@@ -189,6 +190,18 @@ class Oracle {
         if (recovered && quiet.kind == Meaning::Quiet::kEmergency) {
           quiet.kind = Meaning::Quiet::kAtRest;
         }
+      }
+    }
+  }
+
+  /// A motion of several axes that fails may already have begun to take up their backlash.
+  void isSlowingDown(const Call& failed, pulse::Nanoseconds now) {
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      if (!failed.meaning.axes[axis]) continue;
+      for (Quiet& quiet : quiets_[axis]) {
+        if (quiet.order > failed.order || quiet.kind == Meaning::Quiet::kEmergency) continue;
+        quiet.since = std::max(quiet.since, now + slowingOf(axis) - slipped_());
+        quiet.slows = true;
       }
     }
   }

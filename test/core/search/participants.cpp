@@ -115,9 +115,10 @@ Participants::Participants(const Schedule& schedule)
   controller_ = std::make_unique<machine::Controller>(configs_, wiring_.motor_lines,
                                                       std::move(names), wiring_.emergency_stop);
   engine_->listen(news_);
-  levels_.assign(wiring_.inputs.size(), 0);
-  watched_ = readInputs();
-  reads_.assign(watched_.begin(), watched_.end());
+  told_levels_ = machine::ToldLevels(wiring_.inputs.size());
+  const machine::InputReading first = readInputs();
+  watched_ = first.levels;
+  queue(first);
   trace_->rose = [this](std::size_t axis, std::int64_t time) { oracle_.rose(axis, time); };
 }
 
@@ -209,18 +210,17 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   if (client.on_answer) std::exchange(client.on_answer, nullptr)(reply);
 }
 
-std::vector<machine::InputRead> Participants::readInputs() {
-  std::vector<machine::InputRead> reads;
-  reads.reserve(wiring_.inputs.size());
+machine::InputReading Participants::readInputs() {
+  machine::InputReading reading{++readings_, {}};
+  reading.levels.reserve(wiring_.inputs.size());
   for (int input = 0; input < static_cast<int>(wiring_.inputs.size()); ++input) {
-    reads.push_back({input, lines_->read(input)});
+    reading.levels.push_back(lines_->read(input));
   }
-  return reads;
+  return reading;
 }
 
-void Participants::takeRead(const machine::InputRead& read) {
-  int& known = levels_[static_cast<std::size_t>(read.input)];
-  if (std::exchange(known, read.level) != read.level) handle(read);
+void Participants::queue(const machine::InputReading& reading) {
+  for (const machine::InputRead& read : told_levels_.differences(reading)) reads_.push_back(read);
 }
 
 // ---- steps ----
@@ -250,9 +250,7 @@ bool Participants::canGo(Who who) {
                                 }));
     case Who::kWatcher: {
       if (watch_due_ != pulse::kNever) return clock_.now() >= watch_due_;
-      const std::vector<machine::InputRead> reads = readInputs();
-      return !std::equal(reads.begin(), reads.end(), watched_.begin(),
-                         [](const auto& a, const auto& b) { return a.level == b.level; });
+      return readInputs().levels != watched_;
     }
     case Who::kClientA:
       return has_next(0);
@@ -331,15 +329,15 @@ void Participants::go(Who who) {
       }
       const machine::InputRead read = reads_.front();
       reads_.pop_front();
-      return takeRead(read);
+      return handle(read);
     }
     case Who::kRequest: {
       // Everything that was seen before the request was handed over comes before it.
       for (; !edges_.empty(); edges_.pop_front()) handle(machine::InputEdge{edges_.front()});
-      for (; !reads_.empty(); reads_.pop_front()) takeRead(reads_.front());
       Ask asked = std::move(requests_.front());
       requests_.pop_front();
-      for (const machine::InputRead& read : asked.reads) takeRead(read);
+      queue(asked.reading);
+      for (; !reads_.empty(); reads_.pop_front()) handle(reads_.front());
       oracle_.served(asked.id, asked.name, asked.meaning);
       noteServed(asked);
       return handle(machine::Requested{asked.id, std::move(asked.request)});
@@ -411,9 +409,10 @@ void Participants::watch() {
   watch_due_ = pulse::kNever;
   engine_->inputsChanged();
   engine_called_ = engine_reads_inputs_ = true;
-  watched_ = readInputs();
+  const machine::InputReading reading = readInputs();
+  watched_ = reading.levels;
   for (int i = 0; i < count; ++i) edges_.push_back(events.at(static_cast<std::size_t>(i)));
-  reads_.insert(reads_.end(), watched_.begin(), watched_.end());
+  queue(reading);
 }
 
 pulse::Nanoseconds Participants::nextDue() {
@@ -476,7 +475,7 @@ void Participants::post(int client, const std::string& name, machine::Request re
   asked.request = std::move(request);
   asked.meaning = meaning;
   noteGoals(asked);
-  asked.reads = readInputs();
+  asked.reading = readInputs();
   asked.posted = clock_.now();
   asked.posted_step = steps_;
   open_[asked.id] = asked;
@@ -851,7 +850,8 @@ void Participants::checkOutcomes() {
     } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
                std::abs(result->position - move.rest) > 1e-9) {
       oracle_.complain(name + " has reached " + std::to_string(result->position) +
-                       " m, but was to come to rest at " + std::to_string(move.rest) + " m");
+                       " m, but was to come to rest at " + std::to_string(move.rest) +
+                       " m: " + result->message);
     }
   }
   for (const activity::AcceptedHoming& homing : homings_) {

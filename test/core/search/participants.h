@@ -14,6 +14,7 @@
 
 #include "axis/prepared_trajectory.h"
 #include "machine/controller.h"
+#include "machine/told_levels.h"
 #include "machine/wiring.h"
 #include "pulse/pulse_engine.h"
 #include "search/failing_reads.h"
@@ -118,6 +119,7 @@ class Participants {
     int client = 0;
     std::string name;
     machine::Request request;
+    machine::InputReading reading;  // before it was posted
     Meaning meaning;
     std::vector<std::size_t> goals;  ///< axes for which it has a goal
     bool together = false;           ///< along one path
@@ -125,7 +127,6 @@ class Participants {
     std::vector<double> ways;  ///< of a relative goal, by goal
     std::vector<std::optional<double>> targets;
     std::array<std::size_t, kAxes> orders{};  ///< of each axis, when the call was served
-    std::vector<machine::InputRead> reads;
     pulse::Nanoseconds posted = 0;
     std::size_t posted_step = 0;
   };
@@ -171,8 +172,8 @@ class Participants {
   bool itemReady() const;
   pulse::Nanoseconds nextDue();
   void advanceTo(pulse::Nanoseconds time);
-  std::vector<machine::InputRead> readInputs();
-  void takeRead(const machine::InputRead& read);
+  machine::InputReading readInputs();
+  void queue(const machine::InputReading& reading);
   void prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
                       const std::vector<std::uint64_t>& stops, int tries);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
@@ -212,14 +213,15 @@ class Participants {
   std::deque<Ask> requests_;
   std::deque<machine::InputRead> reads_;
   std::deque<gpio::EdgeEvent> edges_;
-  std::vector<int> levels_;
+  machine::ToldLevels told_levels_{0};
+  std::uint64_t readings_ = 0;
   std::deque<activity::PinDone> pins_done_;
   std::deque<Job> jobs_;
   std::deque<pulse::Command> outbox_;
   bool engine_called_ = true;
   pulse::Nanoseconds engine_due_ = 0;
   pulse::Nanoseconds engine_waits_since_ = pulse::kNever;
-  std::vector<machine::InputRead> watched_;
+  std::vector<int> watched_;
   pulse::Nanoseconds watch_due_ = pulse::kNever;
   bool loses_edges_ = false;
   int next_pin_error_ = 0;
