@@ -33,8 +33,8 @@ TEST(ToldLevels, TellsNothingOfAReadingThatBeganBeforeOneThatWasTold) {
   EXPECT_EQ(told(levels, {3, {0}}), (Changes{{0, 0}}));
 }
 
-// What a caller has read is compared with what the watcher reads next, although that is what the
-// watcher has read before.
+// A caller sees a switch bounce that the watcher misses: the watcher's next reading ends that, even
+// if it equals the one before.
 TEST(ToldLevels, TellsOfALevelThatOnlyACallerHasSeenAway) {
   ToldLevels levels(1);
   EXPECT_EQ(told(levels, {1, {1}}), (Changes{{0, 1}}));
