@@ -78,7 +78,7 @@ TEST_F(Draw, RefusesBeforeAnythingMoves) {
   };
   expect_fails("10 10\n10 300\n", "(10, 300) mm is beyond the soft limits of y");
   expect_fails("10 10\nten 30\n", "line 2: ten 30");
-  expect_fails("", "there is no line");
+  expect_fails("", "contains no line");
   EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 64);
   write("10 10\n30 10\n");
   std::vector<std::string> fast = arguments();
