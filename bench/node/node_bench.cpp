@@ -207,7 +207,7 @@ trajectory_messages::FollowJointTrajectoryActionGoal longGoal(int points) {
   constexpr double kAmplitude = 0.01;  // [m]
   constexpr double kRate = 0.5;        // [rad/s]
   const double duration = kPeriod * points;
-  const auto positionAt = [duration](double time) {
+  const auto position_at = [duration](double time) {
     const double begun = std::clamp(time, 0.0, 1.0);
     const double left = std::clamp(duration - time, 0.0, 1.0);
     return kAmplitude * begun * begun * left * left * std::sin(kRate * time);
@@ -217,10 +217,10 @@ trajectory_messages::FollowJointTrajectoryActionGoal longGoal(int points) {
   goal.goal.trajectory.points.resize(static_cast<std::size_t>(points));
   for (int i = 1; i <= points; ++i) {
     const double time = kPeriod * i;
-    const double velocity = (positionAt(time + 1e-4) - positionAt(time - 1e-4)) / 2e-4;
+    const double velocity = (position_at(time + 1e-4) - position_at(time - 1e-4)) / 2e-4;
     auto& point = goal.goal.trajectory.points[static_cast<std::size_t>(i - 1)];
     point.time_from_start = ros::Duration(time);
-    point.positions.assign(3, positionAt(time));
+    point.positions.assign(3, position_at(time));
     point.velocities.assign(3, i < points ? velocity : 0.0);
   }
   return goal;
@@ -234,19 +234,19 @@ int sendTrajectories(int argc, char** argv, const std::string& number, int point
   int sent = 0;
   auto publisher =
       handle.advertise<trajectory_messages::FollowJointTrajectoryActionGoal>("goal", 1);
-  const auto sendNext = [&] {
+  const auto send_next = [&] {
     goal.goal_id.id = number + "_" + std::to_string(++sent);
     publisher.publish(goal);
   };
   const auto subscriber = handle.subscribe<trajectory_messages::FollowJointTrajectoryActionResult>(
       "result", 100,
       [&](const trajectory_messages::FollowJointTrajectoryActionResult::ConstPtr& result) {
-        if (result->status.goal_id.id == goal.goal_id.id) sendNext();
+        if (result->status.goal_id.id == goal.goal_id.id) send_next();
       });
   while (ros::ok() && (publisher.getNumSubscribers() == 0 || subscriber.getNumPublishers() == 0)) {
     ros::WallDuration(0.01).sleep();
   }
-  sendNext();
+  send_next();
   ros::spin();
   return 0;
 }
