@@ -19,7 +19,9 @@ class Roslaunch {
  public:
   Roslaunch(const std::string& file, std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(),
-                     {"roslaunch", "--no-summary", "stepdriver", file, "ns:=" + space()});
+                     // An install space below the sources has files of the same names.
+                     {"roslaunch", "--no-summary",
+                      std::string(STEPDRIVER_SOURCES "/launch/") + file, "ns:=" + space()});
     process_ = std::make_unique<NodeProcess>(arguments, "/usr/bin/env");
   }
   ~Roslaunch() {
