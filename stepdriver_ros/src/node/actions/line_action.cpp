@@ -49,8 +49,12 @@ void LineAction::stop(const FollowingLine& following) {
 // A line whose axes are stopped before it begins is refused.
 void LineAction::cancelBeginning(const GoalHandle& handle) {
   const auto& names = handle.getGoal()->name;
-  for (const auto& axis : machine_.axes()) {
-    if (std::find(names.begin(), names.end(), axis->config().name) != names.end()) axis->stop();
+  try {
+    for (const auto& axis : machine_.axes()) {
+      if (std::find(names.begin(), names.end(), axis->config().name) != names.end()) axis->stop();
+    }
+  } catch (const Error& error) {
+    ROS_ERROR_NAMED("line", "move_line: %s", error.what());
   }
 }
 
