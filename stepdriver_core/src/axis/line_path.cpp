@@ -71,10 +71,11 @@ config::Kind LinePath::kindOfVelocity() const {
 }
 
 double LinePath::pathSpeed(double velocity) const {
+  const config::Kind kind = kindOfVelocity();
   double square = 0.0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const double way = ways_[i].value() / axes_[i].steps_per_unit;
-    if (axes_[i].kind == kindOfVelocity()) square += way * way;
+    if (axes_[i].kind == kind) square += way * way;
   }
   return velocity * static_cast<double>(length_) / std::sqrt(square);
 }
