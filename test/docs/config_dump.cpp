@@ -76,7 +76,7 @@ std::string dump(const ros_node::NodeConfig& config) {
   dump.all(static_cast<int>(config.backend), config.joint_state_rate, config.jog_timeout,
            config.max_lateness, config.write_timeout, config.enforce_realtime,
            config.keep_cpus_awake, config.emergency_stop, config.state_file, config.hardware_id,
-           config.urdf_limits, config.publish_clock);
+           config.urdf_limits, config.publish_clock, config.stop_on_master_lost);
   for (const auto& axis : config.axes) dump.add(axis);
   dump.all(config.simulation.speed, config.simulation.trace, config.simulation.emergency_stop);
   for (const auto& rig : config.simulation.axes) dump.add(rig.second);

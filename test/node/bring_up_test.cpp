@@ -118,6 +118,10 @@ const std::vector<BadBringUp> kBadBringUps = {
      "joint_state_rte",
      {"did you mean joint_state_rate"}},
     {"RateOutOfRange", setting("joint_state_rate", 2000), "joint_state_rate", {"2000", "1000"}},
+    {"UnknownPolicyForALostMaster",
+     setting("on_master_lost", "ignore"),
+     "on_master_lost",
+     {"ignore", "continue or stop"}},
     {"ClockThatStands",
      [](NodeUnderTest& node) {
        node.set("publish_clock", true);

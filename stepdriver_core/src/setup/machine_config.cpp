@@ -24,7 +24,7 @@ const std::vector<std::string> kPolicies = {"warn", "enforce"};
 
 /// Keys of a configuration that only the ROS node uses.
 constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout", "urdf_limits",
-                                     "hardware_id", "publish_clock"};
+                                     "hardware_id", "publish_clock", "on_master_lost"};
 
 void readGpio(ConfigReader gpio, MachineConfig& config) {
   const std::string backend = gpio.oneOf("backend", {"simulated", "libgpiod"});

@@ -31,6 +31,8 @@ NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& na
         "is true, but simulation/speed is 0, and then time stands still while nothing "
         "moves; give a speed above 0");
   }
+  config.stop_on_master_lost =
+      reader.oneOf("on_master_lost", {"continue", "stop"}, "continue") == "stop";
   config.hardware_id = reader.text("hardware_id", config.hardware_id);
   reader.rejectUnknown();
   return config;

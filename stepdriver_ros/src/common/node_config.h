@@ -15,6 +15,7 @@ struct NodeConfig : setup::MachineConfig {
   double jog_timeout = 0.5;        ///< [s] without a jog message until the axis comes to rest
   bool urdf_limits = true;         ///< the limits of robot_description apply as well
   bool publish_clock = false;      ///< the time of the simulated rig on /clock
+  bool stop_on_master_lost = false;  ///< if the ROS master doesn't answer, all axes come to rest
   std::string hardware_id;         ///< for diagnostics; empty: made from the other facts
 };
 
@@ -25,6 +26,7 @@ struct NodeConfig : setup::MachineConfig {
 /// jog_timeout: 0.5               # [s] from 0.02 to 60
 /// urdf_limits: true              # apply the limits of robot_description as well
 /// publish_clock: false           # true: publish the time of the simulated rig on /clock
+/// on_master_lost: continue       # or stop: all axes come to rest
 /// hardware_id: ""                # for diagnostics; empty: the host and the driver chips
 /// @endcode
 ///

@@ -20,6 +20,7 @@
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
 #include "node/diagnostics/diagnostics.h"
+#include "node/master/master_watch.h"
 #include "node/parameters/read_parameters.h"
 #include "node/services/axis_home_service.h"
 #include "node/services/axis_services.h"
@@ -64,7 +65,8 @@ the lines and ends.
               /clock (with ~publish_clock)  ~jog, ~command (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
-              ~state_file  ~hardware_id  ~urdf_limits  ~publish_clock  ~simulation
+              ~state_file  ~hardware_id  ~urdf_limits  ~publish_clock  ~on_master_lost
+              ~simulation
               robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
@@ -88,6 +90,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   move_actions.tellEnded();
   line_action.tellEnded();
   trajectory_action.tellEnded();
+  endDespiteMaster(exit_code);
   queues.finish(kLastAnswers);
   publisher.stop();
   return exit_code;
@@ -118,6 +121,15 @@ void warnOfPositions(const machine::Machine& machine) {
     if (note.empty()) continue;
     ROS_WARN_NAMED("position", "%s: its position is unverified: %s", axis->config().name.c_str(),
                    note.c_str());
+  }
+}
+
+void stopForLostMaster(machine::Machine& machine) {
+  ROS_ERROR_NAMED("master", "All axes come to rest: on_master_lost is stop");
+  try {
+    machine.stop();
+  } catch (const Error& error) {
+    ROS_ERROR_NAMED("master", "The stop failed: %s", error.what());
   }
 }
 
@@ -169,14 +181,18 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   const TrajectoryCommand trajectory_command(private_node, machine, queues);
   TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
   const std::string description = hardware.description();
+  MasterWatch master_watch([&] {
+    if (config.stop_on_master_lost) stopForLostMaster(machine);
+  });
   const Diagnostics diagnostics(
-      node, private_node, machine, queues,
+      node, private_node, machine, queues, master_watch,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
       config.max_lateness);
   std::optional<ClockPublisher> clock_publisher;
   if (config.publish_clock) clock_publisher.emplace(private_node, hardware.clock());
   queues.start();
   publisher.start();
+  master_watch.start();
   ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
                  machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
                  machine.figures().realtime.c_str());
@@ -189,6 +205,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
     }
   }
   ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
+  master_watch.stop();
   return shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
 }
 

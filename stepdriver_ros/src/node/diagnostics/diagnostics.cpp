@@ -16,6 +16,7 @@ namespace {
 
 const ros::WallDuration kPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
+constexpr const char* kMasterName = "ROS master";
 
 /// For the current limits, and for the current motions.
 void readRates(const machine::Machine& machine, EngineReading& reading) {
@@ -35,13 +36,18 @@ void readRates(const machine::Machine& machine, EngineReading& reading) {
 
 Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
                          const machine::Machine& machine, CallQueues& queues,
-                         const std::string& hardware_id, double max_lateness)
-    : machine_(machine), max_lateness_(max_lateness), updater_(node, private_node) {
+                         const MasterWatch& master, const std::string& hardware_id,
+                         double max_lateness)
+    : machine_(machine),
+      master_(master),
+      max_lateness_(max_lateness),
+      updater_(node, private_node) {
   updater_.setHardwareID(hardware_id);
   for (const auto& axis : machine.axes()) {
     updater_.add(axis->config().name, [&axis](Status& status) { tellAxis(*axis, status); });
   }
   updater_.add(kEngineName, [this](Status& status) { tellEngine(status); });
+  updater_.add(kMasterName, [this](Status& status) { tellMaster(status); });
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
       kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); }, false);
@@ -67,6 +73,18 @@ void Diagnostics::tellEngine(Status& status) {
   readRates(machine_, reading);
   slips_before_ = reading.figures.slips;
   reportEngine(reading, status);
+}
+
+void Diagnostics::tellMaster(Status& status) const {
+  const MasterWatch::Reading reading = master_.reading();
+  if (reading.silent > 0.0) {
+    status.summary(Status::ERROR, "doesn't answer: no new client can find this node");
+  } else {
+    status.summary(Status::OK, "knows this node");
+  }
+  status.add("URI", reading.uri);
+  status.add("silent [s]", fmt::format("{:.0f}", reading.silent));
+  status.add("times registered again", reading.restarts);
 }
 
 std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on) {

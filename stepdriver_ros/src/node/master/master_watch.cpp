@@ -1,0 +1,127 @@
+#include "master_watch.h"
+
+#include <pthread.h>
+#include <ros/console.h>
+#include <ros/master.h>
+#include <ros/this_node.h>
+#include <ros/xmlrpc_manager.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr std::chrono::milliseconds kPeriod{1000};
+constexpr std::chrono::milliseconds kPatience{1000};
+
+}  // namespace
+
+void endDespiteMaster(int exit_code) {
+  std::thread([exit_code] {
+    XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kPatience);
+    do {
+      std::this_thread::sleep_for(kPeriod);
+    } while (master.call("getPid", ros::this_node::getName()));
+    std::fputs("The ROS master doesn't answer: the node ends without telling it\n", stderr);
+    std::_Exit(exit_code);
+  }).detach();
+}
+
+MasterWatch::MasterWatch(std::function<void()> on_lost)
+    : on_lost_(std::move(on_lost)),
+      master_(ros::master::getHost(), ros::master::getPort(), kPatience) {}
+
+MasterWatch::~MasterWatch() { stop(); }
+
+void MasterWatch::start() {
+  thread_ = std::thread([this] {
+    pthread_setname_np(pthread_self(), "master");
+    watch();
+  });
+}
+
+void MasterWatch::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ending_ = true;
+  }
+  end_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+MasterWatch::Reading MasterWatch::reading() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Reading reading{ros::master::getURI(), 0.0, restarts_};
+  if (lost_) reading.silent = std::chrono::duration<double>(Clock::now() - *lost_).count();
+  return reading;
+}
+
+void MasterWatch::watch() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!ending_) {
+    lock.unlock();
+    look();
+    lock.lock();
+    end_.wait_for(lock, kPeriod, [this] { return ending_; });
+  }
+}
+
+void MasterWatch::look() {
+  const std::string& name = ros::this_node::getName();
+  // A master may know a node without knowing all that it has registered. This must not be missing.
+  const auto found = master_.call("lookupService", name, name + "/emergency_stop");
+  if (!found) {
+    lose();
+    return;
+  }
+  const bool known = found->code == 1;
+  if (known && !registrations_) registrations_ = Registrations::read(master_, name);
+  if (!known || !registered_) registerAgain();
+  find();
+}
+
+void MasterWatch::lose() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (lost_) return;
+    lost_ = Clock::now();
+  }
+  ROS_ERROR_NAMED("master",
+                  "The ROS master at %s doesn't answer. Clients that are connected are served; "
+                  "new ones can't find this node until the master is back",
+                  ros::master::getURI().c_str());
+  on_lost_();
+}
+
+void MasterWatch::find() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!lost_) return;
+    lost_.reset();
+  }
+  ROS_INFO_NAMED("master", "The ROS master answers again");
+}
+
+void MasterWatch::registerAgain() {
+  if (!registrations_) {
+    ROS_ERROR_THROTTLE_NAMED(60.0, "master",
+                             "The ROS master was started anew before this node could ask it what "
+                             "is registered: start the node again");
+    return;
+  }
+  registered_ =
+      registrations_->registerAgain(master_, ros::XMLRPCManager::instance()->getServerURI());
+  if (!registered_) return;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++restarts_;
+  }
+  ROS_WARN_NAMED("master",
+                 "The ROS master was started anew: %zu topics and %zu services are registered "
+                 "again. It has forgotten all parameters, also this node's",
+                 registrations_->topics(), registrations_->services());
+}
+
+}  // namespace stepdriver::ros_node

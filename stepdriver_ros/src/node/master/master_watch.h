@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "registrations.h"
+#include "xmlrpc_caller.h"
+
+namespace stepdriver::ros_node {
+
+/// Asks the ROS master each second for this node's emergency stop, and registers all topics and
+/// services again with a master that has forgotten them, because it was started anew or was told
+/// so: roscpp registers only once, and without that no new client would find anything of the node.
+class MasterWatch {
+ public:
+  /// @param on_lost called in the watch's thread each time the master no longer answers.
+  explicit MasterWatch(std::function<void()> on_lost);
+  ~MasterWatch();
+  MasterWatch(const MasterWatch&) = delete;
+  MasterWatch& operator=(const MasterWatch&) = delete;
+
+  /// Call it once everything is advertised.
+  void start();
+  /// Waits at most for the answer to the current call, a second.
+  void stop();
+
+  struct Reading {
+    std::string uri;
+    double silent = 0.0;  ///< [s] since when it hasn't answered; 0: it answers
+    int restarts = 0;     ///< how many times the node has registered again
+  };
+  /// Any thread.
+  Reading reading() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void watch();
+  void look();
+  void lose();
+  void find();
+  void registerAgain();
+
+  const std::function<void()> on_lost_;
+  XmlRpcCaller master_;
+  // Of the watch's thread.
+  std::optional<Registrations> registrations_;
+  bool registered_ = true;
+
+  mutable std::mutex mutex_;
+  std::condition_variable end_;
+  bool ending_ = false;
+  std::optional<Clock::time_point> lost_;
+  int restarts_ = 0;
+  std::thread thread_;
+};
+
+/// Ends the process with this code, a second or more from now, if the master doesn't answer then.
+/// At its end a node tells the master so for each topic and service, and roscpp waits for ever for
+/// a master that hangs. Call it when the machine is shut down. The last answers to clients take
+/// less than a second.
+void endDespiteMaster(int exit_code);
+
+}  // namespace stepdriver::ros_node
