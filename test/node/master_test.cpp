@@ -1,4 +1,4 @@
-// Tests what happens to a running node if its ROS master ends, hangs or is started anew. The test
+// Tests what happens to a running node if its ROS master ends, hangs or is restarted. The test
 // and the node use a master of the test's own, and not rostest's.
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
@@ -113,7 +113,7 @@ class MasterTest : public testing::Test {
     move = ros::NodeHandle().serviceClient<MoveTo>(node.full("x/move_to"), true);
     report = ros::NodeHandle().serviceClient<RigReport>(node.full("rig/report"), true);
     ASSERT_TRUE(move.isValid() && report.isValid());
-    ASSERT_TRUE(waitUntil([this] { return master_status().level == DiagnosticStatus::OK; }));
+    ASSERT_TRUE(waitUntil([this] { return masterStatus().level == DiagnosticStatus::OK; }));
     before = registered(node.name());
     ASSERT_GT(before.size(), 30U);
   }
@@ -124,7 +124,7 @@ class MasterTest : public testing::Test {
     ASSERT_TRUE(master->answers());
   }
 
-  DiagnosticStatus master_status() const {
+  DiagnosticStatus masterStatus() const {
     const std::vector<DiagnosticArray> arrays = diagnostics.messages();
     for (auto array = arrays.rbegin(); array != arrays.rend(); ++array) {
       for (const DiagnosticStatus& status : array->status) {
@@ -136,7 +136,7 @@ class MasterTest : public testing::Test {
     return none;
   }
   bool isLost() const {
-    return waitUntil([this] { return master_status().level == DiagnosticStatus::ERROR; });
+    return waitUntil([this] { return masterStatus().level == DiagnosticStatus::ERROR; });
   }
   bool isRegisteredAgain() const {
     return waitUntil([this] { return registered(node.name()) == before; });
@@ -166,11 +166,11 @@ class MasterTest : public testing::Test {
   std::set<std::string> before;
 };
 
-TEST_F(MasterTest, ThatIsStartedAnewFindsEverythingOfTheNode) {
+TEST_F(MasterTest, ThatIsRestartedFindsEverythingOfTheNode) {
   start();
   master->kill();
   ASSERT_TRUE(isLost());
-  expectSays(master_status().message, "doesn't answer");
+  expectSays(masterStatus().message, "doesn't answer");
   EXPECT_TRUE(moveTo(0.001, true).success) << "by a connection that was there before";
   master->start();
   ASSERT_TRUE(master->answers());
@@ -179,11 +179,11 @@ TEST_F(MasterTest, ThatIsStartedAnewFindsEverythingOfTheNode) {
   EXPECT_TRUE(ask("recover").success);
   const Recorder<sensor_msgs::JointState> states(node.beside("joint_states"));
   EXPECT_TRUE(waitUntil([&] { return states.count() > 0; }));
-  EXPECT_TRUE(waitUntil([this] { return master_status().level == DiagnosticStatus::OK; }));
-  expectSays(node.process().output(), "was started anew");
+  EXPECT_TRUE(waitUntil([this] { return masterStatus().level == DiagnosticStatus::OK; }));
+  expectSays(node.process().output(), "was restarted");
 }
 
-TEST_F(MasterTest, ThatIsStartedAnewTellsOfPublishersThatCameBeforeTheNode) {
+TEST_F(MasterTest, ThatIsRestartedTellsOfPublishersThatCameBeforeTheNode) {
   start();
   master->kill();
   ASSERT_TRUE(isLost());

@@ -107,7 +107,7 @@ void MasterWatch::find() {
 void MasterWatch::registerAgain() {
   if (!registrations_) {
     ROS_ERROR_THROTTLE_NAMED(60.0, "master",
-                             "The ROS master was started anew before this node could ask it what "
+                             "The ROS master was restarted before this node could ask it what "
                              "is registered: start the node again");
     return;
   }
@@ -119,7 +119,7 @@ void MasterWatch::registerAgain() {
     ++restarts_;
   }
   ROS_WARN_NAMED("master",
-                 "The ROS master was started anew: %zu topics and %zu services are registered "
+                 "The ROS master was restarted: %zu topics and %zu services are registered "
                  "again. It has forgotten all parameters, also this node's",
                  registrations_->topics(), registrations_->services());
 }
