@@ -11,6 +11,7 @@
 #include <string>
 
 #include "action_statuses.h"
+#include "node/calls/bounded.h"
 
 namespace stepdriver::ros_node {
 
@@ -43,7 +44,9 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
     feedback_publisher_ = node_.advertise<ActionFeedback>("feedback", kQueueSize);
     status_publisher_ =
         node_.advertise<actionlib_msgs::GoalStatusArray>("status", kQueueSize, true);
-    goal_subscriber_ = node_.subscribe("goal", kQueueSize, &Base::goalCallback, asBase());
+    const boost::function<void(const boost::shared_ptr<const Bounded<ActionGoal>>&)> take =
+        [this](const auto& goal) { this->goalCallback(goal); };
+    goal_subscriber_ = node_.subscribe("goal", kQueueSize, take);
     cancel_subscriber_ = node_.subscribe("cancel", kQueueSize, &Base::cancelCallback, asBase());
     statuses_.add([this] { beat(); });
   }

@@ -14,8 +14,8 @@
 namespace stepdriver::ros_node {
 
 /// Asks the ROS master each second for this node's emergency stop, and registers all topics and
-/// services again with a master that has forgotten them, because it was started anew or was told
-/// so: roscpp registers only once, and without that no new client would find anything of the node.
+/// services again with a master that has forgotten them, because it was restarted or was told so:
+/// roscpp registers only once, and without that no new client would find anything of the node.
 class MasterWatch {
  public:
   /// @param on_lost called in the watch's thread each time the master no longer answers.

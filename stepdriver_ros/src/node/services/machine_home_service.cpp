@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "node/calls/bounded.h"
 #include "node/homing_results.h"
 #include "respond.h"
 
@@ -27,7 +28,11 @@ MachineHomeService::MachineHomeService(ros::NodeHandle node, machine::Machine& m
                                        CallQueues& queues)
     : machine_(machine) {
   node.setCallbackQueue(&queues.lines());
-  service_ = node.advertiseService("home", &MachineHomeService::home, this);
+  const boost::function<bool(HomeAxes::Request&, HomeAxes::Response&)> handler =
+      [this](HomeAxes::Request& request, HomeAxes::Response& response) {
+        return home(request, response);
+      };
+  service_ = advertiseBounded(node, "home", handler);
 }
 
 bool MachineHomeService::home(HomeAxes::Request& request, HomeAxes::Response& response) {

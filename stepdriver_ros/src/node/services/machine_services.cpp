@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/text.h"
+#include "node/calls/bounded.h"
 #include "node/line_request.h"
 #include "respond.h"
 #include "stepdriver_core/sim/rig.h"
@@ -114,7 +115,7 @@ void MachineServices::advertiseMoveLine(machine::Machine& machine) {
         return respond(response, [&] { moveLine(machine, request, response); });
       };
   node_.setCallbackQueue(&queues_.lines());
-  servers_.push_back(node_.advertiseService("move_line", handler));
+  servers_.push_back(advertiseBounded(node_, "move_line", handler));
 }
 
 void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {

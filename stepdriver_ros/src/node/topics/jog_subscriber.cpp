@@ -32,7 +32,7 @@ JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, Ca
                                ros::TransportHints().tcpNoDelay());
 }
 
-void JogSubscriber::take(const Jog::ConstPtr& message) {
+void JogSubscriber::take(const boost::shared_ptr<const Bounded<Jog>>& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
     const std::vector<std::size_t> axes = axesOf(*message);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/periodic_poll.h"
 #include "stepdriver_core/machine/machine.h"
@@ -38,7 +39,7 @@ class JogSubscriber {
     std::uint64_t stops = 0;  // AxisState::stops when it began
   };
 
-  void take(const Jog::ConstPtr& message);
+  void take(const boost::shared_ptr<const Bounded<Jog>>& message);
   /// @return the indices of the axes that the message names. @throw Refused
   std::vector<std::size_t> axesOf(const Jog& message) const;
   void jog(std::size_t axis, double velocity);

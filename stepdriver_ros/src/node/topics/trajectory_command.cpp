@@ -20,7 +20,7 @@ TrajectoryCommand::TrajectoryCommand(ros::NodeHandle node, machine::Machine& mac
                                ros::TransportHints().tcpNoDelay());
 }
 
-void TrajectoryCommand::take(const trajectory_msgs::JointTrajectory::ConstPtr& message) {
+void TrajectoryCommand::take(const boost::shared_ptr<const Message>& message) {
   try {
     if (message->points.empty()) {
       stop(message->joint_names);

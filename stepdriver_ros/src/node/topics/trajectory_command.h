@@ -4,6 +4,7 @@
 #include <ros/subscriber.h>
 #include <trajectory_msgs/JointTrajectory.h>
 
+#include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
 #include "refusal_log.h"
 #include "stepdriver_core/machine/machine.h"
@@ -22,7 +23,9 @@ class TrajectoryCommand {
   TrajectoryCommand& operator=(const TrajectoryCommand&) = delete;
 
  private:
-  void take(const trajectory_msgs::JointTrajectory::ConstPtr& message);
+  using Message = Bounded<trajectory_msgs::JointTrajectory>;
+
+  void take(const boost::shared_ptr<const Message>& message);
   void stop(const std::vector<std::string>& joints);
 
   machine::Machine& machine_;
