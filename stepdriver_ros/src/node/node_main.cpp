@@ -19,6 +19,7 @@
 #include "node/actions/move_actions.h"
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
+#include "node/calls/descriptor_watch.h"
 #include "node/diagnostics/diagnostics.h"
 #include "node/master/master_watch.h"
 #include "node/parameters/read_parameters.h"
@@ -184,8 +185,9 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   MasterWatch master_watch([&] {
     if (config.stop_on_master_lost) stopForLostMaster(machine);
   });
+  DescriptorWatch descriptors;
   const Diagnostics diagnostics(
-      node, private_node, machine, queues, master_watch,
+      node, private_node, machine, queues, master_watch, descriptors,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
       config.max_lateness);
   std::optional<ClockPublisher> clock_publisher;
@@ -200,6 +202,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   std::string who;
   while (who.empty()) {
     who = end_requests.waitFor(kPoll);
+    descriptors.look();
     if (const std::string error = machine.stateFileError(); !error.empty()) {
       ROS_ERROR_THROTTLE_NAMED(60.0, "state_file", "%s", error.c_str());
     }

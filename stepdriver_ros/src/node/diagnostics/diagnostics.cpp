@@ -17,6 +17,7 @@ namespace {
 const ros::WallDuration kPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 constexpr const char* kMasterName = "ROS master";
+constexpr const char* kDescriptorsName = "file descriptors";
 
 /// For the current limits, and for the current motions.
 void readRates(const machine::Machine& machine, EngineReading& reading) {
@@ -36,10 +37,11 @@ void readRates(const machine::Machine& machine, EngineReading& reading) {
 
 Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
                          const machine::Machine& machine, CallQueues& queues,
-                         const MasterWatch& master, const std::string& hardware_id,
-                         double max_lateness)
+                         const MasterWatch& master, const DescriptorWatch& descriptors,
+                         const std::string& hardware_id, double max_lateness)
     : machine_(machine),
       master_(master),
+      descriptors_(descriptors),
       max_lateness_(max_lateness),
       updater_(node, private_node) {
   updater_.setHardwareID(hardware_id);
@@ -48,6 +50,7 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   }
   updater_.add(kEngineName, [this](Status& status) { tellEngine(status); });
   updater_.add(kMasterName, [this](Status& status) { tellMaster(status); });
+  updater_.add(kDescriptorsName, [this](Status& status) { tellDescriptors(status); });
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
       kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); }, false);
@@ -85,6 +88,18 @@ void Diagnostics::tellMaster(Status& status) const {
   status.add("URI", reading.uri);
   status.add("silent [s]", fmt::format("{:.0f}", reading.silent));
   status.add("times registered again", reading.restarts);
+}
+
+void Diagnostics::tellDescriptors(Status& status) const {
+  const DescriptorWatch::Figures figures = descriptors_.figures();
+  if (figures.few_left) {
+    status.summary(Status::WARN, "few are left: idle connections are ended");
+  } else {
+    status.summary(Status::OK, "enough are left");
+  }
+  status.add("in use", figures.open);
+  status.add("limit", figures.limit);
+  status.add("idle connections ended", figures.ended);
 }
 
 std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on) {

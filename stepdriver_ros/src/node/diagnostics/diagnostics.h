@@ -9,23 +9,25 @@
 #include <vector>
 
 #include "node/calls/call_queues.h"
+#include "node/calls/descriptor_watch.h"
 #include "node/master/master_watch.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 
-/// The topic /diagnostics at 1 Hz: a status for each axis, one for the pulse engine, and one for
-/// the ROS master.
+/// The topic /diagnostics at 1 Hz: a status for each axis, and one each for the pulse engine, the
+/// ROS master and the file descriptors.
 class Diagnostics {
  public:
   /// @param node, private_node handles of the node, and of its private names.
-  /// @param machine, queues, master outlive the diagnostics.
+  /// @param machine, queues, master, descriptors outlive the diagnostics.
   /// @param hardware_id name of the hardware.
   /// @param max_lateness [s] MachineOptions::max_lateness
   Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
               const machine::Machine& machine, CallQueues& queues, const MasterWatch& master,
-              const std::string& hardware_id, double max_lateness);
+              const DescriptorWatch& descriptors, const std::string& hardware_id,
+              double max_lateness);
   Diagnostics(const Diagnostics&) = delete;
   Diagnostics& operator=(const Diagnostics&) = delete;
 
@@ -35,9 +37,11 @@ class Diagnostics {
   static void tellAxis(const axis::Axis& axis, Status& status);
   void tellEngine(Status& status);
   void tellMaster(Status& status) const;
+  void tellDescriptors(Status& status) const;
 
   const machine::Machine& machine_;
   const MasterWatch& master_;
+  const DescriptorWatch& descriptors_;
   const double max_lateness_;
   std::uint64_t slips_before_ = 0;  // for the timer only
   diagnostic_updater::Updater updater_;
