@@ -191,7 +191,7 @@ class Machine::Impl {
     // decides whether to trust it.
     if (keeper_) keeper_->close(memories());
     ask(*shell_, PowerDown{});
-    if (keeper_ && !keeper_->error().empty()) throw Error(keeper_->error());
+    if (keeper_ && !keeper_->error().empty()) throw StateFileError(keeper_->error());
   }
 
   StateKeeper::Memories memories() const {
@@ -208,7 +208,7 @@ class Machine::Impl {
     for (const MachineAxis* axis : own_axes_) {
       const auto found = loaded.state.axes.find(axis->config().name);
       if (found != loaded.state.axes.end()) {
-        ask(*shell_, RestorePosition{axis->id(), found->second, loaded.state.clean});
+        ask(*shell_, RestorePosition{axis->id(), found->second, loaded.state.clean, loaded.source});
       } else {
         ask(*shell_, NotePosition{axis->id(), loaded.why_none});
       }
