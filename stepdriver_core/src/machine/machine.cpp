@@ -19,6 +19,7 @@
 #include "state_keeper.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
+#include "stepdriver_core/printable.h"
 #include "wiring.h"
 
 namespace stepdriver::machine {
@@ -84,7 +85,7 @@ class Machine::Impl {
       if (axis->config().name == name) return *axis;
       names += (names.empty() ? "" : ", ") + axis->config().name;
     }
-    throw Refused(fmt::format("there is no axis {}; there are {}", name, names));
+    throw Refused(fmt::format("there is no axis {}; there are {}", printable(name), names));
   }
 
   CoordinatedMove moveLine(const LineRequest& request) {

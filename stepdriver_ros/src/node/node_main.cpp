@@ -145,7 +145,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
-  ActionStatuses statuses(private_node);
+  ActionStatuses statuses(private_node, parameters.action_status_frequency);
   std::deque<AxisServices> axis_services;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
