@@ -39,6 +39,7 @@ namespace {
 
 constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
+constexpr int kExitStateFile = 4;
 
 constexpr std::chrono::milliseconds kPoll{1000};
 // Time for the calls that arrived while the axes came to rest.
@@ -68,7 +69,8 @@ the lines and ends.
               robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
-written, 3 the computer is too slow for its axes and ~realtime is enforce, 64 wrong usage.
+written, 3 the computer is too slow for its axes and ~realtime is enforce, 4 ended as asked, but
+~state_file couldn't be written, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -81,9 +83,16 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   int exit_code = kExitOk;
   try {
     machine.shutdown();
+  } catch (const StateFileError&) {
+    exit_code = kExitStateFile;
   } catch (const Error& error) {
     ROS_ERROR_NAMED("node", "Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
+  }
+  if (const std::string error = machine.stateFileError(); !error.empty()) {
+    ROS_ERROR_NAMED("state_file",
+                    "%s; the next start may not know the positions, or not trust them",
+                    error.c_str());
   }
   move_actions.tellEnded();
   line_action.tellEnded();
@@ -118,6 +127,14 @@ void warnOfPositions(const machine::Machine& machine) {
     if (note.empty()) continue;
     ROS_WARN_NAMED("position", "%s: its position is unverified: %s", axis->config().name.c_str(),
                    note.c_str());
+  }
+}
+
+void warnOfTrace(setup::Simulation& simulation) {
+  try {
+    simulation.rig().flushTrace();
+  } catch (const Error& error) {
+    ROS_WARN_NAMED("rig", "%s", error.what());
   }
 }
 
@@ -172,7 +189,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   const Diagnostics diagnostics(
       node, private_node, machine, queues,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
-      config.max_lateness);
+      config.max_lateness, config.state_file);
   std::optional<ClockPublisher> clock_publisher;
   if (config.publish_clock) clock_publisher.emplace(private_node, hardware.clock());
   queues.start();
@@ -189,7 +206,10 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
     }
   }
   ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
-  return shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
+  const int exit_code =
+      shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
+  if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
+  return exit_code;
 }
 
 /// @return the exit code.

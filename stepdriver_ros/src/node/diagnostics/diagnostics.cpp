@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <utility>
 
 #include "axis_diagnostics.h"
 #include "engine_diagnostics.h"
@@ -16,6 +17,7 @@ namespace {
 
 const ros::WallDuration kPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
+constexpr const char* kStateFileName = "state file";
 
 /// For the current limits, and for the current motions.
 void readRates(const machine::Machine& machine, EngineReading& reading) {
@@ -35,13 +37,20 @@ void readRates(const machine::Machine& machine, EngineReading& reading) {
 
 Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
                          const machine::Machine& machine, CallQueues& queues,
-                         const std::string& hardware_id, double max_lateness)
-    : machine_(machine), max_lateness_(max_lateness), updater_(node, private_node) {
+                         const std::string& hardware_id, double max_lateness,
+                         std::string state_file)
+    : machine_(machine),
+      max_lateness_(max_lateness),
+      state_file_(std::move(state_file)),
+      updater_(node, private_node) {
   updater_.setHardwareID(hardware_id);
   for (const auto& axis : machine.axes()) {
     updater_.add(axis->config().name, [&axis](Status& status) { tellAxis(*axis, status); });
   }
   updater_.add(kEngineName, [this](Status& status) { tellEngine(status); });
+  if (!state_file_.empty()) {
+    updater_.add(kStateFileName, [this](Status& status) { tellStateFile(status); });
+  }
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
       kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); }, false);
@@ -67,6 +76,16 @@ void Diagnostics::tellEngine(Status& status) {
   readRates(machine_, reading);
   slips_before_ = reading.figures.slips;
   reportEngine(reading, status);
+}
+
+void Diagnostics::tellStateFile(Status& status) const {
+  const std::string error = machine_.stateFileError();
+  if (error.empty()) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "written");
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, error);
+  }
+  status.add("file", state_file_);
 }
 
 std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on) {

@@ -14,16 +14,17 @@
 
 namespace stepdriver::ros_node {
 
-/// The topic /diagnostics at 1 Hz: a status for each axis, and one for the pulse engine.
+/// The topic /diagnostics at 1 Hz: a status for each axis, one for the pulse engine, and one for
+/// the state file if there is one.
 class Diagnostics {
  public:
   /// @param node, private_node handles of the node, and of its private names.
   /// @param machine, queues outlive the diagnostics.
   /// @param hardware_id name of the hardware.
-  /// @param max_lateness [s] MachineOptions::max_lateness
+  /// @param max_lateness [s], state_file as in MachineOptions
   Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
               const machine::Machine& machine, CallQueues& queues, const std::string& hardware_id,
-              double max_lateness);
+              double max_lateness, std::string state_file);
   Diagnostics(const Diagnostics&) = delete;
   Diagnostics& operator=(const Diagnostics&) = delete;
 
@@ -32,9 +33,11 @@ class Diagnostics {
 
   static void tellAxis(const axis::Axis& axis, Status& status);
   void tellEngine(Status& status);
+  void tellStateFile(Status& status) const;
 
   const machine::Machine& machine_;
   const double max_lateness_;
+  const std::string state_file_;
   std::uint64_t slips_before_ = 0;  // for the timer only
   diagnostic_updater::Updater updater_;
   ros::SteadyTimer timer_;
