@@ -349,20 +349,20 @@ TEST_F(StateFileTest, RefusesToStartWhereItCannotBeWritten) {
 }
 
 TEST_F(StateFileTest, RefusesToStartIfItIsNoRegularFile) {
-  const auto expectNoFile = [this](const std::string& path, const std::string& kind) {
+  const auto expect_no_file = [this](const std::string& path, const std::string& kind) {
     EXPECT_EQ(whyNot(), "the state file " + path + " is " + kind + ", but must be a regular file");
     EXPECT_EQ(std::remove(path.c_str()), 0);
   };
   for (const char* end : {"", ".lock"}) {
     const std::string path = file_ + end;
     ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);  // nobody writes into it
-    expectNoFile(path, "a named pipe");
+    expect_no_file(path, "a named pipe");
     ASSERT_EQ(mkdir(path.c_str(), 0700), 0);
-    expectNoFile(path, "a folder");
+    expect_no_file(path, "a folder");
     ASSERT_EQ(symlink("/dev/zero", path.c_str()), 0);
-    expectNoFile(path, "a symbolic link");
+    expect_no_file(path, "a symbolic link");
     ASSERT_EQ(symlink((directory_ + "/nothing").c_str(), path.c_str()), 0);
-    expectNoFile(path, "a symbolic link");
+    expect_no_file(path, "a symbolic link");
     EXPECT_FALSE(exists(directory_ + "/nothing"));
   }
 }

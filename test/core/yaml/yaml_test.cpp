@@ -152,10 +152,11 @@ TEST(Yaml, RefusesAliasesThatStandForTooMuch) {
   // A list of maps is allowed below << only.
   std::string merges = "a0: {<<: &a0 [{k: x}, {k: x}]}\n";
   for (int i = 1; i < 40; ++i) {
-    const std::string name = "a" + std::to_string(i);
-    const std::string alias = "*a" + std::to_string(i - 1);
-    bomb += name + ": &" + name + " [" + alias + ", " + alias + "]\n";
-    merges += name + ": {<<: &" + name + " [" + alias + ", " + alias + "]}\n";
+    const std::string name = std::to_string(i);
+    const std::string two = "[*a" + std::to_string(i - 1) + ", *a" + std::to_string(i - 1) + "]";
+    bomb.append("a").append(name).append(": &a").append(name).append(" ").append(two).append("\n");
+    merges.append("a").append(name).append(": {<<: &a").append(name).append(" ").append(two);
+    merges.append("}\n");
   }
   const std::string wanted =
       "there are more than 20000 values up to here, each alias counted as the values that it "
