@@ -24,7 +24,9 @@ class VcdTraceTest : public testing::Test {
  public:
   VcdTraceTest()
       : path_(testing::TempDir() + "stepdriver_" +
-              testing::UnitTest::GetInstance()->current_test_info()->name() + ".vcd") {}
+              testing::UnitTest::GetInstance()->current_test_info()->name() + ".vcd") {
+    std::remove(path_.c_str());
+  }
   ~VcdTraceTest() override { std::remove(path_.c_str()); }
 
  protected:
