@@ -8,7 +8,7 @@ namespace stepdriver {
 /// characters would begin a line that nobody wrote, or change what a terminal shows.
 bool isPrintable(const std::string& text);
 
-/// The text with each of these characters as an escape sequence: \n, \t, \x1b.
+/// The text with each of these characters as an escape sequence: `\n`, `\t`, `\x1b`.
 std::string printable(const std::string& text);
 
 }  // namespace stepdriver
