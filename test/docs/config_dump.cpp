@@ -78,7 +78,8 @@ std::string dump(const ros_node::NodeConfig& config) {
            config.keep_cpus_awake, config.emergency_stop, config.state_file, config.hardware_id,
            config.urdf_limits, config.publish_clock, config.stop_on_master_lost);
   for (const auto& axis : config.axes) dump.add(axis);
-  dump.all(config.simulation.speed, config.simulation.trace, config.simulation.emergency_stop);
+  dump.all(config.simulation.speed, config.simulation.trace,
+           config.simulation.trace_overwrites_any_file, config.simulation.emergency_stop);
   for (const auto& rig : config.simulation.axes) dump.add(rig.second);
   return dump.text();
 }

@@ -205,6 +205,18 @@ const std::vector<BadBringUp> kBadBringUps = {
      },
      "axes/x-axis",
      {"letter"}},
+    {"AxisNameThatWouldForgeALineOfTheLog",
+     [](NodeUnderTest& node) {
+       XmlRpc::XmlRpcValue axes;
+       axes["x\n[ERROR] y"]["driver"] = "a4988";
+       node.set("axes", axes);
+     },
+     R"(axes/x\n[ERROR] y)",
+     {R"("x\n[ERROR] y")", "letter"}},
+    {"JointNameThatWouldForgeALineOfTheLog",
+     setting("axes/x/joint", "x\n[ERROR] y"),
+     "axes/x/joint",
+     {R"("x\n[ERROR] y")", "without line breaks"}},
     {"TraceThatCannotBeWritten",
      setting("simulation/trace", "/nowhere/at/all.vcd"),
      "simulation/trace",
@@ -230,6 +242,39 @@ TEST(BringUpWithManyMistakes, ListsThemAllAtOnce) {
     EXPECT_FALSE(lineWith(output, node.full(key)).empty()) << key << " isn't in\n" << output;
   }
   expectSays(output, "6 things are wrong");
+}
+
+TEST(BringUpWithAStatusFrequency, OutOfItsRangeIsRefused) {
+  // It belongs to all action servers of a namespace, not to this node alone.
+  const std::string key = "actionlib_status_frequency";
+  for (const auto& [frequency, words] : std::vector<std::pair<double, std::string>>{
+           {1e9, "is 1000000000.0, but must be from 0 to 1000"},
+           {-1.0, "is -1.0, but must be from 0 to 1000"},
+           {1e-9, "is 1e-09, but must be 0, so that no status is published, or at least 0.01"},
+           {kInfinity, "but must be a finite number from 0 to 1000"},
+           {kNaN, "but must be a finite number from 0 to 1000"}}) {
+    SCOPED_TRACE(frequency);
+    NodeUnderTest node;
+    ros::param::set(node.beside(key), frequency);
+    node.launch();
+    ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 1) << node.process().output();
+    expectSays(node.process().output(), node.beside(key) + " is ");
+    expectSays(node.process().output(), words);
+  }
+  NodeUnderTest node;
+  ros::param::set(node.beside(key), "often");
+  node.launch();
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 1) << node.process().output();
+  expectSays(node.process().output(), node.beside(key) + " is \"often\" (a string), but must be");
+}
+
+TEST(BringUpWithAStatusFrequency, OfZeroOrInItsRangeStarts) {
+  for (const double frequency : {0.0, 0.01, 50.0}) {
+    NodeUnderTest node;
+    ros::param::set(node.beside("actionlib_status_frequency"), frequency);
+    node.start();
+    EXPECT_TRUE(node.moveTo(0.001, true).success) << frequency;
+  }
 }
 
 TEST(BringUpOnGpioLines, OfWhichThereIsNoneEndsWithTheLineAndTheWayOut) {

@@ -1,6 +1,8 @@
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/SetPosition.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -99,6 +101,59 @@ TEST_F(StateFile, SaysThatTheAxisOfAKilledNodeWasMovingAndFromWhere) {
   EXPECT_FALSE(after.position_valid.at(0));
   EXPECT_DOUBLE_EQ(after.position.at(0), 0.008);
   expectSays(after.position_note.at(0), "wasn't shut down: the axis was moving, from 0.008 m");
+}
+
+TEST_F(StateFile, BeyondTheLimitsDoesNotStopTheStartAndIsNotBelieved) {
+  std::ofstream(file()) << "stepdriver state 1\nclean\nx linear 80000 5 0 1 1 1 0\n";
+  node_.start();
+  const AxisStates states = first();
+  EXPECT_DOUBLE_EQ(states.position.at(0), 0.0);
+  EXPECT_FALSE(states.position_valid.at(0));
+  EXPECT_EQ(states.position_note.at(0),
+            "in the state file " + file() +
+                ", the position 5 m is above the soft limit max_position 0.2 m, from the "
+                "configuration");
+  end(SIGTERM);
+  expectSays(node_.process().output(), "x: its position is unverified: in the state file");
+}
+
+TEST_F(StateFile, ThatIsAPipeEndsTheStartAtOnce) {
+  ASSERT_EQ(mkfifo(file().c_str(), 0600), 0);
+  NodeProcess& process = node_.launch();
+  EXPECT_EQ(process.waitForExit(kBound).value_or(-1), 1);
+  expectSays(process.output(), "is a named pipe, but must be a regular file");
+}
+
+TEST_F(StateFile, ThatCannotBeWrittenIsInDiagnosticsAndHasAnExitCodeOfItsOwn) {
+  using diagnostic_msgs::DiagnosticArray;
+  using diagnostic_msgs::DiagnosticStatus;
+  node_.start();
+  const Recorder<DiagnosticArray> diagnostics("/diagnostics");
+  const auto comes = [&](int level, const std::string& message) {
+    return diagnostics.waitForLatest([&](const DiagnosticArray& array) {
+      for (const DiagnosticStatus& status : array.status) {
+        if (status.name != node_.name().substr(1) + ": state file") continue;
+        return status.level == level && status.message == message;
+      }
+      return false;
+    });
+  };
+  EXPECT_TRUE(comes(DiagnosticStatus::OK, "written"));
+  const std::string obstacle = file() + ".new";
+  ASSERT_EQ(mkdir(obstacle.c_str(), 0700), 0);
+  const std::string why = "the state file " + obstacle + " can't be written: Is a directory";
+  standAt(0.008);
+  EXPECT_TRUE(comes(DiagnosticStatus::ERROR, why));
+  ASSERT_EQ(rmdir(obstacle.c_str()), 0);
+  EXPECT_TRUE(comes(DiagnosticStatus::OK, "written"));
+
+  ASSERT_EQ(mkdir(obstacle.c_str(), 0700), 0);
+  node_.process().signal(SIGTERM);
+  EXPECT_EQ(node_.process().waitForExit(kBound).value_or(-1), 4);
+  ASSERT_EQ(rmdir(obstacle.c_str()), 0);
+  const std::string output = node_.process().output();
+  expectSays(output, why + "; the next start may not know the positions, or not trust them");
+  EXPECT_EQ(output.find("Not all could be disabled"), std::string::npos) << output;
 }
 
 TEST_F(StateFile, StopsTheStartWhereItCannotBe) {

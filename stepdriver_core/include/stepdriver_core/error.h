@@ -24,6 +24,12 @@ class GpioError : public Error {
   using Error::Error;
 };
 
+/// The positions of the axes couldn't be written to the state file; names the file and the reason.
+class StateFileError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// One mistake in a configuration.
 struct ConfigIssue {
   std::string key;  ///< full name of the parameter

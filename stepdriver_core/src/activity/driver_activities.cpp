@@ -229,8 +229,8 @@ Steps RestorePosition::plan() {
   if (play != 0) {
     add(steps, std::make_unique<PinsStep>(context(), axis, [this, &axis, play] {
           PinsStep::Writes writes;
-          const auto slack =
-              std::min<std::int64_t>(std::llround(kept_.slack * axis.stepsPerUnit()), play);
+          const auto slack = std::llround(
+              std::clamp(kept_.slack * axis.stepsPerUnit(), 0.0, static_cast<double>(play)));
           writes.scale = pulse::Command::Scale{axis.motor.state().count, slack, play};
           return writes;
         }));
@@ -238,7 +238,7 @@ Steps RestorePosition::plan() {
   add(steps, std::make_unique<RunStep>([this, &axis] {
         const double origin =
             kept_.position - static_cast<double>(axis.jointCount()) / axis.stepsPerUnit();
-        axis.position.restore(origin, axis.whyUnverified(kept_, clean_), kept_.homed);
+        axis.position.restore(origin, doubt_, kept_.homed);
       }));
   return steps;
 }

@@ -120,19 +120,19 @@ class ChangeMicrosteps : public Script {
   const int wanted_;
 };
 
-/// Restores the position of an earlier run.
+/// Restores the position of an earlier run. An empty doubt says that it can be trusted.
 class RestorePosition : public PinScript {
  public:
-  RestorePosition(Context& context, axis::AxisModel& axis, const axis::AxisMemory& kept, bool clean,
-                  Ack call)
-      : PinScript(context, axis, std::move(call)), kept_(kept), clean_(clean) {}
+  RestorePosition(Context& context, axis::AxisModel& axis, const axis::AxisMemory& kept,
+                  std::string doubt, Ack call)
+      : PinScript(context, axis, std::move(call)), kept_(kept), doubt_(std::move(doubt)) {}
 
  protected:
   Steps plan() override;
 
  private:
   const axis::AxisMemory kept_;
-  const bool clean_;
+  const std::string doubt_;
 };
 
 }  // namespace stepdriver::activity

@@ -265,12 +265,27 @@ void AxisModel::rememberRest() {
   rest_.at_home = motor.translator().isAtHome(motor.state().count);
 }
 
-std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean) const {
+std::string AxisModel::whyImpossible(const AxisMemory& kept, const std::string& source) const {
+  if (kept.kind != config.kind || kept.steps_per_unit != config.steps_per_unit) {
+    return fmt::format("the position was kept for another axis, of {} steps per {}",
+                       numberText(kept.steps_per_unit),
+                       kept.kind == config::Kind::kLinear ? "m" : "rad");
+  }
+  return pathAxis().whyBeyondLimits(kept.position, "in " + source + ", the position");
+}
+
+std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean,
+                                     const std::string& source) const {
+  // It may have been kept in another microstep mode, whose backlash is rounded differently.
+  const double tolerance = 0.5 * config.microsteps / config.steps_per_unit;
+  if (!(kept.slack >= 0.0 && kept.slack <= config.backlash + tolerance)) {
+    return fmt::format("in {}, {} of the backlash is taken up, but it must be from 0 to {}", source,
+                       show(kept.slack), show(config.backlash));
+  }
   if (!clean && kept.moving) {
     return fmt::format(
         "the node that kept this position wasn't shut down: the axis was moving, from {}, and it "
-        "is "
-        "not known where it stopped",
+        "is not known where it stopped",
         showPlace(kept.position));
   }
   if (!clean) return "the node that kept this position wasn't shut down";

@@ -126,7 +126,11 @@ class AxisModel {
   AxisMemory memory() const;
   /// Called at the end of each turn: if the axis is at rest, a motion may begin from here.
   void rememberRest();
-  std::string whyUnverified(const AxisMemory& kept, bool clean) const;
+  /// Why a kept position can't be the axis's; empty if it can.
+  /// @param source "the state file /x/state"
+  std::string whyImpossible(const AxisMemory& kept, const std::string& source) const;
+  /// Why a possible position can't be trusted; empty if it can.
+  std::string whyUnverified(const AxisMemory& kept, bool clean, const std::string& source) const;
   /// @}
 
   /// Something stopped it, moving or not: its command has ended.

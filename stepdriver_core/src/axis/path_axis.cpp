@@ -50,20 +50,25 @@ std::string PathAxis::showLimit(double value, config::LimitSource source, const 
 
 void PathAxis::refuse(const std::string& why) const { throw Refused(name + ": " + why); }
 
-void PathAxis::refuseBeyondLimits(double position, const std::string& what) const {
+std::string PathAxis::whyBeyondLimits(double position, const std::string& what) const {
   // Half a step of tolerance: a position that rounds to the limit is at the limit.
   const double tolerance = 0.5 / steps_per_unit;
   if (min_position && position < *min_position - tolerance) {
-    refuse(fmt::format("{} {} is below the soft limit min_position {}", what, show(position),
-                       showLimit(*min_position, min_position_source)));
+    return fmt::format("{} {} is below the soft limit min_position {}", what, show(position),
+                       showLimit(*min_position, min_position_source));
   }
   if (max_position && position > *max_position + tolerance) {
-    refuse(fmt::format("{} {} is above the soft limit max_position {}", what, show(position),
-                       showLimit(*max_position, max_position_source)));
+    return fmt::format("{} {} is above the soft limit max_position {}", what, show(position),
+                       showLimit(*max_position, max_position_source));
   }
   if (std::abs(countOf(position)) > kFarthest) {
-    refuse(fmt::format("{} {} is more than 2^40 steps away", what, show(position)));
+    return fmt::format("{} {} is more than 2^40 steps away", what, show(position));
   }
+  return "";
+}
+
+void PathAxis::refuseBeyondLimits(double position, const std::string& what) const {
+  if (const std::string why = whyBeyondLimits(position, what); !why.empty()) refuse(why);
 }
 
 }  // namespace stepdriver::axis

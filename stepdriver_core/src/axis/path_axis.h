@@ -48,7 +48,10 @@ struct PathAxis {
   /// @throw Refused always: "x: why".
   [[noreturn]] void refuse(const std::string& why) const;
   /// @param position [unit] @param what "the position"
-  /// @throw Refused if it is beyond a soft limit, or too many steps away.
+  /// @return empty if the axis may be there; it may not if that is beyond a soft limit, or too many
+  ///   steps away.
+  std::string whyBeyondLimits(double position, const std::string& what) const;
+  /// @throw Refused if whyBeyondLimits() says why.
   void refuseBeyondLimits(double position, const std::string& what) const;
 };
 

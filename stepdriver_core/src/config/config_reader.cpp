@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "message_text.h"
+#include "stepdriver_core/printable.h"
 
 namespace stepdriver::config {
 namespace {
@@ -93,7 +94,7 @@ const ConfigValue& ConfigReader::value(const std::string& key) const {
 std::string ConfigReader::shown(const std::string& key) const { return value(key).shown(); }
 
 std::string ConfigReader::fullName(const std::string& key) const {
-  return key.empty() ? name_ : name_ + "/" + key;
+  return key.empty() ? name_ : name_ + "/" + printable(key);
 }
 
 double ConfigReader::number(const std::string& key, const Range& range,
@@ -200,9 +201,15 @@ std::optional<std::string> ConfigReader::findText(const std::string& key, Presen
   const ConfigValue* value = find(key, presence, wanted);
   if (value == nullptr) return {};
   const auto* text = value->as<std::string>();
-  if (text != nullptr) return *text;
-  wrong(key, shownWithType(*value), wanted);
-  return {};
+  if (text == nullptr) {
+    wrong(key, shownWithType(*value), wanted);
+    return {};
+  }
+  if (!isPrintable(*text)) {
+    wrong(key, value->shown(), "a text without line breaks and other control characters");
+    return {};
+  }
+  return *text;
 }
 
 std::optional<std::string> ConfigReader::findOneOf(const std::string& key,

@@ -14,6 +14,7 @@
 #include "read_pins.h"
 #include "read_power.h"
 #include "stepdriver_core/config/config_reader.h"
+#include "stepdriver_core/printable.h"
 
 namespace stepdriver::config {
 namespace {
@@ -146,7 +147,7 @@ void checkAxisName(const std::string& name, ConfigReader& axis) {
   if (isAxisName(name)) return;
   axis.issue("", fmt::format("has the name \"{}\", but an axis's name must begin with a letter and "
                              "continue with letters, digits and _ only",
-                             name));
+                             printable(name)));
 }
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,

@@ -604,14 +604,14 @@ void Controller::serve(const BringUp& /*wanted*/, const Ack& call) {
 void Controller::serve(const RestorePosition& wanted, const Ack& call) {
   axis::AxisModel& restored = axis(wanted.axis);
   const axis::AxisMemory& kept = wanted.memory;
-  if (kept.kind != restored.config.kind || kept.steps_per_unit != restored.config.steps_per_unit) {
-    restored.position.setNote(fmt::format(
-        "the position was kept for another axis, of {} steps per {}",
-        numberText(kept.steps_per_unit), kept.kind == config::Kind::kLinear ? "m" : "rad"));
+  const std::string why = restored.whyImpossible(kept, wanted.source);
+  if (!why.empty()) {
+    restored.position.setNote(why);
     return;
   }
+  std::string doubt = restored.whyUnverified(kept, wanted.clean, wanted.source);
   activities_.begin(
-      std::make_unique<activity::RestorePosition>(context_, restored, kept, wanted.clean, call),
+      std::make_unique<activity::RestorePosition>(context_, restored, kept, std::move(doubt), call),
       kTakenOver);
 }
 

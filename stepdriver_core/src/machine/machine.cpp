@@ -19,6 +19,7 @@
 #include "state_keeper.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
+#include "stepdriver_core/printable.h"
 #include "wiring.h"
 
 namespace stepdriver::machine {
@@ -84,7 +85,7 @@ class Machine::Impl {
       if (axis->config().name == name) return *axis;
       names += (names.empty() ? "" : ", ") + axis->config().name;
     }
-    throw Refused(fmt::format("there is no axis {}; there are {}", name, names));
+    throw Refused(fmt::format("there is no axis {}; there are {}", printable(name), names));
   }
 
   CoordinatedMove moveLine(const LineRequest& request) {
@@ -191,7 +192,7 @@ class Machine::Impl {
     // decides whether to trust it.
     if (keeper_) keeper_->close(memories());
     ask(*shell_, PowerDown{});
-    if (keeper_ && !keeper_->error().empty()) throw Error(keeper_->error());
+    if (keeper_ && !keeper_->error().empty()) throw StateFileError(keeper_->error());
   }
 
   StateKeeper::Memories memories() const {
@@ -208,7 +209,7 @@ class Machine::Impl {
     for (const MachineAxis* axis : own_axes_) {
       const auto found = loaded.state.axes.find(axis->config().name);
       if (found != loaded.state.axes.end()) {
-        ask(*shell_, RestorePosition{axis->id(), found->second, loaded.state.clean});
+        ask(*shell_, RestorePosition{axis->id(), found->second, loaded.state.clean, loaded.source});
       } else {
         ask(*shell_, NotePosition{axis->id(), loaded.why_none});
       }

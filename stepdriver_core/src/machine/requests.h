@@ -110,6 +110,7 @@ struct RestorePosition {
   AxisId axis = 0;
   axis::AxisMemory memory;
   bool clean = false;
+  std::string source;  ///< names the file, for messages
 };
 struct NotePosition {
   AxisId axis = 0;

@@ -3,12 +3,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <locale>
 #include <sstream>
 #include <utility>
@@ -23,6 +24,11 @@ constexpr const char* kClean = "clean";
 constexpr const char* kRunning = "running";
 constexpr const char* kColumns =
     "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home moving";
+
+// Nobody else needs to read or write these files.
+constexpr mode_t kMode = 0600;
+// Far more than the lines of any machine.
+constexpr std::size_t kLargest = std::size_t{1} << 20;
 
 [[noreturn]] void failed(const std::string& what, const std::string& path) {
   throw Error(fmt::format("the state file {} can't be {}: {}", path, what, std::strerror(errno)));
@@ -39,39 +45,106 @@ std::string textOf(const KeptState& state) {
   return text;
 }
 
-// The new file, written to the disk before it replaces the old one.
+const char* kindOf(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISLNK(mode)) return "a symbolic link";
+  if (S_ISFIFO(mode)) return "a named pipe";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+[[noreturn]] void isNoFile(const std::string& path, mode_t mode) {
+  throw Error(
+      fmt::format("the state file {} is {}, but must be a regular file", path, kindOf(mode)));
+}
+
+// Opening a pipe may block for ever, and a link would make this write somewhere else.
+void refuseUnlessFile(const std::string& path) {
+  struct stat facts {};
+  if (lstat(path.c_str(), &facts) == 0 && !S_ISREG(facts.st_mode)) isNoFile(path, facts.st_mode);
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  bool isOpen() const { return number_ >= 0; }
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+/// @return empty if there is no file.
+std::optional<std::string> contentsOf(const std::string& path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!file.isOpen() && errno == ENOENT) return std::nullopt;
+  struct stat facts {};
+  if (!file.isOpen() || fstat(file.number(), &facts) != 0) failed("read", path);
+  if (!S_ISREG(facts.st_mode)) isNoFile(path, facts.st_mode);
+  std::string text;
+  char part[4096];
+  for (;;) {
+    const ssize_t count = read(file.number(), part, sizeof part);
+    if (count == 0) return text;
+    if (count < 0 && errno != EINTR) failed("read", path);
+    if (count > 0) text.append(part, static_cast<std::size_t>(count));
+    if (text.size() > kLargest) {
+      throw Error(fmt::format("the state file {} is larger than {} bytes: it is no state file",
+                              path, kLargest));
+    }
+  }
+}
+
+// The new file, written to the disk before it replaces the old one. If that fails, it is removed.
 class NewFile {
  public:
-  explicit NewFile(const std::string& path)
-      : path_(path), file_(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
-    if (file_ < 0) failed("written", path_);
+  explicit NewFile(const std::string& path) : path_(path), file_(create(path)) {
+    if (!file_.isOpen()) failed("written", path_);
   }
-  ~NewFile() { close(file_); }
+  ~NewFile() {
+    if (!replaced_) unlink(path_.c_str());
+  }
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
   void write(const std::string& text) const {
     for (std::size_t done = 0; done < text.size();) {
-      const ssize_t count = ::write(file_, text.data() + done, text.size() - done);
+      const ssize_t count = ::write(file_.number(), text.data() + done, text.size() - done);
       if (count < 0 && errno != EINTR) failed("written", path_);
       if (count > 0) done += static_cast<std::size_t>(count);
     }
-    if (fsync(file_) != 0) failed("written", path_);
+    if (fsync(file_.number()) != 0) failed("written", path_);
+  }
+
+  void replace(const std::string& path) {
+    if (std::rename(path_.c_str(), path.c_str()) != 0) failed("replaced", path);
+    replaced_ = true;
   }
 
  private:
+  static int create(const std::string& path) {
+    // A crash may have left one.
+    if (unlink(path.c_str()) != 0 && errno != ENOENT) return -1;
+    return open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kMode);
+  }
+
   const std::string& path_;
-  int file_;
+  const Descriptor file_;
+  bool replaced_ = false;
 };
 
 void syncDirectory(const std::string& path) {
   const std::string directory = path.substr(0, path.rfind('/') + 1);
-  const int file = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (file < 0) failed("written", path);
-  const int result = fsync(file);
-  close(file);
+  const Descriptor folder(open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!folder.isOpen()) failed("written", path);
   // Some file systems don't support this.
-  if (result != 0 && errno != EINVAL) failed("written", path);
+  if (fsync(folder.number()) != 0 && errno != EINVAL) failed("written", path);
 }
 
 axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
@@ -95,7 +168,9 @@ axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
 
 StateFile::StateFile(std::string path) : path_(std::move(path)) {
   const std::string lock = path_ + ".lock";
-  lock_ = open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  refuseUnlessFile(path_);
+  refuseUnlessFile(lock);
+  lock_ = open(lock.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, kMode);
   if (lock_ < 0) failed("written", path_);
   if (flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
   const int error = errno;
@@ -111,11 +186,9 @@ StateFile::StateFile(std::string path) : path_(std::move(path)) {
 StateFile::~StateFile() { close(lock_); }
 
 std::optional<KeptState> StateFile::load() const {
-  std::ifstream file(path_);
-  if (!file) {
-    if (errno == ENOENT) return std::nullopt;
-    failed("read", path_);
-  }
+  const std::optional<std::string> text = contentsOf(path_);
+  if (!text) return std::nullopt;
+  std::istringstream file(*text);
   const auto broken = [this](int line) {
     return Error(
         fmt::format("the state file {} is broken in line {}; delete or correct it", path_, line));
@@ -137,11 +210,9 @@ std::optional<KeptState> StateFile::load() const {
 
 void StateFile::save(const KeptState& state) const {
   const std::string next = path_ + ".new";
-  {
-    const NewFile file(next);
-    file.write(textOf(state));
-  }
-  if (std::rename(next.c_str(), path_.c_str()) != 0) failed("replaced", path_);
+  NewFile file(next);
+  file.write(textOf(state));
+  file.replace(path_);
   syncDirectory(path_);
 }
 

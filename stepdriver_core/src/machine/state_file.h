@@ -18,13 +18,14 @@ struct KeptState {
 /// A file that keeps the positions of axes beyond the program's end: a line of text for each axis.
 ///
 /// It is replaced as a whole: a reader finds the latest or the previous contents, even after a loss
-/// of power. For one thread at a time.
+/// of power. It is a regular file that only its owner can read and write. For one thread at a time.
 class StateFile {
  public:
   /// Reserves the file for this program with a lock on `path`.lock, which remains.
   ///
   /// @param path absolute; its directory exists.
-  /// @throw Error if another program has reserved it, or the directory can't be written.
+  /// @throw Error if another program has reserved it, if it or its lock is a folder, a link, a pipe
+  ///   or a device, or if the directory can't be written.
   explicit StateFile(std::string path);
   ~StateFile();
   StateFile(const StateFile&) = delete;

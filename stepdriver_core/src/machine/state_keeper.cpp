@@ -23,12 +23,13 @@ StateKeeper::~StateKeeper() {
 
 StateKeeper::Loaded StateKeeper::load() {
   Loaded loaded;
+  loaded.source = "the state file " + file_.path();
   try {
     if (auto kept = file_.load()) {
       loaded.state = *std::move(kept);
-      loaded.why_none = "the state file " + file_.path() + " doesn't contain this axis";
+      loaded.why_none = loaded.source + " doesn't contain this axis";
     } else {
-      loaded.why_none = "the state file " + file_.path() + " didn't exist yet";
+      loaded.why_none = loaded.source + " didn't exist yet";
     }
   } catch (const Error& error) {
     loaded.why_none = error.what();
@@ -92,19 +93,20 @@ void StateKeeper::close(const Memories& last) {
 }
 
 std::string StateKeeper::error() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<std::mutex> lock(error_mutex_);
   return error_;
 }
 
 void StateKeeper::save() {
+  std::string why;
   try {
     file_.save(state_);
-    saved_ = true;
-    error_.clear();
   } catch (const Error& error) {
-    saved_ = false;
-    error_ = error.what();
+    why = error.what();
   }
+  saved_ = why.empty();
+  const std::lock_guard<std::mutex> lock(error_mutex_);
+  error_ = std::move(why);
 }
 
 }  // namespace stepdriver::machine

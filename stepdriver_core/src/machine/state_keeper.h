@@ -25,6 +25,7 @@ class StateKeeper {
   struct Loaded {
     KeptState state;       ///< empty if there is none
     std::string why_none;  ///< why it has no position for an axis
+    std::string source;    ///< names the file, for messages
   };
 
   /// @throw Error if the file can't be reserved.
@@ -49,7 +50,7 @@ class StateKeeper {
   /// The machine is at rest, and stays so.
   void close(const Memories& last);
 
-  /// Why the last write failed; empty: it succeeded.
+  /// Why the last write failed; empty: it succeeded. Doesn't wait for the disk.
   std::string error() const;
 
  private:
@@ -62,6 +63,7 @@ class StateKeeper {
   mutable std::mutex mutex_;
   KeptState state_;
   bool saved_ = false;
+  mutable std::mutex error_mutex_;  // never held while the disk writes
   std::string error_;
   std::condition_variable wake_;
   bool ended_ = false;

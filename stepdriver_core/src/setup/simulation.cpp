@@ -106,9 +106,11 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
   return rig;
 }
 
-std::shared_ptr<sim::PinTrace> traceTo(const std::string& path) {
-  if (path.empty()) return nullptr;
-  return std::make_shared<sim::VcdTrace>(path);
+std::shared_ptr<sim::PinTrace> traceOf(const SimulationConfig& config) {
+  if (config.trace.empty()) return nullptr;
+  using Replaces = sim::VcdTrace::Replaces;
+  return std::make_shared<sim::VcdTrace>(
+      config.trace, config.trace_overwrites_any_file ? Replaces::kAnyFile : Replaces::kTraces);
 }
 
 }  // namespace
@@ -133,7 +135,7 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
     : axes_(axes),
       emergency_stop_(std::move(emergency_stop)),
       clock_(config.speed),
-      rig_(rigOf(axes, config), traceTo(config.trace)),
+      rig_(rigOf(axes, config), traceOf(config)),
       backend_(rig_, [this] { return clock_.now(); }) {
   for (const AxisConfig& axis : axes) {
     const SimulatedAxis& simulated = config.axes.at(axis.name);

@@ -94,6 +94,8 @@ SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::A
   SimulationConfig config;
   config.speed = reader.number("speed", Range{0.0, kHighestSpeed}, config.speed);
   config.trace = reader.text("trace", config.trace);
+  config.trace_overwrites_any_file =
+      reader.boolean("trace_overwrites_any_file", config.trace_overwrites_any_file);
   config.emergency_stop = reader.boolean("emergency_stop", config.emergency_stop);
   ConfigReader rigs = reader.map("axes");
   for (const config::AxisConfig& axis : axes) {

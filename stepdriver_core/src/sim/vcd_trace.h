@@ -1,7 +1,7 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -17,18 +17,27 @@ namespace stepdriver::sim {
 /// scopes: with several axes it shows pins of the same name.
 ///
 /// The same edges make the same file: it contains no date. Edges are buffered; the file is complete
-/// up to the last edge after flush() and after destruction.
+/// up to the last edge after flush() and after destruction. If a write fails, the trace ends with
+/// the last one that succeeded.
 class VcdTrace : public PinTrace {
  public:
-  /// @throw Error if the file can't be written; an existing one is replaced.
-  explicit VcdTrace(const std::string& path);
+  /// Which existing files the trace may replace.
+  enum class Replaces {
+    kTraces,  ///< those that begin as a trace does, and empty ones
+    kAnyFile
+  };
+
+  /// @throw Error if the file can't be written, or may not be replaced.
+  explicit VcdTrace(std::string path, Replaces replaces = Replaces::kTraces);
   ~VcdTrace() override;
+  VcdTrace(const VcdTrace&) = delete;
+  VcdTrace& operator=(const VcdTrace&) = delete;
 
   void begin(const std::vector<TracePin>& pins, const std::vector<bool>& levels,
              std::int64_t time_ns) override;
   void edge(int pin, bool level, std::int64_t time_ns) override;
 
-  /// @throw Error if the file couldn't be written, now or earlier.
+  /// @throw Error, which names the reason, if the file couldn't be written, now or earlier.
   void flush() override;
 
  private:
@@ -36,7 +45,9 @@ class VcdTrace : public PinTrace {
   void writeOut();
 
   const std::string path_;
-  std::ofstream file_;
+  const int file_;
+  std::size_t written_ = 0;  // bytes of the file
+  std::string error_;        // why it is incomplete
   std::string buffer_;
   std::vector<std::string> ids_;
   bool begun_ = false;

@@ -2,16 +2,17 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
+#include <cstddef>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "scalar.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/printable.h"
 #include "stepdriver_core/yaml.h"
 
 namespace stepdriver::yaml {
@@ -21,14 +22,24 @@ using config::ConfigValue;
 
 // Deeper than any configuration; an alias may refer to a node that contains it.
 constexpr int kDeepest = 50;
+// Each is many times more than a configuration of a hundred axes has. Aliases of aliases could
+// stand for more values than any computer has memory for.
+constexpr std::size_t kLargest = std::size_t{1} << 20;
+constexpr int kMostValues = 20'000;
+constexpr std::size_t kLongestText = 4096;
+
+std::string tooLarge(const std::string& name) {
+  return fmt::format("{}: is larger than {} bytes, the most that a configuration may have", name,
+                     kLargest);
+}
 
 class Converter {
  public:
   explicit Converter(std::string name) : name_(std::move(name)) {}
 
   ConfigValue convert(const YAML::Node& node, int depth = 0) {
-    if (depth > kDeepest)
-      fail(node.Mark(), "it is nested too deeply, or it is an alias for a node that contains it");
+    checkDepth(node, depth);
+    countValue(node);
     switch (node.Type()) {
       case YAML::NodeType::Scalar:
         return scalar(node);
@@ -45,15 +56,32 @@ class Converter {
   }
 
   [[noreturn]] void fail(const YAML::Mark& mark, const std::string& what) const {
-    throw Error(fmt::format("{}:{}:{}: {}", name_, mark.line + 1, mark.column + 1, what));
+    throw Error(
+        fmt::format("{}:{}:{}: {}", name_, mark.line + 1, mark.column + 1, printable(what)));
   }
 
  private:
+  void checkDepth(const YAML::Node& node, int depth) const {
+    if (depth > kDeepest)
+      fail(node.Mark(), "it is nested too deeply, or it is an alias for a node that contains it");
+  }
+
+  void countValue(const YAML::Node& node) {
+    if (++values_ <= kMostValues) return;
+    fail(node.Mark(), fmt::format("there are more than {} values up to here, each alias counted as "
+                                  "the values that it stands for",
+                                  kMostValues));
+  }
+
   static bool isPlain(const YAML::Node& node) { return node.Tag().empty() || node.Tag() == "?"; }
 
   ConfigValue scalar(const YAML::Node& node) const {
     static const std::string standard = "tag:yaml.org,2002:";
     const std::string& tag = node.Tag();
+    if (node.Scalar().size() > kLongestText) {
+      fail(node.Mark(), fmt::format("a text of {} characters is too long, at most {} are allowed",
+                                    node.Scalar().size(), kLongestText));
+    }
     try {
       if (isPlain(node)) return resolveScalar(node.Scalar());
       if (tag == "!") return {node.Scalar()};  // quoted
@@ -91,6 +119,8 @@ class Converter {
   }
 
   void merge(const YAML::Node& from, int depth, ConfigValue::Map& into) {
+    checkDepth(from, depth);
+    countValue(from);
     if (from.IsSequence()) {
       for (const auto& item : from) merge(item, depth + 1, into);
       return;
@@ -101,11 +131,13 @@ class Converter {
   }
 
   const std::string name_;
+  int values_ = 0;
 };
 
 }  // namespace
 
 ConfigValue parse(const std::string& text, const std::string& name) {
+  if (text.size() > kLargest) throw Error(tooLarge(name));
   Converter converter(name);
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
@@ -125,7 +157,10 @@ ConfigValue load(const std::string& path) {
   if (std::filesystem::is_directory(path, unknown)) throw Error(path + ": is a folder");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw Error(path + ": can't be read: " + std::strerror(errno));
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text(kLargest + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (file.bad()) throw Error(path + ": can't be read: " + std::strerror(errno));
   return parse(text, path);
 }
 

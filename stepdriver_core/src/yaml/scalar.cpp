@@ -26,13 +26,18 @@ std::string without(const std::string& text, char unwanted) {
   return rest;
 }
 
-bool matches(const std::string& text, const char* pattern) {
-  return std::regex_match(text, std::regex(pattern, std::regex::extended));
+/// Making one takes much longer than matching it: each is made once.
+std::regex pattern(const char* text) { return std::regex(text, std::regex::extended); }
+
+bool matches(const std::string& text, const std::regex& pattern) {
+  return std::regex_match(text, pattern);
 }
 
 std::optional<bool> booleanOf(const std::string& text) {
-  if (matches(text, "yes|Yes|YES|true|True|TRUE|on|On|ON")) return true;
-  if (matches(text, "no|No|NO|false|False|FALSE|off|Off|OFF")) return false;
+  static const std::regex yes = pattern("yes|Yes|YES|true|True|TRUE|on|On|ON");
+  static const std::regex no = pattern("no|No|NO|false|False|FALSE|off|Off|OFF");
+  if (matches(text, yes)) return true;
+  if (matches(text, no)) return false;
   return {};
 }
 
@@ -61,9 +66,9 @@ Signed signOf(const std::string& text) {
 
 /// @return the number as a double, which holds every int of 32 bits exactly.
 std::optional<double> integerOf(const std::string& text) {
-  static constexpr const char* kPattern =
-      "[-+]?(0b[01_]+|0[0-7_]+|0|[1-9][0-9_]*|0x[0-9a-fA-F_]+|[1-9][0-9_]*(:[0-5]?[0-9])+)";
-  if (!matches(text, kPattern)) return {};
+  static const std::regex integer = pattern(
+      "[-+]?(0b[01_]+|0[0-7_]+|0|[1-9][0-9_]*|0x[0-9a-fA-F_]+|[1-9][0-9_]*(:[0-5]?[0-9])+)");
+  if (!matches(text, integer)) return {};
   const auto [sign, digits] = signOf(without(text, '_'));
   if (digits.find(':') != std::string::npos) return sign * sexagesimal(digits);
   int base = 10;
@@ -78,16 +83,17 @@ std::optional<double> integerOf(const std::string& text) {
 }
 
 std::optional<double> realOf(const std::string& text) {
-  if (matches(text, "[.](nan|NaN|NAN)")) return std::numeric_limits<double>::quiet_NaN();
-  if (matches(text, "[-+]?[.](inf|Inf|INF)")) {
+  static const std::regex nan = pattern("[.](nan|NaN|NAN)");
+  static const std::regex infinity = pattern("[-+]?[.](inf|Inf|INF)");
+  static const std::regex in_sixties = pattern("[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+[.][0-9_]*");
+  static const std::regex decimal =
+      pattern("[-+]?[0-9][0-9_]*[.][0-9_]*([eE][-+][0-9]+)?|[.][0-9][0-9_]*([eE][-+][0-9]+)?");
+  if (matches(text, nan)) return std::numeric_limits<double>::quiet_NaN();
+  if (matches(text, infinity)) {
     return signOf(text).sign * std::numeric_limits<double>::infinity();
   }
-  const bool sixties = matches(text, "[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+[.][0-9_]*");
-  if (!sixties && !matches(text,
-                           "[-+]?[0-9][0-9_]*[.][0-9_]*([eE][-+][0-9]+)?|"
-                           "[.][0-9][0-9_]*([eE][-+][0-9]+)?")) {
-    return {};
-  }
+  const bool sixties = matches(text, in_sixties);
+  if (!sixties && !matches(text, decimal)) return {};
   const auto [sign, digits] = signOf(without(text, '_'));
   return sign * (sixties ? sexagesimal(digits) : std::strtod(digits.c_str(), nullptr));
 }
@@ -140,11 +146,13 @@ ConfigValue integerValue(double number, const std::string& text) {
 }  // namespace
 
 ConfigValue resolveScalar(const std::string& text) {
-  if (matches(text, "~|null|Null|NULL|")) return {};
+  static const std::regex nothing = pattern("~|null|Null|NULL|");
+  static const std::regex angle = pattern("(deg|rad)[(][^)]*[)]");
+  if (matches(text, nothing)) return {};
   if (const auto flag = booleanOf(text)) return {*flag};
   if (const auto integer = integerOf(text)) return integerValue(*integer, text);
   if (const auto number = realOf(text)) return {*number};
-  if (matches(text, "(deg|rad)[(][^)]*[)]")) return angleOf(text);
+  if (matches(text, angle)) return angleOf(text);
   return {text};
 }
 

@@ -41,6 +41,7 @@ namespace {
 
 constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
+constexpr int kExitStateFile = 4;
 
 constexpr std::chrono::milliseconds kPoll{1000};
 // Time for the calls that arrived while the axes came to rest.
@@ -71,7 +72,8 @@ the lines and ends.
               robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
-written, 3 the computer is too slow for its axes and ~realtime is enforce, 64 wrong usage.
+written, 3 the computer is too slow for its axes and ~realtime is enforce, 4 ended as asked, but
+~state_file couldn't be written, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -84,9 +86,16 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   int exit_code = kExitOk;
   try {
     machine.shutdown();
+  } catch (const StateFileError&) {
+    exit_code = kExitStateFile;
   } catch (const Error& error) {
     ROS_ERROR_NAMED("node", "Not all could be disabled: %s", error.what());
     exit_code = kExitGpio;
+  }
+  if (const std::string error = machine.stateFileError(); !error.empty()) {
+    ROS_ERROR_NAMED("state_file",
+                    "%s; the next start may not know the positions, or not trust them",
+                    error.c_str());
   }
   move_actions.tellEnded();
   line_action.tellEnded();
@@ -134,6 +143,14 @@ void stopForLostMaster(machine::Machine& machine) {
   }
 }
 
+void warnOfTrace(setup::Simulation& simulation) {
+  try {
+    simulation.rig().flushTrace();
+  } catch (const Error& error) {
+    ROS_WARN_NAMED("rig", "%s", error.what());
+  }
+}
+
 /// Runs the node, once it is registered with the master.
 ///
 /// @return the exit code.
@@ -158,7 +175,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
-  ActionStatuses statuses(private_node);
+  ActionStatuses statuses(private_node, parameters.action_status_frequency);
   std::deque<AxisServices> axis_services;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
@@ -189,7 +206,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   const Diagnostics diagnostics(
       node, private_node, machine, queues, master_watch, descriptors,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
-      config.max_lateness);
+      config);
   std::optional<ClockPublisher> clock_publisher;
   if (config.publish_clock) clock_publisher.emplace(private_node, hardware.clock());
   queues.start();
@@ -209,7 +226,10 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   }
   ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
   master_watch.stop();
-  return shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
+  const int exit_code =
+      shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
+  if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
+  return exit_code;
 }
 
 /// @return the exit code.

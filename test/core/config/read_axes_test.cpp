@@ -221,6 +221,25 @@ TEST(ReadAxes, WantsOneJointForEachAxis) {
                               {"joint", 1, "is 1 (an integer), but must be a string"}});
 }
 
+TEST(ReadAxes, TakesNoNameThatCouldForgeALineOfTheLog) {
+  EXPECT_EQ(issuesOf(mapOf({{"x\n[ERROR] y", linearAxis()}})),
+            Lines{"/axes/x\\n[ERROR] y: has the name \"x\\n[ERROR] y\", but an axis's name must "
+                  "begin with a letter and continue with letters, digits and _ only"});
+  const std::string wanted =
+      ", but must be a text without line breaks and other control characters";
+  expectIssues(linearAxis(), {{"joint", "a\nb", "is \"a\\nb\"" + wanted},
+                              {"joint", "a\x1b[2K", "is \"a\\x1b[2K\"" + wanted},
+                              {"pins/step", "a\x1b[2K", "is \"a\\x1b[2K\"" + wanted},
+                              {"driver", "a\nb", "is \"a\\nb\"" + wanted}});
+  ConfigValue axis = linearAxis();
+  put(axis, "speed\nx", 1);
+  const Lines issues = issuesOf(mapOf({{"x", axis}}));
+  ASSERT_EQ(issues.size(), 1U);
+  EXPECT_EQ(issues[0].rfind("/axes/x/speed\\nx: is not known", 0), 0U) << issues[0];
+  put(axis = linearAxis(), "joint", "my joint-2.größe");
+  EXPECT_EQ(issuesOf(mapOf({{"x", axis}})), Lines{});
+}
+
 TEST(ReadAxes, OverridesTheTimingsOfTheChip) {
   ConfigValue axis = linearAxis();
   put(axis, "timing",

@@ -1,9 +1,11 @@
 #include "machine/state_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -24,6 +26,37 @@ namespace {
 using test::Bench;
 using test::linearAxis;
 
+// While it exists, a write of this process to a file fails, as on a full disk: EFBIG.
+class FullDisk {
+ public:
+  FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit none = before_;
+    none.rlim_cur = 0;
+    setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  void (*const handler_)(int);
+  rlimit before_{};
+};
+
+bool exists(const std::string& path) {
+  struct stat facts {};
+  return lstat(path.c_str(), &facts) == 0;
+}
+
+unsigned permissionsOf(const std::string& path) {
+  struct stat facts {};
+  return lstat(path.c_str(), &facts) == 0 ? facts.st_mode & 0777U : 0;
+}
+
 class StateFileTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -35,7 +68,7 @@ class StateFileTest : public testing::Test {
   }
   void TearDown() override {
     bench_.reset();
-    for (const char* end : {"", ".lock", ".new"}) std::remove((file_ + end).c_str());
+    for (const char* end : {"", ".lock", ".new", ".other"}) std::remove((file_ + end).c_str());
     rmdir(directory_.c_str());
   }
 
@@ -219,6 +252,10 @@ TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
            {"stepdriver state 2\nclean\n", "line 1"},
            {"stepdriver state 1\nfine\n", "line 2"},
            {head + "x linear 80000 nan 0 1 0 1\n", "line 3"},
+           {head + "x linear 80000 1e999 0 1 0 1\n", "line 3"},
+           {head + "x linear 80000 0,008 0 1 0 1\n", "line 3"},
+           {head + "x linear 80000 0.008 -inf 1 0 1\n", "line 3"},
+           {head + "x linear 80000 0.008 0 2 0 1\n", "line 3"},
            {head + "x linear 80000 0.008 0 1\n", "line 3"},
            {head + "x linear 80000 0.008 0 1 0 1 7\n", "line 3"},
            {head + "x linear 80000 0.008 0 1 0 1 0 1\n", "line 3"},
@@ -240,6 +277,58 @@ TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
   EXPECT_TRUE(state().position_valid);
 }
 
+TEST_F(StateFileTest, DoesNotBelieveAPositionThatSetPositionRefuses) {
+  config_.min_position = 0.0;
+  config_.max_position = 0.2;
+  for (const auto& [position, why] : std::vector<std::pair<std::string, std::string>>{
+           {"5", "5 m is above the soft limit max_position 0.2 m, from the configuration"},
+           {"1e308", "1e+308 m is above the soft limit max_position 0.2 m, from the configuration"},
+           {"-0.1", "-0.1 m is below the soft limit min_position 0 m, from the configuration"}}) {
+    SCOPED_TRACE(position);
+    bench_.reset();
+    std::ofstream(file_) << "stepdriver state 1\nclean\nx linear 80000 " << position
+                         << " 0 1 1 1 0\n";
+    start();
+    EXPECT_EQ(state().position_note, "in the state file " + file_ + ", the position " + why);
+    EXPECT_FALSE(state().position_valid);
+    EXPECT_FALSE(state().homed);
+    EXPECT_EQ(state().position, 0.0);
+    try {
+      x().setPosition(std::stod(position));
+      FAIL() << "set_position accepts it";
+    } catch (const Refused& refused) {
+      EXPECT_EQ(std::string(refused.what()), "x: the position " + why);
+    }
+  }
+  config_.min_position.reset();
+  config_.max_position.reset();
+  bench_.reset();
+  std::ofstream(file_) << "stepdriver state 1\nclean\nx linear 80000 1e308 0 1 1 1 0\n";
+  start();
+  EXPECT_EQ(state().position_note,
+            "in the state file " + file_ + ", the position 1e+308 m is more than 2^40 steps away");
+  EXPECT_EQ(state().position, 0.0);
+}
+
+TEST_F(StateFileTest, DoesNotTrustAPositionWithAnImpossibleBacklash) {
+  config_.backlash = 30 / config_.steps_per_unit;
+  for (const char* slack : {"9223372036854775808", "1e308", "-1e308", "-0.0001", "0.001"}) {
+    SCOPED_TRACE(slack);
+    bench_.reset();
+    std::ofstream(file_) << "stepdriver state 1\nclean\nx linear 80000 0.008 " << slack
+                         << " 1 1 1 0\n";
+    start();
+    EXPECT_DOUBLE_EQ(state().position, 0.008);
+    EXPECT_FALSE(state().position_valid);
+    EXPECT_NE(state().position_note.find("of the backlash is taken up, but it must be from 0 to "
+                                         "0.000375 m"),
+              std::string::npos)
+        << state().position_note;
+    EXPECT_EQ(bench_->move(0.0).end, axis::MoveEnd::kReached);
+    EXPECT_NEAR(state().position, 0.0, 1e-12);
+  }
+}
+
 TEST_F(StateFileTest, IsForOneProgramAtATime) {
   start();
   machine::MachineOptions options;
@@ -259,6 +348,92 @@ TEST_F(StateFileTest, RefusesToStartWhereItCannotBeWritten) {
   file_ = directory_ + "/state";
 }
 
+TEST_F(StateFileTest, RefusesToStartIfItIsNoRegularFile) {
+  const auto expect_no_file = [this](const std::string& path, const std::string& kind) {
+    EXPECT_EQ(whyNot(), "the state file " + path + " is " + kind + ", but must be a regular file");
+    EXPECT_EQ(std::remove(path.c_str()), 0);
+  };
+  for (const char* end : {"", ".lock"}) {
+    const std::string path = file_ + end;
+    ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);  // nobody writes into it
+    expect_no_file(path, "a named pipe");
+    ASSERT_EQ(mkdir(path.c_str(), 0700), 0);
+    expect_no_file(path, "a folder");
+    ASSERT_EQ(symlink("/dev/zero", path.c_str()), 0);
+    expect_no_file(path, "a symbolic link");
+    ASSERT_EQ(symlink((directory_ + "/nothing").c_str(), path.c_str()), 0);
+    expect_no_file(path, "a symbolic link");
+    EXPECT_FALSE(exists(directory_ + "/nothing"));
+  }
+}
+
+TEST_F(StateFileTest, DoesNotWriteThroughALinkThatIsInItsWay) {
+  const std::string other = file_ + ".other";
+  std::ofstream(other) << "of somebody else";
+  ASSERT_EQ(symlink(other.c_str(), (file_ + ".new").c_str()), 0);
+  start();
+  standAt(0.008);
+  std::ostringstream left;
+  left << std::ifstream(other).rdbuf();
+  EXPECT_EQ(left.str(), "of somebody else");
+  EXPECT_NE(text().find("x linear 80000 0.008"), std::string::npos) << text();
+}
+
+TEST_F(StateFileTest, OnlyItsOwnerReadsAndWritesIt) {
+  std::ofstream(file_) << "stepdriver state 1\nclean\n";
+  chmod(file_.c_str(), 0644);
+  const mode_t before = umask(0);
+  start();
+  umask(before);
+  EXPECT_EQ(permissionsOf(file_), 0600U);
+  EXPECT_EQ(permissionsOf(file_ + ".lock"), 0600U);
+}
+
+TEST_F(StateFileTest, IsNotReadBeyondWhatAStateFileCanHave) {
+  std::ofstream(file_) << "stepdriver state 1\nclean\n" << std::string(1U << 21U, '#') << "\n";
+  start();
+  EXPECT_EQ(state().position_note,
+            "the state file " + file_ + " is larger than 1048576 bytes: it is no state file");
+  EXPECT_FALSE(state().position_valid);
+}
+
+TEST_F(StateFileTest, OnAFullDiskKeepsTheLastContentsAndSaysSoUntilThereIsRoom) {
+  start();
+  standAt(0.008);
+  const std::string before = text();
+  {
+    const FullDisk full;
+    bench_->move(0.016);
+    bench_->machine->advance(0.001);
+  }
+  EXPECT_EQ(bench_->machine->stateFileError(),
+            "the state file " + file_ + ".new can't be written: File too large");
+  EXPECT_EQ(text(), before);
+  EXPECT_FALSE(exists(file_ + ".new")) << "a rest of it takes up room";
+  bench_->machine->advance(0.001);
+  EXPECT_EQ(bench_->machine->stateFileError(), "");
+  EXPECT_NE(text().find("x linear 80000 0.016"), std::string::npos) << text();
+}
+
+TEST_F(StateFileTest, OnAFullDiskAtTheEndIsAnErrorOfItsOwnAndAllIsDisabled) {
+  start();
+  x().setPosition(0.0);
+  ASSERT_TRUE(bench_->report().energized);
+  std::string why;
+  {
+    const FullDisk full;
+    try {
+      bench_->machine->shutdown();
+    } catch (const StateFileError& error) {
+      why = error.what();
+    }
+  }
+  EXPECT_EQ(why, "the state file " + file_ + ".new can't be written: File too large");
+  EXPECT_FALSE(bench_->report().energized);
+  start();
+  EXPECT_EQ(state().position_note, "the node that kept this position wasn't shut down");
+}
+
 TEST_F(StateFileTest, SaysWhereItCannotBeWrittenLater) {
   start();
   x().setPosition(0.0);
@@ -267,7 +442,7 @@ TEST_F(StateFileTest, SaysWhereItCannotBeWrittenLater) {
   bench_->machine->advance(0.001);
   EXPECT_EQ(bench_->machine->stateFileError(),
             "the state file " + file_ + ".new can't be written: Is a directory");
-  EXPECT_THROW(bench_->machine->shutdown(), Error);
+  EXPECT_THROW(bench_->machine->shutdown(), StateFileError);
   rmdir((file_ + ".new").c_str());
 }
 

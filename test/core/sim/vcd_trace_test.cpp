@@ -1,7 +1,10 @@
 #include "sim/vcd_trace.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -21,7 +24,9 @@ class VcdTraceTest : public testing::Test {
  public:
   VcdTraceTest()
       : path_(testing::TempDir() + "stepdriver_" +
-              testing::UnitTest::GetInstance()->current_test_info()->name() + ".vcd") {}
+              testing::UnitTest::GetInstance()->current_test_info()->name() + ".vcd") {
+    std::remove(path_.c_str());
+  }
   ~VcdTraceTest() override { std::remove(path_.c_str()); }
 
  protected:
@@ -30,6 +35,24 @@ class VcdTraceTest : public testing::Test {
     std::ostringstream all;
     all << file.rdbuf();
     return all.str();
+  }
+
+  static std::string whyNot(const std::string& path,
+                            VcdTrace::Replaces replaces = VcdTrace::Replaces::kTraces) {
+    try {
+      const VcdTrace trace(path, replaces);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+  static std::string whyIncomplete(VcdTrace& trace) {
+    try {
+      trace.flush();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
   }
 
   const std::string path_;
@@ -133,15 +156,77 @@ TEST_F(VcdTraceTest, IsTheSameForTheSameEdges) {
 }
 
 TEST_F(VcdTraceTest, RefusesAFileThatItCannotWrite) {
-  EXPECT_THROW(VcdTrace("/nowhere/at/all.vcd"), Error);
+  EXPECT_EQ(whyNot("/nowhere/at/all.vcd"),
+            "the trace file /nowhere/at/all.vcd can't be written: No such file or directory");
 }
 
-TEST_F(VcdTraceTest, SaysAtAFlushThatTheFileIsIncomplete) {
+TEST_F(VcdTraceTest, ReplacesATraceAndAnEmptyFile) {
+  { VcdTrace(path_).begin({{"x", "step"}}, {false}, 0); }
+  { VcdTrace(path_).begin({{"y", "step"}}, {false}, 0); }
+  EXPECT_EQ(text().find("module x"), std::string::npos) << text();
+  EXPECT_NE(text().find("module y"), std::string::npos) << text();
+  { std::ofstream(path_, std::ios::trunc); }
+  EXPECT_EQ(whyNot(path_), "");
+}
+
+TEST_F(VcdTraceTest, ReplacesNoOtherFileUnlessItMay) {
+  for (const std::string& content :
+       {std::string("my letter\n"), std::string("$"), std::string("$version other $end\n$scope"),
+        std::string("$version stepdrive"), std::string(100'000, 'a')}) {
+    std::ofstream(path_, std::ios::trunc) << content;
+    EXPECT_EQ(whyNot(path_), "the trace file " + path_ +
+                                 " exists and isn't a trace of the simulated rig: give another "
+                                 "name, or set simulation/trace_overwrites_any_file to overwrite "
+                                 "it");
+    EXPECT_EQ(text(), content);
+  }
+  { VcdTrace(path_, VcdTrace::Replaces::kAnyFile).begin({{"x", "step"}}, {false}, 0); }
+  EXPECT_EQ(text().rfind("$version stepdriver $end\n", 0), 0U) << text();
+}
+
+TEST_F(VcdTraceTest, DoesNotWaitForTheReaderOfAPipe) {
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  EXPECT_NE(whyNot(path_).find("isn't a trace"), std::string::npos) << whyNot(path_);
+  EXPECT_EQ(whyNot(path_, VcdTrace::Replaces::kAnyFile),
+            "the trace file " + path_ + " can't be written: No such device or address");
+}
+
+TEST_F(VcdTraceTest, SaysAtEachFlushThatTheFileIsIncomplete) {
   std::ifstream full("/dev/full");
   if (!full) GTEST_SKIP() << "no /dev/full here";
-  VcdTrace trace("/dev/full");
+  VcdTrace trace("/dev/full", VcdTrace::Replaces::kAnyFile);
   trace.begin({{"x", "step"}}, {false}, 0);
-  EXPECT_THROW(trace.flush(), Error);
+  for (int i = 1; i <= 2; ++i) {
+    trace.edge(0, i % 2 == 1, i);
+    EXPECT_EQ(whyIncomplete(trace),
+              "the trace file /dev/full is incomplete, because it couldn't be written: No space "
+              "left on device");
+  }
+}
+
+TEST_F(VcdTraceTest, EndsWithTheLastWriteThatSucceededIfTheDiskIsFull) {
+  std::string so_far;
+  std::string why;
+  {
+    VcdTrace trace(path_);
+    trace.begin({{"x", "step"}}, {false}, 0);
+    trace.flush();
+    so_far = text();
+    const auto before = std::signal(SIGXFSZ, SIG_IGN);
+    rlimit limit{};
+    getrlimit(RLIMIT_FSIZE, &limit);
+    rlimit full = limit;
+    full.rlim_cur = so_far.size() + 3;  // in the middle of a time stamp
+    setrlimit(RLIMIT_FSIZE, &full);
+    trace.edge(0, true, 123'456'789);
+    why = whyIncomplete(trace);
+    setrlimit(RLIMIT_FSIZE, &limit);
+    std::signal(SIGXFSZ, before);
+    trace.edge(0, false, 123'456'790);  // not without the one before
+  }
+  EXPECT_EQ(why, "the trace file " + path_ +
+                     " is incomplete, because it couldn't be written: File too large");
+  EXPECT_EQ(text(), so_far);
 }
 
 }  // namespace

@@ -147,6 +147,50 @@ TEST(Yaml, SaysWhichFileCannotBeRead) {
   }
 }
 
+TEST(Yaml, RefusesAliasesThatStandForTooMuch) {
+  std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  // A list of maps is allowed below << only.
+  std::string merges = "a0: {<<: &a0 [{k: x}, {k: x}]}\n";
+  for (int i = 1; i < 40; ++i) {
+    const std::string name = std::to_string(i);
+    const std::string two = "[*a" + std::to_string(i - 1) + ", *a" + std::to_string(i - 1) + "]";
+    bomb.append("a").append(name).append(": &a").append(name).append(" ").append(two).append("\n");
+    merges.append("a").append(name).append(": {<<: &a").append(name).append(" ").append(two);
+    merges.append("}\n");
+  }
+  const std::string wanted =
+      "there are more than 20000 values up to here, each alias counted as the values that it "
+      "stands for";
+  EXPECT_NE(errorOf(bomb).find(wanted), std::string::npos) << errorOf(bomb);
+  EXPECT_NE(errorOf(merges).find(wanted), std::string::npos) << errorOf(merges);
+  EXPECT_NE(errorOf("a: {<<: &a [*a]}\n").find("alias for a node that contains it"),
+            std::string::npos);
+}
+
+TEST(Yaml, RefusesTooLongAText) {
+  const auto text = [](std::size_t size) { return "a: " + std::string(size, '1') + "x\n"; };
+  EXPECT_EQ(errorOf(text(4095)), "none");
+  EXPECT_EQ(errorOf(text(4096)),
+            "axis.yaml:1:4: a text of 4097 characters is too long, at most 4096 are allowed");
+}
+
+TEST(Yaml, RefusesTooLargeAFileAndReadsNoMoreOfIt) {
+  EXPECT_EQ(errorOf(std::string((1U << 20U) + 1, '\n')),
+            "axis.yaml: is larger than 1048576 bytes, the most that a configuration may have");
+  EXPECT_EQ(errorOf(std::string(1U << 20U, '\n')), "none");
+  try {
+    load("/dev/zero");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "/dev/zero: is larger than 1048576 bytes, the most that a configuration may have");
+  }
+}
+
+TEST(Yaml, ForgesNoLineOfAMessage) {
+  EXPECT_EQ(errorOf("\"x\\ny\": 1\n\"x\\ny\": 2\n"), "axis.yaml:2:1: the key x\\ny occurs twice");
+}
+
 TEST(Yaml, OfAnEmptyFileIsAnEmptyMap) {
   for (const char* text : {"", "# nothing\n", "---\n"}) {
     const ConfigValue tree = parse(text, "text");

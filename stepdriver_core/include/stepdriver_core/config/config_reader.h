@@ -72,6 +72,8 @@ class ConfigReader {
   std::optional<int> findOneOf(const std::string& key, const std::vector<int>& allowed,
                                Presence presence);
   std::optional<bool> findBoolean(const std::string& key, Presence presence);
+  /// A text with control characters is an issue: it could forge a line of a log.
+  ///
   /// @param wanted describes the required text, for messages.
   std::optional<std::string> findText(const std::string& key, Presence presence,
                                       const std::string& wanted = "a string");

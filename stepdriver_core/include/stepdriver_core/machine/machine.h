@@ -32,7 +32,8 @@ struct MachineOptions {
   double write_timeout = 0.5;  ///< [s]
   /// An input that does what Machine::emergencyStop() does, if it becomes active or can't be read.
   std::optional<config::InputSwitch> emergency_stop{};
-  /// Absolute path of the file that keeps positions across a restart; empty: no file.
+  /// Absolute path of the file that keeps positions across a restart; empty: no file. A position
+  /// in it that Axis::setPosition() would refuse isn't restored.
   std::string state_file{};
   /// Held open on a real clock to keep the processors awake, see pulse::kCpuLatencyDevice; empty:
   /// they may sleep.
@@ -151,7 +152,10 @@ class Machine {
   void recover();
 
   /// Refuses every command from now on, decelerates, and disables the axes that are configured so.
-  /// Returns when that is done. @throw Error if a line can't be written; all others are written.
+  /// Returns when that is done.
+  ///
+  /// @throw Error if a line can't be written; all others are written.
+  /// @throw StateFileError if all lines were written, but not the state file.
   void shutdown();
 
   /// What the pulse engine has done so far.

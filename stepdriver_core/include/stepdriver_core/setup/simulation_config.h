@@ -41,8 +41,10 @@ struct SimulatedAxis {
 
 /// The configuration of the simulated rig.
 struct SimulationConfig {
-  double speed = 1.0;           ///< seconds of the rig per second; 0: as fast as possible
-  std::string trace;            ///< path of the VCD file; empty: no trace
+  double speed = 1.0;  ///< seconds of the rig per second; 0: as fast as possible
+  std::string trace;   ///< path of the VCD file; empty: no trace
+  /// It may replace a file that isn't a trace.
+  bool trace_overwrites_any_file = false;
   bool emergency_stop = false;  ///< its button is pressed at the start
   std::map<std::string, SimulatedAxis> axes;
 };
@@ -53,6 +55,7 @@ struct SimulationConfig {
 /// simulation:
 ///   speed: 1.0                   # seconds of the rig per second; 0: as fast as possible
 ///   trace: /tmp/axis.vcd         # path of the pin trace; default: no trace
+///   trace_overwrites_any_file: false  # true: also one that isn't a trace
 ///   emergency_stop: false        # true: the emergency-stop button is pressed at the start
 ///   axes:
 ///     x:                         # `deg` instead of `mm` on a rotary axis

@@ -151,7 +151,7 @@ class Rig : public gpio::Board {
 
   /// Makes the trace readable up to its last edge while the rig lives.
   ///
-  /// @throw Error if the trace can't be written.
+  /// @throw Error if the trace is incomplete because it couldn't be written; it names the reason.
   void flushTrace();
 
   int lineIndex(const std::string& line) override;

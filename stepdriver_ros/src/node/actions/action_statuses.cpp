@@ -1,20 +1,11 @@
 #include "action_statuses.h"
 
-#include <string>
 #include <utility>
 
 namespace stepdriver::ros_node {
-namespace {
 
-constexpr double kDefaultFrequency = 5.0;  // [Hz] that of actionlib
-
-}  // namespace
-
-ActionStatuses::ActionStatuses(const ros::NodeHandle& node) {
-  double frequency = kDefaultFrequency;
-  std::string name;
-  if (node.searchParam("actionlib_status_frequency", name)) node.getParam(name, frequency);
-  if (frequency <= 0.0) return;
+ActionStatuses::ActionStatuses(const ros::NodeHandle& node, double frequency) {
+  if (frequency == 0.0) return;
   timer_ = node.createSteadyTimer(
       ros::WallDuration(1.0 / frequency),
       [this](const ros::SteadyTimerEvent& /*event*/) { publish(); }, false);

@@ -13,9 +13,9 @@ namespace stepdriver::ros_node {
 /// servers, a node with many axes would never sleep.
 class ActionStatuses {
  public:
-  /// @param node a handle with the queue that publishes them. The parameter
-  ///   `actionlib_status_frequency` above the actions' names sets the rate; the default is 5 Hz.
-  explicit ActionStatuses(const ros::NodeHandle& node);
+  /// @param node a handle with the queue that publishes them.
+  /// @param frequency [Hz]; 0: never.
+  ActionStatuses(const ros::NodeHandle& node, double frequency);
   ActionStatuses(const ActionStatuses&) = delete;
   ActionStatuses& operator=(const ActionStatuses&) = delete;
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <utility>
 
 #include "axis_diagnostics.h"
 #include "engine_diagnostics.h"
@@ -18,6 +19,7 @@ const ros::WallDuration kPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 constexpr const char* kMasterName = "ROS master";
 constexpr const char* kDescriptorsName = "file descriptors";
+constexpr const char* kStateFileName = "state file";
 
 /// For the current limits, and for the current motions.
 void readRates(const machine::Machine& machine, EngineReading& reading) {
@@ -38,11 +40,12 @@ void readRates(const machine::Machine& machine, EngineReading& reading) {
 Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
                          const machine::Machine& machine, CallQueues& queues,
                          const MasterWatch& master, const DescriptorWatch& descriptors,
-                         const std::string& hardware_id, double max_lateness)
+                         const std::string& hardware_id, const NodeConfig& config)
     : machine_(machine),
       master_(master),
       descriptors_(descriptors),
-      max_lateness_(max_lateness),
+      max_lateness_(config.max_lateness),
+      state_file_(config.state_file),
       updater_(node, private_node) {
   updater_.setHardwareID(hardware_id);
   for (const auto& axis : machine.axes()) {
@@ -51,6 +54,9 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   updater_.add(kEngineName, [this](Status& status) { tellEngine(status); });
   updater_.add(kMasterName, [this](Status& status) { tellMaster(status); });
   updater_.add(kDescriptorsName, [this](Status& status) { tellDescriptors(status); });
+  if (!state_file_.empty()) {
+    updater_.add(kStateFileName, [this](Status& status) { tellStateFile(status); });
+  }
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
       kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); }, false);
@@ -100,6 +106,16 @@ void Diagnostics::tellDescriptors(Status& status) const {
   status.add("in use", figures.open);
   status.add("limit", figures.limit);
   status.add("idle connections ended", figures.ended);
+}
+
+void Diagnostics::tellStateFile(Status& status) const {
+  const std::string error = machine_.stateFileError();
+  if (error.empty()) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "written");
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, error);
+  }
+  status.add("file", state_file_);
 }
 
 std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/node_config.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
 #include "node/master/master_watch.h"
@@ -17,17 +18,16 @@
 namespace stepdriver::ros_node {
 
 /// The topic /diagnostics at 1 Hz: a status for each axis, and one each for the pulse engine, the
-/// ROS master and the file descriptors.
+/// state file if there is one, the ROS master and the file descriptors.
 class Diagnostics {
  public:
   /// @param node, private_node handles of the node, and of its private names.
   /// @param machine, queues, master, descriptors outlive the diagnostics.
   /// @param hardware_id name of the hardware.
-  /// @param max_lateness [s] MachineOptions::max_lateness
   Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
               const machine::Machine& machine, CallQueues& queues, const MasterWatch& master,
               const DescriptorWatch& descriptors, const std::string& hardware_id,
-              double max_lateness);
+              const NodeConfig& config);
   Diagnostics(const Diagnostics&) = delete;
   Diagnostics& operator=(const Diagnostics&) = delete;
 
@@ -38,11 +38,13 @@ class Diagnostics {
   void tellEngine(Status& status);
   void tellMaster(Status& status) const;
   void tellDescriptors(Status& status) const;
+  void tellStateFile(Status& status) const;
 
   const machine::Machine& machine_;
   const MasterWatch& master_;
   const DescriptorWatch& descriptors_;
   const double max_lateness_;
+  const std::string state_file_;
   std::uint64_t slips_before_ = 0;  // for the timer only
   diagnostic_updater::Updater updater_;
   ros::SteadyTimer timer_;

@@ -16,6 +16,7 @@
 #include "node/calls/bounded.h"
 #include "node/line_request.h"
 #include "respond.h"
+#include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::ros_node {
@@ -55,8 +56,13 @@ std::string kindsText(const sim::RigAxisReport& report) {
 }
 
 RigReport::Response reportOf(setup::Simulation& simulation) {
-  simulation.rig().flushTrace();
   RigReport::Response response;
+  try {
+    simulation.rig().flushTrace();
+  } catch (const Error& error) {
+    ROS_WARN_THROTTLE_NAMED(60.0, "rig", "%s", error.what());
+    response.trace_error = error.what();
+  }
   for (const config::AxisConfig& axis : simulation.axes()) {
     const sim::RigAxisReport report = simulation.rig().report(axis.name);
     response.name.push_back(axis.name);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/text.h"
+#include "stepdriver_core/printable.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -75,8 +76,8 @@ std::vector<std::string> axesOf(const std::vector<std::string>& joints, const Ax
   for (const std::string& joint : joints) {
     const auto axis = axes.find(joint);
     if (axis == axes.end()) {
-      throw BadTrajectory(Kind::kJoints,
-                          fmt::format("there is no joint {}; there are {}", joint, namesOf(axes)));
+      throw BadTrajectory(Kind::kJoints, fmt::format("there is no joint {}; there are {}",
+                                                     printable(joint), namesOf(axes)));
     }
     if (std::find(found.begin(), found.end(), axis->second) != found.end()) {
       throw BadTrajectory(Kind::kJoints, "the joint " + joint + " is named twice");
