@@ -18,9 +18,10 @@ Installs missing packages, builds, and runs the named parts; all of them by defa
           with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
           (test/kernel), with each libgpiod of this Debian; includes --core
-  --ros   the catkin package, its rostests, its install space with all commands and the service, a
-          package that depends on it, and the trace of a move, read by sigrok-cli; the commands of the
-          pages; with --kernel also the whole node on that kernel's GPIO chips
+  --ros   the catkin package, its rostests, its install space with all commands and the service, which
+          other computers can reach the node, a package that depends on it, and the trace of a move, read
+          by sigrok-cli; the commands of the pages; with --kernel also the whole node on that kernel's
+          GPIO chips
   --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
           ThreadSanitizer; a node with each of them in a storm of requests
 
@@ -300,6 +301,12 @@ check_operations() {
   bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
+# Who can reach the node: the loopback, ssh and the firewall of docs/security.md.
+check_fences() {
+  use_ros "$build/install"
+  bash "$src/test/operations/fences_test.sh" "$build/install"
+}
+
 # A catkin package that depends on the installed package.
 check_dependent() {
   use_ros "$build/install"
@@ -432,6 +439,7 @@ if wants ros; then
   stage install check_install node-build
   stage dependent check_dependent install
   stage operations check_operations install
+  stage fences check_fences install
   stage trace check_trace install
   stage docs check_docs install
 fi
