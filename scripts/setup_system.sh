@@ -12,7 +12,7 @@ realtime and the user stepdriver, and installs
   /etc/sysusers.d/stepdriver.conf             these groups and the user
   /etc/udev/rules.d/60-stepdriver-gpio.rules  gives /dev/gpiochip* to the group gpio, and
                                               /dev/cpu_dma_latency to the group realtime
-  /etc/security/limits.d/stepdriver.conf      real-time scheduling for the group realtime
+  /etc/security/limits.d/stepdriver.conf      the limits of the pulse thread for the group realtime
   /etc/systemd/system/stepdriver.service      the node, with the parameters of
                                               /etc/stepdriver/axes.yaml
   /etc/systemd/system/stepdriver-roscore.service  a ROS master, for a machine without one

@@ -11,16 +11,17 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize]
 Installs missing packages, builds, and runs the named parts; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
-          headers; the links of the pages, and the files that they name; the English of pages and
-          comments
+          headers; the keys of package.xml; the links of the pages, and the files that they name; the
+          English of pages and comments
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that use
           the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
           with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
           (test/kernel), with each libgpiod of this Debian; includes --core
-  --ros   the catkin package, its rostests, its install space with all commands and the service, a
-          package that depends on it, and the trace of a move, read by sigrok-cli; the commands of the
-          pages; with --kernel also the whole node on that kernel's GPIO chips
+  --ros   the catkin package, its rostests, its install space with all commands and the service, which
+          other computers can reach the node, a package that depends on it, and the trace of a move, read
+          by sigrok-cli; the commands of the pages; with --kernel also the whole node on that kernel's
+          GPIO chips
   --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
           ThreadSanitizer; a node with each of them in a storm of requests
 
@@ -101,6 +102,7 @@ check_shell() {
     test/operations/*.sh .ci/run)
 }
 
+check_packages() { /usr/bin/python3 -B "$root/test/docs/packages_test.py"; }
 check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
 check_prose() {
   local status=0
@@ -299,6 +301,12 @@ check_operations() {
   bash "$src/test/operations/operations_test.sh" "$build/install"
 }
 
+# Who can reach the node: the loopback, ssh and the firewall of docs/security.md.
+check_fences() {
+  use_ros "$build/install"
+  bash "$src/test/operations/fences_test.sh" "$build/install"
+}
+
 # A catkin package that depends on the installed package.
 check_dependent() {
   use_ros "$build/install"
@@ -393,6 +401,7 @@ strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
 if wants lint; then
   stage shell check_shell
   stage doxygen check_doxygen
+  stage packages check_packages
   stage links check_links
   stage prose check_prose
   # The format is that of Debian 12's clang; other versions format some lines differently.
@@ -430,6 +439,7 @@ if wants ros; then
   stage install check_install node-build
   stage dependent check_dependent install
   stage operations check_operations install
+  stage fences check_fences install
   stage trace check_trace install
   stage docs check_docs install
 fi

@@ -116,7 +116,7 @@ SystemFacts facts() {
   facts.user = "me";
   facts.groups = {"me", "gpio"};
   facts.chips = {{"/dev/gpiochip0", "root", "gpio", 0660, true}};
-  facts.rtprio = "98";
+  facts.rtprio = "50";
   facts.memlock = "unlimited";
   facts.rt_runtime_us = "950000";
   facts.rt_period_us = "1000000";
@@ -140,7 +140,7 @@ TEST(PermissionsText, NamesTheRemedyOnlyWhereItIsNeeded) {
 TEST(LimitsText, TellsWhatWasGrantedAndWhatTheLimitsAre) {
   const std::string good = limitsText(facts(), {0, 0, 0});
   EXPECT_TRUE(has(good, "SCHED_FIFO 50; memory locked; processors kept awake")) << good;
-  EXPECT_TRUE(has(good, "RLIMIT_RTPRIO         98\n")) << good;
+  EXPECT_TRUE(has(good, "RLIMIT_RTPRIO         50\n")) << good;
   EXPECT_TRUE(has(good, "950000 of each 1000000 us")) << good;
   EXPECT_TRUE(has(good, "PREEMPT_RT            no\n")) << good;
   SystemFacts poor = facts();

@@ -84,7 +84,7 @@ units=$machine/etc/systemd/system
 ! grep -rl '@prefix@' "$machine/etc" || fail "@prefix@ is left in these"
 
 # The limits that the node's messages recommend are the installed ones.
-for limit in '@realtime - rtprio 98' '@realtime - memlock unlimited'; do
+for limit in '@realtime - rtprio 50' '@realtime - memlock unlimited'; do
   grep -qxF -e "$limit" "$machine/etc/security/limits.d/stepdriver.conf" || fail "no limit $limit"
   grep -qF -e "$limit" "$bin/stepdriver_node" || fail "the node doesn't say $limit"
 done
@@ -100,12 +100,22 @@ grep -qF "$latency" "$bin/stepdriver_node" || fail "the node doesn't say $latenc
 for unit in stepdriver stepdriver-roscore; do
   output=$(systemd-analyze verify "$units/$unit.service" 2>&1) || fail "$unit.service: $output"
   [[ $output != *"$unit"* ]] || fail "$output"
+  # The threshold is ten times the exposure level.
+  ends 0 systemd-analyze security --no-pager --offline=true --threshold=30 "$units/$unit.service"
+  says "Overall exposure level for $unit.service"
 done
+# A new master knows nothing of the node.
+grep -qx 'PartOf=stepdriver-roscore.service' "$units/stepdriver.service" || fail "the node doesn't follow its master"
+grep -qx 'WantedBy=.* stepdriver-roscore.service' "$units/stepdriver.service" ||
+  fail "the master doesn't start the node"
 if udevadm verify --help >/dev/null 2>&1; then
   ends 0 udevadm verify --resolve-names=never "$machine/etc/udev/rules.d/60-stepdriver-gpio.rules"
 fi
 
 # ---- the service ----
+
+# It runs as systemd would run it: as an ordinary user without capabilities, with the unit's limits and
+# system calls. A refused call ends it here.
 
 # unit_values KEY [UNIT]: the values of a key of the unit.
 unit_values() { sed -n "s/^$1=-\{0,1\}//p" "$units/${2:-stepdriver}.service"; }
@@ -114,12 +124,17 @@ raised=(prlimit "--rtprio=$(unit_values LimitRTPRIO)" "--memlock=$(unit_values L
 chmod 755 "$scratch"
 mkdir -m 777 "$scratch/state"
 log_format=$(sed -n 's/^Environment="\(ROSCONSOLE_FORMAT=.*\)"$/\1/p' "$units/stepdriver.service")
-ordinary=(setpriv --reuid 65534 --regid 65534 --clear-groups env "HOME=$scratch/state"
-  "ROS_HOME=$scratch/state" "ROS_LOG_DIR=$scratch/state" "$log_format")
+ordinary=(setpriv --reuid 65534 --regid 65534 --clear-groups --bounding-set=-all --no-new-privs
+  env "HOME=$scratch/state" "ROS_HOME=$scratch/state" "ROS_LOG_DIR=$scratch/state" "$log_format")
+sandbox=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/sandbox.py
+cp "$sandbox" "$units"/*.service "$scratch"
+confined=(/usr/bin/python3 -B "$scratch/sandbox.py")
 lines_of() { unit_values "$1" | sed "s|/etc/stepdriver/|$scratch/|g"; }
 
 "${raised[@]}" true 2>/dev/null || raised=()  # a container may not
-service=("${raised[@]}" "${ordinary[@]}")
+service=("${raised[@]}" "${ordinary[@]}" "${confined[@]}" "$scratch/stepdriver.service")
+master=("${ordinary[@]}" "${confined[@]}" "$scratch/stepdriver-roscore.service")
+ends 159 "${service[@]}" unshare --user true  # SIGSYS: the service is confined
 "${service[@]}" test -x "$bin/stepdriver_node" || {
   printf 'skipped, because only root can reach %s: the service\n' "$prefix"
   exit "$((failures > 0))"
@@ -155,10 +170,10 @@ node_ends() {
   ((status == $1)) || fail "the node ended with $status, not $1: $(<"$scratch/node.log")"
 }
 
-"$prefix/env.sh" roscore -p "${ROS_MASTER_URI##*:}" >"$scratch/roscore.log" 2>&1 &
+"${master[@]}" "$prefix/env.sh" roscore -p "${ROS_MASTER_URI##*:}" >"$scratch/roscore.log" 2>&1 &
 jobs_started+=("$!")
 words_of "$(unit_values ExecStartPost stepdriver-roscore)"
-ends 0 timeout 60 "${words[@]}"
+ends 0 timeout 60 "${master[@]}" "${words[@]}"
 
 start "$scratch/wrong.yaml"
 node_ends 1
@@ -179,6 +194,9 @@ for ((i = 0; i < 600; i++)); do
   ! grep -q Ready "$scratch/node.log" || break
   sleep 0.1
 done
+ends 0 timeout 60 "$prefix/env.sh" rosservice call /stepdriver/x/enable "data: true"
+ends 0 timeout 60 "$prefix/env.sh" rosservice call /stepdriver/x/move_to "{position: 0.001, wait: true}"
+says "success: True"
 kill -TERM "$node" 2>/dev/null || true
 node_ends 0
 grep -q '\[ *INFO\] Ending on SIGTERM' "$scratch/node.log" ||

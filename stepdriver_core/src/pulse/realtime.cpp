@@ -83,10 +83,11 @@ int lockMemory() {
 
 std::string RealtimeRights::text() const {
   if (scheduler_error < 0) return "real-time rights are not needed: the clock is virtual";
+  static_assert(kRealtimePriority == 50, "the limit below allows that priority, and no higher one");
   std::string text = scheduler_error == 0
                          ? fmt::format("SCHED_FIFO {}", kRealtimePriority)
                          : fmt::format(
-                               "SCHED_FIFO refused ({}): `@realtime - rtprio 98` in "
+                               "SCHED_FIFO refused ({}): `@realtime - rtprio 50` in "
                                "/etc/security/limits.d allows it to the group realtime",
                                std::strerror(scheduler_error));
   text += memory_error == 0 ? "; memory locked"

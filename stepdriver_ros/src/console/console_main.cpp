@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/end_requests.h"
+#include "common/loopback_only.h"
 #include "common/node_start.h"
 #include "console.h"
 #include "driver_parameters.h"
@@ -41,6 +42,7 @@ void findDriver(const std::string& driver) {
 
 int run(const Options& options, EndRequests& end_requests) {
   const ros::NodeHandle node;
+  ros_node::closeToOtherComputers();
   end_requests.takeOverShutdownCall();
   try {
     std::string why;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/end_requests.h"
+#include "common/loopback_only.h"
 #include "common/node_start.h"
 #include "common/xmlrpc_value.h"
 #include "driver_axes.h"
@@ -83,6 +84,7 @@ int run(EndRequests& end_requests) {
     std::string driver;
     const JoystickConfig config = readParameters(driver);
     node.emplace();
+    ros_node::closeToOtherComputers();
     end_requests.takeOverShutdownCall();
     warnOfTooLowRate(driver, config.rate);
     Joystick joystick(*node, driver, config);

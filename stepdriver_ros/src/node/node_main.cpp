@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/end_requests.h"
+#include "common/loopback_only.h"
 #include "common/node_start.h"
 #include "node/actions/action_statuses.h"
 #include "node/actions/homing_action.h"
@@ -244,6 +245,7 @@ int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
   // everything has been logged.
   const ros::NodeHandle node;
   const ros::NodeHandle private_node("~");
+  closeToOtherComputers();
   end_requests.takeOverShutdownCall();
   try {
     return run(parameters, node, private_node, end_requests);

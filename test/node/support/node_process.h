@@ -26,6 +26,7 @@ class NodeProcess {
   NodeProcess(const NodeProcess&) = delete;
   NodeProcess& operator=(const NodeProcess&) = delete;
 
+  pid_t pid() const { return pid_; }
   void signal(int number) const;
 
   /// @return the exit code, or 128 + the signal's number if a signal ended it; no value if it is

@@ -23,6 +23,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "common/loopback_only.h"
+
 namespace stepdriver::ros_node {
 namespace {
 
@@ -45,13 +47,6 @@ Descriptor makeEvent() {
   return event;
 }
 
-/// Asks roscpp whether ROS_IP or ROS_HOSTNAME lets only this computer in.
-class OnlyLocalhost : public ros::TransportTCP {
- public:
-  OnlyLocalhost() : TransportTCP(nullptr) {}
-  bool isWanted() const { return isOnlyLocalhostAllowed(); }
-};
-
 union Address {
   sockaddr any;
   sockaddr_in v4;
@@ -59,7 +54,7 @@ union Address {
 };
 
 Descriptor listenAtAnyPort() {
-  const bool only_localhost = OnlyLocalhost().isWanted();
+  const bool only_localhost = onlyThisComputerMayCall();
   Address address{};
   socklen_t size = 0;
   if (ros::TransportTCP::s_use_ipv6_) {

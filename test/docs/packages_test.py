@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""Checks package.xml: rosdep must know each key, and scripts/packages.txt must have its Debian package.
+
+usage: test/docs/packages_test.py
+
+Exit code 0: they agree; 1: otherwise. The table below is from rosdep's base.yaml and python.yaml. A new
+dependency needs a line here, with the package of its rule for Debian 12. A key like
+libboost-program-options, whose rules end with Debian 11, is refused.
+"""
+
+import re
+import sys
+import xml.etree.ElementTree as xml
+
+import pages
+
+# rosdep's key: the package of its rule for Debian 12.
+SYSTEM_KEYS = {
+    "doxygen": "doxygen",
+    "fmt": "libfmt-dev",
+    "libboost-program-options-dev": "libboost-program-options-dev",
+    "libgpiod-dev": "libgpiod-dev",
+    "libncurses-dev": "libncurses-dev",
+    "liburdfdom-dev": "liburdfdom-dev",
+    "python3-matplotlib": "python3-matplotlib",
+    "python3-yaml": "python3-yaml",
+    "tmux": "tmux",
+    "yaml-cpp": "libyaml-cpp-dev",
+}
+# Packages of noetic/distribution.yaml: their names are keys.
+ROS_KEYS = set(
+    "actionlib actionlib_msgs catkin diagnostic_msgs diagnostic_updater geometry_msgs message_generation "
+    "message_runtime robot_state_publisher rosbag roscpp rosgraph rosgraph_msgs roslaunch rosparam rospy "
+    "rostest rviz sensor_msgs std_msgs std_srvs trajectory_msgs visualization_msgs".split()
+)
+# Needed by an installed program, but rosdep has no key for them: docs/first_programs.md names them.
+WITHOUT_KEY = {"python3-svgelements"}
+
+
+def problems():
+    keys = {
+        element.text.strip()
+        for element in xml.fromstring(pages.text_of("package.xml"))
+        if element.tag.endswith("depend")
+    }
+    for key in sorted(keys - SYSTEM_KEYS.keys() - ROS_KEYS):
+        yield f"package.xml: {key} isn't in the table of keys that rosdep knows for Debian 12"
+    for key in sorted((SYSTEM_KEYS.keys() | ROS_KEYS) - keys):
+        yield f"{key} is in the table of keys, but not in package.xml"
+    listed = set(re.findall(r"^[a-z][^ \n]*", pages.text_of("scripts/packages.txt"), re.MULTILINE))
+    for package in sorted((set(SYSTEM_KEYS.values()) | WITHOUT_KEY) - listed):
+        yield f"scripts/packages.txt: {package} is missing"
+    page = pages.text_of("docs/first_programs.md")
+    for package in sorted(WITHOUT_KEY):
+        if f"`{package}`" not in page:
+            yield f"docs/first_programs.md doesn't say that rosdep has no key for {package}"
+
+
+found = list(problems())
+for problem in found:
+    print(problem)
+sys.exit(1 if found else 0)
