@@ -22,7 +22,7 @@ TEST(TrajectoryAtTheEnd, IsTheClientToldOfByTheThreadThatEndsTheNode) {
   const ros::NodeHandle node("trajectory_end");
   test::Bench bench({test::linearAxis("x")});
   ros_node::CallQueues queues(1);  // without threads
-  ros_node::ActionStatuses statuses(node);
+  ros_node::ActionStatuses statuses(node, 5.0);
   ros_node::TrajectoryAction action(node, *bench.machine, queues, statuses);
   TrajectoryClient client(node.resolveName("follow_joint_trajectory"), false);
   const auto serve_until = [&](const auto& condition) {

@@ -171,7 +171,7 @@ class Judge {
     const std::int64_t begin = std::max(motion.sent, earliest);
     // A line that didn't begin may have moved its axes to take up their backlash.
     if (motion.answered && (motion.waits || !motion.success)) {
-      const std::int64_t end = *motion.answered + longestStop(motion, axis);
+      const std::int64_t end = *motion.answered + longestStop(motion, axis, *motion.answered);
       return {mayBegin(begin), end - seen_.clock_offset + kOffsetError};
     }
     return {mayBegin(begin), kForever};
@@ -227,7 +227,8 @@ class Judge {
     return explained;
   }
 
-  std::int64_t longestStop(const Request& ending, std::size_t axis) const {
+  /// From this time on.
+  std::int64_t longestStop(const Request& ending, std::size_t axis, std::int64_t begin) const {
     double seconds = 0.0;
     // Axes that move together stop as slowly as the slowest of them.
     for (const AxisFacts& facts : seen_.axes) seconds = std::max(seconds, facts.longest_stop);
@@ -235,12 +236,35 @@ class Judge {
     const auto recent = std::lower_bound(trajectories.begin(), trajectories.end(),
                                          ending.sent - kLongestTrajectory);
     if (recent != trajectories.end() && *recent <= *ending.answered) seconds *= kTrajectoryStops;
-    return std::llround(seconds * kStopMargin * 1e9);
+    const std::int64_t longest = std::llround(seconds * kStopMargin * 1e9);
+    // What is late in a stall, and all that comes after it, is late by as much.
+    std::int64_t late = 0;
+    for (;;) {
+      const std::int64_t more = stalls_.between(begin - kLag, begin + longest + late);
+      if (more == late) return longest + late;
+      late = more;
+    }
+  }
+
+  /// How many pulses came in each tenth of a second around an ending, and the stalls there.
+  std::string courseAround(std::int64_t answered, std::size_t axis, std::int64_t last) const {
+    constexpr std::int64_t kTenth = 100 * kMillisecond;
+    std::string text = "pulses in each 0.1 s from 0.5 s before the answer on:";
+    const auto& pulses = seen_.pulses[axis];
+    for (std::int64_t from = answered - 5 * kTenth; from <= last; from += kTenth) {
+      const auto count = std::count_if(pulses.begin(), pulses.end(), [from](const Pulse& pulse) {
+        return pulse.time >= from && pulse.time < from + kTenth;
+      });
+      text += ' ' + std::to_string(count);
+    }
+    const std::int64_t stalled =
+        stalls_.between(answered + seen_.clock_offset - 5 * kTenth, last + seen_.clock_offset);
+    return text + "; stalled for " + formatted("%.3f s", inSeconds(stalled));
   }
 
   void judgeEnd(const Request& ending, std::size_t axis) {
     const bool decelerates = ending.kind == Kind::kStop || ending.kind == Kind::kHold;
-    const std::int64_t allowed = decelerates ? longestStop(ending, axis) : 0;
+    const std::int64_t allowed = decelerates ? longestStop(ending, axis, *ending.answered) : 0;
     const std::int64_t begin = *ending.answered - seen_.clock_offset + kOffsetError + allowed;
     const auto [end, passing] = explainedAfter(ending, axis);
     std::size_t count = 0;
@@ -260,12 +284,13 @@ class Judge {
     }
     if (count == 0) return;
     const std::int64_t answered = *ending.answered - seen_.clock_offset;
-    broken_.push_back(
-        seen_.axes[axis].name + ": " + std::to_string(count) + " pulses after the answer of " +
-        ending.text + ", from " + formatted("%.3f s", inSeconds(first - answered)) + " to " +
-        formatted("%.3f s", inSeconds(last - answered)) + " after it (" +
-        formatted("%.3f s", inSeconds(allowed)) + " are allowed); requests before and after it:" +
-        requestsAround(ending.sent, first + seen_.clock_offset));
+    broken_.push_back(seen_.axes[axis].name + ": " + std::to_string(count) +
+                      " pulses after the answer of " + ending.text + ", from " +
+                      formatted("%.3f s", inSeconds(first - answered)) + " to " +
+                      formatted("%.3f s", inSeconds(last - answered)) + " after it (" +
+                      formatted("%.3f s", inSeconds(allowed)) + " are allowed); " +
+                      courseAround(answered, axis, last) + "; requests before and after it:" +
+                      requestsAround(ending.sent, first + seen_.clock_offset));
   }
 
   std::string requestsAround(std::int64_t begin, std::int64_t end) const {
