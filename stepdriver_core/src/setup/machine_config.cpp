@@ -23,8 +23,8 @@ constexpr double kLongestTimeoutMs = 60'000.0;
 const std::vector<std::string> kPolicies = {"warn", "enforce"};
 
 /// Keys of a configuration that only the ROS node uses.
-constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout", "urdf_limits",
-                                     "hardware_id", "publish_clock", "on_master_lost"};
+constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout",   "urdf_limits",
+                                     "hardware_id",      "publish_clock", "on_master_lost"};
 
 void readGpio(ConfigReader gpio, MachineConfig& config) {
   const std::string backend = gpio.oneOf("backend", {"simulated", "libgpiod"});

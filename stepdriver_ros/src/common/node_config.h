@@ -11,12 +11,12 @@ namespace stepdriver::ros_node {
 
 /// All parameters of the node: those of its machine, and its own.
 struct NodeConfig : setup::MachineConfig {
-  double joint_state_rate = 50.0;  ///< [Hz]
-  double jog_timeout = 0.5;        ///< [s] without a jog message until the axis comes to rest
-  bool urdf_limits = true;         ///< the limits of robot_description apply as well
-  bool publish_clock = false;      ///< the time of the simulated rig on /clock
+  double joint_state_rate = 50.0;    ///< [Hz]
+  double jog_timeout = 0.5;          ///< [s] without a jog message until the axis comes to rest
+  bool urdf_limits = true;           ///< the limits of robot_description apply as well
+  bool publish_clock = false;        ///< the time of the simulated rig on /clock
   bool stop_on_master_lost = false;  ///< if the ROS master doesn't answer, all axes come to rest
-  std::string hardware_id;         ///< for diagnostics; empty: made from the other facts
+  std::string hardware_id;           ///< for diagnostics; empty: made from the other facts
 };
 
 /// Reads the node's private parameters: in addition to those of setup::readMachineConfig()
