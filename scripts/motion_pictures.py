@@ -31,8 +31,9 @@ class Trace:
         return StepCurve.of_counts(*self.steps[axis])
 
 
-def draw(folder, picture, curves, what, width=6.4):
-    """curves: (trace, axis, label) for each; what: the quantities, each of which gets a panel."""
+def draw(folder, picture, curves, what, width=6.4, phases=(), levels=()):
+    """curves: (trace, axis, label) for each; what: the quantities, each of which gets a panel;
+    phases: (begin [s], end [s], name) for each; levels: (speed [steps/s], name) for each."""
     figure, panels = plt.subplots(len(what), 1, sharex=True, squeeze=False,
                                   figsize=(width, 0.5 + 1.35 * len(what)))
     for quantity, panel in zip(what, panels[:, 0]):
@@ -44,6 +45,16 @@ def draw(folder, picture, curves, what, width=6.4):
             if panel is panels[0, 0]:
                 panel.annotate(words, (time, 1.0), xycoords=("data", "axes fraction"),
                                xytext=(2, 1), textcoords="offset points", color="#555555")
+        for begin, end, name in phases:
+            panel.axvline(end, color="#888888", linewidth=0.8, linestyle=":")
+            if panel is panels[0, 0]:
+                panel.annotate(name, ((begin + end) / 2, 1.0), xycoords=("data", "axes fraction"),
+                               xytext=(0, 2), textcoords="offset points", ha="center",
+                               color="#555555")
+        for speed, name in levels if quantity == "speed" else ():
+            panel.axhline(speed, color="#888888", linewidth=0.8, linestyle="--")
+            panel.annotate(name, (0.62, speed), xycoords=("axes fraction", "data"),
+                           xytext=(0, 2), textcoords="offset points", ha="center", color="#555555")
         if quantity == "speed" and min(panel.dataLim.intervaly) >= 0.0:
             panel.set_ylim(bottom=0.0)
         panel.set_ylabel(f"{quantity}\n[{UNITS[quantity]}]")
@@ -104,8 +115,14 @@ def main(traces, pictures):
 
     draw_half_steps(pictures, trace("half_steps"))
     draw(pictures, "trapezoid", one("trapezoid", label="1000 steps") +
-         one("triangle", label="200 steps"), ["position", "speed"])
-    draw(pictures, "s_curve", one("s_curve"), ["position", "speed", "acceleration"])
+         one("triangle", label="200 steps"), ["position", "speed"],
+         phases=[(0.0, 0.45, "acceleration"), (0.45, 1.07875, "cruise"),
+                 (1.07875, 1.30375, "deceleration")],
+         levels=[(100.0, "start speed"), (1000.0, "max speed")])
+    ends = [0.0, 0.1, 0.5, 0.6, 1.0, 1.1, 1.5, 1.6]
+    draw(pictures, "s_curve", one("s_curve"), ["position", "speed", "acceleration"],
+         phases=[(begin, end, str(i + 1)) for i, (begin, end) in enumerate(zip(ends, ends[1:]))],
+         levels=[(1000.0, "max speed")])
     draw(pictures, "speed_override", one("speed_override"), ["position", "speed"])
     draw(pictures, "new_target", one("new_target"), ["position", "speed"])
     draw(pictures, "stop", one("stop"), ["position", "speed"])
