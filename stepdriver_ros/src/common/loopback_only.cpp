@@ -1,6 +1,5 @@
 #include "loopback_only.h"
 
-#include <netinet/in.h>
 #include <ros/console.h>
 #include <ros/network.h>
 #include <ros/transport/transport_tcp.h>
@@ -13,6 +12,8 @@
 #include <cstring>
 #include <filesystem>
 #include <string>
+
+#include "common/socket_address.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -27,23 +28,13 @@ class Transport : public ros::TransportTCP {
   bool isOnlyLocal() const { return isOnlyLocalhostAllowed(); }
 };
 
-union Address {
-  sockaddr any;
-  sockaddr_in v4;
-  sockaddr_in6 v6;
-};
-
 bool listensOn(int socket, std::uint16_t port) {
   int listens = 0;
   socklen_t size = sizeof(listens);
   if (getsockopt(socket, SOL_SOCKET, SO_ACCEPTCONN, &listens, &size) != 0 || listens == 0) {
     return false;
   }
-  Address address{};
-  size = sizeof(address);
-  if (getsockname(socket, &address.any, &size) != 0) return false;
-  if (address.any.sa_family == AF_INET6) return ntohs(address.v6.sin6_port) == port;
-  return address.any.sa_family == AF_INET && ntohs(address.v4.sin_port) == port;
+  return portOf(socket) == port;
 }
 
 /// The socket of roscpp's XML-RPC server. roscpp doesn't tell it, only its port.

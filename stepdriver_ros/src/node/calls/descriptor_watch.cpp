@@ -2,7 +2,6 @@
 
 #include <dirent.h>
 #include <linux/tcp.h>
-#include <netinet/in.h>
 #include <ros/connection_manager.h>
 #include <ros/console.h>
 #include <ros/xmlrpc_manager.h>
@@ -15,6 +14,8 @@
 #include <cstdlib>
 #include <optional>
 #include <system_error>
+
+#include "common/socket_address.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -40,20 +41,6 @@ void raiseLimit() {
   if (limit.rlim_cur >= wanted) return;
   limit.rlim_cur = wanted;
   setrlimit(RLIMIT_NOFILE, &limit);
-}
-
-/// @return the port of a socket's own end; 0: it isn't a socket with a port.
-std::uint16_t portOf(int descriptor) {
-  union {
-    sockaddr any;
-    sockaddr_in v4;
-    sockaddr_in6 v6;
-  } address{};
-  socklen_t size = sizeof(address);
-  if (getsockname(descriptor, &address.any, &size) != 0) return 0;
-  if (address.any.sa_family == AF_INET) return ntohs(address.v4.sin_port);
-  if (address.any.sa_family == AF_INET6) return ntohs(address.v6.sin6_port);
-  return 0;
 }
 
 struct Connection {

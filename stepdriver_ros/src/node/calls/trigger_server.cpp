@@ -1,7 +1,6 @@
 #include "trigger_server.h"
 
 #include <fcntl.h>
-#include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <pthread.h>
 #include <ros/console.h>
@@ -24,6 +23,7 @@
 #include <system_error>
 
 #include "common/loopback_only.h"
+#include "common/socket_address.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -47,15 +47,9 @@ Descriptor makeEvent() {
   return event;
 }
 
-union Address {
-  sockaddr any;
-  sockaddr_in v4;
-  sockaddr_in6 v6;
-};
-
 Descriptor listenAtAnyPort() {
   const bool only_localhost = onlyThisComputerMayCall();
-  Address address{};
+  SocketAddress address{};
   socklen_t size = 0;
   if (ros::TransportTCP::s_use_ipv6_) {
     address.v6.sin6_family = AF_INET6;
@@ -75,12 +69,7 @@ Descriptor listenAtAnyPort() {
 }
 
 std::string uriOf(const Descriptor& listening) {
-  Address address{};
-  socklen_t size = sizeof(address);
-  if (getsockname(listening.number(), &address.any, &size) != 0) fail("getsockname");
-  const in_port_t port =
-      address.any.sa_family == AF_INET6 ? address.v6.sin6_port : address.v4.sin_port;
-  return "rosrpc://" + ros::network::getHost() + ":" + std::to_string(ntohs(port));
+  return "rosrpc://" + ros::network::getHost() + ":" + std::to_string(portOf(listening.number()));
 }
 
 /// Tells the master of a service, or that it has ended.
