@@ -11,8 +11,8 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize]
 Installs missing packages, builds, and runs the named parts; all of them by default.
 
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
-          headers; the keys of package.xml; the links of the pages, and the files that they name; the
-          English of pages and comments
+          headers; the keys of package.xml; the links of the pages, and the files that they name; the tests
+          that docs/reliability.md names; the English of pages and comments
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that use
           the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
           with this build
@@ -104,6 +104,7 @@ check_shell() {
 
 check_packages() { /usr/bin/python3 -B "$root/test/docs/packages_test.py"; }
 check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
+check_reliability() { /usr/bin/python3 -B "$root/test/docs/reliability_test.py"; }
 check_prose() {
   local status=0
   own_files | (cd "$root" && xargs -d '\n' codespell --ignore-words=test/docs/spelling.txt) || status=1
@@ -403,6 +404,7 @@ if wants lint; then
   stage doxygen check_doxygen
   stage packages check_packages
   stage links check_links
+  stage reliability check_reliability
   stage prose check_prose
   # The format is that of Debian 12's clang; other versions format some lines differently.
   if [[ $(clang-format --version) == *' 14.'* ]]; then
