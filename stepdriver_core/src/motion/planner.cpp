@@ -100,8 +100,11 @@ Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimit
   const MotionBuilder motion(state, limits);
   const MotionLimits slower = stopping(motion, limits);
   const std::int64_t rest = motion.nextRest(limits);
-  const bool forwards = motion.heading(limits) > 0.0;
-  if (not_beyond && (forwards ? *not_beyond < rest : *not_beyond > rest)) {
+  const double heading = motion.heading(limits);
+  // A motion that still decelerates hard may turn before it rests, and then leaves what is ahead.
+  const bool ahead =
+      not_beyond && heading * (fromInteger(*not_beyond) - motion.position()).hi >= 0.0;
+  if (ahead && heading * static_cast<double>(rest - *not_beyond) > 0.0) {
     return planMove(at_ns, state, *not_beyond, slower).profile;
   }
   return fastestMove(at_ns, state, rest, slower).profile;

@@ -56,7 +56,8 @@ Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocit
 /// motion keeps its speed for less than a microstep, and then decelerates at the limit. It speeds
 /// up only from a crawl, slower than the speed that the axis reaches within a microstep.
 ///
-/// @param not_beyond a position ahead, before which the motion would have come to rest anyway.
+/// @param not_beyond a position at which the motion would have come to rest anyway. It is ignored
+///   if the stop doesn't head for it.
 Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
                  std::optional<std::int64_t> not_beyond = std::nullopt);
 

@@ -92,6 +92,33 @@ TEST_F(Hold, OfOneMovingAxisHoldsAllAndKeepsTheGoal) {
   expectFree();
 }
 
+// A move with a low jerk that takes over while the axis decelerates at the configured one turns
+// first. Whenever a stop or a hold comes, it brings the axis to rest in the time that it needs.
+TEST_F(Hold, AndStopEndAMoveThatIsAboutToTurn) {
+  for (const bool hold : {true, false}) {
+    for (int after = 1; after < 30; ++after) {
+      SCOPED_TRACE(after);
+      config::AxisConfig config = linearAxis("x", 20'000.0, 0.06, 0.3);
+      config.jerk = 3.0;
+      Bench one({config});
+      axis::Axis& x = one.axis("x");
+      x.setPosition(0.0);
+      x.setLimits({0.0, 0.0, 0.0, 0.3});
+      x.jog(0.04);
+      one.machine->advance(0.5);
+      x.stop();
+      one.machine->advance(0.01 * after);
+      const axis::Move move = x.moveTo(0.1);
+      one.machine->advance(0.007);
+      hold ? one.machine->hold() : x.stop();
+      one.machine->advance(0.45);  // 0.06/0.3 s, and 2.5 times 0.3/3 s
+      EXPECT_FALSE(x.state().moving);
+      EXPECT_EQ(x.result(move).has_value(), !hold);
+      EXPECT_EQ(violationsOf(one.report("x")), "");
+    }
+  }
+}
+
 TEST_F(Hold, OutlastsWhatDropsTheGoalThatItKeeps) {
   const std::vector<std::function<void()>> drops = {
       [this] { axis("x").stop(); },

@@ -204,6 +204,17 @@ TEST(PlanStop, ComesBackToWhatALowerDecelerationMakesItPass) {
   }
 }
 
+// After a jog that decelerates hard, a move with a lower jerk begins to turn, and is stopped.
+TEST(PlanStop, DoesNotGoToATargetFromWhichTheMotionIsTurningAway) {
+  const MotionLimits limits{0, 1000, 2000, 2000, 20000};
+  for (const double sign : {1.0, -1.0}) {
+    const MotionState from = at(0.0, sign * 50.0, sign * -2000.0);
+    const Profile stop = planStop(0, from, limits, sign > 0.0 ? 4000 : -4000);
+    EXPECT_LT(seconds(stop), 0.3);
+    expectSound(stop, from, limits, split(planStop(0, from, limits).endPosition()).whole);
+  }
+}
+
 TEST(PlanStop, EndsACrawlSoon) {
   const MotionLimits limits{0, 1000, 2000, 2000, 20000};
   EXPECT_LT(seconds(planStop(0, at(0.1, 0.01), limits)), 0.15);
