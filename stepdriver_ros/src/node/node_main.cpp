@@ -83,7 +83,7 @@ Start it with: roslaunch stepdriver axis.launch
 /// @return the exit code.
 int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
              LineAction& line_action, TrajectoryAction& trajectory_action,
-             StatePublisher& publisher) {
+             StatePublisher& publisher, EndDespiteMaster& end) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -101,7 +101,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   move_actions.tellEnded();
   line_action.tellEnded();
   trajectory_action.tellEnded();
-  endDespiteMaster(exit_code);
+  end.begin(exit_code);
   queues.finish(kLastAnswers);
   publisher.stop();
   return exit_code;
@@ -156,7 +156,7 @@ void warnOfTrace(setup::Simulation& simulation) {
 ///
 /// @return the exit code.
 int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle private_node,
-        EndRequests& end_requests) {
+        EndRequests& end_requests, EndDespiteMaster& end) {
   const NodeConfig& config = parameters.config;
   for (const std::string& note : parameters.notes) ROS_INFO_NAMED("limits", "%s", note.c_str());
   for (const std::string& text : parameters.warnings) ROS_WARN_NAMED("limits", "%s", text.c_str());
@@ -228,7 +228,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
   master_watch.stop();
   const int exit_code =
-      shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher);
+      shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher, end);
   if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
   return exit_code;
 }
@@ -241,6 +241,7 @@ int explainConfig(const ConfigError& error) {
 
 /// Registers the node and runs it. @return the exit code.
 int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
+  EndDespiteMaster end;
   // With its last handle roscpp shuts down, and so does the log: these handles live until
   // everything has been logged.
   const ros::NodeHandle node;
@@ -248,7 +249,7 @@ int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
   closeToOtherComputers();
   end_requests.takeOverShutdownCall();
   try {
-    return run(parameters, node, private_node, end_requests);
+    return run(parameters, node, private_node, end_requests, end);
   } catch (const ConfigError& error) {
     return explainConfig(error);
   } catch (const GpioError& error) {

@@ -18,15 +18,28 @@ constexpr std::chrono::milliseconds kPatience{1000};
 
 }  // namespace
 
-void endDespiteMaster(int exit_code) {
-  std::thread([exit_code] {
+EndDespiteMaster::~EndDespiteMaster() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ended_ = true;
+  }
+  change_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void EndDespiteMaster::begin(int exit_code) {
+  thread_ = std::thread([this, exit_code, name = ros::this_node::getName()] {
     XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kPatience);
-    do {
-      std::this_thread::sleep_for(kPeriod);
-    } while (master.call("getPid", ros::this_node::getName()));
-    std::fputs("The ROS master doesn't answer: the node ends without telling it\n", stderr);
-    std::_Exit(exit_code);
-  }).detach();
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!change_.wait_for(lock, kPeriod, [this] { return ended_; })) {
+      lock.unlock();
+      if (!master.call("getPid", name)) {
+        std::fputs("The ROS master doesn't answer: the node ends without telling it\n", stderr);
+        std::_Exit(exit_code);
+      }
+      lock.lock();
+    }
+  });
 }
 
 MasterWatch::MasterWatch(std::function<void()> on_lost)

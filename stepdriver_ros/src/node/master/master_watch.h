@@ -60,10 +60,24 @@ class MasterWatch {
   std::thread thread_;
 };
 
-/// Ends the process with this code, a second or more from now, if the master doesn't answer then.
-/// At its end a node tells the master so for each topic and service, and roscpp waits for ever for
-/// a master that hangs. Call it when the machine is shut down. The last answers to clients take
-/// less than a second.
-void endDespiteMaster(int exit_code);
+/// Ends the process in spite of a master that hangs: at its end a node tells the master so for each
+/// topic and service, and roscpp waits for ever for the answers. It lives until roscpp has ended.
+class EndDespiteMaster {
+ public:
+  EndDespiteMaster() = default;
+  ~EndDespiteMaster();
+  EndDespiteMaster(const EndDespiteMaster&) = delete;
+  EndDespiteMaster& operator=(const EndDespiteMaster&) = delete;
+
+  /// From now on it ends the process with this code if the master doesn't answer, a second later or
+  /// more. Call it when the machine is shut down: the last answers to clients take less than that.
+  void begin(int exit_code);
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable change_;
+  bool ended_ = false;
+  std::thread thread_;
+};
 
 }  // namespace stepdriver::ros_node
