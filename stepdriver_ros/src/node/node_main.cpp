@@ -22,6 +22,7 @@
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
 #include "node/diagnostics/diagnostics.h"
+#include "node/master/end_despite_master.h"
 #include "node/master/master_watch.h"
 #include "node/parameters/read_parameters.h"
 #include "node/services/axis_home_service.h"

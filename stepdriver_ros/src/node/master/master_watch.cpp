@@ -6,8 +6,6 @@
 #include <ros/this_node.h>
 #include <ros/xmlrpc_manager.h>
 
-#include <cstdio>
-#include <cstdlib>
 #include <utility>
 
 namespace stepdriver::ros_node {
@@ -17,30 +15,6 @@ constexpr std::chrono::milliseconds kPeriod{1000};
 constexpr std::chrono::milliseconds kPatience{1000};
 
 }  // namespace
-
-EndDespiteMaster::~EndDespiteMaster() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ended_ = true;
-  }
-  change_.notify_all();
-  if (thread_.joinable()) thread_.join();
-}
-
-void EndDespiteMaster::begin(int exit_code) {
-  thread_ = std::thread([this, exit_code, name = ros::this_node::getName()] {
-    XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kPatience);
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!change_.wait_for(lock, kPeriod, [this] { return ended_; })) {
-      lock.unlock();
-      if (!master.call("getPid", name)) {
-        std::fputs("The ROS master doesn't answer: the node ends without telling it\n", stderr);
-        std::_Exit(exit_code);
-      }
-      lock.lock();
-    }
-  });
-}
 
 MasterWatch::MasterWatch(std::function<void()> on_lost)
     : on_lost_(std::move(on_lost)),

@@ -1,0 +1,44 @@
+#include "end_despite_master.h"
+
+#include <ros/master.h>
+#include <ros/this_node.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+
+#include "xmlrpc_caller.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+constexpr std::chrono::milliseconds kPeriod{1000};
+constexpr std::chrono::milliseconds kPatience{1000};
+
+}  // namespace
+
+EndDespiteMaster::~EndDespiteMaster() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ended_ = true;
+  }
+  change_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void EndDespiteMaster::begin(int exit_code) {
+  thread_ = std::thread([this, exit_code, name = ros::this_node::getName()] {
+    XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kPatience);
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!change_.wait_for(lock, kPeriod, [this] { return ended_; })) {
+      lock.unlock();
+      if (!master.call("getPid", name)) {
+        std::fputs("The ROS master doesn't answer: the node ends without telling it\n", stderr);
+        std::_Exit(exit_code);
+      }
+      lock.lock();
+    }
+  });
+}
+
+}  // namespace stepdriver::ros_node
