@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "motion/planner.h"
+#include "pulse/pin_ring.h"
 #include "pulse/pulse_engine.h"
 #include "support/free_hardware.h"
 
@@ -52,6 +53,13 @@ class EngineUnderLoad {
     while (clock_.now() < 1'000'000'000) serve();  // until the ramps are over
   }
 
+  /// Records all edges from now on, in 16 MB.
+  void record() {
+    const std::vector<bool> levels(2 * engine_->channels());
+    ring_ = std::make_unique<pulse::PinRing>(levels, 2'000'000);
+    engine_->recordTo(*ring_);
+  }
+
   void serve() { clock_.waitUntil(engine_->serve()); }
   std::uint64_t slips() const { return engine_->state().slips; }
 
@@ -59,13 +67,15 @@ class EngineUnderLoad {
 
  private:
   FreeClock clock_;
+  std::unique_ptr<pulse::PinRing> ring_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::vector<std::unique_ptr<motion::Profile>> profiles_;
   std::vector<pulse::Follow> follows_;
 };
 
-void run(benchmark::State& state, Steps steps) {
+void run(benchmark::State& state, Steps steps, bool recorded = false) {
   EngineUnderLoad load(static_cast<int>(state.range(0)), steps);
+  if (recorded) load.record();
   const std::uint64_t before = load.lines.edges;
   for (auto unused : state) {
     (void)unused;
@@ -77,8 +87,25 @@ void run(benchmark::State& state, Steps steps) {
 
 void edgesApart(benchmark::State& state) { run(state, Steps::kApart); }
 void edgesTogether(benchmark::State& state) { run(state, Steps::kTogether); }
+void edgesRecorded(benchmark::State& state) { run(state, Steps::kApart, true); }
+
+/// The recorder alone: the edges of one STEP line.
+void recordedEdge(benchmark::State& state) {
+  pulse::PinRing ring({false, false}, 2'000'000);
+  pulse::Nanoseconds now = 0;
+  bool level = false;
+  for (auto unused : state) {
+    (void)unused;
+    level = !level;
+    now += 31'250;
+    ring.add(0, level, now);
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations()));
+}
 
 BENCHMARK(edgesApart)->Name("Engine/edges_apart")->RangeMultiplier(2)->Range(1, 32);
+BENCHMARK(edgesRecorded)->Name("Engine/edges_recorded")->Arg(1)->Arg(32);
+BENCHMARK(recordedEdge)->Name("Recorder/edge");
 BENCHMARK(edgesTogether)->Name("Engine/edges_together")->RangeMultiplier(2)->Range(2, 32);
 
 }  // namespace

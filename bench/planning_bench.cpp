@@ -1,6 +1,13 @@
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <cstdint>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <vector>
 
 #include "motion/planner.h"
 #include "motion/step_finder.h"
@@ -33,6 +40,86 @@ BENCHMARK_CAPTURE(plan, s, MotionState{}, kSCurve)->Name("Plan/s_curve");
 BENCHMARK_CAPTURE(plan, tm, kMoving, kTrapezoid)->Name("Plan/trapezoid_moving");
 BENCHMARK_CAPTURE(plan, sm, kMoving, kSCurve)->Name("Plan/s_curve_moving");
 BENCHMARK_CAPTURE(plan, sl, kLeaving, kSCurve)->Name("Plan/s_curve_turning");
+
+/// A move to plan.
+struct Case {
+  MotionState from;
+  std::int64_t target = 0;
+  MotionLimits limits;
+};
+
+/// The kinds of random moves.
+enum class Kind { kNoJerkFromRest, kNoJerk, kFromRest, kAny, kTurning };
+
+/// Limits over three decades of the speed; moves of up to several times the longest stop.
+Case randomCase(Kind kind, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto power = [&](double from, double to) {
+    return std::pow(10.0, from + (to - from) * unit(random));
+  };
+  const auto either = [&] { return random() % 2 == 0 ? 1.0 : -1.0; };
+  Case one;
+  one.limits.max_speed = power(2.0, 5.0);
+  one.limits.acceleration = one.limits.max_speed * power(-0.5, 1.5);
+  one.limits.deceleration = one.limits.acceleration * power(-0.3, 0.3);
+  const bool jerk = kind != Kind::kNoJerk && kind != Kind::kNoJerkFromRest;
+  if (jerk) one.limits.jerk = one.limits.acceleration * power(0.0, 2.0);
+  const double hardest = std::min(one.limits.acceleration, one.limits.deceleration);
+  double stop = one.limits.max_speed * one.limits.max_speed / hardest;
+  if (jerk) stop += one.limits.max_speed * hardest / one.limits.jerk;
+  const double way = stop * power(-2.0, 0.7) + 1.0;
+  const bool rests = kind == Kind::kFromRest || kind == Kind::kNoJerkFromRest;
+  const double sign = either();
+  one.from.position = std::floor(1e5 * unit(random));
+  if (!rests) {
+    one.from.velocity = sign * one.limits.max_speed * unit(random);
+    if (jerk) one.from.acceleration = either() * hardest * unit(random);
+  }
+  const double towards = kind == Kind::kTurning ? -sign : kind == Kind::kAny ? either() : sign;
+  one.target = std::llround(one.from.position.hi + towards * way);
+  return one;
+}
+
+void planCase(const Case& one) {
+  benchmark::DoNotOptimize(motion::planMove(0, one.from, one.target, one.limits));
+}
+
+/// Each case's shortest time of several, so that only its own work counts.
+std::vector<double> shortestTimes(const std::vector<Case>& cases) {
+  using Clock = std::chrono::steady_clock;
+  std::vector<double> shortest(cases.size(), std::numeric_limits<double>::max());
+  for (int round = 0; round < 5; ++round) {
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const auto begin = Clock::now();
+      planCase(cases[i]);
+      const std::chrono::duration<double, std::nano> took = Clock::now() - begin;
+      shortest[i] = std::min(shortest[i], took.count());
+    }
+  }
+  return shortest;
+}
+
+/// 10,000 random moves: their mean, and the 99th percentile over the mean.
+void planRandom(benchmark::State& state, Kind kind) {
+  std::mt19937_64 random(1);
+  std::vector<Case> cases(10'000);
+  for (Case& one : cases) one = randomCase(kind, random);
+  for (auto round : state) {
+    for (const Case& one : cases) planCase(one);
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(cases.size()));
+  std::vector<double> times = shortestTimes(cases);
+  std::sort(times.begin(), times.end());
+  const double mean =
+      std::accumulate(times.begin(), times.end(), 0.0) / static_cast<double>(times.size());
+  state.counters["p99_over_mean"] = times[times.size() * 99 / 100] / mean;
+}
+
+BENCHMARK_CAPTURE(planRandom, tr, Kind::kNoJerkFromRest)->Name("Plan/random/trapezoid_from_rest");
+BENCHMARK_CAPTURE(planRandom, tm, Kind::kNoJerk)->Name("Plan/random/trapezoid");
+BENCHMARK_CAPTURE(planRandom, sr, Kind::kFromRest)->Name("Plan/random/s_curve_from_rest");
+BENCHMARK_CAPTURE(planRandom, sm, Kind::kAny)->Name("Plan/random/s_curve");
+BENCHMARK_CAPTURE(planRandom, st, Kind::kTurning)->Name("Plan/random/s_curve_turning");
 
 /// The memory that a plan takes: its pieces, and nothing for each step.
 struct Memory {

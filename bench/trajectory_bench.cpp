@@ -33,8 +33,7 @@ PathAxis axisOf(const char* name, double backlash) {
   axis.configured_backlash = backlash;
   axis.backlash = std::llround(backlash * kScale);
   axis.limits = {0.0, 0.1 * kScale, kScale, kScale, 20.0 * kScale};
-  axis.stop_deceleration = kScale;
-  axis.stop_jerk = 20.0 * kScale;
+  axis.stop_limits = axis.limits;
   return axis;
 }
 
@@ -163,7 +162,7 @@ void memory(benchmark::State& state) {
   std::int64_t used = 0;
   for (auto round : state) {
     {
-      axis::Disposer disposer(true);
+      machine::Disposer disposer(true);
       const std::vector<PathStart> starts(3);
       auto trajectory = disposer.keep<PreparedTrajectory>(prepared(3, 300'000, 0.0));
       auto path = PreparedTrajectory::join(trajectory, starts);

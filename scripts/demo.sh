@@ -80,7 +80,8 @@ choose_build_folder
 install_packages core ros trace
 if [[ -z $installed ]]; then
   rm -rf "$ROS_HOME/log"
-  say "Building (a minute or two the first time)"
+  say "Building: the first time this takes about ten minutes of processor time" \
+    "    (in another terminal: tail -f $build/log/build.log)"
   quietly build build_catkin
   quietly install install_catkin
 fi

@@ -6,7 +6,8 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize]
+usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize] [--bad-days]
+                       [--soak] [--fuzz]
 
 Installs missing packages, builds, and runs the named parts; all of them by default.
 
@@ -24,20 +25,24 @@ Installs missing packages, builds, and runs the named parts; all of them by defa
           GPIO chips
   --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
           ThreadSanitizer; a node with each of them in a storm of requests
+  --bad-days  floods of clients against a node (test/bad_days), for two seconds each
+  --soak  the same for a minute each
+  --fuzz  random inputs for everything that reads files, messages and commands (scripts/fuzz.sh)
 
 If a stage fails, the others still run. Exit code 0: every stage passed.
 END
 }
 
-parts=()
+parts=() flood_seconds=2
 for argument; do
   case $argument in
-    --lint | --core | --kernel | --ros | --sanitize) parts+=("${argument#--}") ;;
+    --soak) parts+=(bad-days) flood_seconds=60 ;;
+    --lint | --core | --kernel | --ros | --sanitize | --bad-days | --fuzz) parts+=("${argument#--}") ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
 done
-((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize)
+((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize bad-days fuzz)
 wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 ! wants kernel || wants core || parts+=(core)
 
@@ -87,6 +92,7 @@ own_files() {
     (cd "$root" && git ls-files --cached --others --exclude-standard -- "$@") |
       while IFS= read -r name; do [[ ! -f $root/$name ]] || say "$name"; done
   else
+    (($# > 0)) || set -- '*'
     for pattern; do names+=(-o -name "$pattern"); done
     (cd "$root" && find . -type d '(' -name build -o -name 'build-*' -o -name '.?*' ')' -prune \
       -o -type f '(' "${names[@]:1}" ')' -print) | sed 's|^\./||' | sort
@@ -107,7 +113,8 @@ check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
 check_reliability() { /usr/bin/python3 -B "$root/test/docs/reliability_test.py"; }
 check_prose() {
   local status=0
-  own_files | (cd "$root" && xargs -d '\n' codespell --ignore-words=test/docs/spelling.txt) || status=1
+  # The inputs in test/fuzz/corpus are no prose.
+  own_files | grep -v '^test/fuzz/corpus/' | (cd "$root" && xargs -d '\n' codespell --ignore-words=test/docs/spelling.txt) || status=1
   /usr/bin/python3 -B "$root/test/docs/prose_test.py" || status=1
   return "$status"
 }
@@ -117,8 +124,8 @@ check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 # installed version of libgpiod is compiled.
 tidy_all() {
   local status=0
-  own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel)/' | tidy core || status=1
-  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/' |
+  own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel|test/bad_days/soak)/' | tidy core || status=1
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/|^test/bad_days/[^/]*$' |
     tidy catkin || status=1
   return "$status"
 }
@@ -146,8 +153,8 @@ tidy() {
       --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
 
-# clang-tidy takes longest. It begins before the kernel's stages, which use one processor, and runs in
-# the background with low priority; the stage `tidy` waits for its end.
+# clang-tidy takes longest. It runs in the background with low priority from the kernel's stages on:
+# they and the tests of the node leave it a processor. The stage `tidy` waits for its end.
 tidy_group=
 begin_tidy() {
   rm -f "$build/log/tidy-status"
@@ -351,13 +358,13 @@ sanitize_core() {
   use_test_preset "$preset"
   # The number of schedules of each kind that the search samples.
   STEPDRIVER_SCHEDULES=2000 ctest --test-dir "$build/core-$preset" -j "$jobs" --timeout 300 \
-    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|$excluded"
+    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$excluded"
 }
 # Tests that take minutes with a sanitizer are excluded. The search has one thread, so ThreadSanitizer has
 # nothing to find in it.
 slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess'
-sanitize_core_asan() { sanitize_core asan "$slow_tests" machine_tests pulse_tests search_tests; }
-sanitize_core_tsan() { sanitize_core tsan "$slow_tests" gpio_tests machine_tests pulse_tests; }
+sanitize_core_asan() { sanitize_core asan "$slow_tests" machine_tests pulse_tests recorder_tests search_tests; }
+sanitize_core_tsan() { sanitize_core tsan "$slow_tests" gpio_tests machine_tests pulse_tests recorder_tests; }
 
 # sanitize_node PRESET TEST...: runs a storm and tests of --ros. Only the node that they start has the
 # sanitizer. It writes its findings to files, because not every test reads all that its node prints.
@@ -390,10 +397,27 @@ build_node_tests() {
 sanitize_node_asan() { sanitize_node asan bring_up_test ending_test; }
 sanitize_node_tsan() { sanitize_node tsan ending_test; }
 
+# Floods against a node. The figures are printed, and judged by hand: a test fails by what is wrong, never
+# because something took long.
+test_bad_days() {
+  quietly bad-days-build build_node_tests stepdriver_node bad_days_test
+  use_ros "$build/catkin/devel"
+  # Besides each flood there are its moves and its check.
+  rostest --text "$src/test/bad_days/bad_days.test" "seconds:=$flood_seconds" \
+    "limit:=$((flood_seconds * 20 + 300))" | tee "$build/log/bad-days.log"
+  # With --text the exit code of rostest is meaningless.
+  grep -qF '[  PASSED  ]' "$build/log/bad-days.log" || return 1
+  ! grep -qF '[  FAILED  ]' "$build/log/bad-days.log"
+}
+
+# The same inputs each time: new ones are tried by hand, so that a change fails only for what it did.
+check_fuzz() { bash "$root/scripts/fuzz.sh" --seed 1; }
+
 choose_build_folder
 rm -rf "$build/ros"
 install_packages core ccache "${parts[@]}" "$(wants ros && echo trace)" \
-  "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)" "$(wants sanitize && echo ros)"
+  "$(wants core && echo pictures bench)" "$(wants lint && echo ros bench)" "$(wants sanitize && echo ros)" \
+  "$(wants bad-days && echo ros)" "$(wants fuzz && echo ros)"
 # Compilers newer than Debian 12's may have more warnings. All builds have the same option, because ccache
 # shares only results of the same options.
 strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
@@ -430,11 +454,6 @@ if wants kernel; then
 fi
 if wants ros; then
   stage node-build build_node
-fi
-if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
-  stage tidy check_tidy tidy-setup
-fi
-if wants ros; then
   stage node-tests test_node node-build
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
@@ -445,12 +464,17 @@ if wants ros; then
   stage trace check_trace install
   stage docs check_docs install
 fi
+if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
+  stage tidy check_tidy tidy-setup
+fi
 if wants sanitize; then
   stage asan-core sanitize_core_asan
   stage asan-node sanitize_node_asan
   stage tsan-core sanitize_core_tsan
   stage tsan-node sanitize_node_tsan
 fi
+! wants bad-days || stage bad-days test_bad_days
+! wants fuzz || stage fuzz check_fuzz
 
 say "" "$summary"
 say "$passed passed, $failed failed, $skipped skipped"

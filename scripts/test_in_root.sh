@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--keep]
+usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--demo] [--keep]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
 copies the checkout into it, and runs scripts/demo.sh, scripts/test.sh and the demo again there as root,
@@ -19,21 +19,24 @@ the next time; the working copy is removed at the end.
 
   --blank  uses a folder whose path contains a blank: catkin can't build there, so the build goes
            elsewhere
+  --demo   only runs scripts/demo.sh, once: a newcomer's first command
   --keep   keeps the working copy, and prints its path
 END
 }
 
-suite='' keep='' checkout=/home/user/stepdriver
+suite='' keep='' demo='' checkout=/home/user/stepdriver
 for argument; do
   case $argument in
     bookworm | trixie | focal) suite=$argument ;;
     --blank) checkout="/home/new user/step driver" ;;
+    --demo) demo=1 ;;
     --keep) keep=1 ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
 done
 [[ -n $suite ]] || { usage >&2 && exit 2; }
+[[ -z $demo || $suite != focal ]] || die "--demo: on Ubuntu only scripts/test.sh --core can be tried"
 (($(id -u) == 0)) || die "needs root, for debootstrap and chroot: sudo $0 $suite"
 command -v debootstrap >/dev/null || die "needs debootstrap: apt-get install debootstrap"
 
@@ -58,6 +61,7 @@ mkdir -p "$roots"
 roots=$(cd "$roots" && pwd -P)
 base=$roots/$suite
 commands=(demo.sh test.sh demo.sh)
+[[ -z $demo ]] || commands=(demo.sh)
 if [[ $suite == focal ]]; then
   components=main,universe
   mirror=$(mirror_of Ubuntu http://archive.ubuntu.com/ubuntu)
@@ -93,7 +97,8 @@ at_exit remove_work
 say "Copying the checkout into a clean $suite in $work"
 cp -a "$base/." "$work/"
 cp -L /etc/resolv.conf "$work/etc/resolv.conf"
-printf '127.0.0.1 localhost\n' >"$work/etc/hosts"
+# As an installer of Debian writes it.
+printf '127.0.0.1 localhost\n127.0.1.1 %s\n' "$(hostname)" >"$work/etc/hosts"
 apt_transport >"$work/etc/apt/apt.conf.d/90host"
 cat >"$work/etc/apt/sources.list" <<END
 deb $mirror $suite ${components/,/ }
@@ -119,7 +124,8 @@ inside=(chroot "$work")
 if unshare --mount --pid --fork --kill-child true 2>/dev/null; then
   # shellcheck disable=SC2016
   inside=(unshare --mount --pid --fork --kill-child bash -c '
-    mount -t proc proc "$1/proc" && mount -t tmpfs tmpfs "$1/dev/shm" &&
+    # The root of a system is a mount point, and some programs depend on it.
+    mount --bind "$1" "$1" && mount -t proc proc "$1/proc" && mount -t tmpfs tmpfs "$1/dev/shm" &&
       mount -t devpts -o ptmxmode=0666 devpts "$1/dev/pts" || true
     exec chroot "$@"' in_root "$work")
 else

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "stepdriver_core/printable.h"
+
 namespace stepdriver {
 namespace {
 
@@ -15,6 +17,8 @@ std::string linesOf(const std::vector<ConfigIssue>& issues) {
 }
 
 }  // namespace
+
+Refused::Refused(const std::string& message) : Error(printable(message)) {}
 
 ConfigError::ConfigError(std::vector<ConfigIssue> issues)
     : Error(linesOf(issues)), issues_(std::move(issues)) {}

@@ -23,6 +23,14 @@ std::string upperBoundText(double bound);
 /// "a, b or c"; the joining word can be another.
 std::string listText(const std::vector<std::string>& words, const std::string& joint = "or");
 
+/// "a, b, c": the text of each element.
+template <typename Elements, typename TextOf>
+std::string joinedText(const Elements& elements, const TextOf& text_of) {
+  std::string text;
+  for (const auto& element : elements) text += (text.empty() ? "" : ", ") + text_of(element);
+  return text;
+}
+
 /// @return the word of which this one may be a misspelling; nullptr if none is close enough. Of two
 ///   at the same distance, the first.
 const std::string* nearest(const std::string& word, const std::vector<std::string>& words);

@@ -93,6 +93,60 @@ TEST_F(Configuration, IsShownWithTopSpeedsInStepsPerSecond) {
             "  x     A4988   linear  16          100 mm/s   8000     none\n");
 }
 
+TEST_F(Configuration, HasTheFlightRecorder) {
+  const auto read = [&](const std::string& recorder) {
+    return readConfiguration(file(kAxis + recorder), BackendChoice::kAsInTheFile).recorder;
+  };
+  EXPECT_EQ(read("").seconds, 10.0);
+  EXPECT_EQ(read("").keep, 20);
+  const setup::RecorderConfig given =
+      read("recorder: {seconds: 60, memory_mb: 100, folder: /var/log/axes, keep: 3}\n");
+  EXPECT_EQ(given.seconds, 60.0);
+  EXPECT_EQ(given.memory_mb, 100.0);
+  EXPECT_EQ(given.folder, "/var/log/axes");
+  EXPECT_EQ(given.keep, 3);
+  try {
+    read("recorder: {seconds: 601, memory_mb: 0.5, folder: here, keep: 0, minutes: 1}\n");
+    ADD_FAILURE() << "it was accepted";
+  } catch (const ConfigError& error) {
+    const std::string message = error.what();
+    for (const char* words :
+         {"recorder/seconds: is 601, but must be from 0 to 600",
+          "recorder/memory_mb: is 0.5, but must be from 1 to 1000",
+          "recorder/folder: is \"here\", but must be an absolute path, or empty for the default",
+          "recorder/keep: is 0, but must be from 1 to 1000", "recorder/minutes: is not known"}) {
+      EXPECT_NE(message.find(words), std::string::npos) << words << "\n" << message;
+    }
+  }
+}
+
+TEST_F(Configuration, HasTheHeartbeat) {
+  const auto read = [&](const std::string& more) {
+    return readConfiguration(file(kAxis + more), BackendChoice::kAsInTheFile).options().heartbeat;
+  };
+  EXPECT_FALSE(read(""));
+  const auto given = read("heartbeat: {pin: H}\n");
+  ASSERT_TRUE(given);
+  EXPECT_EQ(given->line, "H");
+  EXPECT_EQ(given->rate, 100.0);
+  EXPECT_EQ(read("heartbeat: {pin: H, rate_hz: 20}\n")->rate, 20.0);
+  for (const auto& [text, words] : std::vector<std::pair<std::string, std::string>>{
+           {"heartbeat: {}\n", "heartbeat/pin: is missing"},
+           {"heartbeat: {pin: H, rate_hz: 0.9}\n",
+            "heartbeat/rate_hz: is 0.9, but must be from 1 to 1000"},
+           {"heartbeat: {pin: H}\nemergency_stop: {pin: H, active_level: high}\n",
+            "which is used twice"},
+           {"heartbeat: {pin: H}\ngpio: {backend: simulated}\nsimulation: {speed: 0}\n",
+            "simulation/speed is 0: it would make"}}) {
+    try {
+      read(text);
+      ADD_FAILURE() << "it was accepted: " << text;
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST_F(Configuration, HasTheRealtimePolicyByItselfOrInAMap) {
   const auto policy = [&](const std::string& realtime) {
     return readConfiguration(file(kAxis + realtime), BackendChoice::kAsInTheFile);
@@ -104,9 +158,12 @@ TEST_F(Configuration, HasTheRealtimePolicyByItselfOrInAMap) {
   EXPECT_TRUE(map.enforce_realtime);
   EXPECT_DOUBLE_EQ(map.max_lateness, 0.002);
   EXPECT_FALSE(policy("realtime: {max_lateness_ms: 2}\n").enforce_realtime);
-  EXPECT_EQ(policy("realtime: enforce\n").options().latency_device, "/dev/cpu_dma_latency");
-  EXPECT_EQ(map.options().latency_device, "/dev/cpu_dma_latency");
-  EXPECT_EQ(policy("realtime: {keep_cpus_awake: false}\n").options().latency_device, "");
+  EXPECT_EQ(policy("realtime: enforce\n").options().realtime.latency_device,
+            "/dev/cpu_dma_latency");
+  EXPECT_EQ(map.options().realtime.latency_device, "/dev/cpu_dma_latency");
+  EXPECT_EQ(policy("realtime: {keep_cpus_awake: false}\n").options().realtime.latency_device, "");
+  EXPECT_EQ(map.options().realtime.cpu, std::nullopt);
+  EXPECT_EQ(policy("realtime: {cpu: 3}\n").options().realtime.cpu, 3);
 }
 
 }  // namespace

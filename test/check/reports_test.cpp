@@ -94,7 +94,7 @@ TEST(ChipsText, TellsWhyAChipCannotBeOpened) {
 TEST(LinesOf, AnAxisAreAllThatAreWired) {
   config::AxisConfig config;
   config.name = "x";
-  config.driver = driver::Model::kDrv8825;
+  config.driver = driver::driverChip("drv8825");
   config.pins.step.line = "S";
   config.pins.ms1.line = "M";
   config.endstop_min = config::Endstop{"E", true, Bias::kAsIs};
@@ -107,8 +107,18 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   config.pins.enable.line = other.pins.enable.line = "N";
   const auto shared = linesOf({config, other});
   EXPECT_EQ(shared[1].pin + "=" + shared[1].line, "x/enable, y/enable=N");
-  const auto with_stop = linesOf({config}, config::InputSwitch{"T", true, Bias::kAsIs});
-  EXPECT_EQ(with_stop.back().pin + "=" + with_stop.back().line, "emergency_stop=T");
+  other.driver.step_inputs = driver::StepInputs::kCwCcw;
+  other.pins.dir.line = "D";
+  other.in_position = config::InPositionPin{"P"};
+  pins.clear();
+  for (const NamedLine& line : linesOf({other})) pins += line.pin + "=" + line.line + " ";
+  EXPECT_EQ(pins, "y/cw=S y/ccw=D y/enable=N y/m0=M y/endstops/min=E y/fault=F y/in_position=P ");
+  machine::MachineOptions options;
+  options.emergency_stop = config::InputSwitch{"T", true, Bias::kAsIs};
+  options.heartbeat = machine::HeartbeatConfig{"H"};
+  pins.clear();
+  for (const NamedLine& line : linesOf({}, options)) pins += line.pin + "=" + line.line + " ";
+  EXPECT_EQ(pins, "emergency_stop=T heartbeat=H ");
 }
 
 SystemFacts facts() {

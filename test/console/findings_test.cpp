@@ -53,6 +53,19 @@ TEST(Findings, TurnTheDirectionRound) {
   EXPECT_NE(text(corrected(once, findings)).find("dir: false"), std::string::npos);
 }
 
+TEST(Findings, SwapTheLinesOfADriverWithOneForEachDirection) {
+  Findings findings = of("x");
+  findings.wrong_way = true;
+  const std::string axis = "axes:\n  x:\n    pins: {cw: A, ccw: B}\n";
+  EXPECT_EQ(text(corrected(valueOf(axis), findings)),
+            text(valueOf("axes:\n  x:\n    pins: {cw: B, ccw: A}\n")));
+  config::AxisConfig config;
+  config.driver.step_inputs = driver::StepInputs::kCwCcw;
+  EXPECT_EQ(changesText(findings, config),
+            (std::vector<std::string>{
+                "x: pins/cw and pins/ccw are swapped, because its plus was your minus"}));
+}
+
 TEST(Findings, InvertASwitchBeforeTheyAreSwapped) {
   Findings findings = of("x");
   findings.min_inverted = true;

@@ -288,7 +288,7 @@ TEST(Session, SetsZeroOnlyAtRest) {
   AxisView axis = axisView("x");
   axis.enabled = false;
   Session session = sessionWith({axis});
-  Orders orders = session.press({'z'}, 0.0);
+  Orders orders = session.press({'z', 'y'}, 0.0);
   ASSERT_EQ(orders.calls.size(), 1U) << "nothing moves, so it needn't be enabled";
   EXPECT_EQ(orders.calls[0].what, Call::What::kSetZero);
   session.answered(orders.calls[0], true, "");
@@ -298,7 +298,42 @@ TEST(Session, SetsZeroOnlyAtRest) {
   EXPECT_TRUE(said(session, "x: the position isn't set because the axis is moving"));
   axis.moving = false;
   session.update({axis}, 0.2);
-  EXPECT_TRUE(session.press({'z'}, 3.0).calls.empty()) << "it isn't known whether it is at rest";
+  EXPECT_TRUE(session.press({'z', 'y'}, 3.0).calls.empty())
+      << "it isn't known whether it is at rest";
+}
+
+TEST(Session, SetsZeroOnlyIfTheUserSaysYes) {
+  Session session = sessionWith({axisView("x"), axisView("y")});
+  for (const Key key : {Key('n'), Key('z'), Key('h'), Key('q'), kKeyEnter, kKeyEscape, kKeyDown}) {
+    session.press({'z'}, 0.0);
+    ASSERT_EQ(session.zeroAsked(), "x");
+    const Orders orders = session.press({key}, 0.0);
+    EXPECT_TRUE(orders.calls.empty()) << key;
+    EXPECT_FALSE(session.zeroAsked().has_value()) << key;
+  }
+  EXPECT_TRUE(said(session, "x: its position stays as it is"));
+  EXPECT_FALSE(session.ended());
+  EXPECT_EQ(session.chosen(), "x");
+
+  Orders orders = session.press({'z', 's', 'y'}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_EQ(orders.calls[0].what, Call::What::kStop);
+  orders = session.press({'z'}, 0.0);
+  orders = session.press({' ', 'y'}, 0.0);
+  EXPECT_TRUE(orders.emergency_stop);
+  EXPECT_TRUE(session.press({'y'}, 0.0).calls.empty()) << "the question is over";
+  session.press({'z', kKeyCtrlC}, 0.0);
+  EXPECT_TRUE(session.ended());
+}
+
+TEST(Session, DoesNotSetZeroIfTheAxisHasBegunToMoveMeanwhile) {
+  AxisView axis = axisView("x");
+  Session session = sessionWith({axis});
+  session.press({'z'}, 0.0);
+  axis.moving = true;
+  session.update({axis}, 0.1);
+  EXPECT_TRUE(session.press({'y'}, 0.1).calls.empty());
+  EXPECT_TRUE(said(session, "x: the position isn't set because the axis is moving"));
 }
 
 TEST(Session, HoldsInAnyStateAndResumesOnlyALiveOne) {

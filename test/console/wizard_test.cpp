@@ -413,7 +413,7 @@ TEST(WizardAnswers, AreAskedAgainUntilTheyAreUnderstood) {
   Person person({"maybe", "-3", "3 inch", "12.5"});
   EXPECT_EQ(askLength(person, "How far?", "mm"), 12.5);
   EXPECT_TRUE(person.heardOf("\"maybe\" isn't understood: it must be a number, in mm"));
-  EXPECT_TRUE(person.heardOf("It must be above 0"));
+  EXPECT_TRUE(person.heardOf("-3 mm is no length: it must be above 0"));
 }
 
 TEST(WizardAxis, HasCurrentAfterwardsOnlyWhereItHadItBefore) {

@@ -23,7 +23,14 @@ class Dump {
   void add(Bias bias) { add(static_cast<int>(bias)); }
   void add(const config::Pin& pin) { all(pin.line, pin.inverted); }
   void add(const config::InputSwitch& input) { all(input.line, input.active_level, input.bias); }
-  void add(const config::FaultPin& fault) { all(fault.line, fault.bias); }
+  void add(const machine::HeartbeatConfig& heartbeat) { all(heartbeat.line, heartbeat.rate); }
+  void add(const config::FaultPin& fault) { all(fault.line, fault.bias, fault.ramps); }
+  void add(const config::InPositionPin& in_position) {
+    all(in_position.line, in_position.bias, in_position.timeout);
+  }
+  void add(const config::BrakeConfig& brake) {
+    all(brake.line, brake.release_level, brake.release_ns, brake.engage_ns);
+  }
   void add(const config::HomingConfig& homing) {
     all(homing.at_max, homing.seek_speed, homing.latch_speed, homing.pull_off, homing.offset,
         homing.max_travel, homing.timeout, homing.debounce, homing.order);
@@ -33,25 +40,38 @@ class Dump {
         timing.mode_setup_ns, timing.mode_hold_ns, timing.enable_ns, timing.wake_ns,
         timing.reset_low_ns, timing.reset_wait_ns);
   }
+  void add(const driver::DriverChip& chip) {
+    all(chip.name, chip.timing, chip.mode_pins, chip.step_active,
+        static_cast<int>(chip.step_inputs), chip.both_edges, chip.enable_on, chip.sleep_asleep,
+        chip.reset_held, chip.fault_active, static_cast<int>(chip.fault_end),
+        chip.in_position_active, static_cast<int>(chip.disabled), static_cast<int>(chip.asleep));
+    for (const driver::Mode& mode : chip.modes) {
+      add(mode.microsteps);
+      for (const bool level : mode.code) add(level);
+    }
+    for (const int microsteps : chip.microsteps) add(microsteps);
+  }
   void add(const config::Pins& pins) {
     all(pins.step, pins.dir, pins.enable, pins.ms1, pins.ms2, pins.ms3, pins.sleep, pins.reset);
   }
   void add(const config::AxisConfig& axis) {
-    all(axis.name, axis.joint, static_cast<int>(axis.kind), static_cast<int>(axis.driver),
-        axis.timing, axis.pins, axis.microsteps, axis.steps_per_unit, axis.steps_per_round);
+    all(axis.name, axis.joint, static_cast<int>(axis.kind), axis.driver, axis.pins, axis.microsteps,
+        axis.steps_per_unit, axis.steps_per_round);
     all(axis.max_speed, axis.start_speed, axis.acceleration, axis.deceleration,
         axis.stop_deceleration, axis.jerk, axis.backlash, axis.min_position, axis.max_position);
-    all(axis.endstop_min, axis.endstop_max, axis.fault, axis.homing, axis.require_homing,
-        axis.enable_on_start, axis.disable_on_shutdown, axis.align_on_microstep_change,
-        axis.idle_timeout, static_cast<int>(axis.idle_action), axis.holds_position_unpowered);
+    all(axis.endstop_min, axis.endstop_max, axis.fault, axis.in_position, axis.brake, axis.homing,
+        axis.require_homing, axis.enable_on_start, axis.disable_on_shutdown,
+        axis.align_on_microstep_change, axis.idle_timeout, static_cast<int>(axis.idle_action),
+        axis.holds_position_unpowered);
   }
   void add(const setup::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
-        rig.max_switch, rig.fail_step_write_after);
+        rig.max_switch, rig.load_falls, rig.fail_step_write_after, rig.settling_ms,
+        rig.faults.never_in_position);
     all(rig.wiring.dir_inverted, rig.wiring.steps_per_unit, rig.wiring.min_pin, rig.wiring.max_pin,
         rig.wiring.min_active_level, rig.wiring.max_active_level);
     all(rig.faults.min_stuck, rig.faults.max_stuck, rig.faults.lose_every,
-        rig.faults.chip_fault_after);
+        rig.faults.chip_fault_after, rig.faults.chip_fault_lasts_ns);
   }
   void add(const joystick::JogAxis& axis) {
     all(axis.name, axis.joystick_axis, static_cast<int>(axis.kind), axis.max_speed,
@@ -75,8 +95,10 @@ std::string dump(const ros_node::NodeConfig& config) {
   Dump dump;
   dump.all(static_cast<int>(config.backend), config.joint_state_rate, config.jog_timeout,
            config.max_lateness, config.write_timeout, config.enforce_realtime,
-           config.keep_cpus_awake, config.emergency_stop, config.state_file, config.hardware_id,
-           config.urdf_limits, config.publish_clock, config.stop_on_master_lost);
+           config.keep_cpus_awake, config.cpu, config.emergency_stop, config.heartbeat,
+           config.state_file, config.recorder.seconds, config.recorder.memory_mb,
+           config.recorder.folder, config.recorder.keep, config.hardware_id, config.urdf_limits,
+           config.publish_clock, config.stop_on_master_lost);
   for (const auto& axis : config.axes) dump.add(axis);
   dump.all(config.simulation.speed, config.simulation.trace,
            config.simulation.trace_overwrites_any_file, config.simulation.emergency_stop);

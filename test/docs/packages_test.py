@@ -21,6 +21,7 @@ SYSTEM_KEYS = {
     "libboost-program-options-dev": "libboost-program-options-dev",
     "libgpiod-dev": "libgpiod-dev",
     "libncurses-dev": "libncurses-dev",
+    "libsystemd-dev": "libsystemd-dev",
     "liburdfdom-dev": "liburdfdom-dev",
     "python3-matplotlib": "python3-matplotlib",
     "python3-yaml": "python3-yaml",

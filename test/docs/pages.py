@@ -20,14 +20,23 @@ def names():
     )
 
 
+def _listed_by_git():
+    """None without git, or if this is no checkout."""
+    try:
+        listed = subprocess.run(
+            ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+            cwd=ROOT, check=False, capture_output=True, text=True,
+        )
+    except FileNotFoundError:
+        return None
+    return listed.stdout.splitlines() if listed.returncode == 0 else None
+
+
 def own_files():
     """All files of the project, by their paths in the checkout."""
-    listed = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT, check=False, capture_output=True, text=True,
-    )
-    if listed.returncode == 0:
-        return [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
+    listed = _listed_by_git()
+    if listed is not None:
+        return [name for name in listed if (ROOT / name).is_file()]
     made = re.compile(r"(build.*|\..*)/")
     files = (str(file.relative_to(ROOT)) for file in ROOT.rglob("*") if file.is_file())
     return [name for name in files if not made.match(name)]

@@ -65,13 +65,15 @@ std::string rotaryKey(const std::string& key) {
 
 const std::string kAxisMap = R"(
     driver: drv8825
-    pins: {step: A, dir: B, enable: C, sleep: D, reset: E, fault: F}
+    pins: {step: A, dir: B, enable: C, sleep: D, reset: E, fault: F, in_position: I}
+    chip: {in_position_active: high}
     invert: {dir: false}
     microsteps: 16
     steps_per_mm: 80.0
     max_speed_mm_s: 100.0
     acceleration_mm_s2: 500.0
     endstops: {min: {pin: G, active_level: low}, max: {pin: H, active_level: low}}
+    brake: {pin: Brake, release_ms: 60.0, engage_ms: 30.0}
     homing: {switch: min, seek_speed_mm_s: 1.0, latch_speed_mm_s: 0.1, pull_off_mm: 1.0, max_travel_mm: 9.0}
     timing: {}
 )";
@@ -81,6 +83,7 @@ Node driver(bool rotary) {
 gpio: {backend: simulated}
 realtime: {}
 emergency_stop: {pin: Z, active_level: high}
+heartbeat: {pin: Y}
 simulation: {axes: {x: {}}}
 axes:
   x:)" + kAxisMap;
@@ -136,8 +139,8 @@ std::vector<Parameter> parametersUnder(const std::string& heading, const std::st
         parameters.push_back({key, type, row[2], row[3]});
         continue;
       }
-      for (const char* pin :
-           {"step", "dir", "enable", "ms1", "ms2", "ms3", "m0", "m1", "m2", "sleep", "reset"}) {
+      for (const char* pin : {"step", "dir", "cw", "ccw", "enable", "ms1", "ms2", "ms3", "m0", "m1",
+                              "m2", "sleep", "reset"}) {
         parameters.push_back({"axes/x/invert/" + std::string(pin), type, row[2], row[3]});
       }
     }
@@ -217,18 +220,19 @@ std::string wantedWords(const Parameter& parameter) {
 /// Whether the bases have the key: they have a map of each kind, and their axes are scaled in the
 /// first of the ways.
 bool isRequired(const Parameter& parameter) {
-  static const std::set<std::string> words = {"required",  "required with it", "no homing",
-                                              "no switch", "no button",        "by the mechanics"};
+  static const std::set<std::string> words = {"required",     "required with it", "no homing",
+                                              "no switch",    "no button",        "no brake",
+                                              "no heartbeat", "by the mechanics"};
   return words.count(parameter.fallback) > 0;
 }
 
 /// The default as a value; no value if the page gives it in words.
 std::optional<ConfigValue> literal(const Parameter& parameter) {
   static const std::set<std::string> words = {"none", "as configured", "host, chips, lines",
-                                              "the axis's name"};
+                                              "the axis's name", "below ROS_HOME"};
   const std::string& text = parameter.fallback;
   if (parameter.type == "text" || parameter.type == "bias") {
-    if (words.count(text) > 0) return {};
+    if (words.count(text) > 0 || text.rfind("[the chip's]", 0) == 0) return {};
     return ConfigValue(text);
   }
   const bool is_value = text == "true" || text == "false" ||
@@ -286,7 +290,9 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
     if (isRequired(parameter) || parameter.type == "line" || parameter.type == "map") continue;
     const auto value = literal(parameter);
     if (!value) continue;
-    if (parameter.key.find("invert/m") != std::string::npos) continue;  // not wired in the bases
+    const bool unwired = parameter.key.find("invert/m") != std::string::npos ||
+                         parameter.key.find("invert/c") != std::string::npos;
+    if (unwired) continue;  // in the bases
     const ConfigValue base =
         parameter.key == "axes/x/gear_ratio" ? scaledByRounds(GetParam()) : GetParam().base;
     const auto without = GetParam().read(with(base, parameter.key, nullptr));

@@ -26,7 +26,7 @@ _CONDITION = (
 
 # Name: what it matches, and how often it may occur in pages and comments together.
 PHRASES = {
-    "conditional where": (_CONDITION, 14),
+    "conditional where": (_CONDITION, 13),
     "go on": (r"\b(?:go|goes|going|went) on\b(?! the )", 0),
     "as ... has it": (r"\bas (?:\S+ ){1,4}(?:has|have|had) (?:it|them)\b", 0),
     "none of": (r"\bnone of (?:it|them|that)\b", 0),

@@ -69,49 +69,87 @@ std::int64_t firstTime(const std::string& cell) {
   return std::llround(number * ns);
 }
 
+/// The columns of the table with a row for each driver.
+enum Figure : std::size_t {
+  kName,
+  kTitle,
+  kMicrosteps,
+  kCodes,
+  kStepHigh,
+  kStepLow,
+  kDir,
+  kMode,
+  kEnable,
+  kWake,
+  kEnableLevel,
+  kFault,
+  kFigures
+};
+
 class WiringPageOfAChip : public testing::TestWithParam<std::string> {
  protected:
-  const driver::DriverChip& chip() const { return *driver::findDriverChip(GetParam()); }
-  std::map<std::string, std::string> facts() const {
-    const auto names = driver::driverChipNames();
-    const auto found = std::find(names.begin(), names.end(), GetParam());
-    return column("The chips", 1 + static_cast<std::size_t>(found - names.begin()),
-                  1 + names.size());
+  const driver::DriverChip& chip() const { return driver::driverChip(GetParam()); }
+  Cells figures() const {
+    for (const Cells& row : tableRows("docs/wiring.md", "The figures of every driver")) {
+      if (row.size() == kFigures && row[kName] == GetParam()) return row;
+    }
+    ADD_FAILURE() << "docs/wiring.md has no row for " << GetParam();
+    return Cells(kFigures);
   }
 };
 
 TEST_P(WiringPageOfAChip, HasTheTimesThatAreKept) {
-  auto facts = this->facts();
+  const Cells figures = this->figures();
   const driver::Timing& timing = chip().timing;
-  EXPECT_EQ(firstTime(facts["STEP high at least"]), timing.step_high_ns);
-  EXPECT_EQ(firstTime(facts["STEP low at least"]), timing.step_low_ns);
-  EXPECT_EQ(firstTime(facts["DIR setup and hold"]), timing.dir_setup_ns);
-  EXPECT_EQ(firstTime(facts["DIR setup and hold"]), timing.dir_hold_ns);
-  EXPECT_EQ(firstTime(facts["Enable to first STEP"]), timing.enable_ns);
-  if (!chip().modes.empty()) {
-    EXPECT_EQ(firstTime(facts["Mode setup and hold"]), timing.mode_setup_ns);
-    EXPECT_EQ(firstTime(facts["Mode setup and hold"]), timing.mode_hold_ns);
-  }
-  if (chip().has_sleep) {
-    EXPECT_EQ(firstTime(facts["Wake-up to first STEP"]), timing.wake_ns);
-  }
+  EXPECT_EQ(firstTime(figures[kStepHigh]), timing.step_high_ns);
+  EXPECT_EQ(firstTime(figures[kStepLow]), timing.step_low_ns);
+  EXPECT_EQ(firstTime(figures[kDir]), timing.dir_setup_ns);
+  EXPECT_EQ(firstTime(figures[kDir]), timing.dir_hold_ns);
+  EXPECT_EQ(firstTime(figures[kEnable]), timing.enable_ns);
+  EXPECT_EQ(firstTime(figures[kMode]), timing.mode_setup_ns);
+  EXPECT_EQ(firstTime(figures[kMode]), timing.mode_hold_ns);
+  EXPECT_EQ(firstTime(figures[kWake]), timing.wake_ns);
 }
 
 TEST_P(WiringPageOfAChip, HasTheModesAndTheirCodes) {
-  auto facts = this->facts();
+  const Cells figures = this->figures();
   std::string microsteps;
-  std::string codes;
   for (const int mode : chip().microsteps) {
     microsteps += (microsteps.empty() ? "" : ", ") + std::to_string(mode);
-    const auto code = driver::codeOf(chip(), mode);
-    if (!code) continue;
-    codes += codes.empty() ? "" : ", ";
-    for (const bool level : *code) codes += level ? 'H' : 'L';
   }
-  EXPECT_EQ(facts["Microsteps"], microsteps);
-  std::string shown = facts["Their codes, L low and H high"];
-  shown.erase(std::remove(shown.begin(), shown.end(), '*'), shown.end());
-  EXPECT_EQ(shown, codes.empty() ? "switches" : codes);
+  EXPECT_EQ(figures[kMicrosteps], microsteps.empty() ? "1 to 256" : microsteps);
+  std::string codes;
+  for (const driver::Mode& mode : chip().modes) {
+    codes += (codes.empty() ? "" : ", ") + std::to_string(mode.microsteps) + " ";
+    for (int pin = 0; pin < chip().mode_pins; ++pin) {
+      codes += mode.code[static_cast<std::size_t>(pin)] ? 'H' : 'L';
+    }
+  }
+  EXPECT_EQ(figures[kCodes], codes.empty() ? "switches" : codes);
+}
+
+TEST_P(WiringPageOfAChip, HasTheLevelsOfEnableAndFault) {
+  const Cells figures = this->figures();
+  EXPECT_EQ(figures[kEnableLevel], chip().enable_on ? "high" : "low");
+  const auto fault = chip().fault_active;
+  EXPECT_EQ(split(figures[kFault], ':').at(0), !fault ? "-" : *fault ? "high" : "low");
+  if (!fault) return;
+  const std::map<driver::FaultEnd, std::string> ends = {
+      {driver::FaultEnd::kItself, "by itself"},
+      {driver::FaultEnd::kReset, "RESET"},
+      {driver::FaultEnd::kEnable, "ENABLE is off"},
+      {driver::FaultEnd::kPower, "power off"}};
+  EXPECT_NE(figures[kFault].find(": " + chip().fault_name + ", until " + ends.at(chip().fault_end)),
+            std::string::npos)
+      << figures[kFault];
+}
+
+TEST_P(WiringPageOfAChip, HasTheInPositionOutput) {
+  const auto level = chip().in_position_active;
+  const std::string wanted = std::string(". In position ") +
+                             (level.value_or(false) ? "high" : "low") + ": " +
+                             chip().in_position_name;
+  EXPECT_EQ(figures()[kFault].find(wanted) != std::string::npos, level.has_value());
 }
 
 INSTANTIATE_TEST_SUITE_P(Chips, WiringPageOfAChip, testing::ValuesIn(driver::driverChipNames()));

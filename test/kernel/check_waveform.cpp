@@ -114,8 +114,7 @@ kernel::WiredAxis wiredAxis(const Asked& asked, const kernel::KernelTrace& trace
                             std::find(inverted.begin(), inverted.end(), name) != inverted.end()};
   };
   kernel::WiredAxis axis;
-  axis.driver = driver->model;
-  axis.timing = driver->timing;
+  axis.driver = *driver;
   axis.step = pin(asked.step, "step");
   axis.dir = pin(asked.dir, "dir");
   if (!asked.enable.empty()) axis.enable = pin(asked.enable, "enable");

@@ -29,8 +29,7 @@ std::size_t pulsesBefore(const Waveform& seen, std::int64_t time_ns) {
 }
 
 TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
-  const std::vector<config::AxisConfig> axes = {
-      axisAt("x", driver::Model::kA4988, placeAt("board-0", 0))};
+  const std::vector<config::AxisConfig> axes = {axisAt("x", "a4988", placeAt("board-0", 0))};
   KernelBench bench(axes);
   const axis::Move move = bench.start("x", kFar);
   bench.awaitCount("x", kAbout);
@@ -59,7 +58,7 @@ TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
 }
 
 TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
-  auto config = axisAt("x", driver::Model::kDrv8825, placeAt("board-0", 0));
+  auto config = axisAt("x", "drv8825", placeAt("board-0", 0));
   config.endstop_max = config::Endstop{"board-1:3", true};
   const std::vector<config::AxisConfig> axes = {config};
   KernelBench bench(axes);
@@ -93,10 +92,10 @@ TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
 }
 
 TEST_F(Ending, ByAnEmergencyStopFinishesThePulse) {
-  auto config_x = axisAt("x", driver::Model::kTb6600, placeAt("board-0", 0, true));
-  config_x.timing.step_high_ns = 300'000;  // so long that most stops come during a pulse
-  const std::vector<config::AxisConfig> axes = {
-      config_x, axisAt("y", driver::Model::kA4988, placeAt("board-1", 0))};
+  auto config_x = axisAt("x", "tb6600", placeAt("board-0", 0, true));
+  config_x.driver.timing.step_high_ns = 300'000;  // so long that most stops come during a pulse
+  const std::vector<config::AxisConfig> axes = {config_x,
+                                                axisAt("y", "a4988", placeAt("board-1", 0))};
   KernelBench bench(axes);
   std::vector<std::int64_t> ends_x = {0};
   std::vector<std::int64_t> ends_y = {0};

@@ -23,6 +23,7 @@ void runGpioTrace(const std::string& arguments) {
 machine::MachineOptions patient() {
   machine::MachineOptions options;
   options.max_lateness = 60.0;
+  options.record_seconds = 60.0;
   return options;
 }
 
@@ -45,12 +46,11 @@ KernelTrace Recording::stop(const std::string& name) {
   return trace;
 }
 
-config::AxisConfig axisAt(const std::string& name, driver::Model model, const Place& place) {
+config::AxisConfig axisAt(const std::string& name, const std::string& model, const Place& place) {
   config::AxisConfig config;
   config.name = name;
   config.joint = name;
-  config.driver = model;
-  config.timing = driver::driverChipOf(model).timing;
+  config.driver = driver::driverChip(model);
   config.pins.step = place.step;
   config.pins.dir = place.dir;
   config.pins.enable = place.enable;

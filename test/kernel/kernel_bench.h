@@ -40,16 +40,18 @@ struct Place {
 
 /// A linear axis of 80 microsteps/mm with 2000 microsteps/s and 10,000 microsteps/s^2, enabled on
 /// start, and without switches.
-config::AxisConfig axisAt(const std::string& name, driver::Model model, const Place& place);
+config::AxisConfig axisAt(const std::string& name, const std::string& model, const Place& place);
 
 /// A machine with a pulse thread on the lines of two chips of the kernel's gpio-sim, board-0 and
-/// board-1. A late pulse is never a fault here, because the machine may stall.
+/// board-1. A late pulse is never a fault here, because the machine may stall. It records its last
+/// minute.
 class KernelBench {
  public:
   /// @param guard of the clock (pulse::SteadyClock).
   explicit KernelBench(const std::vector<config::AxisConfig>& axes,
                        pulse::Nanoseconds guard = 60'000);
 
+  machine::Machine& machine() { return *machine_; }
   axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
   test::GpioSimChip& chip(std::size_t index) { return chips_.at(index); }
 

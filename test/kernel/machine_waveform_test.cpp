@@ -20,14 +20,14 @@ using axis::MoveEnd;
 
 struct Wiring {
   const char* name;
-  driver::Model driver;
+  std::string driver;
   Place place;
   std::optional<driver::Timing> timing = {};  // no value: the driver's own
 };
 
 /// So slow that each required time is longer than the time that passes anyway.
 driver::Timing slowOptos() {
-  driver::Timing timing = driver::driverChipOf(driver::Model::kTb6600).timing;
+  driver::Timing timing = driver::driverChip("tb6600").timing;
   timing.step_high_ns = 150'000;
   timing.step_low_ns = 330'000;
   timing.dir_setup_ns = timing.dir_hold_ns = 40'000'000;
@@ -42,7 +42,7 @@ class OneAxis : public MachineWaveform, public testing::WithParamInterface<Wirin
 
 TEST_P(OneAxis, MovesBackAndForthAsPlanned) {
   auto config = axisAt("x", GetParam().driver, GetParam().place);
-  config.timing = GetParam().timing.value_or(config.timing);
+  config.driver.timing = GetParam().timing.value_or(config.driver.timing);
   const std::vector<config::AxisConfig> axes = {config};
   KernelBench bench(axes);
   const Moves moves = {600, -1'000, 1, -1, 500, -100};
@@ -56,20 +56,19 @@ TEST_P(OneAxis, MovesBackAndForthAsPlanned) {
 
 INSTANTIATE_TEST_SUITE_P(
     On, OneAxis,
-    testing::Values(
-        Wiring{"A4988", driver::Model::kA4988, placeAt("board-0", 0)},
-        Wiring{"Drv8825", driver::Model::kDrv8825, placeAt("board-1", 4)},
-        Wiring{"Tb6600WithSlowOptos", driver::Model::kTb6600, placeAt("board-0", 0), slowOptos()},
-        Wiring{"Tb6600CommonAnode", driver::Model::kTb6600, placeAt("board-0", 1, true)},
-        Wiring{"A4988DirInverted",
-               driver::Model::kA4988,
-               {{"board-0:3", false}, {"board-0:2", true}, {"board-0:1", false}}},
-        Wiring{"Drv8825StepInvertedDirOnTheOtherChip",
-               driver::Model::kDrv8825,
-               {{"board-1:0", true}, {"board-0:0", false}, {"board-0:1", true}}},
-        Wiring{"A4988EnableOnTheOtherChip",
-               driver::Model::kA4988,
-               {{"board-0:0", false}, {"board-0:1", false}, {"board-1:1", false}}}),
+    testing::Values(Wiring{"A4988", "a4988", placeAt("board-0", 0)},
+                    Wiring{"Drv8825", "drv8825", placeAt("board-1", 4)},
+                    Wiring{"Tb6600WithSlowOptos", "tb6600", placeAt("board-0", 0), slowOptos()},
+                    Wiring{"Tb6600CommonAnode", "tb6600", placeAt("board-0", 1, true)},
+                    Wiring{"A4988DirInverted",
+                           "a4988",
+                           {{"board-0:3", false}, {"board-0:2", true}, {"board-0:1", false}}},
+                    Wiring{"Drv8825StepInvertedDirOnTheOtherChip",
+                           "drv8825",
+                           {{"board-1:0", true}, {"board-0:0", false}, {"board-0:1", true}}},
+                    Wiring{"A4988EnableOnTheOtherChip",
+                           "a4988",
+                           {{"board-0:0", false}, {"board-0:1", false}, {"board-1:1", false}}}),
     [](const auto& kind) { return kind.param.name; });
 
 // ---- two axes ----
@@ -93,20 +92,19 @@ class TwoAxes : public MachineWaveform {
 };
 
 TEST_F(TwoAxes, MoveAtOnceOnOneChip) {
-  moveBoth({axisAt("x", driver::Model::kA4988, placeAt("board-0", 0)),
-            axisAt("y", driver::Model::kTb6600, placeAt("board-0", 4, true))});
+  moveBoth({axisAt("x", "a4988", placeAt("board-0", 0)),
+            axisAt("y", "tb6600", placeAt("board-0", 4, true))});
 }
 
 TEST_F(TwoAxes, MoveAtOnceOnTwoChips) {
-  moveBoth({axisAt("x", driver::Model::kDrv8825, placeAt("board-0", 0)),
-            axisAt("y", driver::Model::kA4988, placeAt("board-1", 0))});
+  moveBoth(
+      {axisAt("x", "drv8825", placeAt("board-0", 0)), axisAt("y", "a4988", placeAt("board-1", 0))});
 }
 
 TEST_F(TwoAxes, MoveAtOnceWithTheirPinsSpreadOverBothChips) {
-  moveBoth({axisAt("x", driver::Model::kTb6600,
-                   {{"board-0:0", false}, {"board-1:0", true}, {"board-1:1", false}}),
-            axisAt("y", driver::Model::kDrv8825,
-                   {{"board-1:4", true}, {"board-0:4", false}, {"board-0:5", false}})});
+  moveBoth(
+      {axisAt("x", "tb6600", {{"board-0:0", false}, {"board-1:0", true}, {"board-1:1", false}}),
+       axisAt("y", "drv8825", {{"board-1:4", true}, {"board-0:4", false}, {"board-0:5", false}})});
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Changes the kernel's source, in the current folder, where the tests can't do without it.
+# Makes the changes to the kernel's source, in the current folder, that the tests need.
 set -euo pipefail
 
 die() {

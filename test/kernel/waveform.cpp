@@ -16,7 +16,7 @@ void keepShortest(std::optional<std::int64_t>& shortest, std::int64_t time) {
 /// Follows the lines of one axis, event by event.
 class Reader {
  public:
-  explicit Reader(const WiredAxis& axis) : axis_(axis), chip_(driver::driverChipOf(axis.driver)) {}
+  explicit Reader(const WiredAxis& axis) : axis_(axis), chip_(axis.driver) {}
 
   void take(const LineEvent& event) {
     if (event.read) return;
@@ -53,14 +53,14 @@ class Reader {
   }
 
   void rise(std::int64_t now) {
-    check(Rule::kStepLow, fell_, now, axis_.timing.step_low_ns, waveform_.shortest.low);
+    check(Rule::kStepLow, fell_, now, chip_.timing.step_low_ns, waveform_.shortest.low);
     check(Rule::kInterval, rose_, now, axis_.shortest_interval_ns, waveform_.shortest.interval);
     checkOneWrite(turned_, now);
     if (forward_) {
-      check(Rule::kDirSetup, dir_set_, now, axis_.timing.dir_setup_ns,
+      check(Rule::kDirSetup, dir_set_, now, chip_.timing.dir_setup_ns,
             waveform_.shortest.dir_setup);
     } else {
-      violate(Rule::kDirSetup, now, 0, axis_.timing.dir_setup_ns);
+      violate(Rule::kDirSetup, now, 0, chip_.timing.dir_setup_ns);
     }
     checkEnabled(now);
     rose_ = now;
@@ -68,7 +68,7 @@ class Reader {
   }
 
   void fall(std::int64_t now) {
-    check(Rule::kStepHigh, rose_, now, axis_.timing.step_high_ns, waveform_.shortest.high);
+    check(Rule::kStepHigh, rose_, now, chip_.timing.step_high_ns, waveform_.shortest.high);
     fell_ = now;
   }
 
@@ -78,7 +78,7 @@ class Reader {
       ++waveform_.edges;
       turned_ = now;
       checkOneWrite(rose_, now);
-      check(Rule::kDirHold, rose_, now, axis_.timing.dir_hold_ns, waveform_.shortest.dir_hold);
+      check(Rule::kDirHold, rose_, now, chip_.timing.dir_hold_ns, waveform_.shortest.dir_hold);
     }
     forward_ = forward;
     dir_set_ = now;
@@ -95,8 +95,8 @@ class Reader {
     if (!axis_.enable) return;
     if (!enabled_.value_or(false)) {
       violate(Rule::kEnabled, now);
-    } else if (now - *enable_set_ < axis_.timing.enable_ns) {
-      violate(Rule::kEnableTime, now, now - *enable_set_, axis_.timing.enable_ns);
+    } else if (now - *enable_set_ < chip_.timing.enable_ns) {
+      violate(Rule::kEnableTime, now, now - *enable_set_, chip_.timing.enable_ns);
     }
   }
 
@@ -162,7 +162,6 @@ WiredAxis wiredAxis(const config::AxisConfig& config, const KernelTrace& trace) 
   };
   WiredAxis axis;
   axis.driver = config.driver;
-  axis.timing = config.timing;
   axis.step = wired(config.pins.step);
   axis.dir = wired(config.pins.dir);
   if (config.pins.enable.wired()) axis.enable = wired(config.pins.enable);

@@ -26,8 +26,7 @@ struct WiredPin {
 
 /// The wiring of an axis, and its required times.
 struct WiredAxis {
-  driver::Model driver = driver::Model::kA4988;
-  driver::Timing timing{};
+  driver::DriverChip driver = driver::driverChip("a4988");
   WiredPin step;
   WiredPin dir;
   std::optional<WiredPin> enable;  ///< none: not wired, the motor is always energized

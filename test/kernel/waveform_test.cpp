@@ -53,8 +53,7 @@ class Hand {
 /// one write to the next.
 WiredAxis wired() {
   WiredAxis axis;
-  axis.driver = driver::Model::kDrv8825;
-  axis.timing = driver::driverChipOf(axis.driver).timing;
+  axis.driver = driver::driverChip("drv8825");
   axis.step.line = kStep;
   axis.dir.line = kDir;
   axis.enable = WiredPin{kEnable, false};
@@ -176,7 +175,7 @@ TEST(Waveform, FindsThatDirChangedTooCloseAfterAStep) {
 
 TEST(Waveform, FindsThatStepAndDirChangeInOneWrite) {
   WiredAxis axis = wired();
-  axis.timing.dir_setup_ns = axis.timing.dir_hold_ns = 0;
+  axis.driver.timing.dir_setup_ns = axis.driver.timing.dir_hold_ns = 0;
   const auto apart = [&axis](std::int64_t time) {
     return brokenIn(Hand().request().at(10'000, kDir, true).pulse(10'000 + time, 20'000), axis);
   };

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "support/message_bytes.h"
 #include "support/node_under_test.h"
 #include "support/says.h"
 #include "support/wait.h"
@@ -84,15 +85,6 @@ long mostMemory() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return usage.ru_maxrss;
-}
-
-template <typename M>
-std::string bytesOf(const M& message) {
-  std::string bytes(ros::serialization::serializationLength(message), '\0');
-  ros::serialization::OStream stream(reinterpret_cast<std::uint8_t*>(bytes.data()),
-                                     static_cast<std::uint32_t>(bytes.size()));
-  ros::serialization::serialize(stream, message);
-  return bytes;
 }
 
 /// Reads as roscpp does for a subscriber.

@@ -170,6 +170,7 @@ const std::vector<BadBringUp> kBadBringUps = {
      setting("realtime/keep_cpus_awake", 1),
      "realtime/keep_cpus_awake",
      {"1", "true or false"}},
+    {"NoProcessor", setting("realtime/cpu", -1), "realtime/cpu", {"-1", "from 0 to 1023"}},
     {"UnknownRealtimeWord", setting("realtime", "enforec"), "realtime", {"\"enforec\"", "warn"}},
     {"RealtimeThatIsNoWord", setting("realtime", 5.0), "realtime", {"5", "map"}},
     {"NegativeSimulationSpeed", setting("simulation/speed", -1), "simulation/speed", {"-1"}},

@@ -13,6 +13,7 @@
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/vcd_reader.h"
 #include "support/wait.h"
 
 namespace stepdriver::node_test {
@@ -69,6 +70,110 @@ TEST(ChipServices, AFaultOfTheChipEndsAMoveAndRecoverResetsTheChip) {
   EXPECT_TRUE(node.call<std_srvs::Trigger>("recover").success);
   const auto moved = node.call<MoveTo>("x/move_to", request);
   EXPECT_TRUE(moved.success) << moved.message;
+}
+
+/// Replaces the axis x by one with a driver that only its configuration knows: no microstep pins,
+/// 8000 steps/s at most.
+void describe(NodeUnderTest& node) {
+  node.erase("axes/x");
+  node.set("axes/x/driver", "step_dir");
+  for (const char* pin : {"step", "dir", "enable"}) {
+    node.set(std::string("axes/x/pins/") + pin, std::string("x_") + pin);
+  }
+  node.set("axes/x/chip/enable_active", "high");
+  node.set("axes/x/timing/enable_ms", 2.0);
+  for (const char* time : {"step_high_us", "step_low_us", "dir_setup_us", "dir_hold_us"}) {
+    node.set(std::string("axes/x/timing/") + time, 2.5);
+  }
+  node.set("axes/x/microsteps", 25);
+  node.set("axes/x/steps_per_mm", 80.0);
+  node.set("axes/x/max_speed_mm_s", 100.0);
+  node.set("axes/x/acceleration_mm_s2", 500.0);
+  node.set("axes/x/enable_on_start", true);
+}
+
+TEST(ChipServices, AnAlarmOfADriverWithoutANameEndsAMoveByItsRampAndEnableEndsTheAlarm) {
+  NodeUnderTest node;
+  describe(node);
+  node.set("axes/x/pins/fault", "x_alarm");
+  node.set("axes/x/chip/fault_active", "high");
+  node.set("axes/x/chip/fault_ended_by", "enable");
+  node.set("axes/x/timing/reset_low_ms", 5.0);
+  node.set("axes/x/fault_stop", "ramp");
+  node.set("simulation/axes/x/chip_fault_after", 2000);
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  EXPECT_TRUE(setPosition(node, 0.0).success);
+  const auto failed = node.moveTo(0.1, true);
+  EXPECT_FALSE(failed.success);
+  expectSays(failed.message, "the step_dir driver reports a fault on its fault output");
+  EXPECT_GT(node.pulses(), 2700) << "from 8000 steps/s it needs 800 to stop";
+  EXPECT_LT(node.pulses(), 4000);
+  EXPECT_TRUE(states.waitForLatest(
+      [](const AxisStates& s) { return !s.fault.at(0).empty() && !s.position_valid.at(0); }));
+  expectSays(node.moveTo(0.0, true).message, "recover");
+  const auto recovered = node.call<std_srvs::Trigger>("recover");
+  EXPECT_TRUE(recovered.success) << recovered.message;
+  const auto moved = node.moveTo(0.0, true);
+  EXPECT_TRUE(moved.success) << moved.message;
+  EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+}
+
+TEST(ChipServices, AMoveWaitsUntilTheDriverIsInPositionAndNotForEver) {
+  for (const bool never : {false, true}) {
+    NodeUnderTest node;
+    describe(node);
+    node.set("axes/x/pins/in_position", "x_in_position");
+    node.set("axes/x/in_position_timeout_ms", 900.0);
+    node.set("axes/x/chip/in_position_active", "high");
+    node.set("simulation/axes/x/settling_ms", 400.0);
+    node.set("simulation/axes/x/never_in_position", never);
+    node.start();
+    const Recorder<AxisStates> states(node.full("axis_states"));
+    const auto moved = node.moveTo(0.01, true);
+    EXPECT_EQ(moved.success, !never) << moved.message;
+    EXPECT_EQ(node.pulses(), 800);
+    if (never) {
+      expectSays(moved.message,
+                 "the step_dir driver isn't in position: its in-position output was still inactive "
+                 "900 ms after the end of the motion");
+      EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return !s.fault.at(0).empty(); }));
+    }
+    EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+  }
+}
+
+TEST(ChipServices, DriversWithCwAndCcwOrBothEdgesMoveAndAreTraced) {
+  for (const bool both_edges : {false, true}) {
+    NodeUnderTest node;
+    describe(node);
+    if (both_edges) {
+      node.set("axes/x/chip/step_edges", "both");
+    } else {
+      node.erase("axes/x/pins/step");
+      node.erase("axes/x/pins/dir");
+      node.set("axes/x/pins/cw", "x_cw");
+      node.set("axes/x/pins/ccw", "x_ccw");
+      node.set("axes/x/chip/step_inputs", "cw_ccw");
+    }
+    const std::string trace = node.traced();
+    node.start();
+    EXPECT_TRUE(node.moveTo(0.01, true).success);
+    EXPECT_TRUE(node.moveTo(-0.005, true).success);
+    const auto report = node.rig();
+    EXPECT_EQ(report.pulses_forward.at(0), 800);
+    EXPECT_EQ(report.pulses_backward.at(0), 1200);
+    EXPECT_NEAR(report.carriage.at(0), -0.005, 1e-9);
+    EXPECT_EQ(report.violations.at(0), 0) << report.violation_kinds.at(0);
+    const auto waveforms = readVcd(trace);
+    if (both_edges) {
+      EXPECT_EQ(waveforms.at("x/step").edges.size(), 1U + 2000U);
+      EXPECT_TRUE(waveforms.at("x/step").both_edges);
+    } else {
+      EXPECT_EQ(waveforms.at("x/cw").edges.size(), 1U + 1600U);
+      EXPECT_EQ(waveforms.at("x/ccw").edges.size(), 1U + 2400U);
+    }
+  }
 }
 
 TEST(ChipServices, EnableAndDisableShowInTheStateAndInTheTrace) {

@@ -136,6 +136,8 @@ TEST_F(ConsoleTest, GoesToPositionsInMmAndSetsZero) {
   EXPECT_EQ(node.pulses(), pulses);
 
   terminal.press("z");
+  EXPECT_TRUE(terminal.waitFor("Set the position of x to 0?"));
+  terminal.press("y");
   EXPECT_TRUE(terminal.waitFor("x: this position is 0.0000 mm from now on"));
   EXPECT_TRUE(terminal.waitFor(" 0.0000 mm      0.00 mm/s"));
   for (const char* size : {"0.1 mm", "1 mm", "10 mm"}) {

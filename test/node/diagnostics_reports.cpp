@@ -51,6 +51,8 @@ TEST_F(AxisReport, IsOkWhateverItDoes) {
   expect(DiagnosticStatus::OK, "at rest");
   reading.state.moving = true;
   expect(DiagnosticStatus::OK, "moves");
+  reading.state.held = true;
+  expect(DiagnosticStatus::OK, "on hold");
   reading.state.homing = axis::HomingPhase::kSeeking;
   expect(DiagnosticStatus::OK, "is being homed: seeking");
   reading.state = {};
@@ -102,9 +104,11 @@ TEST_F(AxisReport, TellsAnEndstopThatCannotBeRead) {
 
 TEST_F(AxisReport, HasTheNumbers) {
   reading.endstops.max.reset();
+  reading.state.target = 6.9e-18;
   DiagnosticStatusWrapper status;
   reportAxis(config, reading, status);
   EXPECT_EQ(valueOf(status, "position [m]"), "0.1");
+  EXPECT_EQ(valueOf(status, "target [m]"), "0") << "not the rounding of sums";
   EXPECT_EQ(valueOf(status, "min endstop"), "inactive");
   EXPECT_EQ(valueOf(status, "max endstop"), "none");
   EXPECT_EQ(valueOf(status, "deceleration [m/s^2]"), "0.4");
@@ -155,10 +159,11 @@ TEST_F(EngineReport, WarnsOfALittleMarginBeforeThereIsNone) {
   moving.asked = 15'900.0;
   expect(DiagnosticStatus::OK, "pulses in time");
   moving.asked = 16'100.0;
-  expect(DiagnosticStatus::WARN, "little margin: x: asks for 16100 steps/s");
+  expect(DiagnosticStatus::WARN,
+         "little margin: x needs 16100 steps/s, and this computer can sustain 20000");
   moving.asked = 20'100.0;
   expect(DiagnosticStatus::ERROR,
-         "too fast a motion: x: asks for 20100 steps/s, and this machine holds 20000");
+         "too fast a motion: x needs 20100 steps/s, but this computer can sustain 20000");
 }
 
 TEST_F(EngineReport, WarnsOfATopSpeedThatTheMachineDoesNotHoldThoughNothingMoves) {
@@ -166,7 +171,7 @@ TEST_F(EngineReport, WarnsOfATopSpeedThatTheMachineDoesNotHoldThoughNothingMoves
   reading.rates[0].asked = 15'900.0;
   expect(DiagnosticStatus::OK, "pulses in time");
   reading.rates[0].asked = 16'100.0;
-  expect(DiagnosticStatus::WARN, "at top speed x: asks for 16100 steps/s");
+  expect(DiagnosticStatus::WARN, "at top speed x needs 16100 steps/s");
 }
 
 TEST_F(EngineReport, HasTheNumbers) {
@@ -182,6 +187,7 @@ TEST_F(EngineReport, HasTheNumbers) {
   EXPECT_EQ(valueOf(status, "x: steps/s"), "4000");
   EXPECT_EQ(valueOf(status, "x: margin"), "5");
   EXPECT_EQ(valueOf(status, "x: margin at top speed"), "2");
+  EXPECT_EQ(valueOf(status, "x: steps/s that this computer sustains"), "16000");
   EXPECT_EQ(valueOf(status, "y: steps/s"), "0");
   EXPECT_EQ(valueOf(status, "y: margin"), "at rest");
   reading.rates.clear();

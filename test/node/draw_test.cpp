@@ -76,7 +76,7 @@ TEST_F(Draw, RefusesBeforeAnythingMoves) {
     EXPECT_EQ(end.code, 1);
     expectSays(end.output, words);
   };
-  expect_fails("10 10\n10 300\n", "(10, 300) mm is beyond the soft limits of y");
+  expect_fails("10 10\n10 300\n", "(10, 300) mm is above the soft limit of y, ");
   expect_fails("10 10\nten 30\n", "line 2: ten 30");
   expect_fails("", "contains no line");
   EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 64);

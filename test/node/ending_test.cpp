@@ -13,6 +13,7 @@
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/temporary_file.h"
 #include "support/vcd_reader.h"
 #include "support/wait.h"
 
@@ -137,6 +138,54 @@ TEST(EndingForAnother, IsNotAskedOfByOneWithAWrongConfiguration) {
   const auto answer = node.moveTo(0.001, true);
   EXPECT_TRUE(answer.success) << answer.message;
   EXPECT_EQ(node.process().output().find("Ending"), std::string::npos);
+}
+
+// As always in ROS, the name goes to the newer node.
+TEST(EndingForAnother, IsAskedOfByOneOfTheSameNameWhichMovesNothing) {
+  NodeUnderTest node;
+  node.set("simulation/speed", 1.0);
+  node.start();
+  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(0.2, true); });
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 4000; }));
+  const std::string space = node.name().substr(0, node.name().rfind('/'));
+  NodeProcess second({"__ns:=" + space, "__name:=stepdriver"});
+  ASSERT_EQ(node.process().waitForExit(kBound).value_or(-1), 0) << node.process().output();
+  expectSays(node.process().output(), "Ending on a shutdown call");
+  const auto answer = waiting.get();
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "shut down");
+  EXPECT_LT(answer.position, 0.19) << "it decelerates before its target";
+
+  const auto says = [&second](const char* words) {
+    return second.output().find(words) != std::string::npos;
+  };
+  ASSERT_TRUE(waitUntil([&] { return says("Ready"); })) << second.output();
+  EXPECT_EQ(node.pulses(), 0) << "nobody has asked the second one to move";
+  EXPECT_TRUE(node.moveTo(0.001, true).success);
+  EXPECT_EQ(node.pulses(), 80);
+  second.signal(SIGTERM);
+  EXPECT_EQ(second.waitForExit(kBound).value_or(-1), 0) << second.output();
+}
+
+// The first one ends in order; the second one doesn't share its file, and says why.
+TEST(EndingForAnother, IsAskedOfByOneThatThenFindsTheStateFileInUse) {
+  NodeUnderTest node;
+  const TemporaryFile state(".state");
+  const TemporaryFile lock(".state.lock");
+  node.set("state_file", state.path());
+  node.set("simulation/speed", 1.0);
+  node.set("axes/x/deceleration_mm_s2", 50.0);  // two seconds to stop
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.2, false).success);
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 4000; }));
+  const std::string space = node.name().substr(0, node.name().rfind('/'));
+  NodeProcess second({"__ns:=" + space, "__name:=stepdriver"});
+  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0) << node.process().output();
+  const auto ready = [&second] { return second.output().find("Ready") != std::string::npos; };
+  ASSERT_TRUE(waitUntil([&] { return ready() || second.waitForExit(std::chrono::seconds(0)); }));
+  if (ready()) return;  // the first one was quicker
+  EXPECT_EQ(second.waitForExit(kBound).value_or(-1), 1);
+  expectSays(second.output(), "is used by another program: each node needs its own");
 }
 
 TEST(EndingEnabled, LeavesTheMotorOnWhereConfiguredSo) {

@@ -1,4 +1,3 @@
-#include <actionlib/client/simple_action_client.h>
 #include <gtest/gtest.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
@@ -11,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "support/motion_client.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
-#include "support/says.h"
 #include "support/two_axes.h"
 #include "support/wait.h"
 
@@ -22,8 +21,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-using LineClient = actionlib::SimpleActionClient<MoveLineAction>;
-using State = actionlib::SimpleClientGoalState;
+using LineClient = MotionClient<MoveLineAction>;
 
 MoveLineGoal lineTo(const std::vector<double>& position) {
   MoveLineGoal goal;
@@ -38,17 +36,7 @@ class LineActionTest : public testing::Test {
     node.set("simulation/speed", speed);
     addSecondAxis(node);
     node.start();
-    client = std::make_unique<LineClient>(node.full("move_line"), true);
-    ASSERT_TRUE(client->waitForServer(ros::Duration(kBound.count())));
-  }
-  State await() {
-    EXPECT_TRUE(client->waitForResult(ros::Duration(kBound.count()))) << "no result comes";
-    return client->getState();
-  }
-  void expectEnd(int end, const std::string& words) {
-    const auto result = client->getResult();
-    EXPECT_EQ(result->end, end) << result->message;
-    expectSays(result->message, words);
+    client = std::make_unique<LineClient>(node.full("move_line"));
   }
   std::vector<std::int64_t> positions() {
     const auto report = node.rig();
@@ -68,8 +56,8 @@ TEST_F(LineActionTest, ReachesItsTargetsAndTellsHowFarItIs) {
   std::vector<MoveLineFeedback> told;
   client->sendGoal(lineTo({0.06, 0.04}), {}, {},
                    [&](const MoveLineFeedbackConstPtr& feedback) { told.push_back(*feedback); });
-  EXPECT_EQ(await(), State::SUCCEEDED);
-  expectEnd(MoveLineResult::REACHED, "reached");
+  EXPECT_EQ(client->await(), State::SUCCEEDED);
+  client->expectEnd(MoveLineResult::REACHED, "reached");
   const auto result = client->getResult();
   ASSERT_EQ(result->position.size(), 2U);
   EXPECT_NEAR(result->position[0], 0.06, 1e-12);
@@ -90,13 +78,13 @@ TEST_F(LineActionTest, ReachesItsTargetsAndTellsHowFarItIs) {
 TEST_F(LineActionTest, IsRejectedWithTheReason) {
   start();
   client->sendGoal(lineTo({0.06, 0.5}));
-  EXPECT_EQ(await(), State::REJECTED);
-  expectEnd(MoveLineResult::REFUSED, "0.5");
+  EXPECT_EQ(client->await(), State::REJECTED);
+  client->expectEnd(MoveLineResult::REFUSED, "0.5");
   MoveLineGoal unknown = lineTo({0.01, 0.01});
   unknown.name[1] = "w";
   client->sendGoal(unknown);
-  EXPECT_EQ(await(), State::REJECTED);
-  expectEnd(MoveLineResult::REFUSED, "there is no axis w");
+  EXPECT_EQ(client->await(), State::REJECTED);
+  client->expectEnd(MoveLineResult::REFUSED, "there is no axis w");
   EXPECT_EQ(positions(), (std::vector<std::int64_t>{0, 0}));
 }
 
@@ -105,8 +93,8 @@ TEST_F(LineActionTest, DeceleratesAlongTheLineWhenItIsCancelled) {
   client->sendGoal(lineTo({0.18, 0.12}));
   ASSERT_TRUE(waitUntil([&] { return positions().at(0) > 2000; }));
   client->cancelGoal();
-  EXPECT_EQ(await(), State::PREEMPTED);
-  expectEnd(MoveLineResult::STOPPED, "stop");
+  EXPECT_EQ(client->await(), State::PREEMPTED);
+  client->expectEnd(MoveLineResult::STOPPED, "stop");
   const auto result = client->getResult();
   const std::vector<std::int64_t> end = positions();
   EXPECT_EQ(end.at(0), std::llround(result->position.at(0) * 80'000.0));
@@ -120,8 +108,8 @@ TEST_F(LineActionTest, EndsIfAnotherCommandTakesOver) {
   client->sendGoal(lineTo({0.18, 0.12}));
   ASSERT_TRUE(waitUntil([&] { return positions().at(0) > 2000; }));
   EXPECT_TRUE(node.moveTo(0.0, false).success);
-  EXPECT_EQ(await(), State::PREEMPTED);
-  expectEnd(MoveLineResult::REPLACED, "x");
+  EXPECT_EQ(client->await(), State::PREEMPTED);
+  client->expectEnd(MoveLineResult::REPLACED, "x");
 }
 
 TEST_F(LineActionTest, IsCancelledWhileItsAxesComeToRest) {
@@ -134,7 +122,7 @@ TEST_F(LineActionTest, IsCancelledWhileItsAxesComeToRest) {
   EXPECT_TRUE(trigger("hold").success);
   EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
   client->cancelGoal();
-  const State end = await();
+  const State end = client->await();
   EXPECT_TRUE(end == State::RECALLED || end == State::REJECTED) << end.toString();
   const std::vector<std::int64_t> rest = positions();
   EXPECT_TRUE(trigger("resume").success);
@@ -148,8 +136,8 @@ TEST_F(LineActionTest, IsToldIfTheNodeEnds) {
   client->sendGoal(lineTo({0.18, 0.12}));
   ASSERT_TRUE(waitUntil([&] { return positions().at(0) > 2000; }));
   node.process().signal(SIGTERM);
-  EXPECT_EQ(await(), State::ABORTED);
-  expectEnd(MoveLineResult::STOPPED, "shut down");
+  EXPECT_EQ(client->await(), State::ABORTED);
+  client->expectEnd(MoveLineResult::STOPPED, "shut down");
 }
 
 }  // namespace

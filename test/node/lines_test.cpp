@@ -118,14 +118,14 @@ TEST_F(LinesTest, MovesNothingWhereItIsRefused) {
          r.name = {"x", "x"};
        },
        "the axis x is named twice"},
-      {[](auto& r) { r.name.clear(); }, "no axis is named"},
+      {[](auto& r) { r.name.clear(); }, "no axis is named; there are x, y"},
       {[](auto& r) { r.position = {0.01}; }, "there are 2 names, but 1 positions"},
       {[nan](auto& r) { r.position[1] = nan; },
        "y: the position is nan m, but must be a finite number"},
       {[](auto& r) { r.position[1] = 0.3; }, "0.2 m"},
       {[](auto& r) { r.velocity = -1.0; }, "the velocity of the line is -1"},
       {[nan](auto& r) { r.duration = nan; }, "the duration of the line is nan"},
-      {[](auto& r) { r.velocity = r.duration = 1.0; }, "a velocity and a duration"},
+      {[](auto& r) { r.velocity = r.duration = 1.0; }, "a velocity, 1, and a duration, 1 s"},
   };
   for (const auto& [change, words] : bad) {
     const auto answer = moveLine({0.01, 0.01}, true, change);

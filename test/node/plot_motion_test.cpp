@@ -39,7 +39,7 @@ TEST(PlotMotion, SaysWhyItDrawsNothing) {
     EXPECT_FALSE(picture.exists());
   };
   expect_fails("x", "0.3", 1, "above the soft limit");
-  expect_fails("x", "0", 1, "nothing would move");
+  expect_fails("x", "0", 1, "x is already at 0 mm, so nothing would move");
   expect_fails("z", "0.1", 1, "has no axis z: its axes are x");
   const auto none = runProgram("plot_motion", {"plan", "--node", "/nobody", "--axis", "x", "--to",
                                                "0.1", "-o", picture.path()});

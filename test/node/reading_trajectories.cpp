@@ -144,6 +144,16 @@ TEST(ReadingTrajectories, RefusesAPointInThePast) {
   expectBadMessage(BadTrajectory::Kind::kOldStamp, "point 0", only);
 }
 
+// ros::Time counts to 2106, but a difference of more than 68 years is no ros::Duration.
+TEST(ReadingTrajectories, TakesAStampOfAnyYear) {
+  auto given = message({"elbow"}, {1.0});
+  given.header.stamp = ros::Time(4'294'967'295, 0);
+  EXPECT_NEAR(timedTrajectory(given, kAxes, kNow).delay, 4'294'967'295.0 - kNow.toSec(), 1e-5);
+  given.header.stamp = ros::Time(1, 0);
+  expectBad(BadTrajectory::Kind::kOldStamp, "is in the past by 4294967293 s",
+            [&] { timedTrajectory(given, kAxes, ros::Time(4'294'967'295, 0)); });
+}
+
 TEST(ReadingTrajectories, HasNoLimitWhereNoToleranceIsGivenOrItIsLifted) {
   ros_node::action_msgs::FollowJointTrajectoryGoal goal;
   goal.trajectory = message({"elbow", "shoulder"}, {1.0});
@@ -164,19 +174,42 @@ TEST(ReadingTrajectories, RefusesTolerancesOfOtherJointsAndOfNoNumber) {
   goal.trajectory = message({"elbow"}, {1.0});
   goal.goal_tolerance.resize(1);
   goal.goal_tolerance[0].name = "shoulder";
-  expectBad(BadTrajectory::Kind::kInvalid, "goal_tolerance names the joint shoulder",
+  expectBad(BadTrajectory::Kind::kInvalid,
+            "goal_tolerance names the joint shoulder, but the trajectory has elbow",
             [&] { ros_node::readTolerances(goal); });
   goal.goal_tolerance[0].name = "elbow";
   goal.goal_tolerance[0].position = std::numeric_limits<double>::quiet_NaN();
-  expectBad(BadTrajectory::Kind::kInvalid, "goal_tolerance of the joint elbow isn't a number",
+  expectBad(BadTrajectory::Kind::kInvalid,
+            "goal_tolerance of the joint elbow is nan, but must be a number",
             [&] { ros_node::readTolerances(goal); });
 }
 
+TEST(ReadingTrajectories, QuotesControlCharactersOfAClientAsEscapes) {
+  ros_node::action_msgs::FollowJointTrajectoryGoal goal;
+  goal.trajectory = message({"el\tbow", "a\nb"}, {1.0});
+  goal.goal_tolerance.resize(1);
+  goal.goal_tolerance[0].name = "\x1b[2K";
+  expectBad(BadTrajectory::Kind::kInvalid,
+            R"(names the joint \x1b[2K, but the trajectory has el\tbow, a\nb)",
+            [&] { ros_node::readTolerances(goal); });
+  expectBadMessage(BadTrajectory::Kind::kJoints, R"(there is no joint el\tbow)", goal.trajectory);
+}
+
 TEST(ReadingTrajectories, SaysWhichJointIsTooFarOff) {
-  const std::vector<std::string> joints{"elbow", "shoulder"};
-  EXPECT_EQ(ros_node::violation(joints, {0.1, 0.1}, {1.0, 2.0}, {1.1 - 1e-12, 1.9 + 1e-12}), "");
-  EXPECT_EQ(ros_node::violation(joints, {0.1, 0.1}, {1.0, 2.0}, {1.0, 2.25}),
-            "shoulder is at 2.25, 0.25 from 2; the tolerance is 0.1");
+  const std::vector<ros_node::TrajectoryJoint> joints{{"elbow", config::Kind::kRotary, 509.3},
+                                                      {"slide", config::Kind::kLinear, 80'000.0}};
+  const std::vector<double> limits{0.1, 1e-6};
+  const auto said = [&](const std::vector<double>& actual) {
+    return ros_node::violation("path_tolerance", joints, limits, {1.0, 0.02}, actual);
+  };
+  EXPECT_EQ(said({1.1 - 1e-12, 0.020001 - 1e-12}), "");
+  EXPECT_EQ(said({0.75, 0.02}),
+            "elbow is at 0.75 rad, 0.25 rad from 1 rad; path_tolerance is 0.1 rad");
+  EXPECT_EQ(said({1.0, 0.0200125 + 1e-17}),
+            "slide is at 0.02001 m, 0.00001 m from 0.02 m; path_tolerance is 1e-06 m");
+  EXPECT_EQ(ros_node::violation("goal_tolerance", joints, limits, {1.0, 0.02 + 0.4 / 80'000.0},
+                                {1.0, 0.02}),
+            "slide is at 0.02 m, 0.000005 m from 0.020005 m; goal_tolerance is 1e-06 m");
 }
 
 // The figures are those of clients of control_msgs 1.5 (MoveIt, rosserial's libraries).

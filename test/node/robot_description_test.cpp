@@ -97,7 +97,7 @@ TEST(RobotDescription, LeavesAContinuousJointWithoutPositionLimits) {
   makeRotary(node);
   node.describe(robot("continuous", ""));
   node.start();
-  expectSays(node.process().output(), "max position without limit");
+  expectSays(node.process().output(), "max position none");
   EXPECT_EQ(node.process().output().find("has soft limits"), std::string::npos);
   EXPECT_TRUE(node.moveTo(10.0, true).success);
   EXPECT_EQ(node.pulses(), std::llround(10.0 * 3200 / (2 * std::acos(-1.0))));
@@ -167,6 +167,9 @@ const std::vector<BadDescription> kBadDescriptions = {
     {"VelocityBelowTheLowest", false,
      robot("prismatic", R"(<limit lower="0" upper="0.1" velocity="1e-300" effort="1"/>)"),
      "which is 0.001 steps/s"},
+    {"FartherThanStepsAreCounted", true,
+     robot("revolute", R"(<limit lower="-1e300" upper="0.1" velocity="1" effort="1"/>)"),
+     "which is as far as steps are counted"},
     {"ElsewhereThanTheAxis", false,
      robot("prismatic", R"(<limit lower="1" upper="2" velocity="1" effort="1"/>)"),
      "doesn't overlap the axis's own range"},

@@ -6,15 +6,14 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdio>
-#include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <string>
 
+#include "support/contents_of.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/temporary_folder.h"
 #include "support/wait.h"
 
 // Tests positions that survive the node.
@@ -25,18 +24,11 @@ namespace {
 class StateFile : public testing::Test {
  protected:
   void SetUp() override {
-    char name[] = "/tmp/stepdriver_node_state_XXXXXX";
-    ASSERT_NE(mkdtemp(name), nullptr);
-    directory_ = name;
     node_.set("state_file", file());
     node_.set("axes/x/holds_position_unpowered", true);
   }
-  void TearDown() override {
-    for (const char* end : {"", ".lock"}) std::remove((file() + end).c_str());
-    rmdir(directory_.c_str());
-  }
 
-  std::string file() const { return directory_ + "/state"; }
+  std::string file() const { return folder_.path() + "/state"; }
   void end(int signal) {
     node_.process().signal(signal);
     ASSERT_TRUE(node_.process().waitForExit(kBound));
@@ -54,8 +46,8 @@ class StateFile : public testing::Test {
     return states.messages().at(0);
   }
 
+  const test::TemporaryFolder folder_;
   NodeUnderTest node_;
-  std::string directory_;
 };
 
 TEST_F(StateFile, BringsThePositionBackAfterAShutdown) {
@@ -89,10 +81,7 @@ TEST_F(StateFile, SaysThatTheAxisOfAKilledNodeWasMovingAndFromWhere) {
   node_.start();
   standAt(0.008);
   EXPECT_TRUE(node_.moveTo(0.2, false, 0.001).success);  // takes minutes
-  const auto text = [this] {
-    std::ifstream in(file());
-    return std::string(std::istreambuf_iterator<char>(in), {});
-  };
+  const auto text = [this] { return test::contentsOf(file()); };
   const auto has = [&text](const char* words) { return text().find(words) != std::string::npos; };
   ASSERT_TRUE(waitUntil([&] { return has("80000 0.008") && has(" 1\n"); })) << text();
   end(SIGKILL);
@@ -162,7 +151,7 @@ TEST_F(StateFile, StopsTheStartWhereItCannotBe) {
   EXPECT_EQ(process.waitForExit(kBound).value_or(-1), 1);
   expectSays(process.output(),
              "state_file is \"positions\", but must be an absolute path, or empty for none");
-  node_.set("state_file", directory_ + "/nowhere/state");
+  node_.set("state_file", folder_.path() + "/nowhere/state");
   NodeProcess& other = node_.launch();
   EXPECT_EQ(other.waitForExit(kBound).value_or(-1), 1);
   expectSays(other.output(), "can't be written: No such file or directory");

@@ -277,7 +277,7 @@ TEST_F(TrajectoryActionTest, StopsWhereItLeavesThePathTolerance) {
   tolerate(goal.path_tolerance, "y_joint", 0.01 * kStep);
   send(goal);
   expectAborted(Result::PATH_TOLERANCE_VIOLATED, "y_joint is at");
-  expectSays(said(), "the tolerance is 1.25e-07");
+  expectSays(said(), "path_tolerance is 1.25e-07 m");
   EXPECT_LT(node.pulses(), 18000) << "not the whole way";
   const std::int64_t pulses = node.pulses();
   EXPECT_EQ(node.pulses(), pulses);
@@ -288,7 +288,8 @@ TEST_F(TrajectoryActionTest, EndsAbortedOutsideTheGoalTolerance) {
   Goal goal = goalOf({{1.0, {0.02 + 0.3 * kStep, 0.01}, {0.0, 0.0}}});
   tolerate(goal.goal_tolerance, "x_joint", 0.2 * kStep);
   send(goal);
-  expectAborted(Result::GOAL_TOLERANCE_VIOLATED, "x_joint is at 0.02,");
+  expectAborted(Result::GOAL_TOLERANCE_VIOLATED, "x_joint is at 0.02 m, 0.00000");
+  expectSays(said(), "m from 0.0200038 m; goal_tolerance is 2.5e-06 m");
   goal.goal_tolerance[0].position = 0.4 * kStep;
   goal.trajectory.points[0].positions[1] = 0.0;
   EXPECT_EQ(run(goal), State::SUCCEEDED) << said();

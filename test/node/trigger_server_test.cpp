@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -213,6 +214,20 @@ TEST_F(TriggerServerTest, ClosesTheLongestSilentOfTooMany) {
   EXPECT_TRUE(second.isClosed());
   EXPECT_TRUE(first.call());
   EXPECT_TRUE(others.back()->call());
+}
+
+TEST_F(TriggerServerTest, KeepsClientsThatWaitWhenManyOthersFinishNoHeader) {
+  const TcprosClient waiting(kService);
+  ASSERT_TRUE(waiting.introduce(kService, true));
+  const std::uint16_t port = node_test::servicePort(kService);
+  std::vector<std::unique_ptr<TcprosClient>> others;
+  while (others.size() < 2 * TriggerServer::kMostConnections) {
+    others.push_back(std::make_unique<TcprosClient>(port));
+    others.back()->send(introduction(kService, true).substr(0, 20));
+  }
+  expectService();
+  EXPECT_TRUE(others.front()->isClosed()) << "there were too many";
+  EXPECT_TRUE(waiting.call());
 }
 
 /// Leaves this process no descriptors except those that are open.

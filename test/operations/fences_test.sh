@@ -61,10 +61,11 @@ unset ROS_HOSTNAME
 on_machine() { ip netns exec "$machine" env ROS_MASTER_URI=http://localhost:11311 ROS_IP=127.0.0.1 "$@"; }
 # In a group of its own, because Ctrl-C goes to a group.
 start() {
-  local log=$1
+  local log=$scratch/$1.log
   shift
+  : >"$log" # here, because the job may begin later than what waits for its words
   set -m
-  "$@" >"$scratch/$log.log" 2>&1 </dev/null &
+  "$@" >>"$log" 2>&1 </dev/null &
   set +m
   jobs_started=("$!" "${jobs_started[@]}")
 }

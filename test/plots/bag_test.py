@@ -49,11 +49,14 @@ class BagTest(unittest.TestCase):
             code, error = self.draw(*arguments)
             self.assertEqual(code, 1)
             self.assertIn(words, error)
+        whole = self.bag.read_bytes()
         self.bag.write_text("no bag")
         code, error = self.draw()
         self.assertEqual(code, 1)
         self.assertIn("can't be read as a bag", error)
-        for noise in (bytes(range(255, -1, -1)) * 40, b"#ROSBAG V2.0\n" + bytes(range(256)) * 40):
+        # The last one has messages whose number of positions is wrong.
+        for noise in (bytes(range(255, -1, -1)) * 40, b"#ROSBAG V2.0\n" + bytes(range(256)) * 40,
+                      whole.replace(b"x_joint\x01\x00", b"x_joint\xff\x00")):
             self.bag.write_bytes(noise)
             code, error = self.draw()
             self.assertEqual((code, len(error.splitlines())), (1, 1), error)

@@ -26,7 +26,7 @@ class DrawingTest(unittest.TestCase):
 
     def test_says_which_line_is_no_point(self):
         for text, words in (("1 2\n3\n", "line 2: 3: isn't a point"), ("1 two\n", "line 1"),
-                            ("1 nan\n", "finite"), ("1 2\n", "contains no line")):
+                            ("1 nan\n", "line 1: 1 nan: isn't a point; both numbers must be finite"), ("1 2\n", "contains no line")):
             with self.assertRaises(BadDrawing) as caught:
                 self.read("points.txt", text)
             self.assertIn(words, str(caught.exception))
@@ -47,10 +47,16 @@ class DrawingTest(unittest.TestCase):
         with self.assertRaises(BadDrawing):
             drawing.placed(strokes, ((None, None), PAPER[1]))
 
+    def test_refuses_a_drawing_that_is_too_small_or_too_large_to_scale(self):
+        for stroke in ([(0.0, 0.0), (1e-320, 0.0)], [(1e308, 0.0), (-1e308, 0.0)]):
+            with self.assertRaises(BadDrawing) as caught:
+                drawing.placed([stroke], PAPER)
+            self.assertIn("the drawing can't be scaled: it is ", str(caught.exception))
+
     def test_refuses_a_point_beyond_the_limits_by_its_axis(self):
         drawing.refuse_beyond([[(0.0, 150.0)]], "xy", PAPER)
-        for place, words in (((-1.0, 0.0), "limits of x"), ((0.0, 151.0), "(0, 151) mm"),
-                             ((0.0, 151.0), "limits of y, which are 0.0 and 150.0 mm")):
+        for place, words in (((-1.0, 0.0), "mm is below the soft limit of x, 0 mm"),
+                             ((0.0, 151.0), "(0, 151) mm is above the soft limit of y, 150 mm")):
             with self.assertRaises(BadDrawing) as caught:
                 drawing.refuse_beyond([[place]], "xy", PAPER)
             self.assertIn(words, str(caught.exception))

@@ -4,7 +4,8 @@ import unittest
 from collections import Counter
 
 import support  # noqa: F401: the path to the modules
-from stepdriver_plots.one_stroke import one_stroke
+from stepdriver_plots.errors import BadDrawing
+from stepdriver_plots.one_stroke import OneStroke, one_stroke
 
 
 def lines_of(strokes):
@@ -33,6 +34,14 @@ class OneStrokeTest(unittest.TestCase):
         self.assertEqual(found.added, 0.0)
         self.assertEqual(len(found.stroke), 9)
 
+    def test_says_only_what_it_had_to_add(self):
+        self.assertEqual(OneStroke([], 933.2, 0.0, 0.2).text(), "one stroke of 933 mm")
+        self.assertEqual(OneStroke([], 933.2, 22.9, 0.0).text(),
+                         "one stroke of 933 mm: 23 mm are drawn twice")
+        self.assertEqual(OneStroke([], 40.0, 2.0, 1.0).text(),
+                         "one stroke of 40 mm: 2 mm are drawn twice and 1 mm join parts that don't "
+                         "touch")
+
     def test_goes_back_along_a_line_that_leads_nowhere(self):
         # A star of three rays: the stroke begins and ends with two of them, and draws the third twice.
         middle = (0.0, 0.0)
@@ -53,6 +62,11 @@ class OneStrokeTest(unittest.TestCase):
     def test_begins_near_the_pen_if_it_may_begin_anywhere(self):
         square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
         self.assertEqual(self.check([square], (2.0, 2.0)).stroke[0], (1.0, 1.0))
+
+    def test_refuses_lines_of_no_length(self):
+        with self.assertRaises(BadDrawing) as caught:
+            one_stroke([[(0.0, 0.0), (0.0, 1e-6)], [(50.0, 0.0), (50.0, 1e-6)]], (0.0, 0.0))
+        self.assertIn("shorter than 5e-05 mm", str(caught.exception))
 
     def test_draws_any_drawing(self):
         for seed in range(60):

@@ -1,7 +1,7 @@
 import unittest
 
 from support import ramp
-from stepdriver_plots.step_curve import StepCurve
+from stepdriver_plots.step_curve import StepCurve, differences
 
 
 class StepCurveTest(unittest.TestCase):
@@ -12,6 +12,9 @@ class StepCurveTest(unittest.TestCase):
             self.assertAlmostEqual(speed, 2000.0 * time, delta=1e-6 * speed)
         for acceleration in curve.acceleration()[1][5:]:
             self.assertAlmostEqual(acceleration, 2000.0, delta=0.1)
+
+    def test_has_no_rate_of_change_between_times_that_are_the_same_number(self):
+        self.assertEqual(differences([1.0, 1.0, 2.0], [0.0, 1.0, 3.0]), ([1.5], [2.0]))
 
     def test_scales_to_a_unit(self):
         curve = StepCurve.of_counts([0.0, 0.01, 0.02], [1, 2, 3], "x", "mm", 0.5)

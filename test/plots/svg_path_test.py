@@ -5,6 +5,7 @@ import unittest
 
 import support
 from stepdriver_plots.errors import BadDrawing
+from stepdriver_plots.one_stroke import one_stroke
 from stepdriver_plots.svg_path import read_svg
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" %s>%s</svg>'
@@ -76,17 +77,40 @@ class SvgPathTest(unittest.TestCase):
 
     def test_refuses_what_it_cannot_draw(self):
         for inside, words in (('<text x="1">A</text>', "text isn't drawn"),
-                              ('<path d="M0 0L1e999 1"/>', "isn't finite"),
+                              ('<path d="M0 0L1e999 1"/>', "a drawing reaches to 1e+100"),
+                              ('<path d="M0 0C1e308 1e308 -1e308 -1e308 3 0"/>',
+                               "a drawing reaches to 1e+100"),
+                              ('<path d="M0 0Q1e300 1e-5 3 0"/>', "a drawing reaches to 1e+100"),
                               ("<g>", "can't be read as SVG")):
             with self.assertRaises(BadDrawing) as caught:
                 self.read(inside)
             self.assertIn(words, str(caught.exception))
             self.assertIn(str(self.file), str(caught.exception))
 
+    def test_draws_the_copies_of_an_element(self):
+        self.expect('<defs><g id="a"><path id="b" d="M0 0H1"/></g></defs><use href="#a" x="5"/>'
+                    '<use xmlns:l="http://www.w3.org/1999/xlink" l:href="#b" y="2"/>',
+                    [[(5, 0), (6, 0)], [(0, 2), (1, 2)]])
+
+    def test_refuses_copies_without_end(self):
+        inner = '<path id="a0" d="M0 0H1"/>'
+        for i in range(9):
+            inner += f'<g id="a{i + 1}">' + f'<use href="#a{i}"/>' * 10 + "</g>"
+        for inside, words in (('<g id="a"><path d="M0 0H1"/><use href="#a"/></g>',
+                               "<use> copies the element 'a' into itself"),
+                              ('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>',
+                               "into itself"),
+                              (inner, "copies of elements; at most 10000 are allowed")):
+            with self.assertRaises(BadDrawing) as caught:
+                self.read(inside)
+            self.assertIn(words, str(caught.exception))
+
     def test_the_drawings_that_come_along_can_be_read(self):
         drawings = pathlib.Path(support.SCRIPTS).parents[1] / "config/drawings"
         self.assertEqual(len(read_svg(drawings / "house.svg")), 7)
-        self.assertEqual(len(read_svg(drawings / "sketch.svg")), 1)
+        sketch = read_svg(drawings / "sketch.svg")
+        self.assertEqual(len(sketch), 1)
+        self.assertEqual(one_stroke(sketch, (0.0, 0.0)).twice, 0.0)
 
 
 if __name__ == "__main__":

@@ -37,10 +37,39 @@ class PinTraceTest(unittest.TestCase):
         self.assertEqual(trace.counts("x", False, True)[1], [-1])
         self.assertAlmostEqual(trace.counts("x", True, False)[0][0], 12e-6, delta=1e-12)
 
+    def test_takes_the_levels_that_a_recording_tells(self):
+        # It begins in the middle of a pulse, of a motion that goes backward.
+        recording = vcd((1, 0), [(10, "a", 0), (20, "a", 1), (22, "a", 0), (30, "b", 1), (40, "a", 1)])
+        self.assertEqual(self.trace(recording).counts("x")[1], [1, 2])
+        for comments, counts in ((("step active high", "dir active high"), [-1, 0]),
+                                 (("step active high", "dir active low"), [1, 0]),
+                                 (("step active low", "dir active low"), [1, 2])):
+            lines = "".join(f"$comment x.{words} $end\n" for words in comments)
+            told = recording.replace("$enddefinitions", lines + "$enddefinitions")
+            self.assertEqual(self.trace(told).counts("x")[1], counts, comments)
+
+    def test_counts_the_pulses_of_cw_and_ccw(self):
+        text = vcd((0, 0), [(10, "a", 1), (12, "a", 0), (20, "a", 1), (22, "a", 0), (30, "b", 1), (32, "b", 0)])
+        trace = self.trace(text.replace("a step", "a cw").replace("b dir", "b ccw"))
+        self.assertEqual(trace.axes(), ["x"])
+        self.assertEqual(trace.counts("x")[1], [1, 2, 1])
+        self.assertEqual(trace.counts("x", False, False)[1], [1, 2, 1])
+
+    def test_counts_each_edge_if_the_file_says_that_it_is_a_step(self):
+        text = vcd((0, 1), [(10, "a", 1), (20, "a", 0), (30, "b", 0), (40, "a", 1)])
+        told = text.replace("$enddefinitions", "$comment x.step active both $end\n$enddefinitions")
+        self.assertEqual(self.trace(told).counts("x")[1], [1, 2, 1])
+
+    def test_passes_over_the_comments_of_others(self):
+        text = vcd((0, 1), [(10, "a", 1)])
+        for comment in ("$comment $end\n", "$comment\n any words\n$end\n", "$comment a b c d $end\n"):
+            self.assertEqual(self.trace(comment + text).counts("x")[1], [1])
+
     def test_says_where_it_cannot_read_a_file(self):
         for text, words in (("", "isn't a VCD file"),
                             (vcd((0, 1), [(10, "z", 1)]), "line 14: can't be read: 1z"),
                             (vcd((0, 1), []) + "#ten\n", "line 13: can't be read: #ten"),
+                            (vcd((0, 1), []).replace("#0\n", "") + "1a\n", "line 12: can't be read: 1a"),
                             (vcd((0, 1), []) + "#9" + "0" * 30, "line 13: can't be read: #9")):
             with self.assertRaises(BadTrace) as caught:
                 self.trace(text)
@@ -48,6 +77,19 @@ class PinTraceTest(unittest.TestCase):
         with self.assertRaises(BadTrace) as caught:
             PinTrace(self.file.parent / "none.vcd")
         self.assertIn("none.vcd", str(caught.exception))
+
+    def test_refuses_two_steps_at_one_time(self):
+        for text in (vcd((0, 1), [(10, "a", 1), (10, "a", 0), (10, "a", 1)]),
+                     vcd((0, 1), [(9 * 10**15, "a", 1), (9 * 10**15, "a", 0)]) + "#9000000000000000\n1a\n"):
+            with self.assertRaises(BadTrace) as caught:
+                self.trace(text).counts("x")
+            self.assertIn("has two steps of x at ", str(caught.exception))
+
+    def test_shows_no_character_that_a_terminal_would_obey(self):
+        with self.assertRaises(BadTrace) as caught:
+            self.trace(vcd((0, 1), []) + "#1\x1b[2J" + "x" * 10000)
+        self.assertIn("can't be read: #1\\x1b[2Jxxx", str(caught.exception))
+        self.assertLess(len(str(caught.exception)), 600)
 
     def test_has_no_axis_without_a_level(self):
         self.assertEqual(self.trace(vcd((0, 1), []).replace("0a\n", "").replace("1a\n", "")).axes(), [])

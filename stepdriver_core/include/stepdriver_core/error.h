@@ -15,7 +15,9 @@ class Error : public std::runtime_error {
 /// A command that can't be accepted at the moment. It has changed nothing.
 class Refused : public Error {
  public:
-  using Error::Error;
+  /// @param message may quote what the client sent: what() shows its control characters and line
+  ///   breaks as printable() does.
+  explicit Refused(const std::string& message);
 };
 
 /// A GPIO line can't be requested, written or read; names the line and the reason.

@@ -1,6 +1,7 @@
 #include "activities.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "come_to_rest.h"
@@ -41,12 +42,14 @@ void Activities::begin(std::unique_ptr<Activity> activity, const Why& why) {
 
 void Activities::takeOver(std::unique_ptr<Activity> activity) {
   std::vector<Predecessor> predecessors;
-  std::vector<Predecessor> companions;
+  // By axis. An axis has several goals if the engine has not yet accepted the last one.
+  std::map<const axis::AxisModel*, std::vector<Predecessor>> companions;
   for (axis::AxisModel* axis : activity->axes()) {
     Activity* now = owner(*axis);
     if (now == nullptr) continue;
     for (Predecessor& left : now->handOver("another command took over")) {
-      (has(activity->axes(), left.axis) ? predecessors : companions).push_back(std::move(left));
+      auto& goals = has(activity->axes(), left.axis) ? predecessors : companions[left.axis];
+      goals.push_back(std::move(left));
     }
   }
   Activity& begun = *activity;
@@ -55,9 +58,11 @@ void Activities::takeOver(std::unique_ptr<Activity> activity) {
   // An axis that was given another goal has left its path, and the others can't continue without
   // it.
   const std::string left_by = begun.axes().front()->name();
-  for (Predecessor& companion : companions) {
+  for (const auto& axis : context_.axes) {
+    const auto goals = companions.find(axis.get());
+    if (goals == companions.end()) continue;
     all_.push_back(std::make_unique<ComeToRest>(
-        context_, std::move(companion),
+        context_, std::move(goals->second),
         Why{axis::MoveEnd::kStopped,
             left_by + ", which it moved together with, was given another goal"}));
     all_.back()->begin({});

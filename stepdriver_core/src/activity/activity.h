@@ -66,7 +66,9 @@ class Activity {
   virtual bool isInBackground() const { return false; }
 
   virtual void hold(const Ack& /*call*/) {}
-  /// @throw Refused if it can't be resumed.
+  /// @throw Refused if it is held, and can't be resumed now.
+  virtual void refuseUnlessResumable() const {}
+  /// @pre refuseUnlessResumable() has just returned.
   virtual void resume(const Ack& /*call*/) {}
   /// The speed override or the limits have changed.
   virtual void speedChanged(const Ack& /*call*/) {}

@@ -12,9 +12,12 @@ namespace stepdriver::activity {
 /// Brings one axis to rest from a motion that another activity has begun and left.
 class ComeToRest : public Activity {
  public:
-  ComeToRest(Context& context, Predecessor left, Why why)
-      : Activity(context, {left.axis}, Handover::kAtSpeed),
-        manoeuvre_(context, {{left.axis, goalOf(left.goal)}}),
+  /// @param left the goals of the axis, at least one: the last, and those that it was to replace
+  ///   when the engine had not yet accepted it.
+  ComeToRest(Context& context, std::vector<Predecessor> left, Why why)
+      : Activity(context, {left.back().axis}, Handover::kAtSpeed),
+        manoeuvre_(context, {{left.back().axis, goalOf(left.back().goal)}}),
+        replaced_(left.begin(), left.end() - 1),
         why_(std::move(why)) {}
 
   bool canHandOver() const override { return true; }
@@ -26,7 +29,7 @@ class ComeToRest : public Activity {
 
  protected:
   void onBegin(std::vector<Predecessor> /*predecessors*/) override {
-    manoeuvre_.beginStop(why_);
+    manoeuvre_.beginStop(std::move(replaced_), why_);
     onLook();
   }
   void onLook() override {
@@ -43,6 +46,7 @@ class ComeToRest : public Activity {
   }
 
   Manoeuvre manoeuvre_;
+  std::vector<Predecessor> replaced_;
   const Why why_;
 };
 

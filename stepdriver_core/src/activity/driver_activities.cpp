@@ -10,6 +10,8 @@
 namespace stepdriver::activity {
 namespace {
 
+using driver::FaultEnd;
+
 // A changed level is reported within this time, even if its edge was lost.
 constexpr pulse::Nanoseconds kLevelIsTold = 250'000'000;
 
@@ -18,6 +20,11 @@ std::unique_ptr<Step> resetStep(Context& context, axis::AxisModel& axis) {
     axis.noteUnpowered();
     axis.noteHome();
   });
+}
+
+/// Energizes the motor, or switches its current off, until the next such command.
+std::unique_ptr<Step> powerStep(Context& context, axis::AxisModel& axis, bool on) {
+  return enableStep(context, axis, on, [&axis, on] { axis.motor.power().setEnabled(on); });
 }
 
 }  // namespace
@@ -34,11 +41,10 @@ Steps BringUp::plan() {
         if (!axis.config.enable_on_start || !axis.motor.pins().hasEnable() || axis.fault) return;
         if (context().stops_asked != context().stops_handled) return;
         Steps enabling;
-        add(enabling,
-            enableStep(context(), axis, true, [&axis] { axis.motor.power().setEnabled(true); }));
+        add(enabling, powerStep(context(), axis, true));
         insert(std::move(enabling));
       }));
-  return steps;
+  return braked(context(), axis, std::move(steps));
 }
 
 Steps Enable::plan() {
@@ -46,7 +52,9 @@ Steps Enable::plan() {
   if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
   Steps steps = wakeSteps(context(), axis);
   if (axis.motor.power().wantsEnabled()) return steps;
-  add(steps, enableStep(context(), axis, true, [&axis] { axis.motor.power().setEnabled(true); }));
+  Steps enabling;
+  add(enabling, powerStep(context(), axis, true));
+  append(steps, braked(context(), axis, std::move(enabling)));
   return steps;
 }
 
@@ -55,7 +63,7 @@ Steps Disable::plan() {
   const motor::Power& power = axis.motor.power();
   Steps steps;
   if (!power.wantsEnabled()) return steps;
-  if (power.isEnabled()) add(steps, enableStep(context(), axis, false, {}));
+  if (power.isEnabled()) add(steps, powerStep(context(), axis, false));
   if (power.wantsSleep() != power.isAsleep()) {
     add(steps, pinsStep(context(), axis, axis.motor.pins().sleep(power.wantsSleep())));
   }
@@ -63,14 +71,15 @@ Steps Disable::plan() {
         axis.motor.power().setEnabled(false);
         joined_.clear();
       }));
-  return steps;
+  return braked(context(), axis, std::move(steps));
 }
 
 Steps Sleep::plan() {
   axis::AxisModel& axis = *axes().front();
+  if (axis.motor.power().wantsSleep() == asleep_) {
+    return asleep_ ? Steps() : wakeSteps(context(), axis);
+  }
   Steps steps;
-  if (!asleep_) steps = wakeSteps(context(), axis);
-  if (axis.motor.power().wantsSleep() == asleep_) return steps;
   add(steps, pinsStep(context(), axis, axis.motor.pins().sleep(asleep_)));
   add(steps, std::make_unique<RunStep>([this, &axis] {
         const motor::Power& power = axis.motor.power();
@@ -81,17 +90,16 @@ Steps Sleep::plan() {
       }));
   add(steps, std::make_unique<RunStep>([this, &axis] {
         axis.motor.power().setAsleep(asleep_);
-        axis.noteUnpowered();
-        axis.noteHome();
+        axis.noteAsleep();
       }));
-  return steps;
+  return braked(context(), axis, std::move(steps));
 }
 
 Steps Reset::plan() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
   add(steps, resetStep(context(), axis));
-  return steps;
+  return braked(context(), axis, std::move(steps));
 }
 
 Steps GoIdle::plan() {
@@ -100,13 +108,12 @@ Steps GoIdle::plan() {
   if (axis.config.idle_action == config::IdleAction::kSleep) {
     add(steps, pinsStep(context(), axis, axis.motor.pins().sleep(true), [&axis] {
           axis.motor.power().setIdle(true);
-          axis.noteUnpowered();
-          axis.noteHome();
+          axis.noteAsleep();
         }));
   } else {
     add(steps, enableStep(context(), axis, false, [&axis] { axis.motor.power().setIdle(true); }));
   }
-  return steps;
+  return braked(context(), axis, std::move(steps));
 }
 
 // ---- faults ----
@@ -126,24 +133,32 @@ Steps Recover::plan() {
     }
     add(steps, std::make_unique<RunStep>([&axis] { axis.motor.pinsRestored(); }));
   }
-  add(steps, std::make_unique<RunStep>([this] { insert(resetIfFaulty()); }));
+  add(steps, std::make_unique<RunStep>([this] { insert(endFaultOfDriver()); }));
   add(steps, std::make_unique<RunStep>([this] { clearFault(); }));
-  return steps;
+  return braked(context(), axis, std::move(steps));
 }
 
 bool Recover::isFaulty() {
   axis::AxisModel& axis = *axes().front();
-  return axis.config.fault && !axis.motor.power().isAsleep() &&
-         axis.readInput(axis.motor.lines().fault) == 0;
+  if (!axis.config.fault || axis.motor.power().isAsleep()) return false;
+  const bool level = axis.readInput(axis.motor.lines().fault) != 0;
+  return level == axis.config.driver.fault_active.value_or(false);
 }
 
-Steps Recover::resetIfFaulty() {
+Steps Recover::endFaultOfDriver() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
   // A sleeping chip doesn't report a fault that it may have kept.
   const bool unknown = axis.config.fault && axis.motor.power().isAsleep();
-  if (!(isFaulty() || unknown) || !axis.motor.pins().hasReset()) return steps;
-  add(steps, resetStep(context(), axis));
+  if (!(isFaulty() || unknown)) return steps;
+  const FaultEnd by = axis.config.driver.fault_end;
+  if (by == FaultEnd::kReset && axis.motor.pins().hasReset()) {
+    add(steps, resetStep(context(), axis));
+  } else if (by == FaultEnd::kEnable && axis.motor.pins().hasEnable()) {
+    append(steps, switchOffAndOn());
+  } else {
+    return steps;
+  }
   add(steps, std::make_unique<WaitStep>(context(), [&axis] { return axis.motor.state().ready; }));
   // The line has another level by then, which may be reported a little later.
   add(steps, std::make_unique<WaitStep>(
@@ -152,13 +167,47 @@ Steps Recover::resetIfFaulty() {
   return steps;
 }
 
+// A motor without current stays so; its driver has nothing more to be switched off.
+Steps Recover::switchOffAndOn() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  if (!axis.motor.power().isEnabled()) return steps;
+  if (axis.motor.enableIsHeldByOthers()) {
+    axis.refuse("the " + axis.config.driver.title + " still reports a fault on " +
+                axis.config.driver.fault_name +
+                "; ENABLE ends it, but keeps another axis enabled: disable that one first");
+  }
+  const auto wait = axis.config.driver.timing.reset_low_ns;
+  add(steps, enableStep(context(), axis, false, {}));
+  add(steps, std::make_unique<WaitStep>(context(), [this, wait] { return context().now + wait; }));
+  add(steps, enableStep(context(), axis, true, {}));
+  return steps;
+}
+
+std::string Recover::whyItStays() const {
+  const axis::AxisModel& axis = *axes().front();
+  const motor::DriverPins& pins = axis.motor.pins();
+  switch (axis.config.driver.fault_end) {
+    case FaultEnd::kItself:
+      return "; it ends by itself when its cause is gone";
+    case FaultEnd::kReset:
+      return pins.hasReset() ? ""
+                             : "; RESET isn't wired, so only switching its power off clears it";
+    case FaultEnd::kEnable:
+      return pins.hasEnable() ? ""
+                              : "; ENABLE isn't wired, so only switching its power off clears it";
+    case FaultEnd::kPower:
+      break;
+  }
+  return "; only switching its power off clears it";
+}
+
 void Recover::clearFault() {
   axis::AxisModel& axis = *axes().front();
   if (isFaulty()) {
-    axis.refuse(std::string("the driver chip still reports a fault on nFAULT") +
-                (axis.motor.pins().hasReset()
-                     ? ""
-                     : "; RESET isn't wired, so only switching its power off clears it"));
+    const driver::DriverChip& chip = axis.config.driver;
+    axis.refuse("the " + chip.title + " still reports a fault on " + chip.fault_name +
+                whyItStays());
   }
   if (context().stops_asked != context().stops_cleared) {
     axis.refuse("an emergency stop has come meanwhile");

@@ -89,7 +89,22 @@ class GoIdle : public PinScript {
   Steps plan() override;
 };
 
-/// Ends a fault: restores the pins if a write had failed, and resets a chip that reports one.
+/// Engages the brake. Without a call it is in the background: the axis is at fault.
+class EngageBrake : public PinScript {
+ public:
+  EngageBrake(Context& context, axis::AxisModel& axis, Ack call)
+      : PinScript(context, axis, std::move(call)), is_in_background_(this->call() == nullptr) {}
+  bool isInBackground() const override { return is_in_background_; }
+
+ protected:
+  Steps plan() override { return engageSteps(context(), *axes().front()); }
+
+ private:
+  const bool is_in_background_;
+};
+
+/// Ends a fault: restores the pins if a write had failed, and ends the fault that a driver reports
+/// as DriverChip::fault_end says.
 class Recover : public PinScript {
  public:
   using PinScript::PinScript;
@@ -99,7 +114,9 @@ class Recover : public PinScript {
   Steps plan() override;
 
  private:
-  Steps resetIfFaulty();
+  Steps endFaultOfDriver();
+  Steps switchOffAndOn();
+  std::string whyItStays() const;
   bool isFaulty();
   void clearFault();
 };

@@ -29,9 +29,8 @@ namespace {
 
 // While pins are written, nothing could slow down the others: they come to rest before that.
 Activity::Handover handoverOf(const std::vector<Order>& orders) {
-  const bool wakes = std::any_of(orders.begin(), orders.end(), [](const Order& order) {
-    return order.axis->motor.power().isIdle();
-  });
+  const bool wakes = std::any_of(orders.begin(), orders.end(),
+                                 [](const Order& order) { return order.axis->mustWake(); });
   return wakes ? Activity::Handover::kAfterRest : Activity::Handover::kAtSpeed;
 }
 
@@ -84,15 +83,19 @@ void FollowLine::check() const {
   }
 }
 
-std::shared_ptr<const axis::LinePath> FollowLine::linePath() const {
+const std::shared_ptr<const axis::LinePath>& FollowLine::linePath() {
   std::vector<std::int64_t> targets;
   std::vector<axis::PathAxis> facts;
   for (const Order& order : orders_) {
     targets.push_back(*order.goal.target);
     facts.push_back(order.axis->pathAxis());
   }
-  return std::make_shared<const axis::LinePath>(std::move(facts), startsOf(axes(), 0), targets,
-                                                velocity_, duration_);
+  const std::vector<axis::PathStart> starts = startsOf(axes(), 0);
+  if (!path_ || !path_->isOf(facts, starts)) {
+    path_ = std::make_shared<const axis::LinePath>(std::move(facts), starts, targets, velocity_,
+                                                   duration_);
+  }
+  return path_;
 }
 
 Steps FollowLine::plan() {
@@ -137,8 +140,8 @@ Steps FollowLine::takeUp(const Order& order) {
 
 Steps FollowLine::followLine() {
   check();
-  const auto path = linePath();
-  const auto join = [this, path](std::int64_t at) -> std::shared_ptr<const axis::SharedPath> {
+  const auto join =
+      [this, path = linePath()](std::int64_t at) -> std::shared_ptr<const axis::SharedPath> {
     path->requireStart(startsOf(axes(), at));
     return {path};
   };

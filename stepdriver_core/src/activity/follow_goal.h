@@ -47,14 +47,18 @@ class FollowLine : public Script {
  private:
   Failure notDone(const std::string& why) const override;
   void check() const;
+  /// The line from where the axes stand. It is planned again only if an axis has moved since, to
+  /// take up its backlash, or if its limits have changed.
+  ///
   /// @throw Refused if the limits don't allow its velocity or its duration.
-  std::shared_ptr<const axis::LinePath> linePath() const;
+  const std::shared_ptr<const axis::LinePath>& linePath();
   Steps takeUp(const Order& order);
   Steps followLine();
 
   std::vector<Order> orders_;
   const double velocity_;
   const double duration_;
+  std::shared_ptr<const axis::LinePath> path_;  // the last one
 };
 
 /// The states of axes at a motion time.

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "axis/axis_model.h"
 #include "axis/shared_path.h"
@@ -41,14 +42,19 @@ struct Order {
 
 /// A goal that another one replaces, until the engine has accepted the new one.
 struct Predecessor {
+  /// An order to the engine, towards the goal or to come to rest before it.
+  struct Followed {
+    std::uint64_t serial = 0;
+    bool slows_down = false;
+  };
+
   axis::AxisModel* axis = nullptr;
   Goal goal;
-  bool slowed_down = false;  ///< it had been stopped
-  std::string stopped_by;
+  std::string left_by;       ///< why it isn't reached if its axis comes to rest before it, in words
   Ack call;                  ///< of its beginning, if the engine had not yet accepted it
   std::uint64_t serial = 0;  ///< of the order that would have begun it
-  /// Of an order that stops it, if the engine had not yet taken that; 0: there was none.
-  std::uint64_t stop_serial = 0;
+  /// The last order for it that the engine has accepted, and those that it has not yet handled.
+  std::vector<Followed> orders;
 };
 
 }  // namespace stepdriver::activity

@@ -62,7 +62,7 @@ Homing::Homing(Context& context, axis::AxisModel& axis, std::uint64_t id,
       outcome_(std::move(outcome)) {}
 
 void Homing::refuseUnlessReady(const axis::AxisModel& axis) {
-  if (!axis.config.homing) axis.refuse("homing isn't configured");
+  if (!axis.config.homing) axis.refuse("homing isn't configured: homing/switch is missing");
   axis.refuseUnlessReady();
   axis.refuseWhileHeld();
 }
@@ -108,6 +108,10 @@ void Homing::hold(const Ack& call) {
   if (stroke_) stroke_->hold(call);
 }
 
+void Homing::refuseUnlessResumable() const {
+  if (stroke_) stroke_->refuseUnlessResumable();
+}
+
 void Homing::resume(const Ack& call) {
   if (!isHeld()) return;
   if (stroke_) stroke_->resume(call);
@@ -130,17 +134,20 @@ void Homing::onLook() {
   try {
     step();
   } catch (const Error& error) {
+    waking_.clear();  // its pins could not be written
     fail(error.what());
-    if (stroke_ == nullptr && waking_.empty() && !isFinished()) {
+    if (stroke_ == nullptr && !isFinished()) {
       conclude(failure_ + "; it stands at ", true);
     }
   }
 }
 
 void Homing::step() {
-  if (!waking_.empty()) {
+  while (!waking_.empty()) {
     if (!waking_.front()->look()) return;
-    waking_.clear();
+    waking_.erase(waking_.begin());
+    if (phase_ == HomingPhase::kStopping) waking_.clear();
+    if (!waking_.empty()) waking_.front()->begin();
   }
   const bool ended = stroke_ == nullptr || stroke_->look();
   if (phase_ == HomingPhase::kStopping) {

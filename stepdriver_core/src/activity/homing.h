@@ -30,6 +30,7 @@ class Homing : public Activity {
   bool canHandOver() const override { return stroke_ != nullptr; }
   std::vector<Predecessor> handOver(const std::string& by) override;
   void hold(const Ack& call) override;
+  void refuseUnlessResumable() const override;
   void resume(const Ack& call) override;
   void speedChanged(const Ack& call) override;
   void cancelHomings(const std::vector<std::uint64_t>& ids) override;

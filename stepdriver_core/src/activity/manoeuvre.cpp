@@ -19,13 +19,20 @@ constexpr pulse::Nanoseconds kLongestLead = 2'000'000'000;
 /// [s] Wall-clock time from the beginning of a goal to a motion time.
 double durationOf(const Context& context, const Goal& goal, std::int64_t end_ns) {
   const std::int64_t slid = context.slipped - goal.slipped_ns;
-  return std::max(0.0, static_cast<double>(end_ns - goal.began_ns + slid) * 1e-9);
+  return std::max(0.0, static_cast<double>(end_ns - goal.began_ns + slid) / 1e9);
 }
 
-/// How the engine ended an axis's motion, also in words.
-std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis) {
+bool isAt(const axis::AxisModel& axis, const Goal& goal) {
+  return goal.target == (goal.of_motor ? axis.motor.state().count : axis.jointCount());
+}
+
+/// How the goal of an axis at rest ended, also in words.
+/// @param slowed_down its last motion was to end before it. @param left_by why
+std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const Goal& goal,
+                                            bool slowed_down, const Why& left_by) {
   switch (axis.motor.state().end) {
     case pulse::EndReason::kDone:
+      if (slowed_down || !isAt(axis, goal)) return {left_by.end, left_by.text};
       return {axis::MoveEnd::kReached, ""};
     case pulse::EndReason::kEndstopMin:
       return {axis::MoveEnd::kEndstopMin, "the min endstop was met"};
@@ -34,6 +41,7 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis) {
     case pulse::EndReason::kEmergencyStop:
       return {axis::MoveEnd::kEmergencyStop, axis.fault.what()};
     case pulse::EndReason::kChipFault:
+    case pulse::EndReason::kNotInPosition:
     case pulse::EndReason::kTooLate:
     case pulse::EndReason::kLineError:
       return {axis::MoveEnd::kFault, axis.fault.what()};
@@ -185,9 +193,16 @@ void Manoeuvre::order(Plans plans) {
     axis::AxisModel& axis = *orders_[i].axis;
     const motor::Motion* before = axis.motor.motions().latest();
     open.serials.push_back(axis.motor.nextSerial());
-    follows->push_back({axis.motor.channel(), open.serials[i], plans.planned[i].profile.get(),
-                        before != nullptr ? before->serial : 0, axis.restartInterval(),
-                        plans.path != nullptr ? group_ : 0, context_.stops_handled});
+    pulse::Follow& follow = follows->emplace_back();
+    follow.channel = axis.motor.channel();
+    follow.serial = open.serials[i];
+    follow.profile = plans.planned[i].profile.get();
+    follow.continues = before != nullptr ? before->serial : 0;
+    follow.restart_interval = axis.restartInterval();
+    follow.group = plans.path != nullptr ? group_ : 0;
+    follow.stops = context_.stops_handled;
+    follow.faults = axis.motor.state().faults();
+    follow.settles = mode_ == Mode::kRun;
   }
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     Order& order = orders_[i];
@@ -217,7 +232,8 @@ void Manoeuvre::begin(std::vector<Predecessor> predecessors, Ack call) {
   order(*std::exchange(prepared_, std::nullopt));
 }
 
-void Manoeuvre::beginStop(const Why& why) {
+void Manoeuvre::beginStop(std::vector<Predecessor> predecessors, const Why& why) {
+  predecessors_ = std::move(predecessors);
   started_ = true;
   stop(why);
   look();
@@ -235,6 +251,7 @@ void Manoeuvre::change(Mode mode, const Ack& call) {
   try {
     order(plan(lead_));
   } catch (const std::exception& error) {
+    if (held_) return fail(failureOf(error));
     if (call) call->fail(failureOf(error));
     calls_.clear();
   }
@@ -268,14 +285,16 @@ void Manoeuvre::hold(const Ack& call) {
   change(Mode::kHold, call);
 }
 
+void Manoeuvre::refuseUnlessResumable() const {
+  if (over_ || mode_ != Mode::kHold || anyMoves()) return;
+  for (const Order& order : orders_) {
+    order.axis->refuseUnlessReady();
+    order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
+  }
+}
+
 void Manoeuvre::resume(const Ack& call) {
   if (over_ || mode_ != Mode::kHold) return;
-  if (!anyMoves()) {
-    for (const Order& order : orders_) {
-      order.axis->refuseUnlessReady();
-      order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
-    }
-  }
   from_rest_ = !anyMoves();
   change(Mode::kRun, call);
   held_ = false;
@@ -287,6 +306,12 @@ void Manoeuvre::replan(const Ack& call) {
 }
 
 // ---- news from the engine ----
+
+bool Manoeuvre::isDone() const {
+  return std::all_of(orders_.begin(), orders_.end(), [](const Order& order) {
+    return order.axis->motor.state().end == pulse::EndReason::kDone;
+  });
+}
 
 bool Manoeuvre::isOpen() const {
   for (std::size_t i = 0; i < orders_.size(); ++i) {
@@ -357,6 +382,8 @@ void Manoeuvre::refused() {
   }
   // The motion to change has ended by itself.
   if (started_ && !anyMoves()) {
+    // A resume during the deceleration of a hold came too late: it continues from rest.
+    if (mode_ == Mode::kRun && accepted_mode_ == Mode::kHold && isDone()) from_rest_ = true;
     if (!from_rest_) return calls_.clear();
     if (mode_ == Mode::kHold) held_ = true;
     if (mode_ == Mode::kStop) drop();
@@ -396,13 +423,15 @@ void Manoeuvre::tryAgain() {
 
 // It can't continue as planned. Axes that still move come to rest.
 void Manoeuvre::fail(Failure failure) {
+  const bool is_resume = started_ && from_rest_;
   if (call_) call_->fail(failure);
   call_.reset();
   for (const Ack& call : std::exchange(calls_, {})) {
-    if (anyMoves()) call->fail(failure);
+    if (anyMoves() || is_resume) call->fail(failure);
   }
   why_ = {axis::MoveEnd::kStopped, failure.text};
   if (!started_) failure_ = std::move(failure);
+  if (is_resume) return drop();
   if (!anyMoves()) return finish();
   started_ = true;
   mode_ = Mode::kStop;
@@ -421,10 +450,7 @@ void Manoeuvre::rested() {
     if (why_.text.empty()) return;
     return fail({Failure::Kind::kRefused, orders_.front().axis->name() + ": " + why_.text});
   }
-  const bool done = std::all_of(orders_.begin(), orders_.end(), [](const Order& order) {
-    return order.axis->motor.state().end == pulse::EndReason::kDone;
-  });
-  if (accepted_mode_ == Mode::kHold && mode_ == Mode::kHold && done) {
+  if (accepted_mode_ == Mode::kHold && mode_ == Mode::kHold && isDone()) {
     held_ = true;
     return calls_.clear();
   }
@@ -458,11 +484,17 @@ std::vector<Predecessor> Manoeuvre::handOver() {
   std::vector<Predecessor> left = std::exchange(predecessors_, {});
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Order& order = orders_[i];
-    const auto stop = std::find_if(open_.begin(), open_.end(),
-                                   [](const OpenOrder& open) { return open.mode == Mode::kStop; });
-    left.push_back({order.axis, order.goal, accepted_mode_ == Mode::kStop, why_.text, call_,
-                    open_.empty() ? 0 : open_.front().serials[i],
-                    stop == open_.end() ? 0 : stop->serials[i]});
+    Predecessor& before = left.emplace_back();
+    before.axis = order.axis;
+    before.goal = order.goal;
+    before.left_by = why_.text.empty() ? "another command took over" : why_.text;
+    before.call = call_;
+    if (!open_.empty()) before.serial = open_.front().serials[i];
+    before.orders.push_back({0, accepted_mode_ != Mode::kRun});
+    for (const OpenOrder& open : open_) {
+      if (open.serials[i] == 0) continue;
+      before.orders.push_back({open.serials[i], open.mode != Mode::kRun});
+    }
   }
   over_ = true;
   call_.reset();
@@ -482,26 +514,21 @@ const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
 void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
   // Neither it nor its successor has begun.
   if (ended.call) ended.call->fail(neverBegun(ended));
-  auto [end, why] = endOf(*ended.axis);
-  const bool slowed_down =
-      ended.slowed_down ||
-      (ended.stop_serial != 0 && ended.stop_serial <= ended.axis->motor.state().accepted);
-  if (end == axis::MoveEnd::kReached && slowed_down) {
-    end = axis::MoveEnd::kStopped;
-    why = ended.stopped_by;
-  }
+  const auto last = std::find_if(ended.orders.rbegin(), ended.orders.rend(),
+                                 [&ended](const Predecessor::Followed& order) {
+                                   return order.serial <= ended.axis->motor.state().accepted;
+                                 });
+  const auto [end, why] =
+      endOf(*ended.axis, ended.goal, last->slows_down, {axis::MoveEnd::kStopped, ended.left_by});
   activity::conclude(*ended.axis, ended.goal,
                      resultWith(context, *ended.axis, ended.goal, end, why));
 }
 
 axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
-  auto [end, why] = endOf(*order.axis);
-  if (end == axis::MoveEnd::kReached && accepted_mode_ != Mode::kRun) {
-    end = axis::MoveEnd::kStopped;
-    why = why_.text;
-  } else if (end == axis::MoveEnd::kCompanion) {
-    why = endedWith(*order.axis);
-  }
+  const bool by_fault = why_.end == axis::MoveEnd::kFault;
+  auto [end, why] = endOf(*order.axis, order.goal, accepted_mode_ != Mode::kRun,
+                          {by_fault ? axis::MoveEnd::kFault : axis::MoveEnd::kStopped, why_.text});
+  if (end == axis::MoveEnd::kCompanion) why = endedWith(*order.axis);
   return resultWith(context_, *order.axis, order.goal, end, why);
 }
 

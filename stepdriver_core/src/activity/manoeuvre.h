@@ -31,8 +31,8 @@ class Manoeuvre {
   /// @param predecessors the goals of the axes until now.
   /// @param call is answered when the engine has accepted the order.
   void begin(std::vector<Predecessor> predecessors, Ack call);
-  /// Comes to rest from the motion of another manoeuvre.
-  void beginStop(const Why& why);
+  /// Comes to rest from the motion of another manoeuvre. @param predecessors as above.
+  void beginStop(std::vector<Predecessor> predecessors, const Why& why);
 
   /// There is news from the engine, or time has passed. @return whether the manoeuvre has ended.
   bool look();
@@ -48,7 +48,10 @@ class Manoeuvre {
   /// The same, and keeps the goals.
   void hold(const Ack& call);
   bool isHeld() const { return held_; }
-  /// @throw Refused if it can't be resumed; it stays held then.
+  /// @throw Refused if it is held, and can't be resumed now.
+  void refuseUnlessResumable() const;
+  /// @pre refuseUnlessResumable() has just returned.
+  /// @param call is answered when the engine has accepted the motion.
   void resume(const Ack& call);
   /// The override or the limits have changed.
   void replan(const Ack& call);
@@ -88,6 +91,8 @@ class Manoeuvre {
   void order(Plans plans);
   void change(Mode mode, const Ack& call);
   bool anyMoves() const;
+  /// Its last motions have come to their planned ends.
+  bool isDone() const;
   bool isOpen() const;
   bool wasAccepted(const OpenOrder& order) const;
   void accept(const OpenOrder& order);

@@ -58,7 +58,8 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
     return std::max(now + lead, before->profile->startNs());
   }
   // DIR is set when the profile is accepted, and the chip may still be waking up.
-  const pulse::Nanoseconds dir = axis.config.timing.dir_hold_ns + axis.config.timing.dir_setup_ns;
+  const pulse::Nanoseconds dir =
+      axis.config.driver.timing.dir_hold_ns + axis.config.driver.timing.dir_setup_ns;
   return std::max(now + lead + dir, now + (axis.motor.state().ready - context.now) + dir);
 }
 
@@ -78,7 +79,7 @@ axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::P
   move.rest = axis.positionOf(rest);
   move.target =
       jogs ? move.rest : axis.positionOf(static_cast<double>(*goal.target) + goal.remainder);
-  move.duration = static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9;
+  move.duration = static_cast<double>(profile.endNs() - profile.startNs()) / 1e9;
   move.overshoot = overshoot / axis.stepsPerUnit();
   return move;
 }

@@ -82,6 +82,10 @@ void Script::hold(const Ack& call) {
   if (Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr) manoeuvre->hold(call);
 }
 
+void Script::refuseUnlessResumable() const {
+  if (motion() != nullptr) motion()->refuseUnlessResumable();
+}
+
 void Script::resume(const Ack& call) {
   if (Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr) manoeuvre->resume(call);
 }

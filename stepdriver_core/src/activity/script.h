@@ -43,6 +43,7 @@ class Script : public Activity {
   bool canHandOver() const override;
   std::vector<Predecessor> handOver(const std::string& by) override;
   void hold(const Ack& call) override;
+  void refuseUnlessResumable() const override;
   void resume(const Ack& call) override;
   void speedChanged(const Ack& call) override;
   pulse::Nanoseconds due() const override;

@@ -30,7 +30,7 @@ bool PinsStep::look() {
   if (phase_ == Phase::kReserving) {
     if (state.taken < serial_) return false;
     if (state.accepted != serial_) axis_.refuse("it moves");
-    const driver::Timing& timing = axis_.config.timing;
+    const driver::Timing& timing = axis_.config.driver.timing;
     const pulse::Nanoseconds held = state.rose + std::max(timing.mode_hold_ns, timing.step_high_ns);
     due_ = state.pulses != 0 ? std::max(context_.now, held) : context_.now;
     phase_ = Phase::kWaiting;
@@ -38,7 +38,9 @@ bool PinsStep::look() {
   if (phase_ == Phase::kWriting) {
     if (!context_.pin_done || context_.pin_done->id != job_) return false;
     if (context_.pin_done->error != 0) fail(context_.pin_done->error);
-    due_ = context_.now + writes_.sequence.writes[next_ - 1].then_wait;
+    const motor::PinSequence::Write& written = writes_.sequence.writes[next_ - 1];
+    axis_.motor.brake().noteWritten(written.line, written.level, context_.now);
+    due_ = context_.now + written.then_wait;
     phase_ = Phase::kWaiting;
   }
   if (phase_ == Phase::kWaiting) {
@@ -65,11 +67,13 @@ void PinsStep::writeNext() {
 }
 
 void PinsStep::fail(int error) {
-  const pulse::LineFailure failure{error, writes_.sequence.writes[next_ - 1].line, false};
+  const motor::PinSequence::Write& write = writes_.sequence.writes[next_ - 1];
+  const pulse::LineFailure failure{error, write.line, false};
   const std::string text = axis_.failureText(failure);
   axis_.fault.latch(text, "then call recover");
   axis_.position.distrust();
   axis_.motor.doubtPins();
+  axis_.motor.brake().noteFailed(write.line, write.level);
   axis_.rest_since = context_.now;
   if (writes_.failed) writes_.failed();
   writes_.scale.reset();
@@ -95,7 +99,7 @@ std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool o
     if (on || !axis.motor.enableIsHeldByOthers()) writes.sequence = axis.motor.pins().enable(on);
     axis.motor.noteEnable(on);
     for (const auto& other : context.axes) {
-      if (other->motor.takeReleases()) other->noteUnpowered();
+      if (other->motor.takeReleases()) other->noteDisabled();
     }
     writes.then = then;
     writes.failed = [&axis, on] { axis.motor.noteEnable(!on); };
@@ -105,14 +109,70 @@ std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool o
 
 Steps wakeSteps(Context& context, axis::AxisModel& axis) {
   Steps steps;
-  if (!axis.motor.power().isIdle()) return steps;
+  if (!axis.mustWake()) return steps;
+  if (!axis.motor.power().isIdle()) {
+    steps.push_back(std::make_unique<ReleaseBrakeStep>(context, axis));
+    return steps;
+  }
   const auto awake = [&axis] { axis.motor.power().setIdle(false); };
   if (axis.config.idle_action == config::IdleAction::kSleep) {
     steps.push_back(pinsStep(context, axis, axis.motor.pins().sleep(false), awake));
   } else {
     steps.push_back(enableStep(context, axis, true, awake));
   }
+  return braked(context, axis, std::move(steps));
+}
+
+// ---- the brake ----
+
+void EngageBrakeStep::begin() {
+  if (axis_.motor.brake().isEngaged()) return;
+  writing_ = pinsStep(context_, axis_, axis_.motor.brake().engage());
+  writing_->begin();
+}
+
+bool EngageBrakeStep::look() {
+  if (writing_ && !writing_->look()) return false;
+  writing_.reset();
+  return context_.now >= axis_.motor.brake().settles();
+}
+
+pulse::Nanoseconds EngageBrakeStep::due() const {
+  return writing_ ? writing_->due() : axis_.motor.brake().settles();
+}
+
+bool ReleaseBrakeStep::look() {
+  if (writing_ && !writing_->look()) return false;
+  writing_.reset();
+  if (!axis_.motorHolds()) return true;
+  const motor::Brake& brake = axis_.motor.brake();
+  if (brake.isReleased()) return context_.now >= brake.settles();
+  if (context_.now < axis_.motor.state().ready) return false;
+  writing_ = pinsStep(context_, axis_, brake.release());
+  writing_->begin();
+  return false;
+}
+
+pulse::Nanoseconds ReleaseBrakeStep::due() const {
+  if (writing_) return writing_->due();
+  const motor::Brake& brake = axis_.motor.brake();
+  return brake.isReleased() ? brake.settles() : axis_.motor.state().ready;
+}
+
+Steps engageSteps(Context& context, axis::AxisModel& axis) {
+  Steps steps;
+  if (axis.motor.brake().isWired()) {
+    steps.push_back(std::make_unique<EngageBrakeStep>(context, axis));
+  }
   return steps;
+}
+
+Steps braked(Context& context, axis::AxisModel& axis, Steps steps) {
+  if (!axis.motor.brake().isWired() || steps.empty()) return steps;
+  Steps safe = engageSteps(context, axis);
+  append(safe, std::move(steps));
+  safe.push_back(std::make_unique<ReleaseBrakeStep>(context, axis));
+  return safe;
 }
 
 // ---- motions ----

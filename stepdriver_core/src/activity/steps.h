@@ -83,6 +83,35 @@ class PinsStep : public Step {
   pulse::Nanoseconds due_ = 0;
 };
 
+/// What the two steps below have in common.
+class BrakeStep : public Step {
+ public:
+  BrakeStep(Context& context, axis::AxisModel& axis) : context_(context), axis_(axis) {}
+
+ protected:
+  Context& context_;
+  axis::AxisModel& axis_;
+  std::unique_ptr<Step> writing_;  // of the brake's line; nullptr: it isn't being written
+};
+
+/// Engages the brake of an axis, and waits until it holds the load.
+class EngageBrakeStep : public BrakeStep {
+ public:
+  using BrakeStep::BrakeStep;
+  void begin() override;
+  bool look() override;
+  pulse::Nanoseconds due() const override;
+};
+
+/// If the motor of an axis holds the load: waits for the times of its chip, releases the brake, and
+/// waits until the motor can turn. A fault ends the waiting.
+class ReleaseBrakeStep : public BrakeStep {
+ public:
+  using BrakeStep::BrakeStep;
+  bool look() override;
+  pulse::Nanoseconds due() const override;
+};
+
 /// Follows a motion to its end.
 class FollowStep : public Step {
  public:
@@ -117,7 +146,14 @@ std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool o
 /// Writes a fixed sequence.
 std::unique_ptr<Step> pinsStep(Context& context, axis::AxisModel& axis,
                                const motor::PinSequence& sequence, std::function<void()> then = {});
-/// Switches an idle motor's current on; does nothing if the motor isn't idle.
+/// Makes steps that take the motor's current away, bring it, or interrupt it safe for the load: the
+/// brake is engaged before them, and released after them if the motor holds the load then, when all
+/// times of the chip are over. Every such sequence passes here. Without a brake the steps stay as
+/// they are.
+Steps braked(Context& context, axis::AxisModel& axis, Steps steps);
+/// Engages the brake, if there is one.
+Steps engageSteps(Context& context, axis::AxisModel& axis);
+/// Switches an idle motor's current on, and releases its brake; does nothing if neither is needed.
 Steps wakeSteps(Context& context, axis::AxisModel& axis);
 /// @}
 

@@ -55,8 +55,7 @@ PathAxis AxisModel::pathAxis() const {
   facts.backlash = backlash();
   facts.limits = limits(maxSpeed());
   facts.max_speed_source = maxSpeedSource();
-  facts.stop_deceleration = stopDeceleration();
-  facts.stop_jerk = config.jerk * stepsPerUnit();
+  facts.stop_limits = stopLimits();
   return facts;
 }
 
@@ -71,11 +70,11 @@ PathStart AxisModel::pathStart(std::int64_t at) const {
 
 // ---- limits ----
 
-double AxisModel::maxSpeed() const {
-  // At finer microsteps than the configured ones the chip's own limit may come first.
-  const double period =
-      static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
-  return std::min(limits_now_.max_speed, 1.0 / (period * stepsPerUnit()));
+double AxisModel::maxSpeed() const { return std::min(limits_now_.max_speed, chipsMaxSpeed()); }
+
+double AxisModel::chipsMaxSpeed() const {
+  const double period = static_cast<double>(driver::shortestStepNs(config.driver)) * 1e-9;
+  return 1.0 / (period * stepsPerUnit());
 }
 
 config::LimitSource AxisModel::maxSpeedSource() const {
@@ -92,12 +91,9 @@ motion::MotionLimits AxisModel::limits(double velocity) const {
 
 motion::MotionLimits AxisModel::stopLimits() const {
   const double scale = stepsPerUnit();
-  return {config.start_speed * scale, maxSpeed() * scale, config.acceleration * scale,
-          stopDeceleration(), config.jerk * scale};
-}
-
-double AxisModel::stopDeceleration() const {
-  return config.stop_deceleration.value_or(config.deceleration) * stepsPerUnit();
+  return {config.start_speed * scale, std::min(config.max_speed, chipsMaxSpeed()) * scale,
+          config.acceleration * scale,
+          config.stop_deceleration.value_or(config.deceleration) * scale, config.jerk * scale};
 }
 
 pulse::Nanoseconds AxisModel::restartInterval() const {
@@ -115,8 +111,7 @@ double AxisModel::checkedLimit(const char* what, double wanted, double configure
   const double bound = lowest / config.steps_per_unit;
   if (wanted > 0.0 && wanted * (1.0 + 1e-9) < bound) {
     refuse(fmt::format("the {0} {1} is below the lowest, {2} {3}{4}, which is {5} steps{4}", what,
-                       show(wanted, per), lowerBoundText(bound),
-                       config.kind == config::Kind::kLinear ? "m" : "rad", per,
+                       show(wanted, per), lowerBoundText(bound), config::unitOf(config.kind), per,
                        numberText(lowest)));
   }
   // If no jerk limit is configured, any jerk is allowed.
@@ -154,7 +149,7 @@ void AxisModel::refuseUnlessOpen() const {
 }
 
 void AxisModel::refuseWhileHeld() const {
-  if (mode.held) refuse("held; resume or stop it first");
+  if (mode.held) refuse("the machine is on hold; resume or stop it first");
 }
 
 void AxisModel::refuseUnlessHomed() const {
@@ -203,21 +198,23 @@ void AxisModel::refuseIntoEndstop(std::int64_t steps) const {
 }
 
 void AxisModel::refuseMicrosteps(int wanted) const {
-  const driver::DriverChip& chip = driver::driverChipOf(config.driver);
-  const auto& known = chip.microsteps;
+  const driver::DriverChip& chip = config.driver;
+  const std::vector<int> known = driver::selectableMicrosteps(chip);
   if (chip.modes.empty()) {
     refuse(
-        fmt::format("the microsteps of a {} are set by its DIP switches while its power is off, "
-                    "not by software; they are configured as `microsteps`, here {}",
-                    chip.title, motor.microsteps()));
+        fmt::format("it can't change to {} microsteps: those of a {} are set by its DIP switches "
+                    "while its power is off, and configured as `microsteps`, here {}",
+                    wanted, chip.title, motor.microsteps()));
   }
   if (std::find(known.begin(), known.end(), wanted) == known.end()) {
     refuse(fmt::format("a {} has no 1/{} mode; it has {}", chip.title, wanted,
                        fmt::join(known, ", ")));
   }
   if (!motor.pins().hasMode()) {
-    refuse(fmt::format("the microstep pins aren't configured: the board decides, here 1/{}",
-                       motor.microsteps()));
+    refuse(
+        fmt::format("it can't change to {} microsteps: the microstep pins aren't configured, so "
+                    "that the board decides, here {}",
+                    wanted, motor.microsteps()));
   }
 }
 
@@ -237,6 +234,16 @@ int AxisModel::readInput(int line) const {
 
 // ---- the driver chip ----
 
+bool AxisModel::motorHolds() const {
+  const motor::Power& power = motor.power();
+  return power.isEnabled() && !power.isAsleep() && !fault && mode.closed.empty();
+}
+
+bool AxisModel::mustWake() const {
+  const motor::Brake& brake = motor.brake();
+  return motor.power().isIdle() || (brake.isWired() && !brake.isReleased());
+}
+
 void AxisModel::noteUnpowered() {
   if (!config.holds_position_unpowered) position.distrust();
 }
@@ -244,6 +251,16 @@ void AxisModel::noteUnpowered() {
 void AxisModel::noteHome() {
   if (!motor.translator().isAtHome(motor.state().count)) position.distrust();
   motor.translator().wentHome(motor.state().count);
+}
+
+void AxisModel::noteAsleep() {
+  noteUnpowered();
+  if (config.driver.asleep == driver::TranslatorState::kHome) noteHome();
+}
+
+void AxisModel::noteDisabled() {
+  noteUnpowered();
+  if (config.driver.disabled == driver::TranslatorState::kHome) noteHome();
 }
 
 // ---- over a restart ----
@@ -267,9 +284,12 @@ void AxisModel::rememberRest() {
 
 std::string AxisModel::whyImpossible(const AxisMemory& kept, const std::string& source) const {
   if (kept.kind != config.kind || kept.steps_per_unit != config.steps_per_unit) {
-    return fmt::format("the position was kept for another axis, of {} steps per {}",
-                       numberText(kept.steps_per_unit),
-                       kept.kind == config::Kind::kLinear ? "m" : "rad");
+    const auto scale = [](double steps, config::Kind kind) {
+      return fmt::format("{:.9g} steps per {}", steps, config::unitOf(kind));
+    };
+    return fmt::format("the position was kept for another axis, of {}; this one has {}",
+                       scale(kept.steps_per_unit, kept.kind),
+                       scale(config.steps_per_unit, config.kind));
   }
   return pathAxis().whyBeyondLimits(kept.position, "in " + source + ", the position");
 }
@@ -292,6 +312,9 @@ std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean,
   if (!kept.valid) return "the position couldn't be trusted when it was kept";
   if (!config.holds_position_unpowered) {
     return "the motor had no current in between, and holds_position_unpowered isn't set";
+  }
+  if (config.driver.both_edges && config.driver.disabled == driver::TranslatorState::kCounts) {
+    return "each edge of STEP is a step, and the start may have made one without current";
   }
   if (!kept.at_home) {
     return "the chip was reset in between, which may have turned the motor by up to two full steps";

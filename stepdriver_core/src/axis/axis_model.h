@@ -73,9 +73,9 @@ class AxisModel {
   config::LimitSource maxSpeedSource() const;
   /// [microsteps] @param velocity [unit/s] the highest speed.
   motion::MotionLimits limits(double velocity) const;
-  /// The limits of every stop, regardless of setLimits(): the configured deceleration and jerk.
+  /// [microsteps] The configured limits, of every stop, regardless of setLimits(). Their speed and
+  /// acceleration are for the way to the next whole microstep, from a crawl.
   motion::MotionLimits stopLimits() const;
-  double stopDeceleration() const;  ///< [microsteps/s^2]
   /// Steps closer than this are at a speed that the motor can't start from without a ramp.
   pulse::Nanoseconds restartInterval() const;
   const AxisLimits& limitsOfNextMotion() const { return limits_next_; }
@@ -117,8 +117,17 @@ class AxisModel {
   /// @name The driver chip
   /// @{ The motor was without current for a while.
   void noteUnpowered();
+  /// Whether the motor holds the load, and the brake may be released: it has current, there is no
+  /// fault, and the machine wasn't shut down.
+  bool motorHolds() const;
+  /// Whether something must be done before a motion of an axis that is ready to move: it is idle,
+  /// or its brake is engaged.
+  bool mustWake() const;
   /// The translator has gone Home: from another phase the motor turns when it has current again.
   void noteHome();
+  /// What sleep and disabling do to the motor and the translator.
+  void noteAsleep();
+  void noteDisabled();
   /// @}
 
   /// @name Over a restart
@@ -145,6 +154,8 @@ class AxisModel {
   std::uint64_t stops = 0;
 
  private:
+  /// [unit/s] At finer microsteps than the configured ones it may be below the configured speed.
+  double chipsMaxSpeed() const;
   double checkedLimit(const char* what, double wanted, double configured, double lowest,
                       const char* per,
                       config::LimitSource source = config::LimitSource::kConfiguration) const;

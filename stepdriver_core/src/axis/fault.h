@@ -22,8 +22,13 @@ class Fault {
     what_ = std::move(what);
     remedy_ = std::move(remedy);
   }
+  /// The emergency stop that ends a hang of the pulse thread doesn't hide the reason.
+  void latchHang(std::string what, std::string remedy) {
+    latch(std::move(what), std::move(remedy));
+    hangs_ = true;
+  }
   void latchEmergencyStop(bool by_input) {
-    if (what_ == kEmergencyStopInput) return;
+    if (what_ == kEmergencyStopInput || (hangs_ && !by_input)) return;
     if (by_input) {
       latch(kEmergencyStopInput, "release the button, then call recover");
     } else {
@@ -33,11 +38,13 @@ class Fault {
   void clear() {
     what_.clear();
     remedy_.clear();
+    hangs_ = false;
   }
 
  private:
   std::string what_;
   std::string remedy_;
+  bool hangs_ = false;
 };
 
 }  // namespace stepdriver::axis

@@ -30,17 +30,20 @@ const char* roleOf(int line, const std::array<std::pair<int, const char*>, kCoun
 
 std::string lineFailureText(const pulse::LineFailure& failure, const motor::MotorLines& own,
                             const LineNames& names) {
-  const std::array<std::pair<int, const char*>, 3> input_roles{{{own.endstop_min, "min endstop's"},
+  const std::array<std::pair<int, const char*>, 4> input_roles{{{own.endstop_min, "min endstop's"},
                                                                 {own.endstop_max, "max endstop's"},
-                                                                {own.fault, "fault"}}};
-  const std::array<std::pair<int, const char*>, 8> output_roles{{{own.step, "STEP"},
-                                                                 {own.dir, "DIR"},
-                                                                 {own.enable, "ENABLE"},
-                                                                 {own.sleep, "SLEEP"},
-                                                                 {own.reset, "RESET"},
-                                                                 {own.mode[0], "microstep"},
-                                                                 {own.mode[1], "microstep"},
-                                                                 {own.mode[2], "microstep"}}};
+                                                                {own.fault, "fault"},
+                                                                {own.in_position, "in-position"}}};
+  const std::array<std::pair<int, const char*>, 9> output_roles{
+      {{own.step, own.cw_ccw ? "CW" : "STEP"},
+       {own.dir, own.cw_ccw ? "CCW" : "DIR"},
+       {own.enable, "ENABLE"},
+       {own.sleep, "SLEEP"},
+       {own.reset, "RESET"},
+       {own.brake, "brake"},
+       {own.mode[0], "microstep"},
+       {own.mode[1], "microstep"},
+       {own.mode[2], "microstep"}}};
   const char* role =
       failure.input ? roleOf(failure.line, input_roles) : roleOf(failure.line, output_roles);
   const std::string& line_name =

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "message_text.h"
@@ -17,6 +18,13 @@ namespace stepdriver::axis {
 
 using motion::DoubleDouble;
 
+namespace {
+
+// [s] The search for a speed tries motions that are longer, but not too long to be planned.
+constexpr double kLongestDuration = motion::Profile::kLongest / 4.0;
+
+}  // namespace
+
 LinePath::LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
                    const std::vector<std::int64_t>& targets, double velocity, double duration)
     : axes_(std::move(axes)) {
@@ -27,7 +35,8 @@ LinePath::LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& sta
     ways_.push_back(motion::fromInteger(targets[i] + slack) - origins_[i]);
     length_ = std::max(length_, static_cast<std::int64_t>(std::ceil(std::abs(ways_[i].value()))));
   }
-  takeLimits();
+  limits_ = tightest(&PathAxis::limits);
+  stop_limits_ = tightest(&PathAxis::stop_limits);
   speed_ = velocity > 0.0 && length_ > 0 ? checkedSpeed(velocity) : limits_.max_speed;
   if (duration > 0.0 && length_ > 0) speed_ = speedFor(duration);
 }
@@ -37,29 +46,22 @@ double LinePath::scale(std::size_t member) const {
 }
 
 // Each axis moves in proportion to the path.
-void LinePath::takeLimits() {
+motion::MotionLimits LinePath::tightest(motion::MotionLimits PathAxis::*limits) const {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  limits_ = {kNone, kNone, kNone, kNone, 0.0};
-  double stop_deceleration = kNone;
-  double jerk = kNone;
-  double stop_jerk = kNone;
+  motion::MotionLimits path{kNone, kNone, kNone, kNone, kNone};
   const auto lower = [](double& limit, double other) { limit = std::min(limit, other); };
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (ways_[i].value() == 0.0) continue;
-    const motion::MotionLimits& own = axes_[i].limits;
+    const motion::MotionLimits& own = axes_[i].*limits;
     const double share = scale(i);
-    lower(limits_.start_speed, own.start_speed / share);
-    lower(limits_.max_speed, own.max_speed / share);
-    lower(limits_.acceleration, own.acceleration / share);
-    lower(limits_.deceleration, own.deceleration / share);
-    lower(stop_deceleration, axes_[i].stop_deceleration / share);
-    if (own.jerk > 0.0) lower(jerk, own.jerk / share);
-    if (axes_[i].stop_jerk > 0.0) lower(stop_jerk, axes_[i].stop_jerk / share);
+    lower(path.start_speed, own.start_speed / share);
+    lower(path.max_speed, own.max_speed / share);
+    lower(path.acceleration, own.acceleration / share);
+    lower(path.deceleration, own.deceleration / share);
+    if (own.jerk > 0.0) lower(path.jerk, own.jerk / share);
   }
-  stop_limits_ = limits_;
-  stop_limits_.deceleration = stop_deceleration;
-  if (jerk < kNone) limits_.jerk = jerk;
-  if (stop_jerk < kNone) stop_limits_.jerk = stop_jerk;
+  if (path.jerk == kNone) path.jerk = 0.0;
+  return path;
 }
 
 config::Kind LinePath::kindOfVelocity() const {
@@ -86,17 +88,25 @@ double LinePath::checkedSpeed(double velocity) const {
   axes_.front().refuse(fmt::format(
       "the velocity {0} {2} of the line is above the {1} {2} that the limits of its axes "
       "allow in its direction",
-      numberText(velocity), numberText(velocity * limits_.max_speed / speed),
+      numberText(velocity), upperBoundText(velocity * limits_.max_speed / speed),
       kindOfVelocity() == config::Kind::kLinear ? "m/s" : "rad/s"));
 }
 
 double LinePath::durationAt(double speed) const {
   motion::MotionLimits limits = limits_;
   limits.max_speed = speed;
-  return motion::planMove(0, {}, length_, limits).profile.duration().value();
+  try {
+    return motion::planMove(0, {}, length_, limits).profile.duration().value();
+  } catch (const std::range_error& error) {
+    axes_.front().refuse(error.what());
+  }
 }
 
 double LinePath::speedFor(double duration) const {
+  if (!(duration <= kLongestDuration)) {
+    axes_.front().refuse(fmt::format("the duration of the line is {} s, but must be at most {} s",
+                                     numberText(duration), numberText(kLongestDuration)));
+  }
   const double highest = limits_.max_speed;
   const double fastest = durationAt(highest);
   if (duration < fastest * (1.0 - 1e-9)) {
@@ -112,6 +122,13 @@ double LinePath::speedFor(double duration) const {
     return DoubleDouble(durationAt(low + more.value()) - duration);
   };
   return std::min(highest, low + motion::rootOf(too_long, highest - low).value());
+}
+
+bool LinePath::isOf(const std::vector<PathAxis>& axes, const std::vector<PathStart>& starts) const {
+  return axes_ == axes && std::equal(starts.begin(), starts.end(), origins_.begin(),
+                                     [](const PathStart& start, const DoubleDouble& origin) {
+                                       return (start.motor.position - origin).value() == 0.0;
+                                     });
 }
 
 void LinePath::requireStart(const std::vector<PathStart>& starts) const {

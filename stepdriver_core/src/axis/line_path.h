@@ -20,6 +20,9 @@ class LinePath : public SharedPath {
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
            const std::vector<std::int64_t>& targets, double velocity, double duration);
 
+  /// @return whether it was planned for these axes from these positions.
+  bool isOf(const std::vector<PathAxis>& axes, const std::vector<PathStart>& starts) const;
+
   /// @throw Refused if an axis isn't at rest at the beginning of the line.
   void requireStart(const std::vector<PathStart>& starts) const;
 
@@ -30,7 +33,7 @@ class LinePath : public SharedPath {
   motion::Profile profileOf(std::size_t member, const motion::Profile& path) const override;
 
  private:
-  void takeLimits();
+  motion::MotionLimits tightest(motion::MotionLimits PathAxis::*limits) const;
   /// Linear if a linear axis moves: then the velocity of the line is that of the linear axes.
   config::Kind kindOfVelocity() const;
   double pathSpeed(double velocity) const;

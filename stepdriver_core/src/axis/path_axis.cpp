@@ -22,14 +22,14 @@ auto tied(const motion::MotionLimits& limits) {
 auto tied(const PathAxis& axis) {
   return std::tie(axis.name, axis.kind, axis.microsteps, axis.steps_per_unit, axis.origin,
                   axis.min_position, axis.max_position, axis.configured_backlash, axis.backlash,
-                  axis.stop_deceleration, axis.stop_jerk, axis.max_speed_source,
-                  axis.min_position_source, axis.max_position_source);
+                  axis.max_speed_source, axis.min_position_source, axis.max_position_source);
 }
 
 }  // namespace
 
 bool PathAxis::operator==(const PathAxis& other) const {
-  return tied(*this) == tied(other) && tied(limits) == tied(other.limits);
+  return tied(*this) == tied(other) && tied(limits) == tied(other.limits) &&
+         tied(stop_limits) == tied(other.stop_limits);
 }
 
 double PathAxis::mostAcceleration() const {
@@ -37,7 +37,7 @@ double PathAxis::mostAcceleration() const {
 }
 
 std::string PathAxis::show(double value, const char* per) const {
-  return fmt::format("{:.9g} {}{}", value, kind == config::Kind::kLinear ? "m" : "rad", per);
+  return fmt::format("{:.9g} {}{}", value, config::unitOf(kind), per);
 }
 
 std::string PathAxis::showPlace(double position) const {

@@ -28,8 +28,8 @@ struct PathAxis {
   /// [microsteps] For motions that begin now; the maximum speed is without the override.
   motion::MotionLimits limits;
   config::LimitSource max_speed_source = config::LimitSource::kConfiguration;
-  double stop_deceleration = 0.0;  ///< [microsteps/s^2]
-  double stop_jerk = 0.0;  ///< [microsteps/s^3] as configured, regardless of `limits`; 0: no limit
+  /// [microsteps] For every stop, as configured, regardless of `limits`.
+  motion::MotionLimits stop_limits;
 
   bool operator==(const PathAxis& other) const;
   bool operator!=(const PathAxis& other) const { return !(*this == other); }

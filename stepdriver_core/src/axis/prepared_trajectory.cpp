@@ -287,9 +287,9 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
   }
   requireLimits(axis, peaks, 0.0);
   made.stop_bounds = made.bounds;
-  made.stop_bounds.acceleration = std::max(made.bounds.acceleration, axis.stop_deceleration);
+  made.stop_bounds.acceleration = std::max(made.bounds.acceleration, axis.stop_limits.deceleration);
   made.stop_bounds.jerk =
-      axis.stop_jerk > 0.0 ? std::max(made.bounds.jerk, axis.stop_jerk * kMore) : 0.0;
+      axis.stop_limits.jerk > 0.0 ? std::max(made.bounds.jerk, axis.stop_limits.jerk * kMore) : 0.0;
   return made;
 }
 
@@ -298,10 +298,9 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::lineTo(
   std::vector<std::int64_t> targets;
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const motion::Waypoint& point = parts_[i].ends.back();
-    const std::int64_t joint = std::llround(std::nearbyint(point.position));
+    const std::int64_t joint = motion::restingCount(point.position);
     const std::int64_t slack = std::llround(starts[i].slack);
-    const std::int64_t way =
-        joint + slack - std::llround(std::nearbyint(starts[i].motor.position.value()));
+    const std::int64_t way = joint + slack - std::llround(starts[i].motor.position.value());
     // The backlash is taken up during the motion.
     targets.push_back(joint + (way > 0 ? axes_[i].backlash : way < 0 ? 0 : slack) - slack);
   }

@@ -8,7 +8,8 @@
 namespace stepdriver::config {
 namespace {
 
-constexpr double kLargest = 1e9;  // decimals mean nothing above this
+constexpr double kLargest = 1e9;    // decimals mean nothing above this
+constexpr double kRounding = 1e-6;  // of a microstep, in sums
 
 std::string roundedTo(int decimals, double number) {
   std::string text = fmt::format("{:.{}f}", number, decimals);
@@ -21,12 +22,20 @@ std::string roundedTo(int decimals, double number) {
 }  // namespace
 
 std::string placeText(double position, Kind kind, double steps_per_unit) {
-  const char* const unit = kind == Kind::kLinear ? "m" : "rad";
-  if (!(std::abs(position) < kLargest)) return fmt::format("{:.9g} {}", position, unit);
+  if (!(std::abs(position) < kLargest)) return fmt::format("{:.9g} {}", position, unitOf(kind));
   // There is no position between two microsteps: up to half a microstep, plus rounding, is 0.
-  if (std::abs(position) * steps_per_unit <= 0.5 + 1e-6) position = 0.0;
+  if (std::abs(position) * steps_per_unit <= 0.5 + kRounding) position = 0.0;
   const int decimals = std::max(0, static_cast<int>(std::ceil(std::log10(steps_per_unit))));
-  return fmt::format("{} {}", roundedTo(decimals, position), unit);
+  return fmt::format("{} {}", roundedTo(decimals, position), unitOf(kind));
+}
+
+std::string distanceText(double distance, Kind kind, double steps_per_unit) {
+  const double steps = std::abs(distance) * steps_per_unit;
+  if (!(steps > kRounding && steps < 1.0 - kRounding)) {
+    return placeText(distance, kind, steps_per_unit);
+  }
+  const int decimals = 1 + static_cast<int>(std::ceil(-std::log10(std::abs(distance))));
+  return fmt::format("{} {}", roundedTo(std::max(0, decimals), distance), unitOf(kind));
 }
 
 const char* sourceText(LimitSource source) {

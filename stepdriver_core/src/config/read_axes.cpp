@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cmath>
-#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "message_text.h"
+#include "read_chip.h"
 #include "read_homing.h"
 #include "read_motion.h"
 #include "read_pins.h"
@@ -18,33 +18,6 @@
 
 namespace stepdriver::config {
 namespace {
-
-constexpr double kNsPerUs = 1e3;
-constexpr double kNsPerMs = 1e6;
-constexpr double kLongestUs = 1e6;
-constexpr double kLongestMs = 1e4;
-// A nanosecond: a shorter pulse would be no pulse.
-constexpr double kShortestPulseUs = 1e-3;
-
-struct TimingKey {
-  const char* key;
-  std::int64_t driver::Timing::*time;
-  double ns_per_unit;
-  double min;
-  double max;
-};
-
-constexpr std::array<TimingKey, 10> kTimingKeys{
-    {{"step_high_us", &driver::Timing::step_high_ns, kNsPerUs, kShortestPulseUs, kLongestUs},
-     {"step_low_us", &driver::Timing::step_low_ns, kNsPerUs, kShortestPulseUs, kLongestUs},
-     {"dir_setup_us", &driver::Timing::dir_setup_ns, kNsPerUs, 0.0, kLongestUs},
-     {"dir_hold_us", &driver::Timing::dir_hold_ns, kNsPerUs, 0.0, kLongestUs},
-     {"mode_setup_us", &driver::Timing::mode_setup_ns, kNsPerUs, 0.0, kLongestUs},
-     {"mode_hold_us", &driver::Timing::mode_hold_ns, kNsPerUs, 0.0, kLongestUs},
-     {"enable_ms", &driver::Timing::enable_ns, kNsPerMs, 0.0, kLongestMs},
-     {"wake_ms", &driver::Timing::wake_ns, kNsPerMs, 0.0, kLongestMs},
-     {"reset_low_ms", &driver::Timing::reset_low_ns, kNsPerMs, 0.0, kLongestMs},
-     {"reset_wait_ms", &driver::Timing::reset_wait_ns, kNsPerMs, 0.0, kLongestMs}}};
 
 bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
@@ -56,32 +29,27 @@ bool isAxisName(const std::string& name) {
   return true;
 }
 
-/// Overrides the chip's timings. @return empty if one is wrong.
-std::optional<driver::Timing> readTiming(ConfigReader& axis, const driver::Timing& of_chip) {
-  ConfigReader reader = axis.map("timing");
-  driver::Timing timing = of_chip;
-  bool all_right = reader.isMap();
-  for (const TimingKey& key : kTimingKeys) {
-    const auto time = reader.findNumber(key.key, {key.min, key.max}, Presence::kOptional);
-    if (time) timing.*key.time = std::llround(*time * key.ns_per_unit);
-    all_right = all_right && time.has_value() == reader.has(key.key);
+constexpr int kFinestMicrosteps = 256;
+
+std::optional<int> readMicrosteps(ConfigReader& axis,
+                                  const std::optional<driver::DriverChip>& chip) {
+  if (chip && !chip->microsteps.empty()) {
+    return axis.findOneOf("microsteps", chip->microsteps, Presence::kRequired);
   }
-  reader.rejectUnknown();
-  if (!all_right) return {};
-  return timing;
+  return axis.findInteger("microsteps", 1, kFinestMicrosteps, Presence::kRequired);
 }
 
-const driver::DriverChip* readDriver(ConfigReader& axis) {
-  const auto* name = axis.value("driver").as<std::string>();
-  const auto* chip = name != nullptr ? driver::findDriverChip(*name) : nullptr;
-  if (chip == nullptr) axis.findOneOf("driver", driver::driverChipNames(), Presence::kRequired);
-  axis.allow("driver");
-  return chip;
-}
-
-std::optional<int> readMicrosteps(ConfigReader& axis, const driver::DriverChip* chip) {
-  if (chip != nullptr) return axis.findOneOf("microsteps", chip->microsteps, Presence::kRequired);
-  return axis.findInteger("microsteps", 1, 256, Presence::kRequired);
+/// A mode that the chip has only with a strapped pin can't be selected by lines.
+void checkSelectable(ConfigReader& axis, const AxisConfig& config) {
+  if (!config.pins.ms1.wired() || driver::codeOf(config.driver, config.microsteps)) return;
+  std::vector<std::string> modes;
+  for (const int mode : driver::selectableMicrosteps(config.driver)) {
+    modes.push_back(std::to_string(mode));
+  }
+  axis.contradiction("microsteps",
+                     fmt::format("is {}, but with the microstep pins wired it must be {}: lines "
+                                 "that are high or low select no other mode of the {}",
+                                 axis.shown("microsteps"), listText(modes), config.driver.title));
 }
 
 class AxesReader {
@@ -93,22 +61,24 @@ class AxesReader {
     AxisConfig config;
     config.name = name;
     checkAxisName(name, axis);
-    const driver::DriverChip* chip = readDriver(axis);
+    const std::size_t issues_of_chip = issues_.size();
+    const std::optional<driver::DriverChip> chip = readChip(axis);
     MotionContext context;
+    if (chip && issues_.size() == issues_of_chip) context.timing = chip->timing;
     context.microsteps = readMicrosteps(axis, chip);
-    context.timing = readTiming(axis, chip != nullptr ? chip->timing : driver::Timing{});
-    if (chip != nullptr) {
-      config.driver = chip->model;
+    if (chip) {
+      config.driver = *chip;
       context.chip_title = chip->title;
-    } else {
-      context.timing.reset();
+      context.both_edges = chip->both_edges;
     }
     config.microsteps = context.microsteps.value_or(1);
-    config.timing = context.timing.value_or(driver::Timing{});
     config.joint = readJoint(name, axis);
     const std::size_t issues_before = issues_.size();
-    readPins(axis, chip, config, used_);
-    readPower(axis, issues_.size() == issues_before, config);
+    readPins(axis, chip ? &*chip : nullptr, config, used_);
+    if (chip && context.microsteps) checkSelectable(axis, config);
+    const bool pins_are_right = issues_.size() == issues_before;
+    readPower(axis, pins_are_right, config);
+    readBrake(axis, pins_are_right, config, used_);
     readEndstops(axis, config, used_);
     readHoming(axis, readMotion(axis, context, config), config);
     config.align_on_microstep_change =

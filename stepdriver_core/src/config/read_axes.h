@@ -16,6 +16,9 @@ namespace stepdriver::config {
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
                                  std::vector<ConfigIssue>& issues, UsedLines& used);
 
+/// @return the required name of a line; empty if there is an issue.
+std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedLines& used);
+
 /// Reads `{pin: "gpiochip0:25", active_level: high, bias: as_is}`; bias is optional.
 ///
 /// @return empty if the key is missing.

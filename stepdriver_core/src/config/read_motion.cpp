@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "motion_keys.h"
 #include "read_scale.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/farthest_limit.h"
 
 namespace stepdriver::config {
 namespace {
@@ -19,7 +21,6 @@ namespace {
 constexpr double kHighestAcceleration = 1e12;
 constexpr double kMostBacklash = 1e6;  // steps
 constexpr double kHighestJerk = 1e15;
-constexpr double kFarthestStep = 9007199254740992.0;  // 2^53: doubles represent each step exactly
 
 /// The first given key of this unit; empty: there is none.
 std::string firstGiven(const ConfigReader& axis, const MotionKeys& keys) {
@@ -108,14 +109,29 @@ class MotionReader {
     if (!context_.timing) return;
     const double high_us = static_cast<double>(context_.timing->step_high_ns) / 1e3;
     const double low_us = static_cast<double>(context_.timing->step_low_ns) / 1e3;
-    const double highest = 1e6 / (high_us + low_us);
-    if (rate <= highest * kSlack) return;
+    const double step_us = context_.both_edges ? std::max(high_us, low_us) : high_us + low_us;
+    const double highest = 1e6 / step_us;
+    if (rate <= highest * kSlack) return checkHold(rate);
     mustBe(keys_.max_speed,
            fmt::format("at most {}: it is {} steps/s (at {} steps per {}), and the {} takes at "
-                       "most {} steps/s ({} us high, {} us low)",
+                       "most {} steps/s ({} us high, {} us low{})",
                        upperBoundText(highest / *steps_per_unit_), roughText(rate),
                        roughText(*steps_per_unit_), keys_.unit, context_.chip_title,
-                       upperBoundText(highest), numberText(high_us), numberText(low_us)));
+                       upperBoundText(highest), numberText(high_us), numberText(low_us),
+                       context_.both_edges ? ", each edge a step" : ""));
+  }
+
+  /// A direction that must stand longer than a step lasts would have to stand over the next one.
+  void checkHold(double rate) {
+    const double interval_us = 1e6 / rate;
+    const double hold_us = static_cast<double>(context_.timing->dir_hold_ns) / 1e3;
+    if (hold_us <= interval_us * kSlack) return;
+    axis_.contradiction(
+        "timing/dir_hold_us",
+        fmt::format("is {}, but must be at most {}: at {}, which is {}, a step "
+                    "follows every {} us",
+                    numberText(hold_us), upperBoundText(interval_us), keys_.max_speed,
+                    axis_.shown(keys_.max_speed), roughText(interval_us)));
   }
 
   void readAccelerations(AxisConfig& config) {
@@ -184,9 +200,9 @@ class MotionReader {
 
   std::optional<double> readPosition(const std::string& key) {
     const auto position = axis_.findNumber(key, Range{}, Presence::kOptional);
-    if (position && steps_per_unit_ && std::abs(*position) * *steps_per_unit_ > kFarthestStep) {
+    if (position && steps_per_unit_ && std::abs(*position) * *steps_per_unit_ > kFarthestLimit) {
       mustBe(key, fmt::format("from -{0} to {0}, which is as far as steps are counted",
-                              upperBoundText(kFarthestStep / *steps_per_unit_)));
+                              upperBoundText(kFarthestLimit / *steps_per_unit_)));
     }
     return position;
   }

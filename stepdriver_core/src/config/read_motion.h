@@ -16,6 +16,7 @@ constexpr double kSlack = 1.0 + 1e-9;
 struct MotionContext {
   std::optional<int> microsteps;
   std::optional<driver::Timing> timing;  ///< with the configuration's overrides
+  bool both_edges = false;               ///< each edge of STEP is a step
   std::string chip_title;
 };
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
+#include <initializer_list>
 #include <optional>
 
 #include "config/read_axes.h"
@@ -13,7 +15,7 @@ namespace {
 
 struct PinName {
   const char* key;
-  const char* drv8825_key;  ///< the DRV8825's own name for it; nullptr: the same
+  const char* from_0_key;  ///< on chips that count from M0; nullptr: the same
   Pin Pins::*pin;
 };
 
@@ -26,10 +28,14 @@ constexpr std::array<PinName, 8> kPinNames{{{"step", nullptr, &Pins::step},
                                             {"sleep", nullptr, &Pins::sleep},
                                             {"reset", nullptr, &Pins::reset}}};
 
-bool isMicrostepPin(const PinName& name) { return name.drv8825_key != nullptr; }
+bool isPulsePin(const PinName& name) { return name.pin == &Pins::step || name.pin == &Pins::dir; }
 
-bool isRequired(const PinName& name) { return name.pin == &Pins::step || name.pin == &Pins::dir; }
+/// Its name on a driver with CW and CCW inputs.
+const char* cwCcwKey(const PinName& name) { return name.pin == &Pins::step ? "cw" : "ccw"; }
 
+bool isMicrostepPin(const PinName& name) { return name.from_0_key != nullptr; }
+
+constexpr double kLongestSettlingMs = 60'000.0;
 constexpr const char* kWantedLine = "a line: chip:offset, as \"gpiochip0:17\", or a line's name";
 
 bool isLine(const std::string& line) {
@@ -70,11 +76,14 @@ Bias readBias(ConfigReader& reader, const std::string& key) {
 
 /// Why the chip has no such pin; empty if it has one.
 std::string whyMissing(const driver::DriverChip& chip, const PinName& name) {
+  const std::string without = "the " + chip.title + " has no ";
   if (isMicrostepPin(name) && chip.modes.empty()) {
-    return "the " + chip.title + " has no microstep pins: its microsteps are set by switches";
+    return without + "microstep pins: its microsteps are set by switches";
   }
-  if (name.pin == &Pins::sleep && !chip.has_sleep) return "the " + chip.title + " has no SLEEP pin";
-  if (name.pin == &Pins::reset && !chip.has_reset) return "the " + chip.title + " has no RESET pin";
+  if (name.pin == &Pins::ms2 && chip.mode_pins < 2) return without + "second microstep pin";
+  if (name.pin == &Pins::ms3 && chip.mode_pins < 3) return without + "third microstep pin";
+  if (name.pin == &Pins::sleep && !chip.sleep_asleep) return without + "SLEEP pin";
+  if (name.pin == &Pins::reset && !chip.reset_held) return without + "RESET pin";
   return {};
 }
 
@@ -88,6 +97,7 @@ class PinsReader {
   void read(AxisConfig& config) {
     for (const PinName& name : kPinNames) readPin(name);
     readFaultPin();
+    readInPositionPin();
     reader_.rejectUnknown();
     checkMicrostepPins();
     const bool common_anode = readCommonAnode();
@@ -99,29 +109,51 @@ class PinsReader {
     }
     config.pins = pins_;
     config.fault = fault_;
+    config.in_position = in_position_;
   }
 
  private:
-  bool takesAliases() const { return chip_ == nullptr || chip_->model == driver::Model::kDrv8825; }
+  bool takesAliases() const {
+    return chip_ == nullptr || chip_->mode_pins_from_0 || chip_->name == "step_dir";
+  }
+
+  bool isCwCcw() const {
+    return chip_ != nullptr && chip_->step_inputs == driver::StepInputs::kCwCcw;
+  }
+
+  /// Its name on this driver, which has no M0 to M2.
+  const char* keyOf(const PinName& name) const {
+    return isCwCcw() && isPulsePin(name) ? cwCcwKey(name) : name.key;
+  }
+
+  /// The name that the pin has on the other kind of drivers.
+  void refuseOtherPulsePin(const PinName& name) {
+    const char* const other = isCwCcw() ? name.key : cwCcwKey(name);
+    if (!readLineName(reader_, other, Presence::kOptional) || chip_ == nullptr) return;
+    reader_.contradiction(
+        other,
+        fmt::format("is {}, but the {} has {} inputs: give {}", reader_.shown(other), chip_->title,
+                    isCwCcw() ? "CW and CCW" : "STEP and DIR", reader_.fullName(keyOf(name))));
+  }
 
   bool isNamed(const PinName& name) const {
-    return reader_.has(name.key) || (name.drv8825_key && reader_.has(name.drv8825_key));
+    return reader_.has(keyOf(name)) || (name.from_0_key && reader_.has(name.from_0_key));
   }
 
   void readPin(const PinName& name) {
-    for (const char* key : {name.key, name.drv8825_key}) {
+    for (const char* key : {name.key, name.from_0_key}) {
       if (key != nullptr) reader_.allow(key);
     }
+    if (isPulsePin(name)) refuseOtherPulsePin(name);
     if (chip_ != nullptr) {
       const std::string why = whyMissing(*chip_, name);
       if (!why.empty()) return refuse(name, why);
     }
-    const bool alias = name.drv8825_key != nullptr && reader_.has(name.drv8825_key);
+    const bool alias = name.from_0_key != nullptr && reader_.has(name.from_0_key);
     if (alias && !takesAliases()) {
-      reader_.contradiction(
-          name.drv8825_key,
-          fmt::format("is {}, but that is a name on the DRV8825; on the {} the pin is {}",
-                      reader_.shown(name.drv8825_key), chip_->title, name.key));
+      reader_.contradiction(name.from_0_key,
+                            fmt::format("is {}, but the {} has no M0 to M2; on it the pin is {}",
+                                        reader_.shown(name.from_0_key), chip_->title, name.key));
       return;
     }
     if (alias && reader_.has(name.key)) {
@@ -132,42 +164,70 @@ class PinsReader {
       pins_.enable.line = readLineName(reader_, name.key, Presence::kOptional).value_or("");
       return;
     }
-    const auto presence = isRequired(name) ? Presence::kRequired : Presence::kOptional;
-    const auto line = readLine(reader_, alias ? name.drv8825_key : name.key, presence, used_);
+    const auto presence = isPulsePin(name) ? Presence::kRequired : Presence::kOptional;
+    const auto line = readLine(reader_, alias ? name.from_0_key : keyOf(name), presence, used_);
     (pins_.*name.pin).line = line.value_or("");
   }
 
   void readFaultPin() {
     reader_.allow("fault");
     const Bias bias = readBias(axis_, "fault_bias");
+    const bool ramps = axis_.oneOf("fault_stop", {"at_once", "ramp"}, "at_once") == "ramp";
     if (!reader_.has("fault")) {
-      if (axis_.has("fault_bias")) {
-        axis_.contradiction("fault_bias", fmt::format("is {}, but pins/fault is missing",
-                                                      axis_.shown("fault_bias")));
-      }
+      refuseWithout("fault", {"fault_bias", "fault_stop"});
       return;
     }
-    if (chip_ != nullptr && !chip_->has_fault) {
+    if (chip_ != nullptr && !chip_->fault_active) {
       reader_.contradiction("fault", fmt::format("is {}, but the {} has no fault pin",
                                                  reader_.shown("fault"), chip_->title));
       return;
     }
     if (const auto line = readLine(reader_, "fault", Presence::kOptional, used_)) {
-      fault_ = FaultPin{*line, bias};
+      fault_ = FaultPin{*line, bias, ramps};
+    }
+  }
+
+  void readInPositionPin() {
+    reader_.allow("in_position");
+    InPositionPin pin;
+    pin.bias = readBias(axis_, "in_position_bias");
+    pin.timeout =
+        axis_.number("in_position_timeout_ms", Range{0.0, kLongestSettlingMs, true}, 1000.0) / 1e3;
+    if (!reader_.has("in_position")) {
+      refuseWithout("in_position", {"in_position_bias", "in_position_timeout_ms"});
+      return;
+    }
+    if (chip_ != nullptr && !chip_->in_position_active) {
+      reader_.contradiction("in_position",
+                            fmt::format("is {}, but the {} has no in-position output",
+                                        reader_.shown("in_position"), chip_->title));
+      return;
+    }
+    if (const auto line = readLine(reader_, "in_position", Presence::kOptional, used_)) {
+      pin.line = *line;
+      in_position_ = pin;
+    }
+  }
+
+  /// Keys of the axis that say something about a pin that isn't wired.
+  void refuseWithout(const char* pin, std::initializer_list<const char*> keys) {
+    for (const char* key : keys) {
+      if (!axis_.has(key)) continue;
+      axis_.contradiction(key, fmt::format("is {}, but pins/{} is missing", axis_.shown(key), pin));
     }
   }
 
   void refuse(const PinName& name, const std::string& why) {
-    for (const char* key : {name.key, name.drv8825_key}) {
+    for (const char* key : {name.key, name.from_0_key}) {
       if (key == nullptr || !reader_.has(key)) continue;
       reader_.contradiction(key, fmt::format("is {}, but {}", reader_.shown(key), why));
     }
   }
 
   static void refuseSecondName(ConfigReader& reader, const PinName& name) {
-    reader.contradiction(name.drv8825_key,
+    reader.contradiction(name.from_0_key,
                          fmt::format("is {}, but {}, the same pin, is given too; give one",
-                                     reader.shown(name.drv8825_key), name.key));
+                                     reader.shown(name.from_0_key), name.key));
   }
 
   void checkMicrostepPins() {
@@ -176,25 +236,28 @@ class PinsReader {
     std::vector<std::string> missing;
     const bool aliases =
         takesAliases() && (reader_.has("m0") || reader_.has("m1") || reader_.has("m2"));
+    int pins = 0;
     for (const PinName& name : kPinNames) {
       if (!isMicrostepPin(name)) continue;
-      (isNamed(name) ? named : missing).emplace_back(aliases ? name.drv8825_key : name.key);
+      if (chip_ != nullptr && ++pins > chip_->mode_pins) break;
+      (isNamed(name) ? named : missing).emplace_back(aliases ? name.from_0_key : name.key);
     }
     if (named.empty() || missing.empty()) return;
     reader_.contradiction(
         missing.front(),
-        fmt::format("is missing; wire all three microstep pins, or none if the board "
+        fmt::format("is missing; wire {} microstep pins, or none if the board "
                     "is strapped to `microsteps` (wired: {})",
+                    chip_ != nullptr && chip_->mode_pins == 2 ? "both" : "all three",
                     listText(named, "and")));
   }
 
   bool readCommonAnode() {
     if (!axis_.boolean("common_anode", false)) return false;
-    if (chip_ == nullptr || chip_->model == driver::Model::kTb6600) return true;
+    if (chip_ == nullptr || chip_->opto_inputs) return true;
     axis_.contradiction(
         "common_anode",
-        fmt::format("is true, but must be false on the {}: only a tb6600 has inputs to be "
-                    "wired so; for single pins there is invert",
+        fmt::format("is true, but must be false on the {}: only inputs with optocouplers, such as "
+                    "a tb6600's, are wired so; for single pins there is invert",
                     chip_->title));
     return false;
   }
@@ -205,8 +268,9 @@ class PinsReader {
     }
     ConfigReader invert = axis_.map("invert");
     for (const PinName& name : kPinNames) {
-      readInversion(invert, name.key, name, common_anode);
-      const char* alias = name.drv8825_key;
+      if (isPulsePin(name)) refuseOtherInversion(invert, name);
+      readInversion(invert, keyOf(name), name, common_anode);
+      const char* alias = name.from_0_key;
       if (alias == nullptr || !takesAliases()) continue;
       if (invert.has(alias) && invert.has(name.key)) {
         invert.allow(alias);
@@ -218,22 +282,33 @@ class PinsReader {
     invert.rejectUnknown();
   }
 
+  void refuseOtherInversion(ConfigReader& invert, const PinName& name) {
+    const char* const other = isCwCcw() ? name.key : cwCcwKey(name);
+    if (!invert.findBoolean(other, Presence::kOptional) || chip_ == nullptr) return;
+    invert.contradiction(
+        other, fmt::format("is {}, but the {} has {} inputs{}", invert.shown(other), chip_->title,
+                           isCwCcw() ? "CW and CCW" : "STEP and DIR",
+                           isCwCcw() ? ": to reverse the axis, swap pins/cw and pins/ccw" : ""));
+  }
+
   void readInversion(ConfigReader& invert, const std::string& key, const PinName& name,
                      bool common_anode) {
     const auto inverted = invert.findBoolean(key, Presence::kOptional);
     if (!inverted) return;
     if (!isNamed(name)) {
-      if (isRequired(name) || !reader_.isMap()) return;
+      if (isPulsePin(name) || !reader_.isMap()) return;
       invert.contradiction(
           key, fmt::format("is {}, but only a wired pin may be named here; {} is missing",
                            invert.shown(key), reader_.fullName(key)));
       return;
     }
-    if (common_anode && (name.pin == &Pins::step || name.pin == &Pins::enable)) {
+    const bool pulses = name.pin == &Pins::step || (name.pin == &Pins::dir && isCwCcw());
+    if (common_anode && (pulses || name.pin == &Pins::enable)) {
       invert.contradiction(
-          key, fmt::format("is {}, but common_anode inverts it already; with common_anode "
-                           "only dir may be named here, to reverse the direction",
-                           invert.shown(key)));
+          key, fmt::format("is {}, but common_anode inverts it already{}", invert.shown(key),
+                           isCwCcw() ? ""
+                                     : "; with common_anode only dir may be named here, to reverse "
+                                       "the direction"));
       return;
     }
     Pin& pin = pins_.*name.pin;
@@ -246,16 +321,21 @@ class PinsReader {
   ConfigReader reader_;
   Pins pins_;
   std::optional<FaultPin> fault_;
+  std::optional<InPositionPin> in_position_;
 };
 
 }  // namespace
+
+std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedLines& used) {
+  return readLine(reader, key, Presence::kRequired, used).value_or("");
+}
 
 std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
                                            UsedLines& used) {
   ConfigReader reader = parent.map(key);
   if (!parent.has(key)) return {};
   InputSwitch input;
-  input.line = readLine(reader, "pin", Presence::kRequired, used).value_or("");
+  input.line = readRequiredLine(reader, "pin", used);
   input.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
   input.bias = readBias(reader, "bias");
   reader.rejectUnknown();
@@ -265,6 +345,24 @@ std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::stri
 void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
               UsedLines& used) {
   PinsReader(axis, chip, used).read(config);
+}
+
+void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, UsedLines& used) {
+  ConfigReader reader = axis.map("brake");
+  if (!axis.has("brake")) return;
+  constexpr Range kTimes{0.0, 10'000.0};  // [ms] far above any brake's
+  BrakeConfig brake;
+  brake.line = readRequiredLine(reader, "pin", used);
+  brake.release_level = reader.oneOf("release_level", {"low", "high"}, "high") == "high";
+  brake.release_ns = std::llround(reader.number("release_ms", kTimes) * 1e6);
+  brake.engage_ns = std::llround(reader.number("engage_ms", kTimes) * 1e6);
+  reader.rejectUnknown();
+  config.brake = brake;
+  if (!pins_are_right || config.pins.enable.wired() || config.pins.sleep.wired()) return;
+  axis.contradiction(
+      "brake", fmt::format("is given, but needs {} or {}, and neither is wired: it follows the "
+                           "motor's current, which nothing could switch",
+                           axis.fullName("pins/enable"), axis.fullName("pins/sleep")));
 }
 
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used) {

@@ -5,11 +5,16 @@
 
 namespace stepdriver::config {
 
-/// Reads `pins`, `fault_bias`, `invert` and `common_anode`.
+/// Reads `pins`, `fault_bias`, `fault_stop`, `in_position_...`, `invert` and `common_anode`.
 ///
 /// @param chip nullptr if it isn't known; then nothing that depends on it is checked.
 void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
               UsedLines& used);
+
+/// Reads `brake`.
+///
+/// @param pins_are_right false: the pins that it depends on have issues, and aren't checked again.
+void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, UsedLines& used);
 
 /// Reads `endstops`.
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used);

@@ -5,14 +5,13 @@
 #include <queue>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 
 #include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::driver {
 namespace {
 
-constexpr std::size_t kPins = std::tuple_size<ModeCode>::value;
+constexpr std::size_t kPins = kMostModePins;
 constexpr std::size_t kCodes = std::size_t{1} << kPins;
 constexpr std::size_t kUnseen = kCodes;
 
@@ -39,13 +38,8 @@ std::size_t indexOfMode(const DriverChip& chip, int microsteps) {
   return indexOf(*code);
 }
 
-}  // namespace
-
-std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int to_microsteps) {
-  const std::size_t from = indexOfMode(chip, from_microsteps);
-  const std::size_t to = indexOfMode(chip, to_microsteps);
-
-  // Breadth first from the goal, so that following `next` from the start is a shortest way.
+/// The next code on a shortest way to a mode, for each code; kUnseen: there is no way.
+std::array<std::size_t, kCodes> waysTo(const DriverChip& chip, std::size_t to) {
   std::array<std::size_t, kCodes> next;
   next.fill(kUnseen);
   next[to] = to;
@@ -61,7 +55,20 @@ std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int 
       open.push(neighbour);
     }
   }
+  return next;
+}
 
+}  // namespace
+
+bool hasModePath(const DriverChip& chip, int from_microsteps, int to_microsteps) {
+  const std::size_t from = indexOfMode(chip, from_microsteps);
+  return waysTo(chip, indexOfMode(chip, to_microsteps))[from] != kUnseen;
+}
+
+std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int to_microsteps) {
+  const std::size_t from = indexOfMode(chip, from_microsteps);
+  const std::size_t to = indexOfMode(chip, to_microsteps);
+  const std::array<std::size_t, kCodes> next = waysTo(chip, to);
   if (next[from] == kUnseen) {
     throw std::invalid_argument(
         fmt::format("The {} has no way from {} to {} microsteps over defined pin codes.",

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
+#include <system_error>
 #include <utility>
 
 namespace stepdriver::gpio {
@@ -23,6 +24,7 @@ struct LineWriters::Shared {
   std::shared_ptr<Lines> lines;
   std::mutex mutex;
   std::function<void()> told;  // empty: nobody listens anymore
+  std::function<void(const LineWrite&)> written;
   std::vector<Done> done;
 };
 
@@ -35,15 +37,17 @@ struct LineWriters::Chip {
 };
 
 LineWriters::LineWriters(std::shared_ptr<Lines> lines, bool threaded, std::int64_t timeout_ns,
-                         std::function<void()> told)
+                         std::function<void()> told, std::function<void(const LineWrite&)> written)
     : threaded_(threaded), timeout_ns_(timeout_ns), shared_(std::make_shared<Shared>()) {
   shared_->lines = std::move(lines);
   shared_->told = std::move(told);
+  shared_->written = std::move(written);
 }
 
 LineWriters::~LineWriters() {
   std::unique_lock<std::mutex> lock(shared_->mutex);
   shared_->told = nullptr;
+  shared_->written = nullptr;
   for (auto& [number, chip] : chips_) {
     chip->ending = true;
     chip->changed.notify_all();
@@ -64,6 +68,7 @@ LineWriters::~LineWriters() {
 void LineWriters::write(std::uint64_t id, const LineWrite& write) {
   if (!threaded_) {
     const int error = shared_->lines->write(&write, 1);
+    if (error == 0 && shared_->written) shared_->written(write);
     shared_->done.push_back({id, error});
     return;
   }
@@ -71,7 +76,17 @@ void LineWriters::write(std::uint64_t id, const LineWrite& write) {
   std::shared_ptr<Chip>& chip = chips_[number];
   if (chip == nullptr) {
     chip = std::make_shared<Chip>();
-    chip->thread = std::thread([shared = shared_, chip] { run(shared, chip); });
+    try {
+      chip->thread = std::thread([shared = shared_, chip] { run(shared, chip); });
+    } catch (const std::system_error& error) {
+      chips_.erase(number);
+      {
+        const std::lock_guard<std::mutex> lock(shared_->mutex);
+        shared_->done.push_back({id, error.code().value()});
+      }
+      shared_->told();
+      return;
+    }
   }
   const std::lock_guard<std::mutex> lock(shared_->mutex);
   // The timeout also counts while a write waits behind one that hangs, so its caller is told in
@@ -93,6 +108,7 @@ void LineWriters::run(const std::shared_ptr<Shared>& shared, const std::shared_p
       lock.unlock();
       error = shared->lines->write(&job.write, 1);
       lock.lock();
+      if (error == 0 && shared->written) shared->written(job.write);
     }
     const bool told = chip->jobs.front().told;
     chip->jobs.pop_front();

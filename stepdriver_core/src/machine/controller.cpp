@@ -12,6 +12,7 @@
 #include "activity/homing.h"
 #include "activity/point_motion.h"
 #include "message_text.h"
+#include "motion/spline.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
@@ -27,10 +28,11 @@ using activity::Why;
 const Why kStopped{axis::MoveEnd::kStopped, "it was stopped"};
 const Why kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
 
-constexpr const char* kChipFault =
-    "the driver chip reports over-current or over-temperature on nFAULT";
 constexpr const char* kChipRemedy =
     "let it cool down, check the motor's wiring and the current that is set, then call recover";
+constexpr const char* kPositionRemedy =
+    "check what blocks the motor, and its encoder, then call recover, and home it or set its "
+    "position";
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
     "call "
@@ -47,14 +49,16 @@ void refuseTooFast(const std::vector<const axis::AxisModel*>& axes, double veloc
   const double most = std::sqrt(std::max(linear, rotary));
   if (velocity <= most * (1.0 + 1e-12)) return;
   axes.front()->refuse(fmt::format(
-      "the velocity {} of the line is above {}, the highest that its axes reach together",
-      numberText(velocity), numberText(most)));
+      "the velocity {0} {2} of the line is above {1} {2}, the highest that its axes reach together",
+      numberText(velocity), upperBoundText(most), linear >= rotary ? "m/s" : "rad/s"));
 }
 
-void refuseBadNumber(const axis::AxisModel& axis, const std::string& what, double value) {
+void refuseBadNumber(const axis::AxisModel& axis, const char* what, double value) {
   if (std::isfinite(value) && value >= 0.0) return;
   axis.refuse(
-      fmt::format("the {} is {}, but must be 0 or above, and finite", what, numberText(value)));
+      fmt::format("the {} of the line is {}, but must be a finite number above 0, or 0 for as fast "
+                  "as the limits allow",
+                  what, numberText(value)));
 }
 
 }  // namespace
@@ -126,7 +130,11 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     axis.motor.doubtPins();
   }
   if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep()) {
-    axis.fault.latch(kChipFault, kChipRemedy);
+    const driver::DriverChip& chip = axis.config.driver;
+    axis.fault.latch(fmt::format("the {} reports a fault on {}, such as over-current or "
+                                 "over-temperature",
+                                 chip.title, chip.fault_name),
+                     kChipRemedy);
     axis.position.distrust();
   }
   if (state.ended != before.ended) {
@@ -139,10 +147,40 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
           kLateRemedy);
       axis.position.distrust();
     }
+    if (state.end == pulse::EndReason::kNotInPosition) {
+      const driver::DriverChip& chip = axis.config.driver;
+      axis.fault.latch(
+          fmt::format("the {} isn't in position: {} was still inactive {} after the "
+                      "end of the motion",
+                      chip.title, chip.in_position_name, millisecondsText(state.waited)),
+          kPositionRemedy);
+      axis.position.distrust();
+    }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.position.distrust();
   }
   if (!axis.moving()) axis.atRest();
   if (!was_faulty && axis.fault) axis.noteStop();
+}
+
+void Controller::on(const EngineHangs& hang) {
+  const std::string text = textOf(hang.line);
+  for (const auto& axis : context_.axes) {
+    axis->fault.latchHang(text, "then call recover");
+    axis->position.distrust();
+    axis->noteStop();
+  }
+}
+
+std::string Controller::textOf(const pulse::LineFailure& failure) const {
+  const auto has = [&failure](const auto& axis) {
+    const motor::MotorLines& own = axis->motor.lines();
+    if (!failure.input) return own.step == failure.line || own.dir == failure.line;
+    return own.endstop_min == failure.line || own.endstop_max == failure.line ||
+           own.fault == failure.line || own.in_position == failure.line;
+  };
+  const auto owner = std::find_if(context_.axes.begin(), context_.axes.end(), has);
+  if (owner == context_.axes.end()) return context_.axes.front()->failureText(failure);
+  return (*owner)->config.name + ": " + (*owner)->failureText(failure);
 }
 
 // Starts what the current state requires without a request.
@@ -152,6 +190,12 @@ void Controller::supervise() {
       const auto end =
           axis->fault.isEmergencyStop() ? axis::MoveEnd::kEmergencyStop : axis::MoveEnd::kFault;
       activities_.end(*axis, {end, axis->fault.what()});
+    }
+    // The outputs of a chip at fault are off, and a motor that was stopped at speed may have
+    // stalled.
+    if (axis->fault && axis->motor.brake().isReleased() && activities_.isFree(*axis)) {
+      activities_.begin(std::make_unique<activity::EngageBrake>(context_, *axis, nullptr),
+                        kTakenOver);
     }
     superviseIdle(*axis);
   }
@@ -343,10 +387,12 @@ void Controller::serve(const Jog& wanted, const Ack& call) {
 
 void Controller::serve(const MoveLine& wanted, const Ack& call) {
   const axis::AxisModel& first = axis(wanted.axes.front());
-  refuseBadNumber(first, "velocity of the line", wanted.velocity);
-  refuseBadNumber(first, "duration of the line", wanted.duration);
+  refuseBadNumber(first, "velocity", wanted.velocity);
+  refuseBadNumber(first, "duration", wanted.duration);
   if (wanted.velocity > 0.0 && wanted.duration > 0.0) {
-    first.refuse("the line has a velocity and a duration; give only one of them");
+    first.refuse(
+        fmt::format("the line has a velocity, {}, and a duration, {} s; give only one of them",
+                    numberText(wanted.velocity), numberText(wanted.duration)));
   }
   std::vector<const axis::AxisModel*> moved_axes;
   for (const AxisId id : wanted.axes) moved_axes.push_back(&axis(id));
@@ -376,7 +422,7 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
     Goal goal;
     goal.kind = Goal::Kind::kTogether;
     const double target = wanted.prepared->target(i);
-    goal.target = std::llround(std::nearbyint(target));
+    goal.target = motion::restingCount(target);
     goal.remainder = target - static_cast<double>(*goal.target);
     orders.push_back({&moved, goalWithOutcome(goal)});
   }
@@ -427,16 +473,14 @@ void Controller::serve(const Hold& /*wanted*/, const Ack& call) {
 
 void Controller::serve(const Resume& /*wanted*/, const Ack& call) {
   if (!context_.mode.held) return;
+  // All or none: what is refused for one axis leaves the machine on hold.
+  activities_.forEach([](const Activity& activity) {
+    if (activity.hasBegun()) activity.refuseUnlessResumable();
+  });
   context_.mode.held = false;
   for (const auto& axis : context_.axes) ++axis->stops;
   activities_.forEach([&](Activity& activity) {
-    if (!activity.hasBegun()) return;
-    try {
-      activity.resume(call);
-    } catch (const Error& error) {
-      call->fail(activity::failureOf(error));
-      context_.mode.held = true;
-    }
+    if (activity.hasBegun()) activity.resume(call);
   });
 }
 
@@ -519,7 +563,8 @@ void Controller::serve(const Enable& wanted, const Ack& call) {
   }
   const motor::Power& power = changed.motor.power();
   const Activity* owner = activities_.owner(changed);
-  if (power.wantsEnabled() && !power.isIdle() && (owner == nullptr || !owner->isInBackground())) {
+  const bool is_awake = power.wantsEnabled() && !changed.mustWake();
+  if (is_awake && (owner == nullptr || !owner->isInBackground())) {
     return;
   }
   if (!power.wantsEnabled()) refuseUnlessFree(changed, "it is enabled");
@@ -538,10 +583,10 @@ void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call)
 void Controller::serve(const Sleep& wanted, const Ack& call) {
   axis::AxisModel& changed = axis(wanted.axis);
   refuseUnlessFree(changed, wanted.asleep ? "it is put to sleep" : "it is woken");
-  const driver::DriverChip& chip = driver::driverChipOf(changed.config.driver);
+  const driver::DriverChip& chip = changed.config.driver;
   if (!changed.motor.pins().hasSleep()) {
-    changed.refuse(chip.has_sleep ? "pins/sleep isn't configured"
-                                  : "a " + chip.title + " has no SLEEP pin");
+    changed.refuse(chip.sleep_asleep ? "pins/sleep isn't configured"
+                                     : "a " + chip.title + " has no SLEEP pin");
   }
   ++changed.stops;
   activities_.begin(std::make_unique<activity::Sleep>(context_, changed, wanted.asleep, call),
@@ -551,10 +596,10 @@ void Controller::serve(const Sleep& wanted, const Ack& call) {
 void Controller::serve(const Reset& wanted, const Ack& call) {
   axis::AxisModel& changed = axis(wanted.axis);
   refuseUnlessFree(changed, "it is reset");
-  const driver::DriverChip& chip = driver::driverChipOf(changed.config.driver);
+  const driver::DriverChip& chip = changed.config.driver;
   if (!changed.motor.pins().hasReset()) {
-    changed.refuse(chip.has_reset ? "pins/reset isn't configured"
-                                  : "a " + chip.title + " has no RESET pin");
+    changed.refuse(chip.reset_held ? "pins/reset isn't configured"
+                                   : "a " + chip.title + " has no RESET pin");
   }
   activities_.begin(std::make_unique<activity::Reset>(context_, changed, call), kTakenOver);
 }
@@ -631,9 +676,12 @@ void Controller::serve(const AwaitRest& /*wanted*/, const Ack& call) {
 }
 
 void Controller::serve(const PowerDown& /*wanted*/, const Ack& call) {
+  const Why why{axis::MoveEnd::kStopped, context_.mode.closed};
   for (const auto& axis : context_.axes) {
     if (axis->motor.pins().hasEnable() && axis->config.disable_on_shutdown) {
-      disable(*axis, {axis::MoveEnd::kStopped, context_.mode.closed}, call);
+      disable(*axis, why, call);
+    } else if (axis->motor.brake().isWired()) {
+      activities_.begin(std::make_unique<activity::EngageBrake>(context_, *axis, call), why);
     }
   }
 }

@@ -34,10 +34,14 @@ class Controller {
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
 
+  /// A failure of any axis's line, in words.
+  std::string textOf(const pulse::LineFailure& failure) const;
+
  private:
   // Inputs from outside.
   void on(const Requested& requested);
   void on(const EngineNews& news);
+  void on(const EngineHangs& hang);
   void on(const InputRead& read) { context_.levels.take(read.input, read.level); }
   void on(const InputEdge& edge) { context_.levels.take(edge.edge); }
   void on(const activity::PinDone& done) { context_.pin_done = done; }

@@ -11,7 +11,7 @@
 #include <mutex>
 #include <thread>
 
-namespace stepdriver::axis {
+namespace stepdriver::machine {
 namespace {
 
 constexpr int kNiceness = 10;
@@ -104,4 +104,4 @@ std::shared_ptr<const void> Disposer::keepAny(std::shared_ptr<const void> owned)
   return {object, [queue = queue_, entry](const void* /*object*/) { queue->add(entry); }};
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::machine

@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-namespace stepdriver::axis {
+namespace stepdriver::machine {
 
 /// Frees large objects, such as a plan of hundreds of thousands of points, in a thread of its own
 /// with a low priority, and never in the thread that happens to use them last.
@@ -35,4 +35,4 @@ class Disposer {
   std::shared_ptr<Queue> queue_;
 };
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::machine

@@ -10,8 +10,10 @@
 #include <utility>
 
 #include "controller.h"
+#include "flight_recorder.h"
 #include "machine/disposer.h"
 #include "machine_axis.h"
+#include "message_text.h"
 #include "nanoseconds.h"
 #include "pulse/measure.h"
 #include "pulse/pulse_engine.h"
@@ -19,7 +21,6 @@
 #include "state_keeper.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
-#include "stepdriver_core/printable.h"
 #include "wiring.h"
 
 namespace stepdriver::machine {
@@ -35,13 +36,12 @@ class Machine::Impl {
  public:
   Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options)
-      : disposer_(options.threaded) {
+      : clock_(clock), disposer_(options.threaded) {
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
-    const Wiring wiring(configs, options.emergency_stop);
+    const Wiring wiring(configs, options);
     lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
-      capability_ =
-          pulse::measureCapability(*lines_, clock, wiring.channels, options.latency_device);
+      capability_ = pulse::measureCapability(*lines_, clock, wiring.channels, options.realtime);
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
       if (!why.empty()) throw Refused(why);
     }
@@ -55,20 +55,37 @@ class Machine::Impl {
         *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
     controller_ =
         std::make_unique<Controller>(configs, wiring.motor_lines, names_, wiring.emergency_stop);
-    shell_ =
-        std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring.inputs.size(),
-                                Shell::Options{options.threaded, nanoseconds(options.write_timeout),
-                                               options.latency_device, [this] {
-                                                 if (keeper_) keeper_->noteMotion();
-                                               }});
+    if (wiring.heartbeat) engine_->beat(*wiring.heartbeat);
+    if (options.record_seconds > 0.0) {
+      recorder_ = std::make_unique<FlightRecorder>(
+          configs, wiring, names_, clock.now(),
+          FlightRecorder::Options{options.record_seconds, options.record_bytes});
+      engine_->recordTo(recorder_->pulseRing());
+    }
+    Shell::Options shell_options;
+    shell_options.threaded = options.threaded;
+    shell_options.write_timeout_ns = nanoseconds(options.write_timeout);
+    shell_options.realtime = options.realtime;
+    shell_options.on_motion = [this] {
+      if (keeper_) keeper_->noteMotion();
+    };
+    shell_options.recorder = recorder_.get();
+    shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring.inputs.size(),
+                                     shell_options);
     for (std::size_t i = 0; i < configs.size(); ++i) {
       auto axis = std::make_unique<MachineAxis>(configs[i], i, wiring.motor_lines[i], *shell_,
                                                 *lines_, names_);
       own_axes_.push_back(axis.get());
       axes_.push_back(std::move(axis));
     }
-    ask(*shell_, BringUp{});
-    if (keeper_) startKeeping(options.threaded);
+    try {
+      ask(*shell_, BringUp{});
+      if (keeper_) startKeeping(options.threaded);
+    } catch (const Error&) {
+      // Brakes take time: the lines are released only when they are engaged.
+      powerDownQuietly();
+      throw;
+    }
   }
 
   ~Impl() {
@@ -80,12 +97,14 @@ class Machine::Impl {
   }
 
   MachineAxis& axis(const std::string& name) const {
-    std::string names;
     for (MachineAxis* axis : own_axes_) {
       if (axis->config().name == name) return *axis;
-      names += (names.empty() ? "" : ", ") + axis->config().name;
     }
-    throw Refused(fmt::format("there is no axis {}; there are {}", printable(name), names));
+    throw Refused(fmt::format("there is no axis {}; there are {}", name, allNames()));
+  }
+
+  std::string allNames() const {
+    return joinedText(own_axes_, [](const MachineAxis* axis) { return axis->config().name; });
   }
 
   CoordinatedMove moveLine(const LineRequest& request) {
@@ -124,7 +143,7 @@ class Machine::Impl {
   }
 
   std::vector<MachineAxis*> axesOf(const std::vector<std::string>& names) const {
-    if (names.empty()) throw Refused("no axis is named");
+    if (names.empty()) throw Refused("no axis is named; there are " + allNames());
     std::vector<MachineAxis*> axes;
     for (const std::string& name : names) {
       axes.push_back(&axis(name));
@@ -141,7 +160,7 @@ class Machine::Impl {
     for (MachineAxis* axis : own_axes_) {
       if (axis->config().homing) axes.push_back(axis);
     }
-    if (axes.empty()) throw Refused("no axis has a homing");
+    if (axes.empty()) throw Refused("no axis has a homing; there are " + allNames());
     return axes;
   }
 
@@ -204,6 +223,14 @@ class Machine::Impl {
     return memories;
   }
 
+  void powerDownQuietly() {
+    try {
+      ask(*shell_, Close{"the machine could not begin"});
+      ask(*shell_, PowerDown{});
+    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the error before this one is thrown
+    }
+  }
+
   void startKeeping(bool threaded) {
     const StateKeeper::Loaded loaded = keeper_->load();
     for (const MachineAxis* axis : own_axes_) {
@@ -217,11 +244,18 @@ class Machine::Impl {
     keeper_->start([this] { return memories(); }, threaded);
   }
 
-  // Destroyed in this order: axes, shell, controller, engine, lines.
-  axis::Disposer disposer_;
+  FlightRecorder& recorder() const {
+    if (!recorder_) throw Refused(kNothingRecorded);
+    return *recorder_;
+  }
+
+  pulse::Clock& clock_;
+  // Destroyed in this order: axes, shell, controller, engine, recorder, lines.
+  Disposer disposer_;
   std::shared_ptr<gpio::Lines> lines_;
   axis::LineNames names_;
   std::optional<pulse::Capability> capability_;
+  std::unique_ptr<FlightRecorder> recorder_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<Controller> controller_;
   std::unique_ptr<Shell> shell_;
@@ -286,8 +320,15 @@ CoordinatedResult Machine::wait(const CoordinatedMove& move) const {
   return *result;
 }
 
+// All axes of a path stop with one of them.
+void Machine::stop(const CoordinatedMove& move) {
+  const CoordinatedMove::Member& first = move.members.front();
+  axis(first.axis).stop(first.move);
+}
+
 void Machine::emergencyStop() {
   const std::uint64_t asked = impl_->engine_->emergencyStop();
+  impl_->shell_->wakeUp();
   impl_->shell_->wait([this, asked] { return impl_->shell_->snapshot()->stops_handled >= asked; });
 }
 
@@ -296,6 +337,10 @@ bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped
 void Machine::recover() { ask(*impl_->shell_, Recover{}); }
 
 void Machine::shutdown() { impl_->shutdown(); }
+
+bool Machine::responds(std::chrono::nanoseconds longest) const {
+  return impl_->shell_->responds(longest);
+}
 
 EngineFigures Machine::figures() const {
   const pulse::EngineState state = impl_->engine_->state();
@@ -309,6 +354,15 @@ EngineFigures Machine::figures() const {
   figures.lateness_last_second = impl_->engine_->latenessLastSecond();
   figures.realtime = impl_->shell_->rights().text();
   return figures;
+}
+
+std::string Machine::whyHung() const { return impl_->shell_->whyHung(); }
+Recording Machine::recording() const { return impl_->recorder().recording(impl_->clock_); }
+
+double Machine::recordedSeconds() const { return impl_->recorder().secondsAtTopSpeed(); }
+
+void Machine::onFault(std::function<void()> told) {
+  if (impl_->recorder_) impl_->recorder_->onFault(std::move(told));
 }
 
 std::string Machine::stateFileError() const {

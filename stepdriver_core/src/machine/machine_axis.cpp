@@ -58,7 +58,12 @@ axis::Move MachineAxis::moveRounds(double rounds, double velocity) {
 
 std::optional<axis::MoveResult> MachineAxis::result(const axis::Move& move) const {
   if (move.outcome == nullptr) return std::nullopt;
-  return move.outcome->get();
+  auto ended = move.outcome->get();
+  if (ended) return ended;
+  // Nobody waits until the chip answers.
+  std::string why = shell_.whyHung();
+  if (why.empty()) return std::nullopt;
+  return axis::MoveResult{axis::MoveEnd::kFault, std::move(why), state().position, 0.0};
 }
 
 axis::MoveResult MachineAxis::wait(const axis::Move& move) {

@@ -151,6 +151,11 @@ struct InputRead {
 struct InputEdge {
   gpio::EdgeEvent edge;
 };
+/// The pulse engine waits for a line whose chip doesn't answer. Until it does, nothing moves and
+/// nothing that moved has an end.
+struct EngineHangs {
+  pulse::LineFailure line;
+};
 /// Time has passed.
 struct TimerDue {};
 /// @}
@@ -159,7 +164,9 @@ struct Input {
   pulse::Nanoseconds now = 0;      ///< clock time
   pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
   std::uint64_t stops_asked = 0;   ///< emergency stops that were requested
-  std::variant<Requested, EngineNews, InputRead, InputEdge, activity::PinDone, TimerDue> what;
+  std::variant<Requested, EngineNews, EngineHangs, InputRead, InputEdge, activity::PinDone,
+               TimerDue>
+      what;
 };
 
 }  // namespace stepdriver::machine

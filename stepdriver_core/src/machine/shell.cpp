@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <system_error>
 #include <utility>
 
 #include "pulse/realtime.h"
@@ -18,6 +19,12 @@ constexpr std::int64_t kInputPeriodNs = 100'000'000;
 constexpr pulse::Nanoseconds kOften = 1'000'000;
 constexpr pulse::Nanoseconds kVirtualInputPeriod = 1'000'000;
 constexpr std::size_t kMostRequests = 256;
+// The pulse thread hangs if it makes no progress in a pass from one of so many looks to the next.
+// They are counted, because a process that was suspended looks only once.
+constexpr std::int64_t kLookPeriodNs = 100'000'000;
+constexpr std::int64_t kFewestLooks = 5;
+// The rig has locks, whose owners may wait for a processor.
+constexpr std::int64_t kFewestLooksOnRig = 30;
 
 /// Requests that may be refused because of the level of a switch. Their callers read the inputs
 /// again, so that a switch that was just pressed counts.
@@ -29,8 +36,16 @@ bool asksForLevels(const Request& request) {
          std::holds_alternative<Recover>(request);
 }
 
+std::int64_t steadyNow() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 std::chrono::steady_clock::time_point steadyTime(std::int64_t time_ns) {
   return std::chrono::steady_clock::time_point(std::chrono::nanoseconds(time_ns));
+}
+
+activity::Reply hung(const std::string& why) {
+  return {activity::Failure{activity::Failure::Kind::kGpio, why}, {}};
 }
 
 /// Whether an axis that was at rest moves now.
@@ -52,16 +67,28 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
       inputs_(static_cast<int>(inputs)),
       threaded_(options.threaded),
       on_motion_(options.on_motion),
-      writers_(lines_, options.threaded, options.write_timeout_ns, [this] { wakeUp(); }),
+      most_looks_in_vain_(std::max(clock.realtime() ? kFewestLooks : kFewestLooksOnRig,
+                                   options.write_timeout_ns / kLookPeriodNs)),
+      recorder_(options.recorder),
+      writers_(
+          lines_, options.threaded, options.write_timeout_ns, [this] { wakeUp(); },
+          [this](const gpio::LineWrite& write) {
+            if (recorder_ != nullptr) recorder_->addWrite(write, clock_.now());
+          }),
       told_levels_(inputs),
       snapshot_(controller.snapshot()),
       posted_(engine.channels()) {
   engine_.listen(*this);
   queue(readInputs());
   if (!threaded_) return;
-  pulse_thread_.emplace(engine_, clock_, this, options.latency_device);
-  thread_ = std::thread([this] { run(); });
-  if (inputs_ > 0) watcher_ = std::thread([this] { watchInputs(); });
+  try {
+    pulse_thread_.emplace(engine_, clock_, this, options.realtime);
+    thread_ = std::thread([this] { run(); });
+    if (inputs_ > 0) watcher_ = std::thread([this] { watchInputs(); });
+  } catch (const std::system_error&) {
+    stop();  // ends the threads that were started
+    throw;
+  }
 }
 
 Shell::~Shell() { stop(); }
@@ -90,6 +117,7 @@ pulse::RealtimeRights Shell::rights() const {
 // ---- clients ----
 
 activity::Reply Shell::call(Request request) {
+  if (const std::string why = whyHung(); !why.empty()) return hung(why);
   std::optional<InputReading> reading;
   if (asksForLevels(request)) reading = readInputs();
   activity::CallId id = 0;
@@ -110,11 +138,15 @@ activity::Reply Shell::call(Request request) {
   }
   wake_.notify_one();
   std::optional<activity::Reply> reply;
-  wait([&] {
-    const std::lock_guard<std::mutex> lock(answers_mutex_);
-    reply = answers_[id].reply;
-    return reply.has_value();
-  });
+  try {
+    wait([&] {
+      const std::lock_guard<std::mutex> lock(answers_mutex_);
+      reply = answers_[id].reply;
+      return reply.has_value();
+    });
+  } catch (const GpioError& error) {
+    reply = hung(error.what());
+  }
   const std::lock_guard<std::mutex> lock(answers_mutex_);
   answers_.erase(id);
   return *std::move(reply);
@@ -128,6 +160,7 @@ void Shell::wait(const std::function<bool()>& ready, bool often) {
       lock.unlock();
       if (ready()) return;
       lock.lock();
+      if (!why_hung_.empty()) throw GpioError(why_hung_);
       const auto another = [&] { return turns_ != turns; };
       if (often) {
         answered_.wait_for(lock, std::chrono::nanoseconds(kOften), another);
@@ -145,6 +178,11 @@ void Shell::wait(const std::function<bool()>& ready, bool often) {
     if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
     clock_.waitUntil(often ? std::min(due, clock_.now() + kOften) : due);
   }
+}
+
+std::string Shell::whyHung() const {
+  const std::lock_guard<std::mutex> lock(answers_mutex_);
+  return why_hung_;
 }
 
 void Shell::advance(pulse::Nanoseconds time) {
@@ -202,6 +240,15 @@ void Shell::wakeUp() {
   wake_.notify_one();
 }
 
+bool Shell::responds(std::chrono::nanoseconds longest) {
+  if (!threaded_) return true;
+  std::unique_lock<std::mutex> lock(mutex_);
+  const std::uint64_t rounds = rounds_;
+  woken_ = true;
+  wake_.notify_one();
+  return round_ended_.wait_for(lock, longest, [&] { return ending_ || rounds_ != rounds; });
+}
+
 InputReading Shell::readInputs() {
   InputReading reading{++readings_, {}};
   reading.levels.reserve(static_cast<std::size_t>(inputs_));
@@ -247,8 +294,11 @@ void Shell::run() {
   for (;;) {
     std::int64_t until = writers_.deadline().value_or(pulse::kNever);
     if (clock_.realtime()) until = std::min(until, controller_.due());
+    if (mustWatchPulses()) until = std::min(until, next_look_ns_);
     {
       std::unique_lock<std::mutex> lock(mutex_);
+      ++rounds_;
+      round_ended_.notify_all();
       const auto ready = [this] { return woken_ || ending_; };
       if (until == pulse::kNever) {
         wake_.wait(lock, ready);
@@ -263,6 +313,7 @@ void Shell::run() {
     if (news_hold_.exchange(false)) clock_.release();
     while (turn()) {
     }
+    watchPulses();
     if (!clock_.realtime()) pulse_thread_->setAlarm(alarm());
     // Time stands still until the engine has accepted the orders and the lines are written.
     if (!ordersAreOpen() && writers_.idle()) {
@@ -272,6 +323,41 @@ void Shell::run() {
   }
   if (holding) clock_.release();
   if (news_hold_.exchange(false)) clock_.release();
+}
+
+// Whether the pulse thread has anything to do for which somebody may wait.
+bool Shell::mustWatchPulses() const {
+  if (ordersAreOpen() || engine_.stopsAsked() != engine_.stopsServed()) return true;
+  const auto moves = [](const AxisSnapshot& axis) { return axis.state.moving; };
+  return std::any_of(snapshot_->axes.begin(), snapshot_->axes.end(), moves);
+}
+
+void Shell::watchPulses() {
+  const std::int64_t now = steadyNow();
+  const std::uint64_t passes = pulse_thread_->passes();
+  const bool progresses = passes % 2 == 0 || passes != passes_seen_;
+  passes_seen_ = passes;
+  if (progresses) {
+    looks_in_vain_ = 0;
+    next_look_ns_ = now + kLookPeriodNs;
+    const std::lock_guard<std::mutex> lock(answers_mutex_);
+    why_hung_.clear();
+    return;
+  }
+  if (now < next_look_ns_) return;
+  next_look_ns_ = now + kLookPeriodNs;
+  // On a computer without enough time it may only wait for a processor.
+  if (!pulse_thread_->isBlocked()) looks_in_vain_ = 0;
+  if (++looks_in_vain_ != most_looks_in_vain_) return;
+  // When the chip answers again, the motions don't continue.
+  engine_.emergencyStop();
+  const pulse::LineFailure line = engine_.lineAtWork();
+  const std::string why = controller_.textOf(line);
+  {
+    const std::lock_guard<std::mutex> lock(answers_mutex_);
+    why_hung_ = why;
+  }
+  handle(EngineHangs{line});
 }
 
 // When virtual time must stand still for the controller. The thread that watches the inputs takes
@@ -367,12 +453,14 @@ void Shell::handle(decltype(Input::what) what) {
   input.slipped = engine_.state().slipped;
   input.stops_asked = engine_.stopsAsked();
   input.what = std::move(what);
+  if (recorder_ != nullptr) recorder_->addInput(input);
   controller_.handle(input, out);
-  carryOut(out);
+  carryOut(input, out);
 }
 
-void Shell::carryOut(activity::Outputs& out) {
+void Shell::carryOut(const Input& input, activity::Outputs& out) {
   std::shared_ptr<const MachineSnapshot> shown = controller_.snapshot();
+  if (recorder_ != nullptr) recorder_->addTurn(input, out, *snapshot_, *shown);
   const bool begins = motionBegins(*snapshot_, *shown);
   {
     const std::lock_guard<std::mutex> lock(answers_mutex_);

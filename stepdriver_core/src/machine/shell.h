@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "controller.h"
+#include "flight_recorder.h"
 #include "gpio/line_writers.h"
 #include "pulse/pulse_engine.h"
 #include "pulse/pulse_thread.h"
@@ -36,9 +38,10 @@ class Shell : public pulse::NewsListener {
     bool threaded = true;
     std::int64_t write_timeout_ns =
         0;  ///< for one write of a line that the pulse thread doesn't time
-    std::string latency_device;
+    pulse::RealtimeRequest realtime;
     /// Called when a motion begins, by the thread that all axes wait for: it returns at once.
     std::function<void()> on_motion;
+    FlightRecorder* recorder = nullptr;  ///< outlives the shell; nullptr: nothing is recorded
   };
 
   /// @param controller, engine, clock outlive the shell.
@@ -53,6 +56,7 @@ class Shell : public pulse::NewsListener {
   /// Returns when `ready` returns true. It is called after each event, in the calling thread.
   /// @param often `ready` is also called each millisecond.
   /// @throw Error without threads, if nothing is in progress that could change its answer.
+  /// @throw GpioError if the pulse thread hangs.
   void wait(const std::function<bool()>& ready, bool often = false);
 
   /// Only without threads: lets the clock run for a while.
@@ -61,6 +65,15 @@ class Shell : public pulse::NewsListener {
   std::shared_ptr<const MachineSnapshot> snapshot() const;
   axis::AxisState state(AxisId axis) const;
   double peakRate(AxisId axis) const;
+
+  /// What the pulse thread waits for, if its GPIO chip doesn't answer; empty: it doesn't wait.
+  /// Meanwhile nothing can be done with any axis: calls and waits end with that.
+  std::string whyHung() const;
+  /// To be called when the engine was asked to stop: a pulse thread that hangs must be noticed.
+  void wakeUp();
+
+  /// As Machine::responds().
+  bool responds(std::chrono::nanoseconds longest);
 
   /// The permissions of the pulse thread.
   pulse::RealtimeRights rights() const;
@@ -90,12 +103,13 @@ class Shell : public pulse::NewsListener {
   bool turn();
   bool takeNews();
   void handle(decltype(Input::what) what);
-  void carryOut(activity::Outputs& out);
+  void carryOut(const Input& input, activity::Outputs& out);
   void postCommands();
   bool ordersAreOpen() const;
   pulse::Nanoseconds alarm() const;
   void settle();
-  void wakeUp();
+  bool mustWatchPulses() const;
+  void watchPulses();
   void answer(activity::CallId call, activity::Reply reply);
 
   Controller& controller_;
@@ -105,6 +119,8 @@ class Shell : public pulse::NewsListener {
   const int inputs_;
   const bool threaded_;
   const std::function<void()> on_motion_;
+  const std::int64_t most_looks_in_vain_;
+  FlightRecorder* const recorder_;
   gpio::LineWriters writers_;
 
   // From clients and watchers.
@@ -115,6 +131,8 @@ class Shell : public pulse::NewsListener {
   ToldLevels told_levels_;
   std::atomic<std::uint64_t> readings_{0};  // that have begun
   std::vector<gpio::EdgeEvent> edges_;
+  std::uint64_t rounds_ = 0;  // of the controller's thread
+  std::condition_variable round_ended_;
   bool ending_ = false;
   bool woken_ = false;
   activity::CallId calls_ = 0;
@@ -124,6 +142,7 @@ class Shell : public pulse::NewsListener {
   std::condition_variable answered_;
   std::unordered_map<activity::CallId, Call> answers_;
   std::uint64_t turns_ = 0;
+  std::string why_hung_;
   std::shared_ptr<const MachineSnapshot> snapshot_;
 
   // From the pulse thread.
@@ -134,6 +153,9 @@ class Shell : public pulse::NewsListener {
   std::deque<pulse::Command> outbox_;
   std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
   EngineNews news_seen_;
+  std::uint64_t passes_seen_ = 0;   // of the pulse thread
+  std::int64_t looks_in_vain_ = 0;  // since it has begun or ended a pass
+  std::int64_t next_look_ns_ = 0;
   pulse::Nanoseconds engine_due_ = 0;
 
   std::optional<pulse::PulseThread> pulse_thread_;

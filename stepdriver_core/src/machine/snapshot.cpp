@@ -47,7 +47,7 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
   }
   if (motion->target || motion->slows_down) {
     const pulse::Nanoseconds left = motion->profile->endNs() - after;
-    state.time_left = static_cast<double>(std::max<pulse::Nanoseconds>(left, 0)) * 1e-9;
+    state.time_left = static_cast<double>(std::max<pulse::Nanoseconds>(left, 0)) / 1e9;
   }
   return state;
 }

@@ -31,12 +31,14 @@ Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
             const pulse::Capability& capability) {
   const auto write = static_cast<double>(cost.write.p99);
   const auto read = static_cast<double>(cost.read.p99);
-  const auto high = static_cast<double>(axis.timing.step_high_ns);
+  // If each edge is a step, there is one write for each, and no time between the two of a pulse.
+  const bool both = axis.driver.both_edges;
+  const auto high = both ? 0.0 : static_cast<double>(axis.driver.timing.step_high_ns);
   const auto guard = static_cast<double>(capability.guard);
   Load load{};
   load.rise = read + write;
-  load.calls = read + 2.0 * write;
-  load.chip = high + static_cast<double>(axis.timing.step_low_ns);
+  load.calls = read + (both ? 1.0 : 2.0) * write;
+  load.chip = static_cast<double>(driver::shortestStepNs(axis.driver));
   load.spinning = guard + std::min(guard, high);
   // A sleep ends late, and shortens the spinning; but there must be room for one.
   const double after_sleep =
@@ -128,16 +130,26 @@ std::string reasonOf(const Interval& interval, const Load& load, const Others& o
       of_others);
 }
 
-std::string rateText(double rate) { return fmt::format("{:.0f} steps/s", rate); }
+constexpr double kRounding = 1e-9;  // of a rate, in its calculation
+
+// Rounded away from each other: a rate that is too high doesn't look like one that can be
+// sustained.
+std::string neededText(double rate) {
+  return fmt::format("{:.0f} steps/s", std::ceil(rate * (1.0 - kRounding)));
+}
+std::string sustainedText(double rate) {
+  return fmt::format("{:.0f} steps/s", std::floor(rate * (1.0 + kRounding)));
+}
 
 }  // namespace
 
 std::string StepRate::text() const {
   const std::string of_alone =
-      alone > held ? fmt::format(" while all axes move, {} with this one alone", rateText(alone))
-                   : "";
-  return fmt::format("{}: asks for {}, and this machine holds {}{}: {}", axis, rateText(asked),
-                     rateText(held), of_alone, limited);
+      alone > held
+          ? fmt::format(" while all axes move ({} if only this one does)", sustainedText(alone))
+          : "";
+  return fmt::format("{} needs {}{} this computer can sustain {}{}: {}", axis, neededText(asked),
+                     holds() ? ", and" : ", but", sustainedText(held), of_alone, limited);
 }
 
 bool StepRates::holds() const {
@@ -195,8 +207,8 @@ std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
   }
   if (why.empty()) return "";
   return fmt::format(
-      "this machine doesn't meet the real-time requirements: {}. Lower the top speed or the "
-      "microsteps, allow real-time scheduling, use a PREEMPT_RT kernel, or reduce this machine's "
+      "this computer doesn't meet the real-time requirements: {}. Lower the top speed or the "
+      "microsteps, allow real-time scheduling, use a PREEMPT_RT kernel, or reduce this computer's "
       "load",
       why);
 }

@@ -5,14 +5,28 @@
 
 namespace stepdriver::motion {
 
-/// The fastest way to rest from a velocity and an acceleration [microsteps].
-struct Stop {
-  DoubleDouble length;
-  /// The uncertainty of the length because the velocity and the acceleration are rounded to
-  /// doubles. A target counts as met if it is no farther off. At most a thousandth of a microstep.
-  double doubt = 0.0;
+/// The fastest way to rest from a velocity and an acceleration.
+class Stop {
+ public:
+  /// @param limits outlive the object.
+  Stop(DoubleDouble v, DoubleDouble a, const MotionLimits& limits);
+
+  DoubleDouble length() const { return length_; }  ///< [microsteps] signed
+
+  /// Whether the stop may end there: this far [microsteps] from where it does. The length is
+  /// uncertain because the velocity and the acceleration are rounded to doubles, by a thousandth of
+  /// a microstep at most.
+  bool meets(double distance) const;
+
+ private:
+  static constexpr double kLeastDoubt = 1e-9;
+  static constexpr double kMostDoubt = 1e-3;
+
+  DoubleDouble length_;
+  DoubleDouble v_;
+  DoubleDouble a_;
+  const MotionLimits& limits_;
 };
-Stop stopFrom(DoubleDouble v, DoubleDouble a, const MotionLimits& limits);
 
 /// A motion to rest, in two parts: the first begins where the motion begins, the second ends where
 /// it ends.
@@ -29,6 +43,9 @@ struct Approach {
 ///
 /// With a start speed, the motion is at most that fast, or goes towards the end of `length` and can
 /// stop there.
-Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const MotionLimits& limits);
+///
+/// @param stop from that velocity and acceleration.
+Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const Stop& stop,
+                  const MotionLimits& limits);
 
 }  // namespace stepdriver::motion

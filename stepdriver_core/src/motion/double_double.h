@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace stepdriver::motion {
@@ -22,18 +23,96 @@ struct DoubleDouble {
   double value() const { return hi + lo; }
 };
 
+/// The sum of two doubles.
+inline DoubleDouble exactSum(double a, double b) {
+  const double sum = a + b;
+  const double part = sum - a;
+  return {sum, (a - (sum - part)) + (b - part)};
+}
+
+/// The product of two doubles, if it is neither below 1e-290 nor above 1e290.
+inline DoubleDouble exactProduct(double a, double b) {
+#ifdef FP_FAST_FMA
+  const double product = a * b;
+  return {product, std::fma(a, b, -product)};
+#else
+  // Each factor is split into two of 26 bits: a call of fma() takes longer than that.
+  constexpr double kSplitter = 134217729.0;  // 2^27 + 1
+  const double product = a * b;
+  const double a_scaled = kSplitter * a;
+  const double b_scaled = kSplitter * b;
+  const double a_high = a_scaled - (a_scaled - a);
+  const double b_high = b_scaled - (b_scaled - b);
+  const double a_low = a - a_high;
+  const double b_low = b - b_high;
+  const double rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high);
+  return {product, rest + a_low * b_low};
+#endif
+}
+
+/// The sum of two doubles. @pre |a| >= |b|
+inline DoubleDouble normalized(double a, double b) {
+  const double sum = a + b;
+  return {sum, b - (sum - a)};
+}
+
 /// Exact for every integer of 64 bits.
 DoubleDouble fromInteger(std::int64_t value);
 
-DoubleDouble operator+(DoubleDouble a, DoubleDouble b);
-DoubleDouble operator-(DoubleDouble a, DoubleDouble b);
-DoubleDouble operator*(DoubleDouble a, DoubleDouble b);
+inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
+  DoubleDouble sum = exactSum(a.hi, b.hi);
+  const DoubleDouble low = exactSum(a.lo, b.lo);
+  sum = normalized(sum.hi, sum.lo + low.hi);
+  return normalized(sum.hi, sum.lo + low.lo);
+}
+
+inline DoubleDouble operator-(DoubleDouble a) { return {-a.hi, -a.lo}; }
+
+inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) { return a + (-b); }
+
+inline DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
+  const DoubleDouble product = exactProduct(a.hi, b.hi);
+  return normalized(product.hi, product.lo + (a.hi * b.lo + a.lo * b.hi));
+}
+
 DoubleDouble operator/(DoubleDouble a, DoubleDouble b);
-DoubleDouble operator-(DoubleDouble a);
-bool operator<(DoubleDouble a, DoubleDouble b);
-DoubleDouble abs(DoubleDouble a);
-/// @pre a >= 0
+
+inline bool operator<(DoubleDouble a, DoubleDouble b) {
+  return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);
+}
+
+inline DoubleDouble abs(DoubleDouble a) { return a.hi < 0.0 ? -a : a; }
+
+/// 0 of a negative number.
 DoubleDouble sqrt(DoubleDouble a);
+
+/// @name The same for doubles, for templates of either type
+/// @{
+inline double abs(double a) { return std::abs(a); }
+inline double sqrt(double a) { return a > 0.0 ? std::sqrt(a) : 0.0; }
+inline double highOf(double a) { return a; }
+inline double highOf(DoubleDouble a) { return a.hi; }
+template <typename Real>
+Real numberOf(DoubleDouble a);
+template <>
+inline double numberOf<double>(DoubleDouble a) {
+  return a.hi;
+}
+template <>
+inline DoubleDouble numberOf<DoubleDouble>(DoubleDouble a) {
+  return a;
+}
+/// @}
+
+/// 1/3 to the precision of the type.
+template <typename Real>
+constexpr Real third() {
+  return Real(1.0 / 3.0);
+}
+template <>
+constexpr DoubleDouble third<DoubleDouble>() {
+  return {0x1.5555555555555p-2, 0x1.5555555555555p-56};
+}
 
 /// A number as the nearest integer and the remainder, at most a half.
 struct Split {

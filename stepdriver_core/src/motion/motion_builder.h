@@ -16,6 +16,8 @@ class MotionBuilder {
 
   /// Comes to rest on `target` as fast as possible.
   void moveTo(std::int64_t target, const MotionLimits& limits);
+  /// The same. @param stop from the current velocity and acceleration.
+  void moveTo(std::int64_t target, const Stop& stop, const MotionLimits& limits);
   /// Turns at `target`, which it reaches against the direction `sign`, with the acceleration that
   /// this needs. @return false if the turning point lies beyond the target; nothing is added.
   bool turnAt(std::int64_t target, double sign, const MotionLimits& limits);
@@ -31,7 +33,8 @@ class MotionBuilder {
   DoubleDouble v() const { return v_; }
   DoubleDouble a() const { return a_; }
 
-  Profile profile(std::int64_t start_ns) const;
+  /// All parts; the last call.
+  Profile profile(std::int64_t start_ns);
 
  private:
   // Corrects a velocity that only rounding to doubles has moved off that of a change to a limit or

@@ -2,20 +2,20 @@
 
 #include <cmath>
 
+#include "reach.h"
+
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoTime = 1e-15;  // s
-
 bool same(DoubleDouble a, DoubleDouble b, DoubleDouble scale) {
-  return std::abs((a - b).hi) <= kExact * (std::abs(scale.hi) + std::abs(b.hi));
+  return std::abs((a - b).hi) <= kExact<DoubleDouble> * (std::abs(scale.hi) + std::abs(b.hi));
 }
 
 }  // namespace
 
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t) {
   DoubleDouble slope = phase.v + t * phase.a * DoubleDouble(0.5);
-  if (phase.j != 0.0) slope = slope + t * t * DoubleDouble(phase.j) / DoubleDouble(6.0);
+  if (phase.j != 0.0) slope = slope + t * t * DoubleDouble(phase.j * 0.5) * third<DoubleDouble>();
   return t * slope;
 }
 
@@ -24,7 +24,7 @@ Piece pieceOf(const Phase& phase, DoubleDouble position) {
 }
 
 void Path::run(double j, DoubleDouble duration) {
-  if (!(duration.hi > kNoTime)) return;
+  if (!(duration.hi > Reach<DoubleDouble>::kNoTime)) return;
   const Phase phase{duration, v_, a_, j};
   Phase* last = size_ > 0 ? &phases_[size_ - 1] : nullptr;
   if (last != nullptr && last->j == j && same(end_v_, v_, last->v) && same(end_a_, a_, last->a)) {
@@ -32,7 +32,6 @@ void Path::run(double j, DoubleDouble duration) {
   } else {
     phases_[size_++] = phase;
   }
-  length_ = length_ + wayOf(phase, duration);
   v_ = v_ + duration * (a_ + duration * DoubleDouble(j * 0.5));
   a_ = a_ + duration * DoubleDouble(j);
   end_v_ = v_;
@@ -44,11 +43,13 @@ void Path::settle(DoubleDouble v, DoubleDouble a) {
   a_ = a;
 }
 
-void Path::append(const Path& other, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    settle(other[i].v, other[i].a);
-    run(other[i].j, other[i].duration);
-  }
+void Path::cut(std::size_t count) {
+  settle(phases_[count].v, phases_[count].a);
+  size_ = count;
+  if (count == 0) return;
+  const Phase& last = phases_[count - 1];
+  end_v_ = last.v + last.duration * (last.a + last.duration * DoubleDouble(last.j * 0.5));
+  end_a_ = last.a + last.duration * DoubleDouble(last.j);
 }
 
 }  // namespace stepdriver::motion

@@ -20,6 +20,8 @@ struct Phase {
 /// start time are still unknown. Doesn't allocate.
 class Path {
  public:
+  using Real = DoubleDouble;
+
   Path(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
 
   /// Appends a phase of jerk `j`. It is merged with the phase before it if the two are one motion.
@@ -28,32 +30,32 @@ class Path {
   /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded
   /// one.
   void settle(DoubleDouble v, DoubleDouble a);
-  /// Appends the phases of `other` up to phase `count`.
-  void append(const Path& other, std::size_t count);
+  /// Leaves only the first `count` phases, of more than these.
+  void cut(std::size_t count);
 
   DoubleDouble v() const { return v_; }
   DoubleDouble a() const { return a_; }
-  DoubleDouble length() const { return length_; }  ///< [microsteps] signed
   std::size_t size() const { return size_; }
   const Phase& operator[](std::size_t index) const { return phases_[index]; }
 
- private:
-  // A change of velocity has at most 7 phases: one brings the acceleration to 0, and three lie on
-  // either side of standstill. A motion is two of these and a cruise.
+  /// A change of velocity has at most 7 phases: one brings the acceleration to 0, and three lie on
+  /// either side of standstill. A motion is two of these and a cruise.
   static constexpr std::size_t kMost = 16;
 
+ private:
   std::array<Phase, kMost> phases_;
   std::size_t size_ = 0;
   DoubleDouble v_;
   DoubleDouble a_;
   DoubleDouble end_v_;  // of the last phase, from its polynomial
   DoubleDouble end_a_;
-  DoubleDouble length_;
 };
 
-/// The rounding error of double-double arithmetic in a difference that should be 0, relative to the
-/// operands.
-constexpr double kExact = 1e-29;
+/// The rounding error in a difference that should be 0, relative to the operands.
+template <typename Real>
+inline constexpr double kExact = 1e-13;
+template <>
+inline constexpr double kExact<DoubleDouble> = 1e-29;
 
 /// The distance of a phase in the time `t` from its beginning.
 DoubleDouble wayOf(const Phase& phase, DoubleDouble t);

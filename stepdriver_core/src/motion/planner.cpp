@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "motion_builder.h"
+#include "reach.h"
 #include "velocity_change.h"
 
 namespace stepdriver::motion {
@@ -37,17 +38,17 @@ double speedWithinMicrostep(const MotionLimits& limits) {
 
 // The limits of a stop: the current speed is the maximum, but at least a crawl.
 MotionLimits stopping(const MotionBuilder& motion, const MotionLimits& limits) {
-  const double level = std::abs(levelVelocity({motion.v(), motion.a()}, limits).value());
+  const double level =
+      std::abs(levelVelocity(Reach<DoubleDouble>(motion.v(), motion.a()), limits).value());
   const double crawl = std::max(speedWithinMicrostep(limits), limits.start_speed);
   MotionLimits slower = limits;
   slower.max_speed = std::min(limits.max_speed, std::max(level, crawl));
   return slower;
 }
 
-// With a start speed a motion in the wrong direction comes to rest first.
-void restBeforeTurn(MotionBuilder& motion, double sign, const MotionLimits& limits) {
-  if (startSpeed(limits) == 0.0 || !(sign * motion.v().hi < 0.0)) return;
-  motion.moveTo(motion.nextRest(limits), stopping(motion, limits));
+// Whether it first comes to rest: with a start speed, a motion in the wrong direction does.
+bool turnsAtRest(const MotionBuilder& motion, double sign, const MotionLimits& limits) {
+  return startSpeed(limits) > 0.0 && sign * motion.v().hi < 0.0;
 }
 
 // The fastest motion to rest on the target, which it may overshoot.
@@ -55,15 +56,17 @@ Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t ta
                  const MotionLimits& limits) {
   const DoubleDouble end = fromInteger(target);
   MotionBuilder motion(from, limits);
-  const Stop stop = stopFrom(motion.v(), motion.a(), limits);
-  const double beyond = (end - motion.position() - stop.length).hi;
-  if (std::abs(beyond) > stop.doubt) {
-    restBeforeTurn(motion, std::copysign(1.0, beyond), limits);
+  const Stop stop(motion.v(), motion.a(), limits);
+  const double beyond = (end - motion.position() - stop.length()).hi;
+  if (turnsAtRest(motion, beyond, limits) && !stop.meets(beyond)) {
+    motion.moveTo(motion.nextRest(limits), stopping(motion, limits));
+    motion.moveTo(target, limits);
+  } else {
+    motion.moveTo(target, stop, limits);
   }
-  motion.moveTo(target, limits);
   Plan plan{motion.profile(start_ns)};
   const double farthest = farthestBeyond(plan.profile, from, end);
-  if (farthest > 2.0 * stop.doubt) plan.overshoot = farthest;
+  if (!stop.meets(0.5 * farthest)) plan.overshoot = farthest;
   return plan;
 }
 
@@ -90,7 +93,9 @@ Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocit
   if (stand_at) return planMove(start_ns, from, *stand_at, bounded);
   const double sign = std::copysign(1.0, velocity);
   MotionBuilder motion(from, bounded);
-  restBeforeTurn(motion, sign, bounded);
+  if (turnsAtRest(motion, sign, bounded)) {
+    motion.moveTo(motion.nextRest(bounded), stopping(motion, bounded));
+  }
   motion.moveOn(sign, bounded);
   return {motion.profile(start_ns)};
 }

@@ -23,7 +23,7 @@ DoubleDouble Piece::positionAt(DoubleDouble t) const {
   // Horner's method without zero terms: most pieces have no jerk, and many have no acceleration.
   DoubleDouble slope(v0, v0_rest);
   if (a != 0.0) slope = slope + t * DoubleDouble(a / 2.0, a_rest / 2.0);
-  if (j != 0.0) slope = slope + t * t * DoubleDouble(j) / DoubleDouble(6.0);
+  if (j != 0.0) slope = slope + t * t * DoubleDouble(j * 0.5) * third<DoubleDouble>();
   return p0 + t * slope;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -25,6 +26,10 @@ constexpr double kFarthest = 140737488355328.0;  // 2^47
 /// [microsteps] The largest deviation of the cubics from their quintic segment.
 constexpr double kQuinticError = 0.01;
 
+/// [microsteps] Where a trajectory comes to rest if its last waypoint is at `position`: on the
+/// nearest whole microstep, halves to even.
+inline std::int64_t restingCount(double position) { return std::llround(std::nearbyint(position)); }
+
 /// One axis of a trajectory: from the state at its start through all waypoints, each at its time to
 /// the nanosecond, to rest at the last one.
 ///
@@ -46,8 +51,8 @@ constexpr double kQuinticError = 0.01;
 /// Each segment starts from its waypoint as given, so that errors don't accumulate: where two
 /// pieces meet, the positions differ by less than 2^-52 of the piece's distance.
 ///
-/// The last waypoint's position is rounded to a whole microstep, halves to even; a velocity there
-/// other than 0 ends in a jump to rest.
+/// It ends at the restingCount() of the last waypoint; a velocity there other than 0 ends in a jump
+/// to rest.
 ///
 /// @param from finite; its position is within kFarthest of 0.
 /// @param waypoints at least one, at increasing times from 0 on, all numbers finite.

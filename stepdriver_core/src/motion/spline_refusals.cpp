@@ -87,8 +87,8 @@ void requireReach(double reach, std::size_t index) {
   constexpr double kReach = 9007199254740992.0;  // 2^53
   if (!(reach <= kReach)) {
     refuse(
-        fmt::format("The velocities and accelerations on the way to waypoint {} lead up to {:.17g} "
-                    "microsteps away; allowed is {:.17g}.",
+        fmt::format("The velocities and accelerations on the way to waypoint {} lead up to {:.6g} "
+                    "microsteps away; allowed is {:.0f}.",
                     index, reach, kReach));
   }
 }

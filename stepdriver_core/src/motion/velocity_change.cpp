@@ -6,150 +6,197 @@
 namespace stepdriver::motion {
 namespace {
 
-const DoubleDouble kHalf(0.5);
+template <typename Real>
+Real square(Real x) {
+  return x * x;
+}
 
-DoubleDouble square(DoubleDouble x) { return x * x; }
+template <typename Real>
+Real half(Real x) {
+  return x * Real(0.5);
+}
 
 // The state seen in the direction of the change, so that the velocity always rises.
-struct Mirrored {
-  Path& path;
-  double sign;
+template <typename End>
+class Mirrored {
+ public:
+  using Real = typename End::Real;
 
-  DoubleDouble v() const { return DoubleDouble(sign) * path.v(); }
-  DoubleDouble a() const { return DoubleDouble(sign) * path.a(); }
-  void run(double j, DoubleDouble duration) { path.run(sign * j, duration); }
-  void settle(DoubleDouble v, DoubleDouble a) {
-    path.settle(DoubleDouble(sign) * v, DoubleDouble(sign) * a);
-  }
+  Mirrored(End& path, double sign) : path_(path), sign_(sign) {}
+
+  double sign() const { return sign_; }
+  Real v() const { return seen(path_.v()); }
+  Real a() const { return seen(path_.a()); }
+  void run(double j, Real duration) { path_.run(sign_ * j, duration); }
+  void settle(Real v, Real a) { path_.settle(seen(v), seen(a)); }
+
+ private:
+  Real seen(Real value) const { return sign_ < 0.0 ? -value : value; }
+
+  End& path_;
+  double sign_;
 };
 
 // Rises to the velocity `v_end` and the acceleration `a_end` >= 0 under one acceleration limit. An
 // acceleration above the limit falls to it first; an `a_end` above it is possible only because the
 // acceleration can't fall any faster.
-void rise(Mirrored m, DoubleDouble v_end, DoubleDouble a_end, double limit, double jerk) {
-  const DoubleDouble change = v_end - m.v();
+template <typename End>
+void rise(Mirrored<End> m, typename End::Real v_end, typename End::Real a_end, double limit,
+          double jerk) {
+  using Real = typename End::Real;
+  const Real change = v_end - m.v();
   if (jerk == 0.0) {
     m.settle(m.v(), limit);
-    m.run(0.0, change / DoubleDouble(limit));
+    m.run(0.0, change / Real(limit));
     m.settle(v_end, 0.0);
     return;
   }
-  const DoubleDouble j(jerk);
-  const DoubleDouble a = m.a();
-  const DoubleDouble top = std::max(DoubleDouble(limit), a_end);
+  const Real per_jerk = Real(1.0) / Real(jerk);
+  const Real a = m.a();
+  const Real top = std::max(Real(limit), a_end);
   // The point at which the line that rises from (v, a^2/2) meets the one that falls to (v_end,
   // a_end^2/2).
-  const DoubleDouble corner = (square(a) + square(a_end)) * kHalf + j * change;
+  const Real corner = half(square(a) + square(a_end)) + Real(jerk) * change;
   if (!(square(top) < corner)) {
-    const DoubleDouble peak = sqrt(corner);
-    m.run(jerk, (peak - a) / j);
-    m.run(-jerk, (peak - a_end) / j);
+    const Real peak = sqrt(corner);
+    m.run(jerk, (peak - a) * per_jerk);
+    m.run(-jerk, (peak - a_end) * per_jerk);
   } else {
-    const DoubleDouble up = abs(square(top) - square(a));
-    const DoubleDouble down = square(top) - square(a_end);
-    m.run(a < top ? jerk : -jerk, abs(top - a) / j);
+    const Real up = abs(square(top) - square(a));
+    const Real down = square(top) - square(a_end);
+    m.run(a < top ? jerk : -jerk, abs(top - a) * per_jerk);
     m.settle(m.v(), top);
-    m.run(0.0, (change - (up + down) * kHalf / j) / top);
-    m.run(-jerk, (top - a_end) / j);
+    m.run(0.0, (change - half(up + down) * per_jerk) / top);
+    m.run(-jerk, (top - a_end) * per_jerk);
   }
   m.settle(v_end, a_end);
 }
 
 // Reduces an acceleration against the change to 0.
-void level(Mirrored m, double jerk) {
-  if (jerk == 0.0 || !(m.a() < 0.0)) return;
-  const DoubleDouble v = m.v() - square(m.a()) * kHalf / DoubleDouble(jerk);
-  m.run(jerk, -m.a() / DoubleDouble(jerk));
+template <typename End>
+void level(Mirrored<End> m, double jerk) {
+  using Real = typename End::Real;
+  if (jerk == 0.0 || !(m.a() < Real(0.0))) return;
+  const Real duration = -m.a() / Real(jerk);
+  const Real v = m.v() + half(m.a() * duration);
+  m.run(jerk, duration);
   m.settle(v, 0.0);
 }
 
 // The square of the acceleration that the fastest change may have at standstill, going from the
 // path's state (a >= 0) to `v_end` > 0: all lines of the envelope at v = 0.
-DoubleDouble squareAtStandstill(Mirrored m, DoubleDouble v_end, const MotionLimits& limits) {
-  const DoubleDouble j2(2.0 * limits.jerk);
-  const DoubleDouble limit = std::min(limits.acceleration, limits.deceleration);
-  const DoubleDouble highest = std::min(square(m.a()) - j2 * m.v(), j2 * v_end);
-  const DoubleDouble lowest = square(m.a()) + j2 * m.v();
+template <typename End>
+typename End::Real squareAtStandstill(Mirrored<End> m, typename End::Real v_end,
+                                      const MotionLimits& limits) {
+  using Real = typename End::Real;
+  const Real j2(2.0 * limits.jerk);
+  const Real limit(std::min(limits.acceleration, limits.deceleration));
+  const Real highest = std::min(square(m.a()) - j2 * m.v(), j2 * v_end);
+  const Real lowest = square(m.a()) + j2 * m.v();
   return std::max(std::min(highest, square(limit)), lowest);
 }
 
 // If the acceleration falls too fast to be 0 at the start speed, it still ends there, with the
 // jump.
-bool dropToStartSpeed(Mirrored m, double start, const MotionLimits& limits) {
-  const DoubleDouble above = m.v() - DoubleDouble(start);
-  if (limits.jerk == 0.0 || !(m.a() < 0.0)) return false;
-  const DoubleDouble root = square(m.a()) - DoubleDouble(2.0 * limits.jerk) * above;
-  if (!(root.hi > kExact * limits.jerk * m.v().hi)) return false;
-  m.run(limits.jerk, DoubleDouble(2.0) * above / (sqrt(root) - m.a()));
+template <typename End>
+bool dropToStartSpeed(Mirrored<End> m, double start, const MotionLimits& limits) {
+  using Real = typename End::Real;
+  const Real above = m.v() - Real(start);
+  if (limits.jerk == 0.0 || !(m.a() < Real(0.0))) return false;
+  const Real root = square(m.a()) - Real(2.0 * limits.jerk) * above;
+  if (!(highOf(root) > kExact<Real> * limits.jerk * highOf(m.v()))) return false;
+  m.run(limits.jerk, Real(2.0) * above / (sqrt(root) - m.a()));
   m.settle(start, 0.0);
   return true;
 }
 
 }  // namespace
 
-DoubleDouble levelVelocity(const Path& path, const MotionLimits& limits) {
-  if (limits.jerk == 0.0) return path.v();
-  return path.v() + path.a() * abs(path.a()) * kHalf / DoubleDouble(limits.jerk);
+template <typename End>
+typename End::Real levelVelocity(const End& path, const MotionLimits& limits) {
+  using Real = typename End::Real;
+  if (limits.jerk == 0.0 || highOf(path.a()) == 0.0) return path.v();
+  return path.v() + half(path.a() * abs(path.a())) / Real(limits.jerk);
 }
 
-void changeVelocity(Path& path, DoubleDouble velocity, const MotionLimits& limits) {
-  const DoubleDouble at_level = levelVelocity(path, limits);
-  const DoubleDouble scale = std::max(abs(path.v()), abs(at_level));
-  if (std::abs((velocity - at_level).hi) <= kExact * scale.hi) {
+template <typename End>
+void changeVelocity(End& path, typename End::Real velocity, const MotionLimits& limits) {
+  using Real = typename End::Real;
+  const Real at_level = levelVelocity(path, limits);
+  const double scale = std::max(std::abs(highOf(path.v())), std::abs(highOf(at_level)));
+  if (std::abs(highOf(velocity - at_level)) <= kExact<Real> * scale) {
     // The velocity is practically reached once the acceleration is 0.
-    if (path.a().hi != 0.0) level({path, path.a().hi > 0.0 ? -1.0 : 1.0}, limits.jerk);
+    const double a = highOf(path.a());
+    if (a != 0.0) level(Mirrored<End>(path, a > 0.0 ? -1.0 : 1.0), limits.jerk);
     path.settle(velocity, 0.0);
     return;
   }
-  Mirrored m{path, at_level < velocity ? 1.0 : -1.0};
-  const DoubleDouble goal = DoubleDouble(m.sign) * velocity;
+  Mirrored<End> m(path, at_level < velocity ? 1.0 : -1.0);
+  const Real goal = Real(m.sign()) * velocity;
   level(m, limits.jerk);
-  if (m.v() < 0.0 && DoubleDouble(0.0) < goal) {
-    const DoubleDouble a =
-        limits.jerk > 0.0 ? sqrt(squareAtStandstill(m, goal, limits)) : DoubleDouble(0.0);
+  if (m.v() < Real(0.0) && Real(0.0) < goal) {
+    const Real a = limits.jerk > 0.0 ? sqrt(squareAtStandstill(m, goal, limits)) : Real(0.0);
     rise(m, 0.0, a, limits.deceleration, limits.jerk);
   }
-  const bool falls = m.v() < 0.0;
+  const bool falls = m.v() < Real(0.0);
   rise(m, goal, 0.0, falls ? limits.deceleration : limits.acceleration, limits.jerk);
 }
 
-TurnRange turnRange(const Path& path, double sign, const MotionLimits& limits) {
-  Path at_level = path;
-  const Mirrored m{at_level, sign};
+TurnRange turnRange(DoubleDouble v, DoubleDouble a, double sign, const MotionLimits& limits) {
+  Reach<DoubleDouble> end(v, a);
+  const Mirrored<Reach<DoubleDouble>> m(end, sign);
   level(m, limits.jerk);
   const DoubleDouble softest = square(m.a()) + DoubleDouble(2.0 * limits.jerk) * m.v();
-  return {sqrt(softest), sqrt(squareAtStandstill(m, limits.max_speed, limits))};
+  return {sqrt(softest), sqrt(squareAtStandstill(m, DoubleDouble(limits.max_speed), limits))};
 }
 
-void turn(Path& path, double sign, DoubleDouble a_end, const MotionLimits& limits) {
-  const Mirrored m{path, sign};
+template <typename End>
+void turn(End& path, double sign, typename End::Real a_end, const MotionLimits& limits) {
+  const Mirrored<End> m(path, sign);
   level(m, limits.jerk);
   rise(m, 0.0, a_end, limits.deceleration, limits.jerk);
 }
 
-void comeToRest(Path& path, const MotionLimits& limits) {
+template <typename End>
+void comeToRest(End& path, const MotionLimits& limits) {
+  using Real = typename End::Real;
   const double start = startSpeed(limits);
-  if (start == 0.0) return changeVelocity(path, 0.0, limits);
-  if (DoubleDouble(start) < abs(path.v())) {
-    const double sign = path.v().hi > 0.0 ? 1.0 : -1.0;
-    if (!dropToStartSpeed({path, sign}, start, limits)) {
-      changeVelocity(path, sign * start, limits);
+  if (start == 0.0) return changeVelocity(path, Real(0.0), limits);
+  if (Real(start) < abs(path.v())) {
+    const double sign = highOf(path.v()) > 0.0 ? 1.0 : -1.0;
+    if (!dropToStartSpeed(Mirrored<End>(path, sign), start, limits)) {
+      changeVelocity(path, Real(sign * start), limits);
     }
   }
   path.settle(0.0, 0.0);
 }
 
-void changeToMaximum(Path& path, double sign, const MotionLimits& limits) {
+template <typename End>
+void changeToMaximum(End& path, double sign, const MotionLimits& limits) {
+  using Real = typename End::Real;
   const double start = startSpeed(limits);
   if (start > 0.0) {
-    if (!(DoubleDouble(start) < abs(path.v()))) path.settle(sign * start, 0.0);
-    dropToStartSpeed({path, sign}, start, limits);
+    if (!(Real(start) < abs(path.v()))) path.settle(sign * start, 0.0);
+    dropToStartSpeed(Mirrored<End>(path, sign), start, limits);
   }
-  changeVelocity(path, sign * limits.max_speed, limits);
+  changeVelocity(path, Real(sign * limits.max_speed), limits);
 }
 
 double startSpeed(const MotionLimits& limits) {
   return std::min(limits.start_speed, limits.max_speed);
 }
+
+using Search = Reach<double>;
+using Exact = Reach<DoubleDouble>;
+
+template DoubleDouble levelVelocity(const Exact&, const MotionLimits&);
+template void changeVelocity(Path&, DoubleDouble, const MotionLimits&);
+template void turn(Search&, double, double, const MotionLimits&);
+template void turn(Exact&, double, DoubleDouble, const MotionLimits&);
+template void turn(Path&, double, DoubleDouble, const MotionLimits&);
+template void comeToRest(Search&, const MotionLimits&);
+template void comeToRest(Exact&, const MotionLimits&);
+template void comeToRest(Path&, const MotionLimits&);
+template void changeToMaximum(Path&, double, const MotionLimits&);
 
 }  // namespace stepdriver::motion

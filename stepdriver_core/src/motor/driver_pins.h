@@ -31,7 +31,6 @@ class DriverPins {
 
  private:
   const config::AxisConfig& config_;
-  const driver::DriverChip& chip_;
   const MotorLines lines_;
 };
 

@@ -9,6 +9,7 @@ Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int chan
       lines_(lines),
       pins_(config, lines),
       power_(config.idle_action, !pins_.hasEnable()),
+      brake_(config, lines),
       translator_(config.microsteps) {
   if (pins_.hasEnable()) on_enable_line_ = lines_.enable_line->join();
 }

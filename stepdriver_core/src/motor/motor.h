@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "brake.h"
 #include "driver_pins.h"
 #include "motion/profile.h"
 #include "motions.h"
@@ -40,6 +41,8 @@ class Motor {
 
   Power& power() { return power_; }
   const Power& power() const { return power_; }
+  Brake& brake() { return brake_; }
+  const Brake& brake() const { return brake_; }
   Translator& translator() { return translator_; }
   const Translator& translator() const { return translator_; }
   int microsteps() const { return translator_.microsteps(); }
@@ -68,6 +71,7 @@ class Motor {
   Motions motions_;
   std::uint64_t serial_ = 0;
   Power power_;
+  Brake brake_;
   Translator translator_;
   std::size_t on_enable_line_ = 0;  // its number there
   std::uint64_t releases_seen_ = 0;

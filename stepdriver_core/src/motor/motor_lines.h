@@ -20,13 +20,17 @@ struct MotorLines {
   std::array<int, 3> mode = {-1, -1, -1};
   int sleep = -1;
   int reset = -1;
+  int brake = -1;
   int endstop_min = -1;
   int endstop_max = -1;
   int fault = -1;
+  int in_position = -1;
+  bool cw_ccw = false;  ///< `step` is CW, and `dir` is CCW
 };
 
 /// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and
-/// the configured microstep mode. An axis that stays enabled after a shutdown keeps its chip awake.
+/// the configured microstep mode, and the brake engaged. An axis that stays enabled after a
+/// shutdown keeps its chip awake.
 ///
 /// @param others the axes that are already in the request: their ENABLE lines can be shared.
 MotorLines requestLines(const config::AxisConfig& config, const std::vector<MotorLines>& others,

@@ -1,7 +1,7 @@
 #include "translator.h"
 
-#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "stepdriver_core/driver/driver_chip.h"
 
@@ -15,7 +15,7 @@ bool Translator::isAtHome(std::int64_t count) const {
 std::int64_t Translator::nearestCommon(std::int64_t count, int wanted) const {
   const std::int64_t index = count - home_count_;
   if (driver::keepsPosition(index, microsteps_, wanted)) return count;
-  const double unit = static_cast<double>(microsteps_) / std::min(microsteps_, wanted);
+  const double unit = static_cast<double>(microsteps_) / std::gcd(microsteps_, wanted);
   return home_count_ + std::llround(std::round(static_cast<double>(index) / unit) * unit);
 }
 

@@ -91,17 +91,21 @@ class CallMeter {
 };
 
 /// @param measure_calls false: one failed, and nothing else is measured.
-Capability asPulseThread(Clock& clock, const std::string& latency_device,
+Capability asPulseThread(Clock& clock, const RealtimeRequest& request,
                          const std::function<bool(Capability&)>& measure_calls) {
   Capability capability;
   capability.rights.memory_error = lockMemory();
   std::optional<CpuLatencyHold> awake;
-  if (!latency_device.empty()) {
-    awake.emplace(latency_device);
+  if (!request.latency_device.empty()) {
+    awake.emplace(request.latency_device);
     capability.rights.latency_error = awake->error();
   }
   std::thread([&] {
     capability.rights.scheduler_error = askForScheduler(kRealtimePriority);
+    if (request.cpu) {
+      capability.rights.cpu = *request.cpu;
+      capability.rights.cpu_error = stayOnProcessor(*request.cpu);
+    }
     if (!measure_calls(capability)) return;
     capability.lateness = latenessOf(clock, &Clock::waitUntil, kMeasuredWakeUps);
     capability.sleep_lateness = latenessOf(clock, &Clock::sleepUntil, kMeasuredSleeps);
@@ -123,9 +127,9 @@ Spread spreadOf(std::vector<Nanoseconds> samples) {
 
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
                              const std::vector<ChannelConfig>& channels,
-                             const std::string& latency_device) {
+                             const RealtimeRequest& request) {
   CallMeter meter(lines, clock);
-  Capability capability = asPulseThread(clock, latency_device, [&](Capability& measured) {
+  Capability capability = asPulseThread(clock, request, [&](Capability& measured) {
     for (const ChannelConfig& channel : channels) {
       measured.channels.push_back(meter.measure(channel));
     }
@@ -135,8 +139,8 @@ Capability measureCapability(gpio::Lines& lines, Clock& clock,
   return capability;
 }
 
-Capability measureWakeUps(Clock& clock, const std::string& latency_device) {
-  return asPulseThread(clock, latency_device, [](Capability& /*measured*/) { return true; });
+Capability measureWakeUps(Clock& clock, const RealtimeRequest& request) {
+  return asPulseThread(clock, request, [](Capability& /*measured*/) { return true; });
 }
 
 }  // namespace stepdriver::pulse

@@ -19,7 +19,18 @@ struct ChannelConfig {
   Signal dir;  ///< active: forward, the count rises
   std::optional<Signal> endstop_min;
   std::optional<Signal> endstop_max;
-  std::optional<Signal> fault;  ///< an input of the chip's, active: it has switched its outputs off
+  std::optional<Signal> fault;  ///< the chip's fault output
+  /// A fault doesn't end a motion that has made a step: it is only counted, and a stop is expected.
+  bool ramps_at_fault = false;
+  /// The driver's in-position output: a motion that settles (Follow::settles) ends when it is
+  /// active. If it isn't within the timeout after the end of the profile, the motion ends as
+  /// kNotInPosition.
+  std::optional<Signal> in_position;
+  Nanoseconds in_position_timeout = 0;
+  /// `step` makes steps forward, and pulses on `dir`, which is no level then, make steps backward.
+  /// dir_setup and dir_hold are kept between the pulses of the two.
+  bool dir_steps = false;
+  bool both_edges = false;  ///< each edge of `step` is a step
   Nanoseconds step_high = 0;
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;
@@ -32,10 +43,11 @@ enum class EndReason {
   kEndstopMin,
   kEndstopMax,
   kEmergencyStop,
-  kChipFault,  ///< the chip's fault line became active
-  kTooLate,    ///< a pulse came too late to continue at this speed
-  kLineError,  ///< a line could not be written or read
-  kCompanion,  ///< another channel of the group was ended
+  kChipFault,      ///< the chip's fault line became active
+  kTooLate,        ///< a pulse came too late to continue at this speed
+  kLineError,      ///< a line could not be written or read
+  kNotInPosition,  ///< the in-position output didn't become active in time
+  kCompanion,      ///< another channel of the group was ended
 };
 
 /// A write or a read that failed.
@@ -60,12 +72,15 @@ struct ChannelState {
   LineFailure failure;            ///< the last one
   Nanoseconds end_time = 0;       ///< motion time at which it ended
   bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
+  Nanoseconds waited = 0;         ///< for the in-position output, before kNotInPosition
   Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
   std::uint64_t epoch = 0;        ///< how many times the scale of `count` has changed
   Nanoseconds rose = 0;           ///< clock time by which the last active STEP edge had happened
   std::uint64_t chip_faults = 0;  ///< how many times the fault line became active
   std::uint64_t line_errors = 0;  ///< failed writes and reads
   Nanoseconds ready = 0;          ///< clock time before which no step goes out
+
+  std::uint64_t faults() const { return chip_faults + line_errors; }
 };
 
 }  // namespace stepdriver::pulse

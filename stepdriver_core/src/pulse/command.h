@@ -27,6 +27,11 @@ struct Follow {
   /// PulseEngine::stopsServed() as it was known when this was planned. If an emergency stop has
   /// been requested since, this one is refused.
   std::uint64_t stops = 0;
+  /// ChannelState::faults() as it was known when this was planned. If a fault has come since, this
+  /// one is refused.
+  std::uint64_t faults = 0;
+  /// At its end it waits for the in-position output, if the channel has one.
+  bool settles = false;
 };
 
 /// An order to the pulse thread. Serials rise by one on each channel.

@@ -10,23 +10,27 @@ void EngineChannel::pullNext() {
   if (finder.next(step)) next = step;
 }
 
-void EngineChannel::adopt(const motion::Profile& followed, std::uint64_t serial) {
-  profile = &followed;
-  finder = motion::StepFinder(followed, state.count);
-  state.following = serial;
+void EngineChannel::adopt(const Successors::Entry& followed) {
+  profile = followed.profile;
+  finder = motion::StepFinder(*followed.profile, state.count);
+  state.following = followed.serial;
+  settles = followed.settles && config.in_position;
   pullNext();
+  // A plan without a step, as for another speed, doesn't begin the wait again.
+  if (next) settling = false;
+  look_at = 0;
 }
 
 void EngineChannel::follow(const Follow& order) {
   restart_interval = order.restart_interval;
   group = order.group;
   if (profile == nullptr) {
-    adopt(*order.profile, order.serial);
+    adopt({order.profile, order.serial, order.settles});
     last_planned = order.profile->startNs();
     late = 0;
     running = false;
   } else {
-    successors.add(*order.profile, order.serial);
+    successors.add({order.profile, order.serial, order.settles});
   }
 }
 
@@ -71,6 +75,7 @@ void EngineChannel::endMotion(EndReason reason, Nanoseconds motion_now) {
   }
   state.following = 0;
   profile = nullptr;
+  settling = false;
   successors.clear();
   next.reset();
   publish();

@@ -39,9 +39,14 @@ struct EngineChannel {
     return successors.empty() ? state.following : successors.last().serial;
   }
 
+  /// The line of pulses in a direction.
+  const Signal& stepOf(int forward) const {
+    return config.dir_steps && forward < 0 ? config.dir : config.step;
+  }
+
   void publish() { published.store(state); }
   void pullNext();
-  void adopt(const motion::Profile& followed, std::uint64_t serial);
+  void adopt(const Successors::Entry& followed);
   void follow(const Follow& order);
   /// @return whether it could be reserved: it is at rest, and not reserved yet.
   bool reserve();
@@ -51,13 +56,15 @@ struct EngineChannel {
   void endMotion(EndReason reason, Nanoseconds motion_now);
 
   std::size_t index = 0;
-  bool high = false;       // the pulse is out
+  bool high = false;       // the pulse is out; never so if both edges are steps
+  bool toggled = false;    // both edges are steps, and the line is at its active level
   bool running = false;    // the current motion has made a step
   bool changed = false;    // it must be scheduled
   bool faulty = false;     // the last reading of the fault line
   bool unchecked = false;  // its fault line must be read before the next step
   bool reserved = false;   // the chip's other pins are being written
-  int direction = -1;      // the direction on the DIR line
+  int direction = -1;      // the direction on the DIR line, or of pulse_line
+  Signal pulse_line;       // the line of steps in that direction
   std::optional<motion::Step> next;
   Nanoseconds last_planned = 0;  // motion time of the step before, or of the profile's start
   Nanoseconds late = 0;          // of the next step, so far
@@ -66,6 +73,13 @@ struct EngineChannel {
   Nanoseconds rose = 0;
   Nanoseconds fell = 0;
   Nanoseconds turned = 0;
+
+  // At the end of a profile that settles: it waits for the in-position output, from this clock time
+  // on, and looks again at the other one.
+  bool settles = false;
+  bool settling = false;
+  Nanoseconds settling_since = 0;
+  Nanoseconds look_at = 0;
 
   const motion::Profile* profile = nullptr;  // the one that is followed
   std::uint64_t group = 0;                   // of the last order; 0: no group

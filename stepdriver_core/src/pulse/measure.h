@@ -25,6 +25,6 @@ constexpr int kMeasuredCalls = 200;    // of each line; fewer if they take more 
 /// @throw GpioError if a line can't be written or read.
 Capability measureCapability(gpio::Lines& lines, Clock& clock,
                              const std::vector<ChannelConfig>& channels,
-                             const std::string& latency_device = kCpuLatencyDevice);
+                             const RealtimeRequest& request = {});
 
 }  // namespace stepdriver::pulse

@@ -1,12 +1,20 @@
 #include "pulse/pulse_engine.h"
 
 #include <algorithm>
+#include <cerrno>
 
 #include "engine_channel.h"
 
 namespace stepdriver::pulse {
 
 using Action = EngineChannel::Action;
+
+namespace {
+
+// How often the in-position output is read at the end of a motion, if no edge is reported.
+constexpr Nanoseconds kLookPeriod = 1'000'000;
+
+}  // namespace
 
 PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
                          const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
@@ -20,6 +28,7 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
   for (std::size_t i = 0; i < channels.size(); ++i) {
     channels_[i].index = i;
     channels_[i].config = channels[i];
+    channels_[i].pulse_line = channels_[i].stepOf(channels_[i].direction);
   }
   due_.reserve(channels.size());
   changed_.reserve(channels.size());
@@ -52,10 +61,11 @@ Nanoseconds PulseEngine::serve() {
   scheduleChanged();
   collectDue(now);
   writeOthers(now);
+  writeHeartbeat(now);
   scheduleChanged();
   serveStops();
   tell();
-  return dues_.earliest();
+  return heartbeat_ ? std::min(dues_.earliest(), heartbeat_->due()) : dues_.earliest();
 }
 
 void PulseEngine::tell() {
@@ -125,7 +135,8 @@ bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const bool late =
       start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
   return !late && !channel.reserved && order.continues == channel.latest() &&
-         channel.successors.hasRoom(start) && order.stops == stopsAsked() && !emergencyStopped();
+         channel.successors.hasRoom(start) && order.faults == channel.state.faults() &&
+         order.stops == stopsAsked() && !emergencyStopped();
 }
 
 // ---- inputs and emergency stops ----
@@ -155,7 +166,7 @@ void PulseEngine::inputsChanged() {
 
 void PulseEngine::readEmergencyStop() {
   if (!emergency_input_) return;
-  const int level = lines_.read(emergency_input_->line);
+  const int level = readLine(emergency_input_->line);
   const bool active = level < 0 || (level != 0) == emergency_input_->active;
   // If it is still active after a clear, that is another stop.
   if (active && !(emergency_input_active_ && emergencyStopped())) {
@@ -177,20 +188,29 @@ void PulseEngine::readInputs(Nanoseconds now) {
   for (Channel& channel : channels_) {
     if (channel.config.fault) readFault(channel, now);
     if (channel.next) mayStep(channel, now);
+    if (channel.settling) {
+      channel.look_at = now;
+      changed(channel);
+    }
   }
 }
 
 void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
   // While its pins change, and while it wakes, a chip's fault line means nothing.
   if (channel.reserved || now < channel.state.ready) return;
-  const int level = lines_.read(channel.config.fault->line);
+  const int level = readLine(channel.config.fault->line);
   const bool faulty = level < 0 || (level != 0) == channel.config.fault->active;
   if (faulty && !channel.faulty) {
     if (level < 0) {
       fail(channel, {-level, channel.config.fault->line, true}, now);
     } else {
       ++channel.state.chip_faults;
-      end(channel, EndReason::kChipFault, now);
+      if (channel.config.ramps_at_fault && channel.profile != nullptr && channel.running) {
+        channel.publish();
+        news_ = true;
+      } else {
+        end(channel, EndReason::kChipFault, now);
+      }
     }
   }
   channel.faulty = faulty;
@@ -206,7 +226,7 @@ bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
   const bool forward = channel.next->direction > 0;
   const auto& endstop = forward ? channel.config.endstop_max : channel.config.endstop_min;
   if (!endstop) return true;
-  const int level = lines_.read(endstop->line);
+  const int level = readLine(endstop->line);
   if (level < 0) {
     fail(channel, {-level, endstop->line, true}, now);
     return false;
@@ -214,6 +234,25 @@ bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
   if ((level != 0) != endstop->active) return true;
   end(channel, forward ? EndReason::kEndstopMax : EndReason::kEndstopMin, now);
   return false;
+}
+
+// ---- lines ----
+
+int PulseEngine::writeLines(const gpio::LineWrite* writes, std::size_t count) {
+  output_at_work_.store(writes->output, std::memory_order_relaxed);
+  input_at_work_.store(-1, std::memory_order_relaxed);
+  return lines_.write(writes, count);
+}
+
+int PulseEngine::readLine(int input) {
+  input_at_work_.store(input, std::memory_order_relaxed);
+  return lines_.read(input);
+}
+
+LineFailure PulseEngine::lineAtWork() const {
+  const int input = input_at_work_.load(std::memory_order_relaxed);
+  if (input >= 0) return {ETIMEDOUT, input, true};
+  return {ETIMEDOUT, output_at_work_.load(std::memory_order_relaxed)};
 }
 
 // ---- edges ----
@@ -254,11 +293,11 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     const Action action = channel.action();
     const bool fall = action == Action::kFall;
     if (!fall && !(action == Action::kRise && mayStep(channel, now))) continue;
-    const Signal& step = channel.config.step;
+    const Signal& step = channel.pulse_line;
     // Member by member: copying a complete pair would make the processor wait.
     gpio::LineWrite& write = writes_.emplace_back();
     write.output = step.line;
-    write.level = step.active != fall;
+    write.level = step.active != (fall || channel.toggled);
     writers_.push_back(&channel);
   }
   // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
@@ -267,7 +306,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
   dropEnded();
   if (writes_.empty()) return;
   const std::uint64_t pulses = state_.pulses;
-  const int error = lines_.write(writes_.data(), writes_.size());
+  const int error = writeLines(writes_.data(), writes_.size());
   if (error != 0) {
     writeOneByOne(error, now);
   } else {
@@ -293,12 +332,14 @@ void PulseEngine::dropEnded() {
 void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     Channel& channel = *writers_[i];
-    errors_[i] = writers_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
+    errors_[i] = writers_.size() > 1 ? writeLines(&writes_[i], 1) : error;
     const Nanoseconds done = clock_.now();
     if (errors_[i] == 0) {
       written(channel, done);
     } else {
-      (channel.high ? channel.fell : channel.rose) = done;
+      // The edge may have happened.
+      if (channel.high || channel.config.both_edges) channel.fell = done;
+      if (!channel.high) channel.rose = done;
       channel.high = false;
     }
   }
@@ -311,10 +352,18 @@ void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
 
 void PulseEngine::written(Channel& channel, Nanoseconds now) {
   changed(channel);
-  channel.high = !channel.high;
-  if (!channel.high) {
+  const Signal& step = channel.pulse_line;
+  if (channel.config.both_edges) {
+    channel.toggled = !channel.toggled;
+    if (ring_ != nullptr) ring_->add(step.line, channel.toggled == step.active, now);
     channel.fell = now;
-    return;
+  } else {
+    channel.high = !channel.high;
+    if (ring_ != nullptr) ring_->add(step.line, channel.high == step.active, now);
+    if (!channel.high) {
+      channel.fell = now;
+      return;
+    }
   }
   channel.rose = now;
   ++state_.pulses;
@@ -331,7 +380,7 @@ void PulseEngine::writeOthers(Nanoseconds now) {
         turn(channel, now);
         break;
       case Action::kFinish:
-        end(channel, EndReason::kDone, now);
+        finish(channel, now);
         break;
       default:
         break;
@@ -339,16 +388,50 @@ void PulseEngine::writeOthers(Nanoseconds now) {
   }
 }
 
+void PulseEngine::writeHeartbeat(Nanoseconds now) {
+  if (!heartbeat_ || now < heartbeat_->due()) return;
+  const gpio::LineWrite write = heartbeat_->next();
+  const int error = writeLines(&write, 1);
+  if (error == 0 && ring_ != nullptr) ring_->add(write.output, write.level, clock_.now());
+  if (!heartbeat_->done(error == 0, now)) return;
+  // Whatever watches the line now takes the motors' power away.
+  for (Channel& channel : channels_) fail(channel, {error, write.output}, now);
+}
+
 void PulseEngine::turn(Channel& channel, Nanoseconds now) {
+  if (channel.config.dir_steps) {
+    channel.turned = clock_.now();  // the last pulse may have ended in this pass
+    channel.direction = channel.next->direction;
+    channel.pulse_line = channel.stepOf(channel.direction);
+    return changed(channel);
+  }
   const bool forward = channel.next->direction > 0;
   const Signal& dir = channel.config.dir;
   const gpio::LineWrite write{dir.line, forward ? dir.active : !dir.active};
-  if (const int error = lines_.write(&write, 1)) {
+  if (const int error = writeLines(&write, 1)) {
     fail(channel, {error, write.output}, now);
     return;
   }
   channel.turned = clock_.now();
+  if (ring_ != nullptr) ring_->add(write.output, write.level, channel.turned);
   channel.direction = channel.next->direction;
+  changed(channel);
+}
+
+void PulseEngine::finish(Channel& channel, Nanoseconds now) {
+  if (!channel.settles) return end(channel, EndReason::kDone, now);
+  const Signal& in_position = *channel.config.in_position;
+  const int level = readLine(in_position.line);
+  if (level < 0) return fail(channel, {-level, in_position.line, true}, now);
+  if ((level != 0) == in_position.active) return end(channel, EndReason::kDone, now);
+  if (!channel.settling) channel.settling_since = now;
+  channel.settling = true;
+  const Nanoseconds latest = channel.settling_since + channel.config.in_position_timeout;
+  if (now >= latest) {
+    channel.state.waited = now - channel.settling_since;
+    return end(channel, EndReason::kNotInPosition, now);
+  }
+  channel.look_at = std::min(now + kLookPeriod, latest);
   changed(channel);
 }
 
@@ -405,8 +488,7 @@ void PulseEngine::scheduleAll() {
 
 bool PulseEngine::schedule(Channel& channel) {
   while (!channel.high && channel.isSucceeded()) {
-    const Successors::Entry first = channel.successors.takeFirst();
-    channel.adopt(*first.profile, first.serial);
+    channel.adopt(channel.successors.takeFirst());
     channel.publish();
   }
   Nanoseconds due = kNever;
@@ -427,7 +509,7 @@ bool PulseEngine::schedule(Channel& channel) {
       due = channel.state.pulses != 0 ? channel.rose + channel.config.dir_hold : 0;
       break;
     case Action::kFinish:
-      due = channel.profile->endNs() + state_.slipped;
+      due = std::max(channel.profile->endNs() + state_.slipped, channel.look_at);
       break;
   }
   dues_.set(channel.index, due);
@@ -444,7 +526,9 @@ bool PulseEngine::scheduleRise(Channel& channel) {
   const ChannelConfig& config = channel.config;
   Nanoseconds earliest = std::max(channel.state.ready, channel.turned + config.dir_setup);
   if (channel.state.pulses != 0) {
-    earliest = std::max({earliest, channel.fell + config.step_low, closestRise(channel)});
+    // Both edges being steps, the last one was the beginning of the active time, or its end.
+    const Nanoseconds gap = channel.toggled ? config.step_high : config.step_low;
+    earliest = std::max({earliest, channel.fell + gap, closestRise(channel)});
   }
   const Nanoseconds planned = channel.next->time_ns + state_.slipped;
   dues_.set(channel.index, std::max(planned, earliest));

@@ -9,8 +9,10 @@
 #include "pulse/channel.h"
 #include "pulse/command.h"
 #include "pulse/due_tree.h"
+#include "pulse/heartbeat.h"
 #include "pulse/lateness_record.h"
 #include "pulse/mailbox.h"
+#include "pulse/pin_ring.h"
 #include "pulse/snapshot.h"
 #include "pulse/stop_counts.h"
 #include "stepdriver_core/gpio/lines.h"
@@ -101,9 +103,21 @@ class PulseEngine {
   /// @param listener outlives the engine; set before the first serve().
   void listen(NewsListener& listener) { listener_ = &listener; }
 
+  /// @param line changes its level in serve(), after the edges of the axes, at its rate. If it
+  ///   can't be written, that is a failure of every channel. Set before the first serve().
+  void beat(const HeartbeatLine& line) { heartbeat_.emplace(line, clock_.now()); }
+
+  /// @param ring records each edge of STEP, DIR and heartbeat lines at the end of its write. It
+  ///   outlives the engine; set before the first serve().
+  void recordTo(PinRing& ring) { ring_ = &ring; }
+
   /// The state of a channel, consistent and from one instant.
   ChannelState channel(int index) const;
   EngineState state() const { return figures_.load(); }
+
+  /// A line for which serve() waits now, or has waited last: if that doesn't return, its chip
+  /// doesn't answer. The error is ETIMEDOUT.
+  LineFailure lineAtWork() const;
 
   /// The lateness of active STEP edges, relative to their planned times.
   LatenessFigures lateness() const { return lateness_.sinceStart(); }
@@ -131,6 +145,10 @@ class PulseEngine {
   void readFault(Channel& channel, Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
 
+  // Lines.
+  int writeLines(const gpio::LineWrite* writes, std::size_t count);
+  int readLine(int input);
+
   // Edges.
   void collectDue(Nanoseconds now);
   bool meetLateness(Nanoseconds now);
@@ -139,7 +157,9 @@ class PulseEngine {
   void writeOneByOne(int error, Nanoseconds now);
   void written(Channel& channel, Nanoseconds now);
   void writeOthers(Nanoseconds now);
+  void writeHeartbeat(Nanoseconds now);
   void turn(Channel& channel, Nanoseconds now);
+  void finish(Channel& channel, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
   void endOne(Channel& channel, EndReason reason, Nanoseconds now);
@@ -173,8 +193,12 @@ class PulseEngine {
   StopCounts stops_;
   std::atomic<std::uint64_t> input_stops_{0};
   NewsListener* listener_ = nullptr;
+  PinRing* ring_ = nullptr;
+  std::optional<Heartbeat> heartbeat_;
   bool news_ = false;  // of this pass
   std::atomic<bool> inputs_changed_{false};
+  std::atomic<int> output_at_work_{-1};
+  std::atomic<int> input_at_work_{-1};  // -1: an output is
   EngineState state_;
   LatenessRecord lateness_;
   Snapshot<EngineState> figures_;

@@ -1,19 +1,23 @@
 #include "pulse/pulse_thread.h"
 
 #include <pthread.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
 
 #include "pulse/realtime.h"
 
 namespace stepdriver::pulse {
 
 PulseThread::PulseThread(PulseEngine& engine, Clock& clock, NewsListener* listener,
-                         const std::string& latency_device)
-    : engine_(engine), clock_(clock), listener_(listener) {
+                         const RealtimeRequest& request)
+    : engine_(engine), clock_(clock), listener_(listener), cpu_(request.cpu.value_or(-1)) {
   if (clock_.realtime()) {
     lock_error_ = lockMemory();
-    if (!latency_device.empty()) latency_.emplace(latency_device);
+    if (!request.latency_device.empty()) latency_.emplace(request.latency_device);
   }
   thread_ = std::thread([this] { run(); });
 }
@@ -34,14 +38,18 @@ void PulseThread::setAlarm(Nanoseconds time) {
 
 void PulseThread::run() {
   pthread_setname_np(pthread_self(), "pulse");
+  id_ = gettid();
   if (clock_.realtime()) {
     scheduler_error_ = askForScheduler(kRealtimePriority);
+    if (cpu_ >= 0) cpu_error_ = stayOnProcessor(cpu_);
     touchStack();
   } else if (clock_.keepsRealTime()) {
     askForScheduler(kPromptPriority);  // a rig without that right is only slower
   }
-  while (!stopping_) {
+  for (std::uint64_t passes = 0; !stopping_; passes += 2) {
+    passes_.store(passes + 1, std::memory_order_release);
     const Nanoseconds due = engine_.serve();
+    passes_.store(passes + 2, std::memory_order_release);
     Nanoseconds alarm = alarm_.load(std::memory_order_acquire);
     if (alarm != kNever && listener_ != nullptr && clock_.now() >= alarm) {
       // It goes off once; an alarm that was set meanwhile is checked in the next pass.
@@ -52,8 +60,18 @@ void PulseThread::run() {
   }
 }
 
+bool PulseThread::isBlocked() const {
+  std::ifstream file("/proc/self/task/" + std::to_string(id_.load()) + "/stat");
+  std::string text;
+  std::getline(file, text);
+  // 37 (pulse) S 1 ...
+  const std::size_t name_end = text.rfind(')');
+  return name_end != std::string::npos && text.size() > name_end + 2 && text[name_end + 2] != 'R';
+}
+
 RealtimeRights PulseThread::rights() const {
-  return {scheduler_error_.load(), lock_error_.load(), latency_ ? latency_->error() : -1};
+  return {scheduler_error_.load(), lock_error_.load(), latency_ ? latency_->error() : -1,
+          cpu_error_.load(), cpu_};
 }
 
 }  // namespace stepdriver::pulse

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <atomic>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <thread>
@@ -14,17 +17,16 @@ namespace stepdriver::pulse {
 
 /// A thread that serves an engine.
 ///
-/// It requests SCHED_FIFO 50, locked memory and processors that don't sleep if the clock is a
-/// real-time one. If any of these is refused, it works without it, and rights() says so. On a
-/// virtual clock that keeps real time it requests a lower priority, so that a stop doesn't wait for
-/// a processor.
+/// It requests SCHED_FIFO 50, locked memory, processors that don't sleep and, if wanted, one
+/// processor for itself alone, if the clock is a real-time one. If any of these is refused, it
+/// works without it, and rights() says so. On a virtual clock that keeps real time it requests a
+/// lower priority, so that a stop doesn't wait for a processor.
 class PulseThread {
  public:
   /// @param engine, clock outlive the thread. @param listener is told when an alarm goes off; may
   ///   be nullptr.
-  /// @param latency_device see CpuLatencyHold; empty: the processors may sleep.
   PulseThread(PulseEngine& engine, Clock& clock, NewsListener* listener = nullptr,
-              const std::string& latency_device = kCpuLatencyDevice);
+              const RealtimeRequest& request = {});
 
   /// Calls stop() if that wasn't called.
   ~PulseThread();
@@ -38,6 +40,14 @@ class PulseThread {
   /// Replaces the previous alarm; kNever: no alarm. Safe from any thread.
   void setAlarm(Nanoseconds time);
 
+  /// Changes when a pass of the engine begins and when it ends; odd during a pass. Safe from any
+  /// thread.
+  std::uint64_t passes() const { return passes_.load(std::memory_order_acquire); }
+
+  /// Whether the thread waits, in a system call or for a lock: false if it runs, or if it only
+  /// waits for a processor. Safe from any thread.
+  bool isBlocked() const;
+
   /// What the thread requested and was granted.
   RealtimeRights rights() const;
 
@@ -49,8 +59,12 @@ class PulseThread {
   NewsListener* const listener_;
   std::atomic<Nanoseconds> alarm_{kNever};
   std::atomic<bool> stopping_{false};
+  std::atomic<std::uint64_t> passes_{0};
+  std::atomic<pid_t> id_{0};              // of the thread
   std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not requested
   std::atomic<int> lock_error_{-1};
+  std::atomic<int> cpu_error_{-1};
+  const int cpu_;  // -1: any
   std::optional<CpuLatencyHold> latency_;
   std::thread thread_;
 };

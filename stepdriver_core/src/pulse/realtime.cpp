@@ -33,6 +33,16 @@ std::string latencyText(int error) {
   return fmt::format("{} can't be held ({})", text, std::strerror(error));
 }
 
+std::string processorText(int cpu, int error) {
+  if (error < 0) return "";
+  if (error == 0) return fmt::format("; only on processor {}", cpu);
+  return fmt::format(
+      "; not on processor {} ({}): realtime/cpu must be the number of a processor that is online "
+      "and "
+      "that this process may use, as in /sys/devices/system/cpu/online",
+      cpu, std::strerror(error));
+}
+
 // The constants of the pulse thread's own code are smaller. This keeps out the tables of libraries
 // that it doesn't call: ICU's, which the log library depends on, take 30 MB.
 constexpr std::size_t kLargestConstants = 4 << 20;
@@ -65,6 +75,14 @@ int askForScheduler(int priority) {
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
 }
 
+int stayOnProcessor(int cpu) {
+  if (cpu < 0 || cpu >= CPU_SETSIZE) return EINVAL;
+  cpu_set_t only;
+  CPU_ZERO(&only);
+  CPU_SET(static_cast<std::size_t>(cpu), &only);
+  return pthread_setaffinity_np(pthread_self(), sizeof only, &only);
+}
+
 int lockMemory() {
   // Root may lift it, and any user may raise it up to the hard limit.
   const rlimit none{RLIM_INFINITY, RLIM_INFINITY};
@@ -95,7 +113,7 @@ std::string RealtimeRights::text() const {
                                   "; memory not locked ({}): `@realtime - memlock unlimited` in "
                                   "/etc/security/limits.d allows it to the group realtime",
                                   std::strerror(memory_error));
-  return text + latencyText(latency_error);
+  return text + latencyText(latency_error) + processorText(cpu, cpu_error);
 }
 
 }  // namespace stepdriver::pulse

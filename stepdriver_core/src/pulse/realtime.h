@@ -12,6 +12,12 @@ constexpr int kPromptPriority = 10;
 /// @return 0, or the errno of the refusal.
 int askForScheduler(int priority);
 
+/// Lets the calling thread run on one processor only.
+///
+/// @param cpu its number, from 0.
+/// @return 0, or the errno of the refusal.
+int stayOnProcessor(int cpu);
+
 /// Locks the present and future memory of the process: pages that were used once stay in memory.
 /// Code and data of the program and its libraries are loaded first, except for tables of more than
 /// 4 MB; everything else takes no memory until it is used. This is done only if the process has no

@@ -4,9 +4,9 @@
 
 namespace stepdriver::pulse {
 
-void Successors::add(const motion::Profile& profile, std::uint64_t serial) {
-  while (size_ > 0 && last().profile->startNs() >= profile.startNs()) --size_;
-  entries_[size_++] = {&profile, serial};
+void Successors::add(const Entry& entry) {
+  while (size_ > 0 && last().profile->startNs() >= entry.profile->startNs()) --size_;
+  entries_[size_++] = entry;
 }
 
 Successors::Entry Successors::takeFirst() {

@@ -16,6 +16,7 @@ class Successors {
   struct Entry {
     const motion::Profile* profile = nullptr;
     std::uint64_t serial = 0;
+    bool settles = false;
   };
 
   bool empty() const { return size_ == 0; }
@@ -29,7 +30,7 @@ class Successors {
   }
 
   /// @pre hasRoom() for it.
-  void add(const motion::Profile& profile, std::uint64_t serial);
+  void add(const Entry& entry);
   Entry takeFirst();
   void clear() { size_ = 0; }
 

@@ -19,6 +19,11 @@ using config::Range;
 constexpr double kLongestLatenessMs = 1000.0;
 constexpr double kShortestTimeoutMs = 10.0;
 constexpr double kLongestTimeoutMs = 60'000.0;
+constexpr Range kRecordedSeconds{0.0, 600.0};
+constexpr Range kRecorderMemory{1.0, 1000.0};
+constexpr Range kHeartbeatRates{1.0, 1000.0};  // Hz
+constexpr int kMostProcessors = 1024;          // CPU_SETSIZE of the C library
+constexpr int kMostRecordings = 1000;
 
 const std::vector<std::string> kPolicies = {"warn", "enforce"};
 
@@ -47,7 +52,35 @@ void readRealtime(ConfigReader realtime, MachineConfig& config) {
       "max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, config.max_lateness * 1e3);
   config.max_lateness = milliseconds * 1e-3;
   config.keep_cpus_awake = realtime.boolean("keep_cpus_awake", config.keep_cpus_awake);
+  config.cpu = realtime.findInteger("cpu", 0, kMostProcessors - 1, config::Presence::kOptional);
   realtime.rejectUnknown();
+}
+
+void refuseRelativePath(ConfigReader& reader, const std::string& key, const std::string& path,
+                        const char* otherwise) {
+  if (path.empty() || path[0] == '/') return;
+  reader.issue(key, fmt::format("is {}, but must be an absolute path, or empty for {}",
+                                reader.shown(key), otherwise));
+}
+
+void readRecorder(ConfigReader reader, RecorderConfig& recorder) {
+  recorder.seconds = reader.number("seconds", kRecordedSeconds, recorder.seconds);
+  recorder.memory_mb = reader.number("memory_mb", kRecorderMemory, recorder.memory_mb);
+  recorder.folder = reader.text("folder", recorder.folder);
+  refuseRelativePath(reader, "folder", recorder.folder, "the default");
+  recorder.keep = reader.integer("keep", 1, kMostRecordings, recorder.keep);
+  reader.rejectUnknown();
+}
+
+std::optional<machine::HeartbeatConfig> readHeartbeat(ConfigReader& machine,
+                                                      config::UsedLines& used) {
+  ConfigReader reader = machine.map("heartbeat");
+  if (!machine.has("heartbeat")) return {};
+  machine::HeartbeatConfig heartbeat;
+  heartbeat.line = config::readRequiredLine(reader, "pin", used);
+  heartbeat.rate = reader.number("rate_hz", kHeartbeatRates, heartbeat.rate);
+  reader.rejectUnknown();
+  return heartbeat;
 }
 
 }  // namespace
@@ -59,8 +92,12 @@ machine::MachineOptions MachineConfig::options() const {
   options.measure = true;
   options.enforce = enforce_realtime;
   options.emergency_stop = emergency_stop;
+  options.heartbeat = heartbeat;
   options.state_file = state_file;
-  options.latency_device = keep_cpus_awake ? pulse::kCpuLatencyDevice : "";
+  options.record_seconds = recorder.seconds;
+  options.record_bytes = static_cast<std::size_t>(recorder.memory_mb * 1e6);
+  options.realtime.latency_device = keep_cpus_awake ? pulse::kCpuLatencyDevice : "";
+  options.realtime.cpu = cpu;
   return options;
 }
 
@@ -68,10 +105,8 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   MachineConfig config;
   readGpio(reader.map("gpio"), config);
   config.state_file = reader.text("state_file", config.state_file);
-  if (!config.state_file.empty() && config.state_file[0] != '/') {
-    reader.issue("state_file", fmt::format("is {}, but must be an absolute path, or empty for none",
-                                           reader.shown("state_file")));
-  }
+  refuseRelativePath(reader, "state_file", config.state_file, "none");
+  readRecorder(reader.map("recorder"), config.recorder);
   if (reader.value("realtime").as<std::string>() != nullptr) {
     config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
   } else {
@@ -85,13 +120,22 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
       config::readAxes(reader.value("axes"), reader.fullName("axes"), reader.issues(), used);
   const bool axes_are_right = reader.issues().size() == issues_before;
   config.emergency_stop = config::readInputSwitch(reader, "emergency_stop", used);
+  config.heartbeat = readHeartbeat(reader, used);
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !reader.has("emergency_stop")) {
     simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",
                                                            simulation.shown("emergency_stop"),
                                                            reader.fullName("emergency_stop")));
   }
+  const std::string simulation_speed = simulation.fullName("speed");
   config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right);
+  if (config.heartbeat && config.backend == GpioBackend::kSimulated &&
+      config.simulation.speed == 0.0) {
+    reader.contradiction("heartbeat",
+                         fmt::format("is given, but {} is 0: it would make the time of the rig "
+                                     "run on at rest too; leave it out, or give another speed",
+                                     simulation_speed));
+  }
   if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {
     reader.contradiction(
         "simulation/trace",

@@ -58,7 +58,9 @@ std::optional<sim::SwitchSpec> switchOf(const std::optional<config::Endstop>& en
 
 /// The axis as it is really wired.
 AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
-  if (wiring.dir_inverted) axis.pins.dir.inverted = *wiring.dir_inverted;
+  const bool cw_ccw = axis.driver.step_inputs == driver::StepInputs::kCwCcw;
+  if (wiring.dir_inverted && !cw_ccw) axis.pins.dir.inverted = *wiring.dir_inverted;
+  if (wiring.dir_inverted.value_or(false) && cw_ccw) std::swap(axis.pins.step, axis.pins.dir);
   if (wiring.steps_per_unit) {
     axis.steps_per_unit = *wiring.steps_per_unit * config::configUnitsPerUnit(axis.kind);
   }
@@ -77,8 +79,7 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
   const AxisConfig axis = wired(configured, simulated.wiring);
   sim::RigAxisSpec spec;
   spec.name = axis.name;
-  spec.model = axis.driver;
-  spec.timing = axis.timing;
+  spec.chip = axis.driver;
   spec.step = wireOf(axis.pins.step);
   spec.dir = wireOf(axis.pins.dir);
   spec.enable = wireOf(axis.pins.enable);
@@ -92,6 +93,13 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
       axis.microsteps / axis.steps_per_unit * config::configUnitsPerUnit(axis.kind);
   spec.start = simulated.start;
   if (axis.fault) spec.fault_line = axis.fault->line;
+  if (axis.in_position) spec.in_position_line = axis.in_position->line;
+  spec.settling_ns = std::llround(simulated.settling_ms * 1e6);
+  if (axis.brake) {
+    spec.brake = sim::BrakeSpec{axis.brake->line, axis.brake->release_level, axis.brake->release_ns,
+                                axis.brake->engage_ns};
+  }
+  spec.load_falls = simulated.load_falls;
   const SwitchPlaces places = switchPlaces(axis, simulated);
   spec.min_switch = switchOf(axis.endstop_min, simulated, places.min);
   spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);

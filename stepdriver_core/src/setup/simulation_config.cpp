@@ -1,5 +1,6 @@
 #include "stepdriver_core/setup/simulation_config.h"
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -13,6 +14,8 @@ using config::Range;
 constexpr double kHighestSpeed = 1e6;
 constexpr int kMostBounces = 1000;
 constexpr double kLongestBounceMs = 1000.0;
+constexpr double kLongestSettlingMs = 60'000.0;
+constexpr double kLongestFaultMs = 3.6e6;
 constexpr int kMostWrites = std::numeric_limits<int>::max();
 
 /// Reads the rig of one axis.
@@ -32,6 +35,10 @@ class SimulatedAxisReader {
     axis.bounces = reader_.integer("bounces", 0, kMostBounces, axis.bounces);
     axis.bounce_ms =
         reader_.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, axis.bounce_ms);
+    axis.settling_ms =
+        reader_.number("settling_ms", Range{0.0, kLongestSettlingMs}, axis.settling_ms);
+    axis.faults.never_in_position = reader_.boolean("never_in_position", false);
+    axis.load_falls = speed("load_falls").value_or(axis.load_falls);
     readWiring(axis.wiring);
     axis.faults.min_stuck = stuck("min_stuck");
     axis.faults.max_stuck = stuck("max_stuck");
@@ -40,6 +47,8 @@ class SimulatedAxisReader {
             reader_.findInteger("chip_fault_after", 0, kMostWrites, Presence::kOptional)) {
       axis.faults.chip_fault_after = *steps;
     }
+    axis.faults.chip_fault_lasts_ns =
+        std::llround(reader_.number("chip_fault_ms", Range{0.0, kLongestFaultMs}, 0.0) * 1e6);
     axis.fail_step_write_after =
         reader_.findInteger("fail_step_write_after", 0, kMostWrites, Presence::kOptional);
     reader_.rejectUnknown();
@@ -52,6 +61,16 @@ class SimulatedAxisReader {
     reader_.findNumber(what + "_mm", range, Presence::kOptional);
     reader_.findNumber(what + "_deg", range, Presence::kOptional);
     return {};
+  }
+
+  std::optional<double> speed(const std::string& what) {
+    std::optional<double> value;
+    for (const char* unit : {"mm", "deg"}) {
+      if (!unit_.empty() && unit_ != unit) continue;
+      value =
+          reader_.findNumber(what + "_" + unit + "_s", Range::notNegative(), Presence::kOptional);
+    }
+    return value;
   }
 
   void readWiring(SimulatedWiring& wiring) {

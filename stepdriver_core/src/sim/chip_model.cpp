@@ -1,6 +1,6 @@
 #include "chip_model.h"
 
-#include <algorithm>
+#include <numeric>
 
 namespace stepdriver::sim {
 namespace {
@@ -11,6 +11,17 @@ constexpr std::array<Wire RigAxisSpec::*, kPinCount> kWires{
     &RigAxisSpec::step, &RigAxisSpec::dir, &RigAxisSpec::enable, &RigAxisSpec::ms1,
     &RigAxisSpec::ms2,  &RigAxisSpec::ms3, &RigAxisSpec::sleep,  &RigAxisSpec::reset};
 
+/// Each mode's microstep is a whole number of the finest one's.
+int finestOf(const RigAxisSpec& spec) {
+  int finest = spec.microsteps;
+  for (const int microsteps : spec.chip.microsteps) finest = std::lcm(finest, microsteps);
+  return finest;
+}
+
+bool wiresModePins(const RigAxisSpec& spec) {
+  return !spec.ms1.line.empty() || !spec.ms2.line.empty() || !spec.ms3.line.empty();
+}
+
 std::int64_t floorDivide(std::int64_t dividend, std::int64_t divisor) {
   const std::int64_t quotient = dividend / divisor;
   return dividend % divisor < 0 ? quotient - 1 : quotient;
@@ -18,17 +29,23 @@ std::int64_t floorDivide(std::int64_t dividend, std::int64_t divisor) {
 
 }  // namespace
 
-const char* nameOf(Pin pin) { return kPinNames[static_cast<std::size_t>(pin)]; }
+const char* nameOf(const RigAxisSpec& spec, Pin pin) {
+  if (spec.chip.step_inputs == driver::StepInputs::kCwCcw) {
+    if (pin == Pin::kStep) return "cw";
+    if (pin == Pin::kDir) return "ccw";
+  }
+  return kPinNames[static_cast<std::size_t>(pin)];
+}
 
 const Wire& wireOf(const RigAxisSpec& spec, Pin pin) {
   return spec.*kWires[static_cast<std::size_t>(pin)];
 }
 
 ChipModel::ChipModel(const RigAxisSpec& spec)
-    : chip_(driver::driverChipOf(spec.model)),
-      timing_(spec.timing),
-      finest_(*std::max_element(chip_.microsteps.begin(), chip_.microsteps.end())),
+    : chip_(spec.chip),
+      finest_(finestOf(spec)),
       declared_microsteps_(spec.microsteps),
+      decodes_(!chip_.modes.empty() && wiresModePins(spec)),
       microsteps_(spec.microsteps) {
   const driver::ModeCode straps =
       driver::codeOf(chip_, spec.microsteps).value_or(driver::ModeCode{});
@@ -46,7 +63,7 @@ bool ChipModel::idleLevel(Pin pin, bool wired, const driver::ModeCode& straps) c
     case Pin::kStep:
       return !chip_.step_active;
     case Pin::kDir:
-      return !wired && at(pin).inverted;
+      return isCwCcw() ? !chip_.step_active : !wired && at(pin).inverted;
     case Pin::kEnable:
       return wired ? !chip_.enable_on : chip_.enable_on;
     case Pin::kMs1:
@@ -56,9 +73,9 @@ bool ChipModel::idleLevel(Pin pin, bool wired, const driver::ModeCode& straps) c
     case Pin::kMs3:
       return !wired && straps[2];
     case Pin::kSleep:
-      return wired ? chip_.sleep_asleep : !chip_.sleep_asleep;
+      return wired == chip_.sleep_asleep.value_or(false);
     case Pin::kReset:
-      return wired ? chip_.reset_held : !chip_.reset_held;
+      return wired == chip_.reset_held.value_or(false);
   }
   return false;
 }
@@ -83,9 +100,10 @@ std::optional<ChipModel::Pulse> ChipModel::edge(Pin pin, bool line_level, std::i
   state.changed_ns = time_ns;
   switch (pin) {
     case Pin::kStep:
-      return onStep(time_ns);
+      return onStep(pin, time_ns);
     case Pin::kDir:
-      checkTime(step_active_ns_, time_ns, timing_.dir_hold_ns, Violation::kDirHold);
+      if (isCwCcw()) return onStep(pin, time_ns);
+      checkTime(step_active_ns_, time_ns, chip_.timing.dir_hold_ns, Violation::kDirHold);
       break;
     case Pin::kMs1:
     case Pin::kMs2:
@@ -93,7 +111,6 @@ std::optional<ChipModel::Pulse> ChipModel::edge(Pin pin, bool line_level, std::i
       onMode(time_ns);
       break;
     case Pin::kEnable:
-      break;
     case Pin::kSleep:
     case Pin::kReset:
       goHomeIfHeld();
@@ -107,57 +124,83 @@ void ChipModel::checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int6
   if (time_ns - since_ns < limit_ns) count(violation);
 }
 
-std::optional<ChipModel::Pulse> ChipModel::onStep(std::int64_t time_ns) {
-  if (at(Pin::kStep).level != chip_.step_active) {
-    checkTime(step_active_ns_, time_ns, timing_.step_high_ns, Violation::kShortStepHigh);
+std::optional<ChipModel::Pulse> ChipModel::onStep(Pin pin, std::int64_t time_ns) {
+  if (at(pin).level != chip_.step_active && !chip_.both_edges) {
+    checkTime(step_active_ns_, time_ns, chip_.timing.step_high_ns, Violation::kShortStepHigh);
     step_inactive_ns_ = time_ns;
     return std::nullopt;
   }
-  checkPins(time_ns);
+  checkPins(pin, time_ns);
   checkReadiness(time_ns);
   step_active_ns_ = time_ns;
+  last_step_ = pin;
 
-  Pulse pulse{at(Pin::kDir).level, 0};
-  const bool counts = awake() && !inReset() && (enabled() || chip_.counts_while_disabled);
-  if (counts) pulse.moved = advance(pulse.forward);
+  Pulse pulse{isCwCcw() ? pin == Pin::kStep : at(Pin::kDir).level, 0};
+  if (counts()) pulse.moved = advance(pulse.forward);
   return pulse;
 }
 
-void ChipModel::checkPins(std::int64_t time_ns) {
-  checkTime(step_inactive_ns_, time_ns, timing_.step_low_ns, Violation::kShortStepLow);
-  checkTime(at(Pin::kDir).changed_ns, time_ns, timing_.dir_setup_ns, Violation::kDirSetup);
-  checkTime(mode_changed_ns_, time_ns, timing_.mode_setup_ns, Violation::kModeSetup);
+void ChipModel::checkGap(Pin pin, std::int64_t time_ns) {
+  if (!chip_.both_edges) {
+    return checkTime(step_inactive_ns_, time_ns, chip_.timing.step_low_ns,
+                     Violation::kShortStepLow);
+  }
+  const bool was_active = at(pin).level != chip_.step_active;
+  checkTime(step_active_ns_, time_ns,
+            was_active ? chip_.timing.step_high_ns : chip_.timing.step_low_ns,
+            was_active ? Violation::kShortStepHigh : Violation::kShortStepLow);
+}
+
+// The times of DIR are those between the pulses on the two inputs.
+void ChipModel::checkTurn(Pin pin, std::int64_t time_ns) {
+  const Pin other = pin == Pin::kStep ? Pin::kDir : Pin::kStep;
+  if (at(other).level == chip_.step_active) count(Violation::kBothInputs);
+  if (last_step_ != other) return;
+  checkTime(step_inactive_ns_, time_ns, chip_.timing.dir_setup_ns, Violation::kDirSetup);
+  checkTime(step_active_ns_, time_ns, chip_.timing.dir_hold_ns, Violation::kDirHold);
+}
+
+void ChipModel::checkPins(Pin pin, std::int64_t time_ns) {
+  checkGap(pin, time_ns);
+  if (isCwCcw()) {
+    checkTurn(pin, time_ns);
+  } else {
+    checkTime(at(Pin::kDir).changed_ns, time_ns, chip_.timing.dir_setup_ns, Violation::kDirSetup);
+  }
+  checkTime(mode_changed_ns_, time_ns, chip_.timing.mode_setup_ns, Violation::kModeSetup);
   if (!decoded_) count(Violation::kUndefinedMode);
 }
 
 void ChipModel::checkReadiness(std::int64_t time_ns) {
   if (enabled()) {
-    checkTime(at(Pin::kEnable).changed_ns, time_ns, timing_.enable_ns, Violation::kStepAfterEnable);
+    checkTime(at(Pin::kEnable).changed_ns, time_ns, chip_.timing.enable_ns,
+              Violation::kStepAfterEnable);
   } else {
     count(Violation::kStepWhileDisabled);
   }
   if (!awake()) {
     count(Violation::kStepWhileAsleep);
-  } else if (chip_.has_sleep) {
-    checkTime(at(Pin::kSleep).changed_ns, time_ns, timing_.wake_ns, Violation::kStepAfterWake);
+  } else if (chip_.sleep_asleep) {
+    checkTime(at(Pin::kSleep).changed_ns, time_ns, chip_.timing.wake_ns, Violation::kStepAfterWake);
   }
   if (inReset()) {
     count(Violation::kStepInReset);
-  } else if (chip_.has_reset) {
-    checkTime(at(Pin::kReset).changed_ns, time_ns, timing_.reset_wait_ns, Violation::kStepInReset);
+  } else if (chip_.reset_held) {
+    checkTime(at(Pin::kReset).changed_ns, time_ns, chip_.timing.reset_wait_ns,
+              Violation::kStepInReset);
   }
 }
 
 void ChipModel::onMode(std::int64_t time_ns) {
-  if (chip_.modes.empty()) return;
+  if (!decodes_) return;
   decode();
   mode_changed_ns_ = time_ns;
-  checkTime(step_active_ns_, time_ns, timing_.mode_hold_ns, Violation::kModeHold);
+  checkTime(step_active_ns_, time_ns, chip_.timing.mode_hold_ns, Violation::kModeHold);
   if (!decoded_) count(Violation::kUndefinedMode);
 }
 
 std::optional<int> ChipModel::decodedMicrosteps() const {
-  if (chip_.modes.empty()) return declared_microsteps_;
+  if (!decodes_) return declared_microsteps_;
   return driver::microstepsOf(chip_,
                               {at(Pin::kMs1).level, at(Pin::kMs2).level, at(Pin::kMs3).level});
 }
@@ -173,8 +216,20 @@ std::int64_t ChipModel::advance(bool forward) {
   return translator_ - before;
 }
 
+bool ChipModel::counts() const {
+  if (inReset()) return false;
+  if (!awake()) return chip_.asleep == driver::TranslatorState::kCounts;
+  return enabled() || chip_.disabled == driver::TranslatorState::kCounts;
+}
+
+bool ChipModel::isHeldAtHome() const {
+  if (inReset()) return true;
+  if (!awake()) return chip_.asleep == driver::TranslatorState::kHome;
+  return !enabled() && chip_.disabled == driver::TranslatorState::kHome;
+}
+
 void ChipModel::goHomeIfHeld() {
-  if (awake() && !inReset()) return;
+  if (!isHeldAtHome()) return;
   translator_ = cycle() * floorDivide(translator_ + cycle() / 2, cycle());
 }
 

@@ -16,7 +16,7 @@ enum class Pin { kStep, kDir, kEnable, kMs1, kMs2, kMs3, kSleep, kReset };
 constexpr std::size_t kPinCount = 8;
 
 /// The name of a pin in traces.
-const char* nameOf(Pin pin);
+const char* nameOf(const RigAxisSpec& spec, Pin pin);
 const Wire& wireOf(const RigAxisSpec& spec, Pin pin);
 
 /// A driver chip: pins in, translator out. It knows the times of all edges and counts violations of
@@ -40,7 +40,12 @@ class ChipModel {
   /// The level of the pin's line.
   bool lineLevel(Pin pin) const { return at(pin).level != at(pin).inverted; }
   bool energized() const { return enabled() && awake() && !inReset(); }
-  bool inReset() const { return chip_.has_reset && at(Pin::kReset).level == chip_.reset_held; }
+  /// What ends a latched fault has happened.
+  bool endsFault() const {
+    if (chip_.fault_end == driver::FaultEnd::kReset) return inReset();
+    return chip_.fault_end == driver::FaultEnd::kEnable && !enabled();
+  }
+  bool inReset() const { return chip_.reset_held && at(Pin::kReset).level == *chip_.reset_held; }
   std::int64_t translator() const { return translator_; }
   int microsteps() const { return microsteps_; }
   int finest() const { return finest_; }
@@ -59,25 +64,33 @@ class ChipModel {
   PinState& at(Pin pin) { return pins_[static_cast<std::size_t>(pin)]; }
   const PinState& at(Pin pin) const { return pins_[static_cast<std::size_t>(pin)]; }
   bool enabled() const { return at(Pin::kEnable).level == chip_.enable_on; }
-  bool awake() const { return !chip_.has_sleep || at(Pin::kSleep).level != chip_.sleep_asleep; }
+  bool awake() const { return !chip_.sleep_asleep || at(Pin::kSleep).level != *chip_.sleep_asleep; }
+  /// It takes STEP into account, whether current flows or not.
+  bool counts() const;
+  /// Its pins, or its state without current, keep the translator at Home.
+  bool isHeldAtHome() const;
 
   bool idleLevel(Pin pin, bool wired, const driver::ModeCode& straps) const;
   std::optional<int> decodedMicrosteps() const;
   void decode() { decoded_ = decodedMicrosteps(); }
   void checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int64_t limit_ns,
                  Violation violation);
-  std::optional<Pulse> onStep(std::int64_t time_ns);
-  void checkPins(std::int64_t time_ns);
+  bool isCwCcw() const { return chip_.step_inputs == driver::StepInputs::kCwCcw; }
+  std::optional<Pulse> onStep(Pin pin, std::int64_t time_ns);
+  void checkPins(Pin pin, std::int64_t time_ns);
+  void checkGap(Pin pin, std::int64_t time_ns);
+  void checkTurn(Pin pin, std::int64_t time_ns);
   void checkReadiness(std::int64_t time_ns);
   void onMode(std::int64_t time_ns);
   std::int64_t advance(bool forward);
   void goHomeIfHeld();
 
-  const driver::DriverChip& chip_;
-  const driver::Timing timing_;
+  const driver::DriverChip chip_;
   const int finest_;
   const int declared_microsteps_;
+  const bool decodes_;  // a microstep pin is wired
   std::array<PinState, kPinCount> pins_;
+  Pin last_step_ = Pin::kStep;  // of the last active edge
   std::int64_t step_active_ns_ = kForEver;
   std::int64_t step_inactive_ns_ = kForEver;
   std::int64_t mode_changed_ns_ = kForEver;

@@ -17,8 +17,15 @@ namespace {
 
 struct PinOnLine {
   RigAxis* axis;
-  Pin pin;
+  std::optional<Pin> pin;  ///< of the chip; empty: the brake
   int trace_pin;
+
+  void request(bool level, std::int64_t time_ns) const {
+    pin ? axis->request(*pin, level, time_ns) : axis->setBrake(level, time_ns);
+  }
+  void edge(bool level, std::int64_t time_ns) const {
+    pin ? axis->edge(*pin, level, time_ns) : axis->setBrake(level, time_ns);
+  }
 };
 
 struct WriteFault {
@@ -29,7 +36,7 @@ struct WriteFault {
 /// A line: the pins that it drives, or the contacts that drive it.
 struct Line {
   std::vector<PinOnLine> pins;
-  std::vector<const SwitchModel*> contacts;
+  std::vector<SwitchModel*> contacts;
   bool other_level = false;  // of an input that no axis has
   std::optional<WriteFault> write_fault;
   gpio::EdgeListener listener;
@@ -44,8 +51,8 @@ struct Line {
                                    : !contacts.front()->spec().active_level;
   }
 
-  bool settledLevel() const {
-    return level([](const SwitchModel* contact) { return contact->settled(); });
+  bool settledLevel(std::int64_t time_ns) const {
+    return level([time_ns](const SwitchModel* contact) { return contact->settled(time_ns); });
   }
 };
 
@@ -95,7 +102,7 @@ class Rig::Impl {
     feed.switchesMoved(time_ns);
     for (const int index : watched) {
       Line& line = at(index);
-      const bool level = line.settledLevel();
+      const bool level = line.settledLevel(time_ns);
       if (level == line.told_level) continue;
       line.told_level = level;
       line.listener(level, time_ns);
@@ -122,16 +129,22 @@ class Rig::Impl {
       const Pin pin = static_cast<Pin>(i);
       const std::string& line = wireOf(axis.spec(), pin).line;
       if (line.empty()) continue;
-      const TracePin trace_pin{axis.spec().name, nameOf(pin)};
+      TracePin trace_pin{axis.spec().name, nameOf(axis.spec(), pin)};
+      trace_pin.both_edges = pin == Pin::kStep && axis.spec().chip.both_edges;
       const int index = feed.addPin(trace_pin, axis.chip().lineLevel(pin));
       lineOf(line).pins.push_back({&axis, pin, index});
+    }
+    if (const BrakeModel* brake = axis.brake()) {
+      const int index = feed.addPin({axis.spec().name, "brake"}, brake->lineLevel());
+      lineOf(brake->spec().line).pins.push_back({&axis, std::nullopt, index});
     }
     wire(axis, axis.switchAt(Side::kMin), "endstop_min");
     wire(axis, axis.switchAt(Side::kMax), "endstop_max");
     wire(axis, axis.faultContact(), "fault");
+    wire(axis, axis.inPositionContact(), "in_position");
   }
 
-  void wire(const RigAxis& axis, const SwitchModel* contact, const char* variable) {
+  void wire(const RigAxis& axis, SwitchModel* contact, const char* variable) {
     if (contact == nullptr || contact->spec().line.empty()) return;
     lineOf(contact->spec().line).contacts.push_back(contact);
     feed.addSwitch({axis.spec().name, variable}, contact);
@@ -158,7 +171,7 @@ std::vector<std::string> Rig::axes() const {
 
 void Rig::setFaults(const std::string& axis, const RigFaults& faults) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
-  impl_->axisOf(axis).setFaults(faults);
+  impl_->axisOf(axis).setFaults(faults, impl_->latest_ns);
   impl_->switchesMoved(impl_->latest_ns);
 }
 
@@ -203,7 +216,7 @@ void Rig::onRequest(int line, bool level, std::int64_t time_ns) {
   if (pins.empty()) return;
   for (const PinOnLine& pin : pins) {
     impl_->feed.settle(pin.trace_pin, level, now_ns);
-    pin.axis->request(pin.pin, level, now_ns);
+    pin.request(level, now_ns);
   }
   impl_->switchesMoved(now_ns);
 }
@@ -215,7 +228,7 @@ void Rig::onEdge(int line, bool level, std::int64_t time_ns) {
   if (pins.empty()) return;
   for (const PinOnLine& pin : pins) {
     impl_->feed.edge(pin.trace_pin, level, now_ns);
-    pin.axis->edge(pin.pin, level, now_ns);
+    pin.edge(level, now_ns);
   }
   impl_->switchesMoved(now_ns);
 }
@@ -228,8 +241,9 @@ void Rig::onRelease(int /*line*/, std::int64_t time_ns) {
 bool Rig::inputLevel(int line, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  return impl_->at(line).level(
-      [now_ns](const SwitchModel* contact) { return contact->active(now_ns); });
+  const Line& input = impl_->at(line);
+  for (SwitchModel* contact : input.contacts) contact->noteRead(now_ns);
+  return input.level([now_ns](const SwitchModel* contact) { return contact->active(now_ns); });
 }
 
 void Rig::watchInput(int line, gpio::EdgeListener listener) {
@@ -239,7 +253,7 @@ void Rig::watchInput(int line, gpio::EdgeListener listener) {
   Line& input = impl_->at(line);
   input.listener = std::move(listener);
   if (!input.listener) return;
-  input.told_level = input.settledLevel();
+  input.told_level = input.settledLevel(impl_->latest_ns);
   watched.push_back(line);
 }
 

@@ -13,11 +13,12 @@ namespace stepdriver::sim {
 namespace {
 
 const RigAxisSpec& checked(const RigAxisSpec& spec) {
-  const driver::DriverChip& chip = driver::driverChipOf(spec.model);
-  const std::vector<int>& known = chip.microsteps;
-  if (std::find(known.begin(), known.end(), spec.microsteps) == known.end()) {
+  const std::vector<int>& known = spec.chip.microsteps;
+  const bool is_known =
+      known.empty() || std::find(known.begin(), known.end(), spec.microsteps) != known.end();
+  if (!is_known || spec.microsteps < 1) {
     throw std::invalid_argument(fmt::format("Axis {} of the rig: a {} doesn't do {} microsteps.",
-                                            spec.name, chip.title, spec.microsteps));
+                                            spec.name, spec.chip.title, spec.microsteps));
   }
   if (!(spec.full_step_travel > 0.0)) {
     throw std::invalid_argument(
@@ -27,12 +28,13 @@ const RigAxisSpec& checked(const RigAxisSpec& spec) {
   return spec;
 }
 
-// The open drain of nFAULT is a contact that no carriage presses.
-std::optional<SwitchModel> madeFaultContact(const std::string& line) {
+// An output of the driver is a contact that no carriage presses or releases.
+std::optional<SwitchModel> madeContact(const std::string& line, bool active_level, bool pressed) {
   if (line.empty()) return std::nullopt;
   SwitchSpec spec;
   spec.line = line;
-  spec.position = std::numeric_limits<double>::infinity();
+  spec.active_level = active_level;
+  spec.position = std::numeric_limits<double>::infinity() * (pressed ? -1.0 : 1.0);
   return SwitchModel(spec, Side::kMax, 0.0);
 }
 
@@ -50,75 +52,131 @@ RigAxis::RigAxis(const RigAxisSpec& spec)
       energized_(chip_.energized()),
       min_switch_(madeSwitch(spec_.min_switch, Side::kMin, spec_.start)),
       max_switch_(madeSwitch(spec_.max_switch, Side::kMax, spec_.start)),
-      fault_(madeFaultContact(spec_.fault_line)) {}
+      fault_(madeContact(spec_.fault_line, spec_.chip.fault_active.value_or(false), false)),
+      in_position_(madeContact(spec_.in_position_line,
+                               spec_.chip.in_position_active.value_or(false), true)) {
+  if (spec_.brake) brake_.emplace(*spec_.brake);
+  settle(kForEver);
+}
 
-const SwitchModel* RigAxis::switchAt(Side side) const {
-  const std::optional<SwitchModel>& model = side == Side::kMin ? min_switch_ : max_switch_;
+SwitchModel* RigAxis::switchAt(Side side) {
+  std::optional<SwitchModel>& model = side == Side::kMin ? min_switch_ : max_switch_;
   return model ? &*model : nullptr;
 }
 
 void RigAxis::request(Pin pin, bool line_level, std::int64_t time_ns) {
+  fall(time_ns);
   follow(chip_.request(pin, line_level, time_ns), time_ns);
 }
 
 void RigAxis::edge(Pin pin, bool line_level, std::int64_t time_ns) {
+  fall(time_ns);
   follow(chip_.edge(pin, line_level, time_ns), time_ns);
 }
 
+void RigAxis::setBrake(bool line_level, std::int64_t time_ns) {
+  fall(time_ns);
+  brake_->set(line_level, time_ns);
+  if (energized_) snapRotor();
+}
+
+double RigAxis::fallUntil(std::int64_t time_ns) const {
+  if (spec_.load_falls <= 0.0 || energized_ || fell_to_ns_ == kForEver) return 0.0;
+  const std::int64_t end = brake_ ? std::min(time_ns, brake_->holdsFrom()) : time_ns;
+  return spec_.load_falls * static_cast<double>(std::max<std::int64_t>(end - fell_to_ns_, 0)) / 1e9;
+}
+
+void RigAxis::fall(std::int64_t time_ns) {
+  const double way = fallUntil(time_ns);
+  fell_to_ns_ = time_ns;
+  if (way == 0.0) return;
+  fell_ += way;
+  rotor_ -= way * chip_.finest() / spec_.full_step_travel;
+  moveSwitches(time_ns);
+}
+
 void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns) {
-  if (chip_.inReset()) setChipFault(false);
+  if (chip_.endsFault() || time_ns >= chip_fault_ends_ns_) mendChip();
   const bool was_energized = energized_;
   energized_ = chip_.energized() && !chip_fault_;
   if (pulse) takePulse(*pulse, time_ns);
   if (energized_ && !was_energized) snapRotor();
+  if (in_position_ && (pulse || energized_ != was_energized)) settle(time_ns);
   if (energized_) moveSwitches(time_ns);
 }
 
 void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   ++(pulse.forward ? pulses_forward_ : pulses_backward_);
-  const SwitchModel* const ahead = switchAt(pulse.forward ? Side::kMax : Side::kMin);
-  if (ahead != nullptr && ahead->active(time_ns)) chip_.count(Violation::kStepIntoSwitch);
+  for (const Side side : {Side::kMin, Side::kMax}) {
+    SwitchModel* const contact = switchAt(side);
+    const bool is_ahead = pulse.forward == (side == Side::kMax);
+    if (contact != nullptr && contact->noteStep(time_ns) && is_ahead) {
+      chip_.count(Violation::kStepIntoSwitch);
+    }
+  }
+  const bool braked = brake_ && brake_->drags(time_ns);
+  if (braked) chip_.count(Violation::kStepAgainstBrake);
 
-  if (!energized_ || pulse.moved == 0) return;
+  if (!energized_ || braked || pulse.moved == 0) return;
   rotor_ += static_cast<double>(pulse.moved);
   ++motor_steps_;
   // The loss is in the coupling, not in the rotor: the rotor then still agrees with the translator,
   // and the lost steps stay lost when the current is switched.
   if (faults_.lose_every > 0 && motor_steps_ % faults_.lose_every == 0) slipped_ += pulse.moved;
-  if (faults_.chip_fault_after == motor_steps_) setChipFault(true);
+  if (faults_.chip_fault_after == motor_steps_) breakChip(time_ns);
+}
+
+// After a pulse the motor takes its time to come to rest.
+void RigAxis::settle(std::int64_t time_ns) {
+  if (!in_position_) return;
+  const bool never = !energized_ || faults_.never_in_position;
+  in_position_->stick(false, never ? kNever : time_ns + spec_.settling_ns);
 }
 
 void RigAxis::snapRotor() {
+  if (brake_ && !brake_->isReleased()) return;
   const auto phase = static_cast<double>(chip_.translator());
   const auto cycle = static_cast<double>(chip_.cycle());
   rotor_ = phase + cycle * std::round((rotor_ - phase) / cycle);
 }
 
-double RigAxis::carriage() const {
-  const double microsteps = rotor_ - static_cast<double>(slipped_);
+double RigAxis::carriage(double rotor) const {
+  const double microsteps = rotor - static_cast<double>(slipped_);
   return spec_.start + microsteps * spec_.full_step_travel / chip_.finest();
 }
 
 void RigAxis::moveSwitches(std::int64_t time_ns) {
-  if (min_switch_) min_switch_->follow(carriage(), time_ns);
-  if (max_switch_) max_switch_->follow(carriage(), time_ns);
+  if (min_switch_) min_switch_->follow(carriage(rotor_), time_ns);
+  if (max_switch_) max_switch_->follow(carriage(rotor_), time_ns);
 }
 
-void RigAxis::setFaults(const RigFaults& faults) {
+void RigAxis::setFaults(const RigFaults& faults, std::int64_t time_ns) {
+  fall(time_ns);
   faults_ = faults;
   motor_steps_ = 0;
   if (min_switch_) min_switch_->stick(faults.min_stuck);
   if (max_switch_) max_switch_->stick(faults.max_stuck);
-  if (faults.chip_fault_after == 0) setChipFault(true);
+  settle(time_ns);
+  if (faults.chip_fault_after == 0) breakChip(time_ns);
 }
 
-void RigAxis::setChipFault(bool faulty) {
-  chip_fault_ = faulty;
-  if (faulty) energized_ = false;
-  if (fault_) fault_->stick(faulty ? std::optional<bool>(true) : std::nullopt);
+void RigAxis::breakChip(std::int64_t time_ns) {
+  const bool ends = spec_.chip.fault_end == driver::FaultEnd::kItself;
+  chip_fault_ = true;
+  chip_fault_ends_ns_ =
+      ends && faults_.chip_fault_lasts_ns > 0 ? time_ns + faults_.chip_fault_lasts_ns : kNever;
+  energized_ = false;
+  if (fault_) fault_->stick(true, chip_fault_ends_ns_);
+}
+
+void RigAxis::mendChip() {
+  chip_fault_ = false;
+  chip_fault_ends_ns_ = kNever;
+  if (fault_) fault_->stick({});
 }
 
 void RigAxis::placeCarriage(double position, std::int64_t time_ns) {
+  fall(time_ns);
   rotor_ = (position - spec_.start) * chip_.finest() / spec_.full_step_travel +
            static_cast<double>(slipped_);
   if (energized_) snapRotor();
@@ -130,7 +188,9 @@ RigAxisReport RigAxis::report(std::int64_t time_ns) const {
   report.pulses_forward = pulses_forward_;
   report.pulses_backward = pulses_backward_;
   report.translator = chip_.translator();
-  report.carriage = carriage();
+  const double falling = fallUntil(time_ns);
+  report.fell = fell_ + falling;
+  report.carriage = carriage(rotor_) - falling;
   report.microsteps = chip_.microsteps();
   report.energized = energized_;
   report.min_pressed = min_switch_ && min_switch_->active(time_ns);

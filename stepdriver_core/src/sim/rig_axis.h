@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "brake_model.h"
 #include "chip_model.h"
 #include "stepdriver_core/sim/rig.h"
 #include "switch_model.h"
@@ -19,22 +20,33 @@ class RigAxis {
   const ChipModel& chip() const { return chip_; }
 
   /// @return nullptr if there is no such switch.
-  const SwitchModel* switchAt(Side side) const;
+  SwitchModel* switchAt(Side side);
 
   void request(Pin pin, bool line_level, std::int64_t time_ns);
   void edge(Pin pin, bool line_level, std::int64_t time_ns);
+  /// nullptr if there is none.
+  const BrakeModel* brake() const { return brake_ ? &*brake_ : nullptr; }
+  /// The line of the brake has this level from now on. @pre There is a brake.
+  void setBrake(bool line_level, std::int64_t time_ns);
   /// The contact that pulls the fault line low; nullptr if that isn't wired.
-  const SwitchModel* faultContact() const { return fault_ ? &*fault_ : nullptr; }
-  void setFaults(const RigFaults& faults);
+  SwitchModel* faultContact() { return fault_ ? &*fault_ : nullptr; }
+  /// The contact of the in-position output; nullptr if that isn't wired.
+  SwitchModel* inPositionContact() { return in_position_ ? &*in_position_ : nullptr; }
+  void setFaults(const RigFaults& faults, std::int64_t time_ns);
   void placeCarriage(double position, std::int64_t time_ns);
   RigAxisReport report(std::int64_t time_ns) const;
 
  private:
-  double carriage() const;
+  double carriage(double rotor) const;
   void follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns);
   void takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns);
-  void setChipFault(bool faulty);
+  void breakChip(std::int64_t time_ns);
+  void mendChip();
+  void settle(std::int64_t time_ns);
   void snapRotor();
+  /// [mm|deg] How far the load sinks from the last event to a time.
+  double fallUntil(std::int64_t time_ns) const;
+  void fall(std::int64_t time_ns);
   void moveSwitches(std::int64_t time_ns);
 
   const RigAxisSpec spec_;
@@ -45,10 +57,15 @@ class RigAxis {
   std::int64_t motor_steps_ = 0;  // since the faults were set
   std::int64_t pulses_forward_ = 0;
   std::int64_t pulses_backward_ = 0;
+  double fell_ = 0.0;                   // [mm|deg]
+  std::int64_t fell_to_ns_ = kForEver;  // the load has sunk until this time
   RigFaults faults_;
-  bool chip_fault_ = false;  // latched
+  bool chip_fault_ = false;
+  std::int64_t chip_fault_ends_ns_ = kNever;
   std::optional<SwitchModel> min_switch_, max_switch_;
   std::optional<SwitchModel> fault_;
+  std::optional<SwitchModel> in_position_;
+  std::optional<BrakeModel> brake_;
 };
 
 }  // namespace stepdriver::sim

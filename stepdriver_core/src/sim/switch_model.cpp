@@ -26,14 +26,15 @@ void SwitchModel::follow(double carriage, std::int64_t time_ns) {
 }
 
 bool SwitchModel::active(std::int64_t time_ns) const {
-  if (stuck_) return *stuck_;
+  if (isStuck(time_ns)) return *stuck_;
   if (bounce_edges_ == 0) return pressed_;
   const std::int64_t edges = std::min((time_ns - changed_ns_) / spec_.bounce_ns, bounce_edges_);
   return edges % 2 == 0 ? pressed_ : !pressed_;
 }
 
 std::int64_t SwitchModel::nextBounce(std::int64_t time_ns) const {
-  if (bounce_edges_ == 0 || stuck_) return kNever;
+  if (isStuck(time_ns)) return stuck_until_ns_;
+  if (bounce_edges_ == 0) return kNever;
   const std::int64_t edge = (time_ns - changed_ns_) / spec_.bounce_ns + 1;
   return edge <= bounce_edges_ ? changed_ns_ + edge * spec_.bounce_ns : kNever;
 }

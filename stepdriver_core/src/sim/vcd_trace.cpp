@@ -61,6 +61,12 @@ bool isTraceOrEmpty(int file) {
 
 /// Opens it and makes it empty. Doesn't wait for a reader of a pipe.
 int openForTrace(const std::string& path, VcdTrace::Replaces replaces) {
+  if (replaces == VcdTrace::Replaces::kNoFile) {
+    constexpr int kNew = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
+    const int file = open(path.c_str(), kNew, 0600);
+    if (file < 0) cannotBeWritten(path);
+    return file;
+  }
   const bool any = replaces == VcdTrace::Replaces::kAnyFile;
   struct stat facts {};
   // Even opening can do something to a device.
@@ -110,6 +116,11 @@ void VcdTrace::begin(const std::vector<TracePin>& pins, const std::vector<bool>&
     buffer_ += "$var wire 1 " + ids_[i] + ' ' + variable + " $end\n";
   }
   if (!pins.empty()) buffer_ += "$upscope $end\n";
+  for (const TracePin& pin : pins) {
+    if (!pin.active && !pin.both_edges) continue;
+    buffer_ += "$comment " + wordOf(pin.scope) + '.' + wordOf(pin.variable) + " active ";
+    buffer_ += pin.both_edges ? "both $end\n" : *pin.active ? "high $end\n" : "low $end\n";
+  }
   buffer_ += "$enddefinitions $end\n#0\n$dumpvars\n";
   for (std::size_t i = 0; i < pins.size(); ++i) buffer_ += (levels[i] ? '1' : '0') + ids_[i] + '\n';
   buffer_ += "$end\n";
@@ -127,6 +138,12 @@ void VcdTrace::edge(int pin, bool level, std::int64_t time_ns) {
 void VcdTrace::flush() {
   writeOut();
   if (!error_.empty()) throw Error(error_);
+}
+
+void VcdTrace::end(std::int64_t time_ns) {
+  if (begun_ && time_ns > last_ns_) stamp(time_ns);
+  begun_ = false;
+  flush();
 }
 
 void VcdTrace::stamp(std::int64_t time_ns) {

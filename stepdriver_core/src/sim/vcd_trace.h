@@ -24,7 +24,8 @@ class VcdTrace : public PinTrace {
   /// Which existing files the trace may replace.
   enum class Replaces {
     kTraces,  ///< those that begin as a trace does, and empty ones
-    kAnyFile
+    kAnyFile,
+    kNoFile,  ///< none: the file is new, follows no link, and only its owner can read it
   };
 
   /// @throw Error if the file can't be written, or may not be replaced.
@@ -39,6 +40,10 @@ class VcdTrace : public PinTrace {
 
   /// @throw Error, which names the reason, if the file couldn't be written, now or earlier.
   void flush() override;
+
+  /// Closes the trace with this time instead of 1 us after the last edge. No edge may follow.
+  /// @throw Error as flush().
+  void end(std::int64_t time_ns);
 
  private:
   void stamp(std::int64_t time_ns);

@@ -28,8 +28,12 @@ const char* nameOf(Violation violation) {
       return "step too soon after wake-up";
     case Violation::kStepInReset:
       return "step in reset or too soon after it";
+    case Violation::kBothInputs:
+      return "pulses on CW and CCW at the same time";
     case Violation::kStepIntoSwitch:
       return "step into an active switch";
+    case Violation::kStepAgainstBrake:
+      return "step against the brake";
   }
   return "unknown violation";
 }

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
@@ -6,9 +7,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
+#include <set>
+#include <sstream>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "scalar.h"
 #include "stepdriver_core/error.h"
@@ -31,6 +34,94 @@ constexpr std::size_t kLongestText = 4096;
 std::string tooLarge(const std::string& name) {
   return fmt::format("{}: is larger than {} bytes, the most that a configuration may have", name,
                      kLargest);
+}
+
+/// How many bytes the character here has in UTF-8; 0: these bytes aren't UTF-8.
+std::size_t characterLength(const std::string& text, std::size_t at) {
+  const auto byte = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
+  };
+  const unsigned first = byte(at);
+  if (first < 0x80) return 1;
+  const std::size_t length = first < 0xc2 ? 0 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
+  if (length == 0 || first > 0xf4) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if (byte(at + i) < 0x80 || byte(at + i) > 0xbf) return 0;
+  }
+  // Characters with fewer bytes, halves of pairs of UTF-16, and what is above U+10FFFF.
+  const unsigned second = byte(at + 1);
+  const bool wrong = (first == 0xe0 && second < 0xa0) || (first == 0xed && second > 0x9f) ||
+                     (first == 0xf0 && second < 0x90) || (first == 0xf4 && second > 0x8f);
+  return wrong ? 0 : length;
+}
+
+/// White space and line breaks are control characters too, but YAML knows them.
+bool isText(const std::string& character) {
+  static const std::set<std::string> spaces = {"\t",       "\n",           "\r",
+                                               "\xc2\x85", "\xe2\x80\xa8", "\xe2\x80\xa9"};
+  return isPrintable(character) || spaces.count(character) != 0;
+}
+
+/// As YAML and PyYAML require. yaml-cpp would take a text with null characters for UTF-16 or
+/// UTF-32.
+void refuseUnlessText(const std::string& text, const std::string& name) {
+  int line = 1;
+  int column = 1;
+  for (std::size_t at = 0; at < text.size(); ++column) {
+    const std::size_t length = characterLength(text, at);
+    if (length == 0 || !isText(text.substr(at, length))) {
+      throw Error(
+          fmt::format("{}:{}:{}: the byte 0x{:02x} is no text: a configuration is UTF-8 "
+                      "without control characters",
+                      name, line, column, static_cast<unsigned char>(text[at])));
+    }
+    if (text[at] == '\n') {
+      ++line;
+      column = 0;
+    }
+    at += length;
+  }
+}
+
+/// The place of the first value of a document.
+class FirstMark : public YAML::EventHandler {
+ public:
+  std::optional<YAML::Mark> mark;
+
+  void OnDocumentStart(const YAML::Mark& /*mark*/) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& at, YAML::anchor_t /*anchor*/) override { note(at); }
+  void OnAlias(const YAML::Mark& at, YAML::anchor_t /*anchor*/) override { note(at); }
+  void OnScalar(const YAML::Mark& at, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                const std::string& /*value*/) override {
+    note(at);
+  }
+  void OnSequenceStart(const YAML::Mark& at, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                       YAML::EmitterStyle::value /*style*/) override {
+    note(at);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& at, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                  YAML::EmitterStyle::value /*style*/) override {
+    note(at);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void note(const YAML::Mark& at) {
+    if (!mark) mark = at;
+  }
+};
+
+/// The place of a second document; no value if there is none. YAML::LoadAll() would find it too,
+/// but it never ends if the text continues with something that can't begin a document, as in `, a`.
+std::optional<YAML::Mark> secondDocument(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  FirstMark first;
+  FirstMark second;
+  if (parser.HandleNextDocument(first)) parser.HandleNextDocument(second);
+  return second.mark;
 }
 
 class Converter {
@@ -138,14 +229,13 @@ class Converter {
 
 ConfigValue parse(const std::string& text, const std::string& name) {
   if (text.size() > kLargest) throw Error(tooLarge(name));
+  refuseUnlessText(text, name);
   Converter converter(name);
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty()) return ConfigValue::Map{};
-    if (documents.size() > 1) {
-      converter.fail(documents[1].Mark(), "a second document begins here; only one is allowed");
+    if (const auto second = secondDocument(text)) {
+      converter.fail(*second, "a second document begins here; only one is allowed");
     }
-    const ConfigValue value = converter.convert(documents.front());
+    const ConfigValue value = converter.convert(YAML::Load(text));
     return value.isNothing() ? ConfigValue::Map{} : value;
   } catch (const YAML::Exception& error) {
     converter.fail(error.mark, error.msg);

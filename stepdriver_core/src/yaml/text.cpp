@@ -1,12 +1,14 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
 #include "scalar.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/printable.h"
 #include "stepdriver_core/yaml.h"
 
 namespace stepdriver::yaml {
@@ -14,8 +16,10 @@ namespace {
 
 using config::ConfigValue;
 
-/// Whether a plain scalar with this text is a string with this text: `on` and 017 aren't.
+/// Whether a plain scalar with this text is a string with this text: `on` and 017 aren't, and a
+/// carriage return at its end would belong to the line.
 bool isPlain(const std::string& text) {
+  if (!isPrintable(text)) return false;
   try {
     const ConfigValue value = resolveScalar(text);
     const std::string* const read = value.as<std::string>();
@@ -28,6 +32,8 @@ bool isPlain(const std::string& text) {
 /// The shortest text that is read back as the same number, always with a decimal point: YAML 1.1
 /// requires one in a double.
 std::string doubleText(double number) {
+  if (std::isnan(number)) return ".nan";
+  if (std::isinf(number)) return number > 0.0 ? ".inf" : "-.inf";
   constexpr int kFewest = 6;
   constexpr int kMost = 17;
   char text[64];
@@ -43,7 +49,8 @@ std::string doubleText(double number) {
 }
 
 void emitText(YAML::Emitter& emitter, const std::string& text) {
-  if (!isPlain(text)) emitter << YAML::DoubleQuoted;
+  // This also escapes U+007F, which YAML doesn't allow as it is.
+  if (!isPlain(text)) emitter << YAML::DoubleQuoted << YAML::EscapeNonAscii;
   emitter << text;
 }
 

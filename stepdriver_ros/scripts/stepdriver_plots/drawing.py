@@ -46,7 +46,7 @@ def point(words, where):
     except ValueError:
         raise BadDrawing(f"{where}: isn't a point; a point is two numbers in mm, x and y") from None
     if not (math.isfinite(x) and math.isfinite(y)):
-        raise BadDrawing(f"{where}: must be finite numbers")
+        raise BadDrawing(f"{where}: isn't a point; both numbers must be finite")
     return x, y
 
 
@@ -78,9 +78,13 @@ def placed(strokes, limits, scale=None, corner=None):
         scale = min(room / size for room, size in zip(free, sizes) if size > 0.0)
     if corner is None:
         corner = [(low + high - scale * size) / 2 for (low, high), size in zip(limits, sizes)]
-    return [[tuple(at + scale * (value - low)
-                   for at, value, (low, _) in zip(corner, point, box)) for point in stroke]
-            for stroke in strokes]
+    there = [[tuple(at + scale * (value - low)
+                    for at, value, (low, _) in zip(corner, point, box)) for point in stroke]
+             for stroke in strokes]
+    if not all(math.isfinite(value) for stroke in there for point in stroke for value in point):
+        raise BadDrawing(f"the drawing can't be scaled: it is {sizes[0]:.6g} wide and {sizes[1]:.6g} "
+                         "high")
+    return there
 
 
 def refuse_beyond(strokes, axes, limits):
@@ -88,10 +92,13 @@ def refuse_beyond(strokes, axes, limits):
     for stroke in strokes:
         for place in stroke:
             for axis, value, (low, high) in zip(axes, place, limits):
-                if (low is not None and value < low - 1e-9) or \
-                        (high is not None and value > high + 1e-9):
-                    raise BadDrawing(f"the point ({place[0]:.6g}, {place[1]:.6g}) mm is beyond the "
-                                     f"soft limits of {axis}, which are {low} and {high} mm")
+                below = low is not None and value < low - 1e-9
+                above = high is not None and value > high + 1e-9
+                if below or above:
+                    raise BadDrawing(
+                        f"the point ({place[0]:.6g}, {place[1]:.6g}) mm is "
+                        f"{'below' if below else 'above'} the soft limit of {axis}, "
+                        f"{low if below else high:.6g} mm")
 
 
 def refuse_too_fast(lines, axes, speeds, speed):

@@ -53,7 +53,8 @@ class DriverNode:
                         "name of the node, and is it running?")
 
     def wiring(self, axis):
-        """Whether the lines of STEP and DIR are inverted."""
+        """Whether the lines of STEP and DIR, or of CW and CCW, are inverted."""
         both = bool(self.axis_param(axis, "common_anode", False))
         return [both != bool(self.axis_param(axis, f"invert/{pin}", False))
-                for pin in ("step", "dir")]
+                for pin in (("cw", "ccw") if self.axis_param(axis, "chip/step_inputs") == "cw_ccw"
+                            else ("step", "dir"))]

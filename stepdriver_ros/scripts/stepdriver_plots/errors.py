@@ -2,9 +2,16 @@
 
 import pathlib
 
+LONGEST = 500  # characters of a message
+
 
 class Undrawable(Exception):
-    """Says what is wrong, and what was expected."""
+    """Says what is wrong, and what was expected, in one line: characters of a file that a terminal
+    would obey are shown as escape sequences."""
+
+    def __init__(self, message):
+        text = "".join(char if char.isprintable() else ascii(char)[1:-1] for char in message)
+        super().__init__(text if len(text) <= LONGEST else text[:LONGEST] + " ...")
 
 
 def refuse_endless(path):

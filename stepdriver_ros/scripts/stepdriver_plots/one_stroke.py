@@ -4,9 +4,19 @@ import heapq
 import math
 from collections import defaultdict, namedtuple
 
-OneStroke = namedtuple("OneStroke", "stroke length twice added")
-OneStroke.__doc__ = """Points, and [the drawing's unit] the length of the stroke, how much of that is
-drawn twice, and how much joins parts of the drawing that don't touch."""
+from .errors import BadDrawing
+
+
+class OneStroke(namedtuple("OneStroke", "stroke length twice added")):
+    """Points, and [mm] the length of the stroke, how much of that is drawn twice, and how much joins
+    parts of the drawing that don't touch."""
+
+    def text(self):
+        more = [f"{length:.0f} mm {what}" for length, what in (
+            (self.twice, "are drawn twice"), (self.added, "join parts that don't touch"))
+                if round(length) > 0]
+        return f"one stroke of {self.length:.0f} mm{': ' if more else ''}{' and '.join(more)}"
+
 
 SAME = 1e-6  # of the drawing's size: points that are closer than this count as one
 
@@ -40,6 +50,9 @@ class Graph:
             for here, there in zip(nodes, nodes[1:]):
                 if here != there and there not in self._lines[here]:
                     self._add(here, there)
+        if not self._lines:
+            raise BadDrawing("one stroke can't follow lines that are all shorter than "
+                             f"{self._grid:.6g} mm, a millionth of the drawing's size")
 
     def _node(self, point):
         node = tuple(round(value / self._grid) for value in point)

@@ -10,9 +10,13 @@ GAP = float("nan")  # interrupts the line of a graph
 
 def differences(times, values):
     """The times halfway between samples, and the rates of change at those times."""
-    at = [(a + b) / 2 for a, b in zip(times, times[1:])]
-    changes = zip(times, times[1:], values, values[1:])
-    return at, [(w - v) / (b - a) for a, b, v, w in changes]
+    at, rates = [], []
+    for a, b, v, w in zip(times, times[1:], values, values[1:]):
+        # Far from 0, times that are only nanoseconds apart can be the same number.
+        if b > a:
+            at.append((a + b) / 2)
+            rates.append((w - v) / (b - a))
+    return at, rates
 
 
 class StepCurve:

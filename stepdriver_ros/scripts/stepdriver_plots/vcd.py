@@ -1,4 +1,4 @@
-"""Reads pin traces such as those that the simulated rig writes."""
+"""Reads pin traces such as those that the simulated rig and the flight recorder write."""
 
 from .errors import BadTrace, refuse_endless
 
@@ -9,6 +9,9 @@ class PinTrace:
     def __init__(self, path):
         self.levels = {}  # (axis, pin): first level
         self.edges = {}   # (axis, pin): [(time in ns, level)]
+        self.active = {}  # (axis, pin): active level, if the file says it
+        self.both_edges = set()  # (axis, pin): each edge is a step
+        self._path = path
         self._names = {}
         self._scale = None
         try:
@@ -21,28 +24,51 @@ class PinTrace:
             raise BadTrace(f"{path} isn't a VCD file: it has no $timescale, or no $var")
 
     def axes(self):
-        """The names of the axes whose STEP and DIR lines both have a level."""
+        """The names of the axes whose STEP and DIR lines, or CW and CCW lines, both have a level."""
         return [axis for axis, pin in self.levels
-                if pin == "step" and (axis, "dir") in self.levels]
+                if (pin == "step" and (axis, "dir") in self.levels) or
+                (pin == "cw" and (axis, "ccw") in self.levels)]
 
     def counts(self, axis, invert_step=None, invert_dir=None):
-        """The times [s] of the steps, and the count after each. By default, STEP is inactive at its
-        first level, and DIR is inverted if STEP is (common anode inverts both).
+        """The times [s] of the steps, and the count after each; each time is later than the one before.
+        By default, the levels are those that the file tells; otherwise STEP is inactive at its first
+        level, and DIR is inverted if STEP is (common anode inverts both).
         """
-        resting = self.levels[axis, "step"]
-        active = not resting if invert_step is None else not invert_step
-        forward = (active if invert_dir is None else not invert_dir)
+        if (axis, "cw") in self.levels:
+            return self._counts(axis, self._pulses(axis, "cw", 1, invert_step) +
+                                self._pulses(axis, "ccw", -1, invert_dir))
+        active = self.active.get((axis, "step"), not self.levels[axis, "step"])
+        if invert_step is not None:
+            active = not invert_step
+        forward = self.active.get((axis, "dir"), active)
+        if invert_dir is not None:
+            forward = not invert_dir
         changes = sorted([(time, 0, level) for time, level in self.edges[axis, "dir"]] +
                          [(time, 1, level) for time, level in self.edges[axis, "step"]])
-        direction, count = self.levels[axis, "dir"], 0
-        times, counts = [], []
+        direction, steps = self.levels[axis, "dir"], []
         for time, is_step, level in changes:
             if not is_step:
                 direction = level
-            elif level == active:
-                count += 1 if direction == forward else -1
-                times.append(time * 1e-9)
-                counts.append(count)
+            elif level == active or (axis, "step") in self.both_edges:
+                steps.append((time, 1 if direction == forward else -1))
+        return self._counts(axis, steps)
+
+    def _pulses(self, axis, pin, way, inverted):
+        """The times of the pulses on a line whose steps all go one way."""
+        active = self.active.get((axis, pin), not self.levels[axis, pin])
+        if inverted is not None:
+            active = not inverted
+        return [(time, way) for time, level in self.edges[axis, pin] if level == active]
+
+    def _counts(self, axis, steps):
+        """The times [s] of steps, and the count after each."""
+        count, times, counts = 0, [], []
+        for time, way in sorted(steps):
+            if times and time * 1e-9 <= times[-1]:
+                raise BadTrace(f"{self._path} has two steps of {axis} at {time} ns")
+            count += way
+            times.append(time * 1e-9)
+            counts.append(count)
         return times, counts
 
     def _read(self, path, file):
@@ -62,6 +88,13 @@ class PinTrace:
                     key = (".".join(scopes), words[4])
                     self._names[words[3]] = key
                     self.edges[key] = []
+                elif words[0] == "$comment" and words[2:3] == ["active"] and len(words) == 5:
+                    # Other programs' comments say other things.
+                    axis, _, pin = words[1].rpartition(".")
+                    if words[3] == "both":
+                        self.both_edges.add((axis, pin))
+                    else:
+                        self.active[axis, pin] = words[3] == "high"
                 elif words[0].startswith("#"):
                     time = int(words[0][1:]) * self._scale
                     if not 0 <= time < 2**63:
@@ -74,6 +107,8 @@ class PinTrace:
     def _change(self, key, level, time):
         if key not in self.levels:
             self.levels[key] = level
+        elif time is None:
+            raise ValueError("an edge before the first time")
         else:
             self.edges[key].append((time, level))
 

@@ -84,7 +84,7 @@ class Check {
       return;
     }
     const std::vector<gpio::ChipInfo> chips = gpio::gpioChips();
-    const LinesReport report = linesReport(chips, linesOf(config_.axes, config_.emergency_stop));
+    const LinesReport report = linesReport(chips, linesOf(config_.axes, config_.options()));
     section(title, chipsText(chips) + "\n" + report.text);
     if (report.missing == 0) return;
     note(kExitLines,
@@ -97,14 +97,13 @@ class Check {
     if (real_ && exit_code_ == kExitGood) {
       try {
         const auto backend = gpio::makeLibgpiodBackend();
-        capability_ =
-            machine::measure(config_.axes, *backend, clock_, config_.options().latency_device);
+        capability_ = machine::measure(config_.axes, *backend, clock_, config_.options().realtime);
         return;
       } catch (const GpioError& error) {
         note(kExitLines, error.what());
       }
     }
-    capability_ = pulse::measureWakeUps(clock_, config_.options().latency_device);
+    capability_ = pulse::measureWakeUps(clock_, config_.options().realtime);
   }
 
   void reportRates() {
@@ -112,12 +111,12 @@ class Check {
     const machine::StepRates rates = machine::stepRates(config_.axes, capability_);
     section("Step rates at which about one step in a hundred is late, or fewer", ratesText(rates));
     if (!rates.holds()) {
-      note(
-          kExitRates,
-          fmt::format(
-              "this machine can't sustain the top speed of {}. Lower that or the microsteps, allow "
-              "real-time scheduling, use a PREEMPT_RT kernel, or reduce this machine's load.",
-              tooFast(rates)));
+      note(kExitRates,
+           fmt::format(
+               "this computer can't sustain the top speed of {}. Lower that or the microsteps, "
+               "allow "
+               "real-time scheduling, use a PREEMPT_RT kernel, or reduce this computer's load.",
+               tooFast(rates)));
     } else if (config_.enforce_realtime) {
       const std::string why = machine::whyNotInRealtime(config_.axes, capability_);
       if (!why.empty()) note(kExitRates, "the node won't start (realtime: enforce): " + why + ".");
@@ -139,9 +138,7 @@ class Check {
     bool back = false;
     try {
       if (InterruptWatch::comesWithin(kWarning)) throw Error("interrupted");
-      const MoveOrder order{config_.axes,           options_.axis,
-                            options_.distance,      config_.max_lateness,
-                            config_.emergency_stop, config_.options().latency_device};
+      const MoveOrder order{config_.axes, options_.axis, options_.distance, config_.options()};
       const auto backend = gpio::makeLibgpiodBackend();
       back = moveForthAndBack(order, *backend, clock_,
                               [](const std::string& line) { print(line + "\n"); });

@@ -58,7 +58,7 @@ std::string holderOf(const gpio::LineInfo& info) {
 }  // namespace
 
 std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
-                               const std::optional<config::InputSwitch>& emergency_stop) {
+                               const machine::MachineOptions& machine) {
   std::vector<NamedLine> lines;
   std::vector<std::size_t> enables;  // the lines that axes may share
   for (const config::AxisConfig& axis : axes) {
@@ -66,8 +66,9 @@ std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
       if (!line.empty()) lines.push_back({axis.name + "/" + pin, line});
     };
     const config::Pins& pins = axis.pins;
-    add("step", pins.step.line);
-    add("dir", pins.dir.line);
+    const bool cw_ccw = axis.driver.step_inputs == driver::StepInputs::kCwCcw;
+    add(cw_ccw ? "cw" : "step", pins.step.line);
+    add(cw_ccw ? "ccw" : "dir", pins.dir.line);
     const auto shared = std::find_if(enables.begin(), enables.end(), [&](std::size_t i) {
       return lines[i].line == pins.enable.line;
     });
@@ -77,17 +78,20 @@ std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
       enables.push_back(lines.size());
       add("enable", pins.enable.line);
     }
-    const bool numbered_from_0 = axis.driver == driver::Model::kDrv8825;
+    const bool numbered_from_0 = axis.driver.mode_pins_from_0;
     add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
     add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
     add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);
     add("sleep", pins.sleep.line);
     add("reset", pins.reset.line);
+    if (axis.brake) add("brake", axis.brake->line);
     if (axis.endstop_min) add("endstops/min", axis.endstop_min->line);
     if (axis.endstop_max) add("endstops/max", axis.endstop_max->line);
     if (axis.fault) add("fault", axis.fault->line);
+    if (axis.in_position) add("in_position", axis.in_position->line);
   }
-  if (emergency_stop) lines.push_back({"emergency_stop", emergency_stop->line});
+  if (machine.emergency_stop) lines.push_back({"emergency_stop", machine.emergency_stop->line});
+  if (machine.heartbeat) lines.push_back({"heartbeat", machine.heartbeat->line});
   return lines;
 }
 

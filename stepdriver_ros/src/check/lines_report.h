@@ -6,17 +6,19 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/chip_table.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::check {
 
-/// A line of an axis or of the emergency stop.
+/// A line of an axis or of the machine.
 struct NamedLine {
   std::string pin;   ///< x/step, emergency_stop
   std::string line;  ///< its name in the file
 };
 
+/// @param machine its lines count too.
 std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
-                               const std::optional<config::InputSwitch>& emergency_stop = {});
+                               const machine::MachineOptions& machine = {});
 
 /// The existing chips, and the lines that the file names.
 struct LinesReport {

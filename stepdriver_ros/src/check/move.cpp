@@ -73,10 +73,10 @@ bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clo
     axis.enable_on_start = false;
     axis.disable_on_shutdown = true;
   }
-  machine::MachineOptions options;
-  options.max_lateness = order.max_lateness;
-  options.emergency_stop = order.emergency_stop;
-  options.latency_device = order.latency_device;
+  machine::MachineOptions options = order.machine;
+  options.measure = false;
+  options.state_file.clear();
+  options.record_seconds = 0.0;
   machine::Machine machine(axes, backend, clock, options);
   InterruptWatch watch([&] {
     say("  interrupted: decelerating");

@@ -7,6 +7,7 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::check {
@@ -16,9 +17,8 @@ struct MoveOrder {
   std::vector<config::AxisConfig> axes;  ///< all axes: their lines are held
   std::string only;                      ///< name of an axis; empty: all, one after the other
   std::optional<double> distance;        ///< [mm|deg] 1 mm or 10 degrees by default
-  double max_lateness = 0.005;           ///< [s] see machine::MachineOptions
-  std::optional<config::InputSwitch> emergency_stop{};
-  std::string latency_device{};  ///< the same
+  /// As configured. Nothing is measured, kept or recorded, whatever it says.
+  machine::MachineOptions machine{};
 };
 
 /// The position to declare for an axis before a stroke of this length, both in its unit, so that

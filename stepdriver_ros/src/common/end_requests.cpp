@@ -11,7 +11,17 @@
 
 namespace stepdriver::ros_node {
 
-EndRequests::EndRequests() : signals_(endSignals()) {
+namespace {
+
+sigset_t signalsOf(EndRequests::Usr1 usr1) {
+  sigset_t signals = endSignals();
+  if (usr1 == EndRequests::Usr1::kAsksForARecording) sigaddset(&signals, SIGUSR1);
+  return signals;
+}
+
+}  // namespace
+
+EndRequests::EndRequests(Usr1 usr1) : signals_(signalsOf(usr1)) {
   pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
 }
 
@@ -33,6 +43,7 @@ std::string EndRequests::waitFor(std::chrono::milliseconds time) {
   const timespec timeout{static_cast<time_t>(seconds.count()), static_cast<long>(rest.count())};
   const int number = sigtimedwait(&signals_, nullptr, &timeout);
   if (shutdown_called_ || ros::isShuttingDown()) return "a shutdown call (rosnode kill)";
+  recording_ = recording_ || number == SIGUSR1;
   for (const EndSignal& signal : kEndSignals) {
     if (signal.number == number) return signal.name;
   }

@@ -4,8 +4,6 @@
 #include <cstdio>
 #include <string>
 
-#include "stepdriver_core/config/axis_config.h"
-
 namespace stepdriver::ros_node {
 
 /// A number for messages: six digits, no trailing zeros. From 100000 on it is a whole number, which
@@ -16,8 +14,5 @@ inline std::string roundedText(double number) {
   std::snprintf(text, sizeof text, size < 1e5 || size > 9e15 ? "%.6g" : "%.0f", number);
   return text;
 }
-
-/// The axis's unit on every ROS interface.
-inline const char* unitOf(config::Kind kind) { return kind == config::Kind::kLinear ? "m" : "rad"; }
 
 }  // namespace stepdriver::ros_node

@@ -52,7 +52,7 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
                              {"state", 2, 12, false, {}}};
   for (const AxisView& axis : session.driver().axes()) {
     const config::AxisConfig* config = session.driver().config(axis.name);
-    const std::string unit = config == nullptr ? "?" : unitOf(config->kind);
+    const std::string unit = config == nullptr ? "?" : configUnitOf(config->kind);
     const bool chosen = axis.name == session.chosen();
     const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
     const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,

@@ -195,7 +195,7 @@ double DriverClient::unitsOf(const std::string& axis) const {
 TableUnits DriverClient::tableUnitsOf(const std::string& axis) const {
   const config::AxisConfig* config = session_.driver().config(axis);
   if (config == nullptr) return {};
-  return {config::configUnitsPerUnit(config->kind), unitOf(config->kind)};
+  return {config::configUnitsPerUnit(config->kind), configUnitOf(config->kind)};
 }
 
 void DriverClient::take(const AxisStates& states) {

@@ -78,8 +78,8 @@ class DriverView {
 /// [mm|deg] Travel of one step of the axis in the current microstep mode.
 double stepOf(const config::AxisConfig& config, const AxisView& axis);
 
-/// `mm` or `deg`.
-inline const char* unitOf(config::Kind kind) {
+/// The unit of configurations, which the console shows: `mm` or `deg`.
+inline const char* configUnitOf(config::Kind kind) {
   return kind == config::Kind::kLinear ? "mm" : "deg";
 }
 

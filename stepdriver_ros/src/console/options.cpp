@@ -35,7 +35,7 @@ restores the terminal when it ends. Nothing moves when it starts, and a disabled
   - +               one step
   i                 step size: one step of the motor, 0.1, 1 or 10 mm (or degrees)
   g                 go to a position: type it, then press Enter
-  z                 set zero at this position
+  z y               set zero at this position: y confirms it
   e, d              enable, disable
   h, a              home the axis, home all
   p, c              hold all axes, resume

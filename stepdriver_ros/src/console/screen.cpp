@@ -134,19 +134,25 @@ std::vector<Row> pendingRows(const Session& session, int columns, double now) {
 std::vector<Row> settingRows(const Session& session, int columns) {
   const auto factor = session.speedOverride();
   const config::AxisConfig* config = session.driver().config(session.chosen());
-  const std::string unit = config == nullptr ? "mm" : unitOf(config->kind);
+  const std::string unit = config == nullptr ? "mm" : configUnitOf(config->kind);
   return rowsOf(fmt::format("- + steps: {}    speed override: {}", session.stepSize().text(unit),
                             factor ? fmt::format("{:.0f} %", *factor * 100.0) : "unknown"),
                 columns);
 }
 
 std::vector<Row> promptRows(const Session& session, int columns) {
+  if (const auto& axis = session.zeroAsked()) {
+    return rowsOf(fmt::format("Set the position of {} to 0? Its soft limits then count from here. "
+                              "(y yes, any other key no)",
+                              shortName(*axis, kShortName)),
+                  columns, true);
+  }
   const PositionPrompt* const prompt = session.prompt();
   if (prompt == nullptr) return {};
   const config::AxisConfig* config = session.driver().config(prompt->axis());
   return rowsOf(fmt::format("Move {} to [{}]: {}_    (Enter moves it, Esc cancels, s stops)",
                             shortName(prompt->axis(), kShortName),
-                            config == nullptr ? "?" : unitOf(config->kind), prompt->text()),
+                            config == nullptr ? "?" : configUnitOf(config->kind), prompt->text()),
                 columns, true);
 }
 
@@ -178,11 +184,12 @@ std::vector<Row> helpRows(const Session& session, int columns) {
   if (!session.showsHelp()) return rows;
   append(rows,
          packed({", . jog slowly too", "k j tab choose an axis too", "= one step too"}, columns));
-  for (const char* line : {"A jog ends 0.2 s after the last key; keys held repeat by themselves.",
-                           "- is towards min, + towards max. s and Esc decelerate, SPACE doesn't.",
-                           "i: one motor step, 0.1, 1 or 10 mm or deg. z: this position becomes 0.",
-                           "p pauses all motions until c. [ ] slow down or speed up all by 10 %.",
-                           "r ends faults and an emergency stop, and moves nothing."}) {
+  for (const char* line :
+       {"A jog ends 0.2 s after the last key; keys held repeat by themselves.",
+        "- is towards min, + towards max. s and Esc decelerate, SPACE doesn't.",
+        "i: one motor step, 0.1, 1 or 10 mm or deg. z: this place is 0, after a y.",
+        "p pauses all motions until c. [ ] slow down or speed up all by 10 %.",
+        "r ends faults and an emergency stop, and moves nothing."}) {
     append(rows, rowsOf(line, columns));
   }
   return rows;

@@ -24,7 +24,9 @@ constexpr int kFastest = 200;
 /// The positions that the limits of the axis allow: "0.0000 mm to 200.0000 mm"; empty: any.
 std::string rangeText(const config::AxisConfig& config) {
   const double units = config::configUnitsPerUnit(config.kind);
-  const auto shown = [&](double limit) { return positionText(limit * units, unitOf(config.kind)); };
+  const auto shown = [&](double limit) {
+    return positionText(limit * units, configUnitOf(config.kind));
+  };
   const auto& min = config.min_position;
   const auto& max = config.max_position;
   if (min && max) return shown(*min) + " to " + shown(*max);
@@ -100,6 +102,8 @@ Orders Session::press(const std::vector<Key>& keys, double now) {
   for (const Key key : keys) {
     if (prompt_) {
       typeInto(key, now, orders);
+    } else if (zero_asked_) {
+      answerZero(key, now, orders);
     } else if (const auto command = commandOf(key)) {
       obey(*command, now, orders);
     }
@@ -133,6 +137,7 @@ void Session::obey(const Command& command, double now, Orders& orders) {
       emergency_since_ = now;
       emergency_seen_ = false;
       prompt_.reset();
+      zero_asked_.reset();
       break;
     case Action::kStop:
       call({Call::What::kStop, {}}, now, orders);
@@ -164,7 +169,7 @@ void Session::obey(const Command& command, double now, Orders& orders) {
       openPrompt(now);
       break;
     case Action::kSetZero:
-      setZero(now, orders);
+      askForZero(now);
       break;
     case Action::kHold:
       call({Call::What::kHold, {}}, now, orders);
@@ -240,14 +245,16 @@ void Session::openPrompt(double now) {
   }
 }
 
+bool Session::leavesDialogue(Key key, double now, Orders& orders) {
+  if (key != 's' && key != kKeyCtrlC) return false;
+  prompt_.reset();
+  zero_asked_.reset();
+  obey(*commandOf(key), now, orders);
+  return true;
+}
+
 void Session::typeInto(Key key, double now, Orders& orders) {
-  const auto command = commandOf(key);
-  const bool stops = command && command->action == Action::kStop && key != kKeyEscape;
-  if (stops || (command && command->action == Action::kQuit && key == kKeyCtrlC)) {
-    prompt_.reset();
-    obey(*command, now, orders);
-    return;
-  }
+  if (leavesDialogue(key, now, orders)) return;
   switch (prompt_->press(key)) {
     case PositionPrompt::Outcome::kOpen:
       break;
@@ -269,7 +276,7 @@ void Session::goToTyped(double now, Orders& orders) {
     return;
   }
   const config::AxisConfig& config = *driver_.config(typed.axis());
-  const std::string unit = unitOf(config.kind);
+  const std::string unit = configUnitOf(config.kind);
   const std::string range = rangeText(config);
   const auto number = typed.number();
   if (!number) {
@@ -288,14 +295,31 @@ void Session::goToTyped(double now, Orders& orders) {
   call(std::move(go), now, orders);
 }
 
-void Session::setZero(double now, Orders& orders) {
-  const AxisView* axis = driver_.axis(chosen_);
-  if (!driver_.live(now) || axis == nullptr || driver_.config(chosen_) == nullptr) {
+bool Session::mayBeZeroed(const std::string& name, double now) {
+  const AxisView* axis = driver_.axis(name);
+  if (!driver_.live(now) || axis == nullptr || driver_.config(name) == nullptr) {
     messages_.say("no position is set: the driver's state isn't live");
-  } else if (axis->moving) {
-    messages_.say(chosen_ + ": the position isn't set because the axis is moving; s stops it");
-  } else {
-    call({Call::What::kSetZero, chosen_}, now, orders);
+    return false;
+  }
+  if (axis->moving) {
+    messages_.say(name + ": the position isn't set because the axis is moving; s stops it");
+    return false;
+  }
+  return true;
+}
+
+void Session::askForZero(double now) {
+  if (mayBeZeroed(chosen_, now)) zero_asked_ = chosen_;
+}
+
+void Session::answerZero(Key key, double now, Orders& orders) {
+  if (leavesDialogue(key, now, orders)) return;
+  const std::string axis = *zero_asked_;
+  zero_asked_.reset();
+  if (key != 'y') {
+    messages_.say(axis + ": its position stays as it is");
+  } else if (mayBeZeroed(axis, now)) {
+    call({Call::What::kSetZero, axis}, now, orders);
   }
 }
 

@@ -84,8 +84,8 @@ class Session {
   Session(std::string driver, JogSpeeds speeds) : name_(std::move(driver)), speeds_(speeds) {}
 
   /// All keys since the last call. An emergency stop among them comes first, and the other keys are
-  /// dropped. While a position is being typed, the keys belong to it, except for those that stop or
-  /// quit; Escape cancels it.
+  /// dropped. While a position is being typed, or the question about zero is open, the keys belong
+  /// to that, except for those that stop or quit; Escape cancels it.
   Orders press(const std::vector<Key>& keys, double now);
   /// Handles the passing of time. Call it often.
   Orders tick(double now);
@@ -112,6 +112,8 @@ class Session {
   const StepSize& stepSize() const { return step_size_; }
   /// The position that is being typed; nullptr: none.
   const PositionPrompt* prompt() const { return prompt_ ? &*prompt_ : nullptr; }
+  /// The axis whose present position becomes 0 if the user says yes; empty: no such question.
+  const std::optional<std::string>& zeroAsked() const { return zero_asked_; }
   /// The driver's, whoever set it; empty: unknown, because the driver's state isn't live.
   std::optional<double> speedOverride() const { return override_; }
   const std::vector<PendingCall>& pending() const { return pending_; }
@@ -129,8 +131,13 @@ class Session {
   void home(bool all, double now, Orders& orders);
   void openPrompt(double now);
   void typeInto(Key key, double now, Orders& orders);
+  /// Obeys a key that stops or quits, and closes what is being typed or asked.
+  bool leavesDialogue(Key key, double now, Orders& orders);
   void goToTyped(double now, Orders& orders);
-  void setZero(double now, Orders& orders);
+  void askForZero(double now);
+  void answerZero(Key key, double now, Orders& orders);
+  /// Says why not.
+  bool mayBeZeroed(const std::string& name, double now);
   void resume(double now, Orders& orders);
   void changeOverride(int direction, double now, Orders& orders);
   /// Why the axis must not be moved; empty: it may be moved.
@@ -145,6 +152,7 @@ class Session {
   HeldJog jog_;
   StepSize step_size_;
   std::optional<PositionPrompt> prompt_;
+  std::optional<std::string> zero_asked_;
   std::optional<double> override_;
   std::string chosen_;
   std::vector<PendingCall> pending_;

@@ -76,8 +76,8 @@ std::string Joystick::mistakeIn(const sensor_msgs::Joy& message) const {
     }
     if (!std::isfinite(message.axes[index])) {
       return fmt::format(
-          "axis {} of the message, which jogs {}, isn't a finite number: nothing jogs", index,
-          axis.config.name);
+          "axis {} of the message, which jogs {}, is {}, but must be a finite number: nothing jogs",
+          index, axis.config.name, message.axes[index]);
     }
   }
   if (config_.deadman_button >= static_cast<int>(message.buttons.size())) {

@@ -8,6 +8,7 @@
 #include <ros/this_node.h>
 
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <optional>
 #include <string>
@@ -17,6 +18,7 @@
 #include "common/end_requests.h"
 #include "common/loopback_only.h"
 #include "common/node_start.h"
+#include "common/xml_depth.h"
 #include "common/xmlrpc_value.h"
 #include "driver_axes.h"
 #include "joystick.h"
@@ -32,6 +34,7 @@ constexpr double kPoll = 0.02;  // [s]
 constexpr std::chrono::milliseconds kLastWords{50};
 // How many messages should arrive in the driver's jog_timeout, so that a late one ends no jog.
 constexpr double kMessagesInTimeout = 3.0;
+constexpr double kRounding = 1e-9;
 
 constexpr const char* kUsage = R"(usage: stepdriver_joystick [--help] [name:=value ...]
 
@@ -74,7 +77,7 @@ void warnOfTooLowRate(const std::string& driver, double rate) {
       "joystick",
       "~rate is %g Hz and %s/jog_timeout is %g s, so the driver ends a jog if a message is late. "
       "Use %g Hz or more",
-      rate, driver.c_str(), timeout, kMessagesInTimeout / timeout);
+      rate, driver.c_str(), timeout, std::ceil(kMessagesInTimeout / timeout - kRounding));
 }
 
 int run(EndRequests& end_requests) {
@@ -114,6 +117,7 @@ int run(EndRequests& end_requests) {
 int main(int argc, char** argv) {
   namespace joystick = stepdriver::joystick;
   namespace ros_node = stepdriver::ros_node;
+  ros_node::limitXmlDepth();
   ros_node::EndRequests end_requests;
   if (const auto code = ros_node::handleArguments(argc, argv, joystick::kUsage)) return *code;
   ros::init(argc, argv, "joystick", ros::init_options::NoSigintHandler);

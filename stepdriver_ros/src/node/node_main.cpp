@@ -4,16 +4,22 @@
 #include <ros/node_handle.h>
 #include <ros/this_node.h>
 
+#include <boost/thread/exceptions.hpp>
 #include <cstddef>
+#include <cstdlib>
 #include <deque>
 #include <exception>
+#include <new>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 #include "common/end_requests.h"
 #include "common/loopback_only.h"
 #include "common/node_start.h"
+#include "common/xml_depth.h"
 #include "node/actions/action_statuses.h"
 #include "node/actions/homing_action.h"
 #include "node/actions/line_action.h"
@@ -21,14 +27,18 @@
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
+#include "node/calls/memory_watch.h"
 #include "node/diagnostics/diagnostics.h"
+#include "node/flight_recorder_service.h"
 #include "node/master/end_despite_master.h"
 #include "node/master/master_watch.h"
+#include "node/memory_reserve.h"
 #include "node/parameters/read_parameters.h"
 #include "node/services/axis_home_service.h"
 #include "node/services/axis_services.h"
 #include "node/services/machine_home_service.h"
 #include "node/services/machine_services.h"
+#include "node/systemd/service_manager.h"
 #include "node/topics/clock_publisher.h"
 #include "node/topics/jog_subscriber.h"
 #include "node/topics/state_publisher.h"
@@ -44,6 +54,7 @@ namespace {
 constexpr int kExitGpio = 2;
 constexpr int kExitTooSlow = 3;
 constexpr int kExitStateFile = 4;
+constexpr int kExitExhausted = 5;
 
 constexpr std::chrono::milliseconds kPoll{1000};
 // Time for the calls that arrived while the axes came to rest.
@@ -56,26 +67,26 @@ constexpr const char* kUsage = R"(usage: stepdriver_node [--help] [name:=value .
 
 Drives the axes of the parameter ~axes through services, and publishes their positions.
 On SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill` it decelerates, disables the axes, releases
-the lines and ends.
+the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dump does.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
               ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~home
-              ~move_line  ~hold  ~resume
+              ~move_line  ~hold  ~resume  ~dump
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  /diagnostics
               /clock (with ~publish_clock)  ~jog, ~command (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
-              ~state_file  ~hardware_id  ~urdf_limits  ~publish_clock  ~on_master_lost
-              ~simulation
+              ~state_file  ~recorder  ~hardware_id  ~urdf_limits  ~publish_clock
+              ~on_master_lost  ~simulation
               robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
 written, 3 the computer is too slow for its axes and ~realtime is enforce, 4 ended as asked, but
-~state_file couldn't be written, 64 wrong usage.
+~state_file couldn't be written, 5 the computer had no memory or no thread left, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
 
@@ -102,6 +113,13 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   move_actions.tellEnded();
   line_action.tellEnded();
   trajectory_action.tellEnded();
+  if (!machine.whyHung().empty()) {
+    // All that reads or releases lines would wait for the chip.
+    ROS_FATAL_NAMED("node",
+                    "The node ends without releasing its lines: cut the power of the motors");
+    std::this_thread::sleep_for(kLastAnswers);
+    std::_Exit(kExitGpio);
+  }
   end.begin(exit_code);
   queues.finish(kLastAnswers);
   publisher.stop();
@@ -173,6 +191,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
   CallQueues queues(machine.axes().size());
+  FlightRecorderService recorder(machine, config.recorder, ros::this_node::getName());
   // Subscribers to latched topics need a queue too.
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
@@ -197,6 +216,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   const MachineHomeService machine_home_service(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
+  recorder.advertise(private_node, queues);
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues);
   TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
@@ -208,30 +228,40 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   const Diagnostics diagnostics(
       node, private_node, machine, queues, master_watch, descriptors,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
-      config);
+      config, recorder);
   std::optional<ClockPublisher> clock_publisher;
   if (config.publish_clock) clock_publisher.emplace(private_node, hardware.clock());
   queues.start();
   publisher.start();
   master_watch.start();
+  const ServiceManager service_manager(machine);
+  ServiceManager::tellReady();
   ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
                  machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
                  machine.figures().realtime.c_str());
 
+  MemoryWatch memory;
   std::string who;
   while (who.empty()) {
     who = end_requests.waitFor(kPoll);
     descriptors.look();
+    memory.look();
+    if (end_requests.takeRecordingRequest()) recorder.request("SIGUSR1");
     if (const std::string error = machine.stateFileError(); !error.empty()) {
       ROS_ERROR_THROTTLE_NAMED(60.0, "state_file", "%s", error.c_str());
     }
   }
-  ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
+  if (MemoryReserve::isUsed()) {
+    ROS_FATAL_NAMED("node", "Ending: the computer has no memory left for this node");
+  } else {
+    ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
+  }
+  ServiceManager::tellEnding();
   master_watch.stop();
   const int exit_code =
       shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher, end);
   if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
-  return exit_code;
+  return MemoryReserve::isUsed() ? kExitExhausted : exit_code;
 }
 
 /// @return the exit code.
@@ -259,6 +289,15 @@ int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
   } catch (const Refused& error) {
     ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitTooSlow;
+  } catch (const boost::thread_resource_error& error) {
+    ROS_FATAL_NAMED("node", "Not started: no thread can be started: %s", error.what());
+    return kExitExhausted;
+  } catch (const std::system_error& error) {
+    ROS_FATAL_NAMED("node", "Not started: no thread can be started: %s", error.what());
+    return kExitExhausted;
+  } catch (const std::bad_alloc&) {
+    ROS_FATAL_NAMED("node", "Not started: the computer has no memory left for this node");
+    return kExitExhausted;
   } catch (const std::exception& error) {
     ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitConfig;
@@ -280,7 +319,9 @@ int start(EndRequests& end_requests) {
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
   node::setThreadStacks();
-  node::EndRequests end_requests;
+  const node::MemoryReserve memory_reserve;
+  node::limitXmlDepth();
+  node::EndRequests end_requests(node::EndRequests::Usr1::kAsksForARecording);
   if (const auto code = node::handleArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
   if (!node::waitForMaster(end_requests)) return node::kExitOk;

@@ -17,8 +17,7 @@ using test::linearAxis;
 using test::violationsOf;
 
 TEST(AxisChip, WakesAndEnablesLongEnoughBeforeTheFirstStep) {
-  for (const driver::Model model :
-       {driver::Model::kA4988, driver::Model::kDrv8825, driver::Model::kTb6600}) {
+  for (const std::string model : {"a4988", "drv8825", "tb6600"}) {
     config::AxisConfig config = linearAxis("x", model);
     config.enable_on_start = false;
     Bench bench({config});
@@ -42,7 +41,7 @@ TEST(AxisChip, WakesAndEnablesLongEnoughBeforeTheFirstStep) {
 TEST(AxisChip, WakesWhicheverPinsAreWired) {
   for (const bool sleep_wired : {false, true}) {
     for (const bool reset_wired : {false, true}) {
-      config::AxisConfig config = linearAxis("x", driver::Model::kDrv8825);
+      config::AxisConfig config = linearAxis("x", "drv8825");
       config.start_speed = config.max_speed;
       if (!sleep_wired) config.pins.sleep.line.clear();
       if (!reset_wired) config.pins.reset.line.clear();
@@ -55,11 +54,11 @@ TEST(AxisChip, WakesWhicheverPinsAreWired) {
 }
 
 TEST(AxisChip, KeepsTheChipsTimesAtItsHighestRate) {
-  for (const driver::Model model :
-       {driver::Model::kA4988, driver::Model::kDrv8825, driver::Model::kTb6600}) {
+  for (const std::string model : {"a4988", "drv8825", "tb6600"}) {
     config::AxisConfig config = linearAxis("x", model);
     const double period =
-        static_cast<double>(config.timing.step_high_ns + config.timing.step_low_ns) * 1e-9;
+        static_cast<double>(config.driver.timing.step_high_ns + config.driver.timing.step_low_ns) *
+        1e-9;
     config.max_speed = 1.0 / period / config.steps_per_unit;
     config.start_speed = config.max_speed;
     Bench bench({config});
@@ -124,7 +123,7 @@ TEST(AxisChip, RefusesAMicrostepModeThatHasNoPositionHere) {
 }
 
 TEST(AxisChip, MovesToTheNearestCommonPositionWhereThatIsWanted) {
-  config::AxisConfig config = linearAxis("x", driver::Model::kDrv8825);
+  config::AxisConfig config = linearAxis("x", "drv8825");
   config.align_on_microstep_change = true;
   Bench bench({config});
   axis::Axis& x = bench.axis();
@@ -141,7 +140,7 @@ TEST(AxisChip, MovesToTheNearestCommonPositionWhereThatIsWanted) {
 
 TEST(AxisChip, StopsAtAFaultOfTheChipAndResetsItToRecover) {
   for (const bool reset_wired : {true, false}) {
-    config::AxisConfig config = linearAxis("x", driver::Model::kDrv8825);
+    config::AxisConfig config = linearAxis("x", "drv8825");
     config.fault = config::FaultPin{"x.fault", Bias::kPullUp};
     if (!reset_wired) config.pins.reset.line.clear();
     Bench bench({config}, true, 1.0);
@@ -185,14 +184,15 @@ TEST(AxisChip, CountsTheTranslatorFromHomeAfterAReset) {
 }
 
 TEST(AxisChip, RefusesToSetTheMicrostepsOfATb6600) {
-  Bench bench({linearAxis("x", driver::Model::kTb6600)});
-  EXPECT_REFUSED(bench.axis().setMicrosteps(8), "DIP switches");
+  Bench bench({linearAxis("x", "tb6600")});
+  EXPECT_REFUSED(bench.axis().setMicrosteps(8),
+                 "it can't change to 8 microsteps: those of a TB6600 are set by its DIP switches");
   EXPECT_REFUSED(bench.axis().sleep(true), "no SLEEP pin");
   EXPECT_REFUSED(bench.axis().reset(), "no RESET pin");
 }
 
 TEST(AxisChip, InvertsEverySignalOfACommonAnode) {
-  config::AxisConfig config = linearAxis("x", driver::Model::kTb6600);
+  config::AxisConfig config = linearAxis("x", "tb6600");
   config.pins.step.inverted = true;
   config.pins.dir.inverted = true;
   config.pins.enable.inverted = true;

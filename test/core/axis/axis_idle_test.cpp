@@ -20,7 +20,7 @@ using test::violationsOf;
 constexpr double kTimeout = 2.0;
 
 config::AxisConfig idleAxis(IdleAction action = IdleAction::kDisable,
-                            driver::Model model = driver::Model::kA4988) {
+                            const std::string& model = "a4988") {
   config::AxisConfig config = test::linearAxis("x", model);
   config.idle_timeout = kTimeout;
   config.idle_action = action;
@@ -64,10 +64,9 @@ TEST(AxisIdle, StaysAwakeThroughALongMotionAndCountsFromItsEnd) {
 }
 
 TEST(AxisIdle, WakesForTheNextMotionWithTheChipsTimes) {
-  for (const driver::Model model :
-       {driver::Model::kA4988, driver::Model::kDrv8825, driver::Model::kTb6600}) {
+  for (const std::string model : {"a4988", "drv8825", "tb6600"}) {
     for (const IdleAction action : {IdleAction::kDisable, IdleAction::kSleep}) {
-      if (action == IdleAction::kSleep && model == driver::Model::kTb6600) continue;
+      if (action == IdleAction::kSleep && model == "tb6600") continue;
       config::AxisConfig config = idleAxis(action, model);
       config.start_speed = config.max_speed;  // the first step comes at once
       Bench bench({config});

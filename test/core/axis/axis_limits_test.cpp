@@ -98,6 +98,22 @@ TEST_F(AxisLimitsTest, SlowsDownAMotionUnderWayAtItsDeceleration) {
   EXPECT_EQ(bench->pulses(), 10'000);
 }
 
+// At 0.03 steps/s the next whole step is half a minute away.
+TEST_F(AxisLimitsTest, StopsAtOnceHoweverSlowTheyAre) {
+  constexpr double kWholeStep = 0.05;  // s, from rest to rest at 2 m/s^2
+  for (const AxisLimits& slow :
+       {AxisLimits{3e-5, 0.0, 0.0, 0.0}, AxisLimits{0.0, 3e-5, 3e-5, 0.0}}) {
+    build();
+    x().setLimits(slow);
+    x().moveTo(10.0);
+    advance(0.3);
+    x().stop();
+    advance(kWholeStep);
+    EXPECT_FALSE(x().state().moving);
+    EXPECT_LE(bench->pulses(), 1);
+  }
+}
+
 TEST_F(AxisLimitsTest, GoesFasterAgainWhereTheLimitIsRaised) {
   x().setLimits({0.25, 0.0, 0.0, 0.0});
   x().jog(0.25);
@@ -259,6 +275,22 @@ TEST_F(AxisLimitsTest, AxesThatMoveTogetherKeepWhatTheyBeganWith) {
   EXPECT_EQ(result.end, MoveEnd::kReached);
   EXPECT_NEAR(result.duration, move.duration, 1e-9);
   EXPECT_NEAR(bench->move(0.049).duration, 0.2, 1e-3) << "0.001 m at 0.01 m/s with 0.1 m/s^2";
+}
+
+TEST_F(AxisLimitsTest, AxesThatMoveTogetherStopAtOnceHoweverSlowTheyAre) {
+  bench =
+      std::make_unique<Bench>(std::vector<config::AxisConfig>{linearAxis("x"), linearAxis("y")});
+  for (axis::Axis* axis : {&bench->axis("x"), &bench->axis("y")}) {
+    axis->setLimits({1e-6, 0.0, 0.0, 0.0});
+  }
+  machine::LineRequest line;
+  line.names = {"x", "y"};
+  line.positions = {0.05, 0.025};
+  const auto move = bench->machine->moveLine(line);
+  advance(0.1);
+  bench->machine->stop(move);
+  advance(0.1);
+  EXPECT_TRUE(bench->machine->result(move));
 }
 
 }  // namespace

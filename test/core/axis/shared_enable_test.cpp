@@ -18,8 +18,7 @@ using test::violationsOf;
 
 /// Two axes with one ENABLE line, none enabled at the start.
 std::vector<config::AxisConfig> sharingAxes() {
-  std::vector<config::AxisConfig> axes = {linearAxis("x"),
-                                          linearAxis("y", driver::Model::kDrv8825)};
+  std::vector<config::AxisConfig> axes = {linearAxis("x"), linearAxis("y", "drv8825")};
   for (config::AxisConfig& axis : axes) {
     axis.pins.enable.line = "both.enable";
     axis.enable_on_start = false;

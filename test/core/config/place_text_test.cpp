@@ -26,5 +26,15 @@ TEST(PlaceText, IsShortForWhatIsFarAway) {
   EXPECT_EQ(placeText(std::numeric_limits<double>::quiet_NaN(), Kind::kLinear, 1.0), "nan m");
 }
 
+TEST(DistanceText, OfLessThanAMicrostepHasTwoDigits) {
+  const auto text = [](double by) { return distanceText(by, Kind::kLinear, 80'000.0); };
+  EXPECT_EQ(text(0.0126 - 0.0125), "0.0001 m");
+  EXPECT_EQ(text(12.5e-6), "0.00001 m");
+  EXPECT_EQ(text(6.25e-6), "0.0000063 m");
+  EXPECT_EQ(text(2e-7), "0.0000002 m");
+  EXPECT_EQ(text(6.9e-18), "0 m");
+  EXPECT_EQ(distanceText(1.0 / 3000.0, Kind::kRotary, 509.3), "0.00033 rad");
+}
+
 }  // namespace
 }  // namespace stepdriver::config

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "stepdriver_core/error.h"
+
 namespace stepdriver {
 namespace {
 
@@ -31,6 +33,10 @@ TEST(Printable, ShowsControlCharactersAndLineBreaksAsEscapes) {
     EXPECT_FALSE(isPrintable(text)) << shown;
     EXPECT_EQ(printable(text), shown);
   }
+}
+
+TEST(Printable, IsWhatARefusalSays) {
+  EXPECT_STREQ(Refused("there is no axis a\nb").what(), "there is no axis a\\nb");
 }
 
 }  // namespace

@@ -6,6 +6,9 @@ namespace stepdriver::config {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+const std::string kDrivers =
+    "a4988, drv8825, tb6600, tmc2208, tmc2209, tmc2130, drv8434, lv8729, tb6560, dm542, dm556, "
+    "cl57t or step_dir";
 
 TEST(ReadAxes, ReadsAWholeLinearA4988) {
   ConfigValue axis = linearAxis();
@@ -35,7 +38,7 @@ TEST(ReadAxes, ReadsAWholeLinearA4988) {
   EXPECT_EQ(config.name, "x");
   EXPECT_EQ(config.joint, "x_joint");
   EXPECT_EQ(config.kind, Kind::kLinear);
-  EXPECT_EQ(config.driver, driver::Model::kA4988);
+  EXPECT_EQ(config.driver.name, "a4988");
   EXPECT_EQ(config.pins.step.line, "gpiochip0:17");
   EXPECT_EQ(config.pins.dir.line, "STEP-DIR");
   EXPECT_EQ(config.pins.enable.line, "pinctrl-bcm2835:22");
@@ -81,7 +84,7 @@ TEST(ReadAxes, ReadsAWholeRotaryDrv8825) {
 
   const AxisConfig config = readX(axis);
   EXPECT_EQ(config.kind, Kind::kRotary);
-  EXPECT_EQ(config.driver, driver::Model::kDrv8825);
+  EXPECT_EQ(config.driver.name, "drv8825");
   EXPECT_EQ(config.pins.ms1.line, "M0");
   EXPECT_EQ(config.pins.ms2.line, "M1");
   EXPECT_EQ(config.pins.ms3.line, "M2");
@@ -104,7 +107,7 @@ TEST(ReadAxes, ReadsAWholeCommonAnodeTb6600) {
   put(axis, "mm_per_round", 8.0);
 
   const AxisConfig config = readX(axis);
-  EXPECT_EQ(config.driver, driver::Model::kTb6600);
+  EXPECT_EQ(config.driver.name, "tb6600");
   EXPECT_TRUE(config.pins.step.inverted);
   EXPECT_TRUE(config.pins.dir.inverted);
   EXPECT_TRUE(config.pins.enable.inverted);
@@ -126,8 +129,7 @@ TEST(ReadAxes, FillsInTheDefaults) {
   EXPECT_FALSE(config.enable_on_start);
   EXPECT_TRUE(config.disable_on_shutdown);
   EXPECT_FALSE(config.align_on_microstep_change);
-  EXPECT_EQ(config.timing.step_high_ns,
-            driver::driverChipOf(driver::Model::kA4988).timing.step_high_ns);
+  EXPECT_EQ(config.driver.timing.step_high_ns, driver::driverChip("a4988").timing.step_high_ns);
 }
 
 TEST(ReadAxes, GivesTheAxesInTheOrderOfTheirNames) {
@@ -170,16 +172,16 @@ TEST(ReadAxes, TakesADriverInUpperAndLowerCase) {
 }
 
 TEST(ReadAxes, ListsTheDriversAndNamesTheNearest) {
-  expectIssues(linearAxis(),
-               {{"driver", "a4899",
-                 "is \"a4899\", but must be a4988, drv8825 or tb6600; did you mean a4988?"},
-                {"driver", "stspin", "is \"stspin\", but must be a4988, drv8825 or tb6600"},
-                {"driver", 4988, "is 4988 (an integer), but must be a4988, drv8825 or tb6600"}});
+  expectIssues(
+      linearAxis(),
+      {{"driver", "a4899", "is \"a4899\", but must be " + kDrivers + "; did you mean a4988?"},
+       {"driver", "stspin", "is \"stspin\", but must be " + kDrivers + ""},
+       {"driver", 4988, "is 4988 (an integer), but must be " + kDrivers + ""}});
 }
 
 TEST(ReadAxes, NamesWhatIsMissing) {
   expectMissing(linearAxis(),
-                {{"driver", "a4988, drv8825 or tb6600"},
+                {{"driver", kDrivers},
                  {"pins/step", "a line: chip:offset, as \"gpiochip0:17\", or a line's name"},
                  {"pins/dir", "a line: chip:offset, as \"gpiochip0:17\", or a line's name"},
                  {"microsteps", "1, 2, 4, 8 or 16"},
@@ -202,7 +204,7 @@ TEST(ReadAxes, ChecksMicrostepsAgainstTheChip) {
                  "is 16.0 (a number with a decimal point), but must be an integer: 1, "
                  "2, 4, 8 or 16"}});
   expectIssues(rotaryAxis(), {{"microsteps", 64, "is 64, but must be 1, 2, 4, 8, 16 or 32"}});
-  for (const int microsteps : driver::driverChipOf(driver::Model::kTb6600).microsteps) {
+  for (const int microsteps : driver::driverChip("tb6600").microsteps) {
     ConfigValue axis = tb6600Axis();
     put(axis, "microsteps", microsteps);
     EXPECT_EQ(readX(axis).microsteps, microsteps);
@@ -253,7 +255,7 @@ TEST(ReadAxes, OverridesTheTimingsOfTheChip) {
              {"wake_ms", 1.7},
              {"reset_low_ms", 0.0},
              {"reset_wait_ms", 10000}}));
-  const driver::Timing timing = readX(axis).timing;
+  const driver::Timing timing = readX(axis).driver.timing;
   EXPECT_EQ(timing.step_high_ns, 1900);
   EXPECT_EQ(timing.step_low_ns, 2000);
   EXPECT_EQ(timing.dir_setup_ns, 0);

@@ -70,14 +70,13 @@ TEST(ReadPins, KeepsTheNamesOfTheDrv8825FromTheA4988) {
 
   ConfigValue axis = linearAxis();
   for (const char* pin : {"m0", "m1", "m2"}) put(axis, std::string("pins/") + pin, pin);
-  EXPECT_EQ(
-      issuesOfX(axis),
-      (Lines{"/axes/x/pins/m0: is \"m0\", but that is a name on the DRV8825; on the A4988 the "
-             "pin is ms1",
-             "/axes/x/pins/m1: is \"m1\", but that is a name on the DRV8825; on the A4988 the "
-             "pin is ms2",
-             "/axes/x/pins/m2: is \"m2\", but that is a name on the DRV8825; on the A4988 the "
-             "pin is ms3"}));
+  EXPECT_EQ(issuesOfX(axis),
+            (Lines{"/axes/x/pins/m0: is \"m0\", but the A4988 has no M0 to M2; on it the pin "
+                   "is ms1",
+                   "/axes/x/pins/m1: is \"m1\", but the A4988 has no M0 to M2; on it the pin "
+                   "is ms2",
+                   "/axes/x/pins/m2: is \"m2\", but the A4988 has no M0 to M2; on it the pin "
+                   "is ms3"}));
 }
 
 TEST(ReadPins, SaysWhyATb6600HasNoSuchPin) {
@@ -126,8 +125,8 @@ TEST(ReadPins, KeepsCommonAnodeForTheTb6600) {
       linearAxis(),
       {{"common_anode", false, ""},
        {"common_anode", true,
-        "is true, but must be false on the A4988: only a tb6600 has inputs to be wired so; "
-        "for single pins there is invert"}});
+        "is true, but must be false on the A4988: only inputs with optocouplers, such as a "
+        "tb6600's, are wired so; for single pins there is invert"}});
 }
 
 TEST(ReadPins, ChecksTheEndstops) {
@@ -163,11 +162,42 @@ TEST(ReadPins, ReadsTheFaultPinOfAChipThatHasOne) {
                                    "fault pin"});
 }
 
-TEST(ReadPins, RefusesABiasOfNothing) {
-  ConfigValue axis = linearAxis();
-  put(axis, "fault_bias", "pull_up");
-  EXPECT_EQ(issuesOfX(axis), Lines{"/axes/x/fault_bias: is \"pull_up\", but pins/fault is "
-                                   "missing"});
+TEST(ReadPins, RefusesWhatBelongsToAPinThatIsMissing) {
+  const std::vector<std::pair<std::string, ConfigValue>> keys = {{"fault_bias", "pull_up"},
+                                                                 {"fault_stop", "ramp"},
+                                                                 {"in_position_bias", "pull_up"},
+                                                                 {"in_position_timeout_ms", 200.0}};
+  for (const auto& [key, value] : keys) {
+    ConfigValue axis = linearAxis();
+    put(axis, key, value);
+    const std::string pin = key.rfind("fault", 0) == 0 ? "fault" : "in_position";
+    EXPECT_EQ(issuesOfX(axis),
+              lineOfX(key, "is " + value.shown() + ", but pins/" + pin + " is missing"));
+  }
+}
+
+TEST(ReadPins, ReadsTheInPositionPinOfADriverThatHasOne) {
+  ConfigValue axis = tb6600Axis();
+  put(axis, "driver", "cl57t");
+  put(axis, "pins/in_position", "GPIO4");
+  EXPECT_EQ(readX(axis).in_position->timeout, 1.0);
+  put(axis, "in_position_bias", "pull_up");
+  put(axis, "in_position_timeout_ms", 250);
+  put(axis, "pins/fault", "GPIO5");
+  put(axis, "fault_stop", "ramp");
+  const AxisConfig config = readX(axis);
+  ASSERT_TRUE(config.in_position && config.fault);
+  EXPECT_EQ(config.in_position->line, "GPIO4");
+  EXPECT_EQ(config.in_position->bias, Bias::kPullUp);
+  EXPECT_EQ(config.in_position->timeout, 0.25);
+  EXPECT_TRUE(config.fault->ramps);
+  expectIssues(axis, {{"in_position_timeout_ms", 0, "is 0, but must be above 0 and at most 60000"},
+                      {"fault_stop", "slowly", "is \"slowly\", but must be at_once or ramp"}});
+  put(axis, "driver", "tb6600");
+  drop(axis, "pins/fault");
+  drop(axis, "fault_stop");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("pins/in_position", "is \"GPIO4\", but the TB6600 has no in-position output"));
 }
 
 TEST(ReadPins, UsesEachLineOnce) {

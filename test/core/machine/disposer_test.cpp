@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace stepdriver::axis {
+namespace stepdriver::machine {
 namespace {
 
 /// Records the thread in which it was freed.
@@ -91,4 +91,4 @@ TEST(Disposer, FreesAllThatSeveralThreadsHandOver) {
 }
 
 }  // namespace
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::machine

@@ -1,16 +1,15 @@
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <functional>
 #include <future>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
 #include "support/refusal.h"
+#include "support/within.h"
 
 // A hold is a state of the machine. Whether axes move or not, it lasts until a resume or a stop of
 // the machine.
@@ -22,15 +21,7 @@ using axis::MoveEnd;
 using test::Bench;
 using test::linearAxis;
 using test::violationsOf;
-
-bool within(const std::function<bool()>& true_now) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
-  while (!true_now()) {
-    if (std::chrono::steady_clock::now() > end) return false;
-    std::this_thread::yield();
-  }
-  return true;
-}
+using test::within;
 
 class Hold : public testing::Test {
  protected:
@@ -49,12 +40,13 @@ class Hold : public testing::Test {
   void expectHeld() {
     for (const char* name : {"x", "y", "z"}) {
       EXPECT_TRUE(axis(name).state().held) << name;
-      EXPECT_REFUSED(axis(name).moveTo(0.01), "held; resume or stop it first");
-      EXPECT_REFUSED(axis(name).jog(0.01), "held; resume or stop it first");
+      EXPECT_REFUSED(axis(name).moveTo(0.01), "the machine is on hold; resume or stop it first");
+      EXPECT_REFUSED(axis(name).jog(0.01), "the machine is on hold; resume or stop it first");
     }
-    EXPECT_REFUSED(machine().moveLine({{"x", "y"}, {0.01, 0.01}}), "held; resume or stop it first");
+    EXPECT_REFUSED(machine().moveLine({{"x", "y"}, {0.01, 0.01}}),
+                   "the machine is on hold; resume or stop it first");
     EXPECT_REFUSED(machine().followTrajectory({{"x"}, {{1.0, {0.01}, {}, {}}}}),
-                   "held; resume or stop it first");
+                   "the machine is on hold; resume or stop it first");
   }
   void expectFree() {
     for (const char* name : {"x", "y", "z"}) {
@@ -208,8 +200,8 @@ TEST_F(Hold, RefusesWhatMovesNothingOnlyToAnAxisThatKeepsAGoal) {
   machine().advance(0.3);
   machine().hold();
   machine().advance(1.0);
-  EXPECT_REFUSED(axis("y").setPosition(0.0), "held; resume or stop it first");
-  EXPECT_REFUSED(axis("y").sleep(true), "held; resume or stop it first");
+  EXPECT_REFUSED(axis("y").setPosition(0.0), "the machine is on hold; resume or stop it first");
+  EXPECT_REFUSED(axis("y").sleep(true), "the machine is on hold; resume or stop it first");
   axis("x").setPosition(0.002);
   axis("x").sleep(true);
   axis("x").sleep(false);

@@ -147,6 +147,12 @@ TEST_F(Line, TakesTheTimeThatItIsGiven) {
   EXPECT_EQ(why, "x: the target can't be reached in 1.4 s; the limits of the axes allow 1.5 s");
 }
 
+TEST_F(Line, SaysItsDurationWithoutTheRoundingOfNanoseconds) {
+  const CoordinatedMove move = start({{"x"}, {0.9}});
+  EXPECT_EQ(move.duration, 1.4);
+  EXPECT_EQ(machine().wait(move).duration, 1.4);
+}
+
 TEST_F(Line, RefusesAVelocityAboveItsLimitsInItsDirection) {
   // x may move at 1 m/s, so 3 and 4 m: 5/3 m/s.
   EXPECT_EQ(refusal([&] { start({{"x", "y"}, {3.0, 4.0}, false, 1.25}); }), "");
@@ -167,8 +173,19 @@ TEST_F(Line, RefusesAVelocityThatItsAxesNeverReachWithoutStoppingThem) {
   const axis::Move move = bench->axis("x").moveTo(0.5);
   advance(0.2);
   const std::string why = refusal([&] { start({{"x", "y"}, {3.0, 4.0}, false, 50.0}); });
-  EXPECT_NE(why.find("x: the velocity 50 of the line is above "), std::string::npos) << why;
+  EXPECT_NE(why.find("x: the velocity 50 m/s of the line is above 1.41421 m/s, the highest "),
+            std::string::npos)
+      << why;
   EXPECT_EQ(bench->axis("x").wait(move).end, MoveEnd::kReached);
+}
+
+TEST_F(Line, GivesABoundThatItAccepts) {
+  // x may move at 1 m/s, so 1 and 0.666 m: 1.2014799... m/s.
+  const std::string why = refusal([&] { start({{"x", "y"}, {1.0, 2.0 / 3.0}, false, 1.3}); });
+  EXPECT_EQ(why,
+            "x: the velocity 1.3 m/s of the line is above the 1.20148 m/s that the limits of its "
+            "axes allow in its direction");
+  EXPECT_EQ(refusal([&] { start({{"x", "y"}, {1.0, 2.0 / 3.0}, false, 1.20148}); }), "");
 }
 
 TEST_F(Line, RefusesBeforeItsBacklashIsTakenUp) {
@@ -196,6 +213,22 @@ TEST_F(Line, StopsAllOfItsAxesAlongThePath) {
   expectClean();
 }
 
+TEST_F(Line, AStopOfItLeavesTheOneThatReplacedItAlone) {
+  const CoordinatedMove older = start({{"x", "y"}, {1.0, 0.7}});
+  advance(0.8);
+  const CoordinatedMove newer = start({{"x", "y"}, {0.2, 0.1}});
+  machine().stop(older);
+  EXPECT_EQ(machine().wait(newer).end, MoveEnd::kReached);
+  EXPECT_NEAR(position("y"), 0.1, 1e-12);
+
+  const CoordinatedMove stopped = start({{"x", "y"}, {1.2, 0.8}});
+  advance(0.8);
+  machine().stop(stopped);
+  EXPECT_EQ(machine().wait(stopped).end, MoveEnd::kStopped);
+  EXPECT_LT(position("y"), 0.7);
+  expectClean();
+}
+
 TEST_F(Line, IsHeldAndGoesOnWithoutLeavingIt) {
   const CoordinatedMove move = start({{"x", "y"}, {1.0, 0.7}});
   advance(0.6);
@@ -206,7 +239,8 @@ TEST_F(Line, IsHeldAndGoesOnWithoutLeavingIt) {
   EXPECT_NEAR(bench->axis("x").state().target, 1.0, 1e-12);
   expectOnTheLine(1.0, 0.7);
   EXPECT_FALSE(machine().result(move).has_value());
-  EXPECT_EQ(refusal([&] { bench->axis("x").moveTo(0.0); }), "x: held; resume or stop it first");
+  EXPECT_EQ(refusal([&] { bench->axis("x").moveTo(0.0); }),
+            "x: the machine is on hold; resume or stop it first");
   advance(2.0);
   machine().resume();
   advance(0.3);
@@ -363,6 +397,15 @@ TEST_F(Line, RelativeToAStopUnderWayCountsFromWhereThatEnds) {
   expectClean();
 }
 
+// Such a motion would be longer than one that can be planned.
+TEST_F(Line, RefusesADurationOfDecades) {
+  for (const double duration : {1e9 + 1.0, 3.9e9, 7.5e168, 1.7e308}) {
+    EXPECT_REFUSED(start({{"x", "y"}, {0.5, 0.4}, false, 0.0, duration}),
+                   "but must be at most 1000000000 s");
+  }
+  EXPECT_NEAR(start({{"x", "y"}, {0.5, 0.4}, false, 0.0, 1e9}).duration, 1e9, 1.0);
+}
+
 TEST_F(Line, RelativeToAJogWithoutAnEndIsRefused) {
   bench->axis("x").jog(0.5);
   advance(0.5);
@@ -376,16 +419,18 @@ TEST_F(Line, RefusesWhatItCannotDoAndMovesNothing) {
   const auto refused = [&](const machine::LineRequest& request) {
     return refusal([&] { start(request); });
   };
-  EXPECT_EQ(refused({{}, {}}), "no axis is named");
+  EXPECT_EQ(refused({{}, {}}), "no axis is named; there are x, y, c");
   EXPECT_EQ(refused({{"x", "q"}, {1.0, 1.0}}), "there is no axis q; there are x, y, c");
   EXPECT_EQ(refused({{"x", "x"}, {1.0, 1.0}}), "the axis x is named twice");
   EXPECT_EQ(refused({{"x", "y"}, {1.0}}), "there are 2 names, but 1 positions");
   EXPECT_EQ(refused({{"x", "y"}, {1.0, std::nan("")}}),
             "y: the position is nan m, but must be a finite number");
-  EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}, false, -1.0}),
-            "x: the velocity of the line is -1, but must be 0 or above, and finite");
+  EXPECT_EQ(
+      refused({{"x", "y"}, {1.0, 1.0}, false, -1.0}),
+      "x: the velocity of the line is -1, but must be a finite number above 0, or 0 for as fast as "
+      "the limits allow");
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}, false, 1.0, 1.0}),
-            "x: the line has a velocity and a duration; give only one of them");
+            "x: the line has a velocity, 1, and a duration, 1 s; give only one of them");
   bench->axis("y").enable(false);
   EXPECT_EQ(refused({{"x", "y"}, {1.0, 1.0}}), "y: disabled; enable it first");
   advance(1.0);

@@ -149,7 +149,7 @@ class Batch {
   // These commands are never refused for any other reason.
   void count(const Refused& refusal) {
     const std::string text = refusal.what();
-    if (text.find(": held; resume or stop it first") != std::string::npos) {
+    if (text.find(": the machine is on hold; resume or stop it first") != std::string::npos) {
       ++refused_.held;
     } else if (text.find("soft limit") != std::string::npos) {
       ++refused_.beyond_limits;

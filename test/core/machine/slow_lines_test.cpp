@@ -2,7 +2,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -28,27 +32,30 @@ using test::violationsOf;
 
 constexpr std::chrono::seconds kBound{60};
 
-/// Writes of one line wait until the test releases them.
+/// Writes of a line wait until the test releases them.
 class Gate {
  public:
-  explicit Gate(std::string line) : line_(std::move(line)) {}
-
-  void close() { closed_ = true; }
+  void close(const std::string& line) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    line_ = line;
+    closed_ = true;
+  }
   void open() {
     const std::lock_guard<std::mutex> lock(mutex_);
     closed_ = false;
     opened_.notify_all();
   }
   void pass(const std::string& line) {
-    if (line != line_ || !closed_) return;
+    if (!closed_) return;
     std::unique_lock<std::mutex> lock(mutex_);
+    if (line != line_) return;
     ++waiting_;
     opened_.wait(lock, [this] { return !closed_.load(); });
   }
   int waited() const { return waiting_; }
 
  private:
-  const std::string line_;
+  std::string line_;
   std::atomic<bool> closed_{false};
   std::atomic<int> waiting_{0};
   std::mutex mutex_;
@@ -101,17 +108,43 @@ class SlowLines : public testing::Test {
  protected:
   axis::Axis& axis(const std::string& name) { return machine_->axis(name); }
 
+  bool recovers() {
+    try {
+      machine_->recover();
+    } catch (const Refused&) {
+      return false;
+    }
+    return true;
+  }
+
+  /// Calls it in a thread of its own. @return the error that it ended with.
+  std::string errorOf(const std::function<void()>& call) {
+    const auto run = [call]() -> std::string {
+      try {
+        call();
+      } catch (const GpioError& error) {
+        return error.what();
+      }
+      return "it succeeded";
+    };
+    std::future<std::string>& answer = calls_.emplace_back(std::async(std::launch::async, run));
+    return answer.wait_for(kBound) == std::future_status::ready ? answer.get() : "no answer";
+  }
+
   std::vector<config::AxisConfig> axes_;
   pulse::VirtualClock clock_{1.0};
   sim::Rig rig_;
   gpio::SimulatedBackend lines_;
-  Gate gate_{"y.enable"};
+  Gate gate_;
   GatedBackend backend_;
   std::unique_ptr<machine::Machine> machine_;
+  // They end when the gate is open.
+  std::deque<std::future<std::string>> calls_;
+  std::future<axis::MoveResult> waiting_;
 };
 
 TEST_F(SlowLines, AHungWriteIsAFaultThatNamesTheLineAndDelaysNoOtherAxis) {
-  gate_.close();
+  gate_.close("y.enable");
   auto disabled = std::async(std::launch::async, [this]() -> std::string {
     try {
       axis("y").enable(false);
@@ -148,7 +181,7 @@ TEST_F(SlowLines, AHungWriteIsAFaultThatNamesTheLineAndDelaysNoOtherAxis) {
 }
 
 TEST_F(SlowLines, AnEmergencyStopIsServedWhileAWriteHangs) {
-  gate_.close();
+  gate_.close("y.enable");
   auto disabled = std::async(std::launch::async, [this] {
     try {
       axis("y").enable(false);
@@ -163,6 +196,58 @@ TEST_F(SlowLines, AnEmergencyStopIsServedWhileAWriteHangs) {
   EXPECT_EQ(axis("x").wait(move).end, MoveEnd::kEmergencyStop);
   ASSERT_EQ(disabled.wait_for(kBound), std::future_status::ready);
   EXPECT_FALSE(disabled.get());
+}
+
+// The pulse thread waits for the line: no axis can step.
+TEST_F(SlowLines, AHungWriteOfStepIsToldToAllWhoWaitAndNothingMovesWhenItReturns) {
+  const axis::Move move = axis("x").moveTo(0.08);
+  while (axis("x").state().position < 0.002) std::this_thread::yield();
+  gate_.close("x.step");
+  waiting_ = std::async(std::launch::async, [this, move] { return axis("x").wait(move); });
+  ASSERT_EQ(waiting_.wait_for(kBound), std::future_status::ready);
+  const axis::MoveResult result = waiting_.get();
+  EXPECT_EQ(result.end, MoveEnd::kFault);
+  const std::string why =
+      "x: the STEP line x.step can't be written: ETIMEDOUT, the chip doesn't answer; check the "
+      "cable and the supply of its chip";
+  EXPECT_EQ(result.message, why);
+  for (const char* name : {"x", "y"}) {
+    EXPECT_EQ(axis(name).state().fault, why);
+    EXPECT_FALSE(axis(name).state().position_valid);
+  }
+  // Nobody is told that something has stopped, or waits for it.
+  EXPECT_EQ(errorOf([this] { machine_->emergencyStop(); }), why);
+  EXPECT_EQ(errorOf([this] { machine_->stop(); }), why);
+  EXPECT_EQ(errorOf([this] { axis("x").stop(); }), why);
+  EXPECT_EQ(errorOf([this] { axis("y").moveTo(0.01); }), why);
+  EXPECT_EQ(errorOf([this] { machine_->recover(); }), why);
+
+  // The chip answers again: at most the pulse of that write goes out.
+  const std::int64_t before = rig_.report("x").pulses_forward;
+  gate_.open();
+  while (!machine_->whyHung().empty()) std::this_thread::yield();
+  EXPECT_NE(axis("x").state().fault, "") << "only recover ends it";
+  // It is refused until the pulse thread has ended all motions.
+  const auto end = std::chrono::steady_clock::now() + kBound;
+  while (!recovers()) ASSERT_LT(std::chrono::steady_clock::now(), end);
+  EXPECT_FALSE(axis("x").state().moving);
+  EXPECT_FALSE(axis("x").state().position_valid);
+  const std::int64_t after = rig_.report("x").pulses_forward;
+  EXPECT_LE(after, before + 1);
+  EXPECT_EQ(rig_.report("y").pulses_forward, 0);
+  EXPECT_EQ(std::llround(axis("x").state().position * 80'000.0), after);
+  EXPECT_EQ(axis("x").wait(axis("x").moveTo(0.01)).end, MoveEnd::kReached);
+  EXPECT_EQ(violationsOf(rig_.report("x")) + violationsOf(rig_.report("y")), "");
+}
+
+TEST_F(SlowLines, AHungWriteOfStepEndsTheCallsThatWaitForAnEmergencyStopOrTheEnd) {
+  axis("x").moveTo(0.08);
+  while (axis("x").state().position < 0.002) std::this_thread::yield();
+  gate_.close("x.step");
+  while (gate_.waited() == 0) std::this_thread::yield();
+  const std::string why = "the STEP line x.step can't be written: ETIMEDOUT";
+  EXPECT_NE(errorOf([this] { machine_->emergencyStop(); }).find(why), std::string::npos);
+  EXPECT_NE(errorOf([this] { machine_->shutdown(); }).find(why), std::string::npos);
 }
 
 }  // namespace

@@ -1,21 +1,20 @@
 #include "machine/state_file.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/contents_of.h"
+#include "support/full_disk.h"
+#include "support/temporary_folder.h"
 
 // Positions that survive a restart. 80 microsteps/mm, 1/16, so the translator is at Home every 0.8
 // mm.
@@ -24,28 +23,8 @@ namespace stepdriver {
 namespace {
 
 using test::Bench;
+using test::FullDisk;
 using test::linearAxis;
-
-// While it exists, a write of this process to a file fails, as on a full disk: EFBIG.
-class FullDisk {
- public:
-  FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit none = before_;
-    none.rlim_cur = 0;
-    setrlimit(RLIMIT_FSIZE, &none);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  void (*const handler_)(int);
-  rlimit before_{};
-};
 
 bool exists(const std::string& path) {
   struct stat facts {};
@@ -59,18 +38,7 @@ unsigned permissionsOf(const std::string& path) {
 
 class StateFileTest : public testing::Test {
  protected:
-  void SetUp() override {
-    char name[] = "/tmp/stepdriver_state_XXXXXX";
-    ASSERT_NE(mkdtemp(name), nullptr);
-    directory_ = name;
-    file_ = directory_ + "/state";
-    config_.holds_position_unpowered = true;
-  }
-  void TearDown() override {
-    bench_.reset();
-    for (const char* end : {"", ".lock", ".new", ".other"}) std::remove((file_ + end).c_str());
-    rmdir(directory_.c_str());
-  }
+  StateFileTest() { config_.holds_position_unpowered = true; }
 
   void start(bool threaded = false) {
     bench_.reset();
@@ -95,11 +63,7 @@ class StateFileTest : public testing::Test {
     ASSERT_EQ(bench_->move(position).end, axis::MoveEnd::kReached);
     bench_->machine->advance(0.001);
   }
-  std::string text() const {
-    std::ostringstream all;
-    all << std::ifstream(file_).rdbuf();
-    return all.str();
-  }
+  std::string text() const { return test::contentsOf(file_); }
   std::string whyNot() {
     try {
       start();
@@ -110,8 +74,8 @@ class StateFileTest : public testing::Test {
   }
 
   config::AxisConfig config_ = linearAxis("x");
-  std::string directory_;
-  std::string file_;
+  const test::TemporaryFolder folder_;
+  std::string file_ = folder_.path() + "/state";
   std::unique_ptr<Bench> bench_;
 };
 
@@ -220,7 +184,10 @@ TEST_F(StateFileTest, IsNotForAnotherAxis) {
   config_.steps_per_unit = 40'000.0;
   start();
   EXPECT_EQ(state().position, 0.0);
-  EXPECT_EQ(state().position_note, "the position was kept for another axis, of 80000 steps per m");
+  EXPECT_EQ(
+      state().position_note,
+      "the position was kept for another axis, of 80000 steps per m; this one has 40000 steps "
+      "per m");
   bench_.reset();
   config_.name = "z";
   start();
@@ -343,9 +310,8 @@ TEST_F(StateFileTest, IsForOneProgramAtATime) {
 }
 
 TEST_F(StateFileTest, RefusesToStartWhereItCannotBeWritten) {
-  file_ = directory_ + "/nowhere/state";
+  file_ = folder_.path() + "/nowhere/state";
   EXPECT_EQ(whyNot(), "the state file " + file_ + " can't be written: No such file or directory");
-  file_ = directory_ + "/state";
 }
 
 TEST_F(StateFileTest, RefusesToStartIfItIsNoRegularFile) {
@@ -361,9 +327,9 @@ TEST_F(StateFileTest, RefusesToStartIfItIsNoRegularFile) {
     expect_no_file(path, "a folder");
     ASSERT_EQ(symlink("/dev/zero", path.c_str()), 0);
     expect_no_file(path, "a symbolic link");
-    ASSERT_EQ(symlink((directory_ + "/nothing").c_str(), path.c_str()), 0);
+    ASSERT_EQ(symlink((folder_.path() + "/nothing").c_str(), path.c_str()), 0);
     expect_no_file(path, "a symbolic link");
-    EXPECT_FALSE(exists(directory_ + "/nothing"));
+    EXPECT_FALSE(exists(folder_.path() + "/nothing"));
   }
 }
 
@@ -373,9 +339,7 @@ TEST_F(StateFileTest, DoesNotWriteThroughALinkThatIsInItsWay) {
   ASSERT_EQ(symlink(other.c_str(), (file_ + ".new").c_str()), 0);
   start();
   standAt(0.008);
-  std::ostringstream left;
-  left << std::ifstream(other).rdbuf();
-  EXPECT_EQ(left.str(), "of somebody else");
+  EXPECT_EQ(test::contentsOf(other), "of somebody else");
   EXPECT_NE(text().find("x linear 80000 0.008"), std::string::npos) << text();
 }
 
@@ -402,7 +366,7 @@ TEST_F(StateFileTest, OnAFullDiskKeepsTheLastContentsAndSaysSoUntilThereIsRoom) 
   standAt(0.008);
   const std::string before = text();
   {
-    const FullDisk full;
+    const FullDisk full(0);
     bench_->move(0.016);
     bench_->machine->advance(0.001);
   }
@@ -421,7 +385,7 @@ TEST_F(StateFileTest, OnAFullDiskAtTheEndIsAnErrorOfItsOwnAndAllIsDisabled) {
   ASSERT_TRUE(bench_->report().energized);
   std::string why;
   {
-    const FullDisk full;
+    const FullDisk full(0);
     try {
       bench_->machine->shutdown();
     } catch (const StateFileError& error) {

@@ -89,8 +89,8 @@ TEST(StepRatesInMotion, AreThoseOfTheAxesThatMoveBesideTheOthersThatMove) {
 
 TEST(StepRates, AreLimitedByThePulseItself) {
   config::AxisConfig config = axisOf(8000.0);
-  config.timing.step_high_ns = 30'000;
-  config.timing.step_low_ns = 20'000;
+  config.driver.timing.step_high_ns = 30'000;
+  config.driver.timing.step_low_ns = 20'000;
   const StepRate rate =
       machine::stepRates({config}, capabilityOf({1000, 1'000'000, 2000, 500})).axes.front();
   EXPECT_DOUBLE_EQ(rate.held, 1e9 / (2'000.0 + 4'500.0 + 50'000.0));
@@ -150,15 +150,15 @@ TEST(StepRates, ThatDoNotHoldNameAxisAskedRateHeldRateAndReason) {
   EXPECT_FALSE(rates.holds());
   ASSERT_EQ(rates.complaints().size(), 1U);
   EXPECT_EQ(rates.complaints()[0],
-            "x: asks for 20001 steps/s, and this machine holds 20000 steps/s: wake-ups late by "
+            "x needs 20001 steps/s, but this computer can sustain 20000 steps/s: wake-ups late by "
             "10.0 us and calls of 2.5 us before the pulse is out must fit in a quarter of a step's "
             "interval");
   const std::vector<config::AxisConfig> two = {axisOf(19'000.0), axisOf(1000.0, "y")};
   const auto both =
       machine::stepRates(two, capabilityOf({10'000, 1'000'000, 2000, 500}, 2)).complaints();
   ASSERT_EQ(both.size(), 1U);
-  EXPECT_NE(both[0].find("holds 16667 steps/s while all axes move, 20000 steps/s with this one "
-                         "alone: "),
+  EXPECT_NE(both[0].find("but this computer can sustain 16666 steps/s while all axes move (20000 "
+                         "steps/s if only this one does): "),
             std::string::npos)
       << both[0];
 }
@@ -167,7 +167,7 @@ TEST(WhyNotInRealtime, NamesRightsAndAxes) {
   Capability capability = capabilityOf({10'000, 1'000'000, 2000, 500});
   EXPECT_EQ(machine::whyNotInRealtime({axisOf(20'000.0)}, capability), "");
   const std::string too_fast = machine::whyNotInRealtime({axisOf(20'001.0)}, capability);
-  EXPECT_NE(too_fast.find("x: asks for 20001 steps/s"), std::string::npos) << too_fast;
+  EXPECT_NE(too_fast.find("x needs 20001 steps/s"), std::string::npos) << too_fast;
   EXPECT_NE(too_fast.find("PREEMPT_RT"), std::string::npos) << too_fast;
   for (const pulse::RealtimeRights rights : {pulse::RealtimeRights{EPERM, 0}, {0, EPERM}}) {
     capability.rights = rights;
@@ -217,7 +217,7 @@ TEST_F(MachineOnSlowHardware, RefusesIfAskedToAndReleasesEveryLineUnmoved) {
     FAIL();
   } catch (const Refused& refused) {
     const std::string text = refused.what();
-    EXPECT_NE(text.find("x: asks for 50001"), std::string::npos) << text;
+    EXPECT_NE(text.find("x needs 50001"), std::string::npos) << text;
   }
   EXPECT_FALSE(backend.held);
   for (const SlowBackend::Write& write : backend.written) EXPECT_FALSE(write.edge) << write.line;
@@ -262,8 +262,8 @@ TEST_F(FormulaOnTheEngine, HoldsWhereLatenessLimits) {
 TEST_F(FormulaOnTheEngine, HoldsWhereThePulseLimits) {
   const auto slow = [](double rate) {
     config::AxisConfig config = axisOf(rate);
-    config.timing.step_high_ns = 30'000;
-    config.timing.step_low_ns = 20'000;
+    config.driver.timing.step_high_ns = 30'000;
+    config.driver.timing.step_low_ns = 20'000;
     return config;
   };
   const double rate = held({slow(1000.0)});

@@ -61,7 +61,7 @@ TEST_F(CpuLatency, IsHeldWhileTheEngineRunsOnARealClock) {
   test::RecordingLines lines(nowhere);
   SteadyClock clock;
   PulseEngine engine(lines, clock, {ChannelConfig{}}, 1'000'000);
-  PulseThread driver(engine, clock, nullptr, device);
+  PulseThread driver(engine, clock, nullptr, {device});
   EXPECT_TRUE(isOpen());
   EXPECT_EQ(driver.rights().latency_error, 0);
   driver.stop();
@@ -72,13 +72,13 @@ TEST_F(CpuLatency, IsLeftAloneOnAVirtualClockAndWhereItIsNotWanted) {
   VirtualClock virtual_clock;
   test::RecordingLines lines(virtual_clock);
   PulseEngine engine(lines, virtual_clock, {ChannelConfig{}}, 1'000'000);
-  const PulseThread driver(engine, virtual_clock, nullptr, device);
+  const PulseThread driver(engine, virtual_clock, nullptr, {device});
   EXPECT_FALSE(isOpen());
   EXPECT_EQ(driver.rights().latency_error, -1);
 
   SteadyClock clock;
   PulseEngine on_steady(lines, clock, {ChannelConfig{}}, 1'000'000);
-  const PulseThread unwanted(on_steady, clock, nullptr, "");
+  const PulseThread unwanted(on_steady, clock, nullptr, {""});
   EXPECT_EQ(unwanted.rights().latency_error, -1);
 }
 
@@ -89,10 +89,10 @@ TEST_F(CpuLatency, IsHeldWhileWakeUpsAreMeasured) {
     held = held && isOpen();
     return 0;
   };
-  EXPECT_EQ(measureWakeUps(clock, device).rights.latency_error, 0);
+  EXPECT_EQ(measureWakeUps(clock, {device}).rights.latency_error, 0);
   EXPECT_TRUE(held);
   EXPECT_FALSE(isOpen());
-  EXPECT_EQ(measureWakeUps(clock, "").rights.latency_error, -1);
+  EXPECT_EQ(measureWakeUps(clock, {""}).rights.latency_error, -1);
 }
 
 TEST(RealtimeRights, TellWhereEachIsGranted) {
@@ -121,6 +121,19 @@ TEST(RealtimeRights, AreGrantedWithoutAwakeProcessorsAndThatRefusalCounts) {
   EXPECT_TRUE((RealtimeRights{EPERM, 0, 0}.anyRefused()));
   EXPECT_FALSE((RealtimeRights{0, 0, 0}.anyRefused()));
   EXPECT_FALSE((RealtimeRights{0, 0, -1}.anyRefused()));
+}
+
+TEST(RealtimeRights, AreNotGrantedOnAnotherProcessorThanTheWantedOne) {
+  const RealtimeRights granted{0, 0, -1, 0, 3};
+  EXPECT_TRUE(granted.granted());
+  EXPECT_FALSE(granted.anyRefused());
+  EXPECT_EQ(granted.text(), "SCHED_FIFO 50; memory locked; only on processor 3");
+  const RealtimeRights refused{0, 0, -1, EINVAL, 3};
+  EXPECT_FALSE(refused.granted());
+  EXPECT_TRUE(refused.anyRefused());
+  EXPECT_NE(refused.text().find("not on processor 3 (Invalid argument): realtime/cpu must be"),
+            std::string::npos)
+      << refused.text();
 }
 
 }  // namespace

@@ -404,5 +404,61 @@ TEST_F(PulseEngineTest, RefusesMoreSuccessorsThanItHasRoomForAndKeepsThose) {
   EXPECT_EQ(engine->channel(0).ended, last);
 }
 
+TEST_F(PulseEngineTest, RefusesWhatWasPlannedBeforeAFaultAtRest) {
+  ChannelConfig faulty = config(0);
+  faulty.fault = Signal{0, true};
+  lines.inputs[0] = 0;
+  make({faulty, config(1)});
+  lines.inputs[0] = 1;
+  engine->inputsChanged();
+  engine->serve();
+  EXPECT_EQ(engine->channel(0).chip_faults, 1U);
+  const auto before = follow(cruise(1'000'000, 0, 100, 1000.0));
+  follows.back().faults = 0;
+  const auto other = follow(cruise(1'000'000, 0, 100, 1000.0), 1);
+  runOut();
+  EXPECT_EQ(engine->channel(0).taken, before);
+  EXPECT_EQ(engine->channel(0).accepted, 0U);
+  EXPECT_EQ(engine->channel(0).count, 0);
+  EXPECT_EQ(engine->channel(1).accepted, other);
+  EXPECT_EQ(engine->channel(1).count, 100);
+}
+
+TEST_F(PulseEngineTest, OnlyCountsAFaultOfAChipThatRamps) {
+  ChannelConfig ramps = config(0);
+  ramps.fault = Signal{0, true};
+  ramps.ramps_at_fault = true;
+  ChannelConfig ends = config(1);
+  ends.fault = Signal{1, true};
+  lines.inputs[0] = lines.inputs[1] = 0;
+  make({ramps, ends});
+  for (const int channel : {0, 1}) follow(cruise(1'000'000, 0, 100, 1000.0), channel);
+  runUntil(50'300'000);
+  lines.inputs[0] = lines.inputs[1] = 1;
+  engine->inputsChanged();
+  runOut();
+  EXPECT_EQ(engine->channel(0).chip_faults, 1U);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(0).count, 100) << "without an order to stop";
+  EXPECT_EQ(engine->channel(1).chip_faults, 1U);
+  EXPECT_EQ(engine->channel(1).end, EndReason::kChipFault);
+  EXPECT_EQ(engine->channel(1).count, 49);
+}
+
+TEST_F(PulseEngineTest, EndsAMotionWithoutAStepAtAFaultEvenIfTheChipRamps) {
+  ChannelConfig ramps = config(0);
+  ramps.fault = Signal{0, true};
+  ramps.ramps_at_fault = true;
+  lines.inputs[0] = 0;
+  make({ramps});
+  follow(cruise(100'000'000, 0, 100, 1000.0));
+  runUntil(50'000'000);
+  lines.inputs[0] = 1;
+  engine->inputsChanged();
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kChipFault);
+  EXPECT_EQ(engine->channel(0).count, 0);
+}
+
 }  // namespace
 }  // namespace stepdriver::pulse

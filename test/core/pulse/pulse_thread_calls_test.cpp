@@ -139,6 +139,11 @@ class Retargeting {
   }
 
  private:
+  // The ring must be there before the thread begins.
+  PulseEngine& recorded() {
+    engine_.recordTo(ring_);
+    return engine_;
+  }
   void post(const Command& command) {
     while (!engine_.post(command)) pause();
   }
@@ -186,8 +191,9 @@ class Retargeting {
 
   WatchingLines lines_;
   SteadyClock clock_;
+  PinRing ring_{std::vector<bool>(std::size_t{2} * kChannels), 1'000};
   PulseEngine engine_{lines_, clock_, configs(), 60'000'000'000};
-  PulseThread thread_{engine_, clock_};
+  PulseThread thread_{recorded(), clock_};
   std::vector<std::unique_ptr<motion::Profile>> profiles_;
   std::vector<std::vector<Follow>> follows_;
   const motion::Profile* followed_ = nullptr;

@@ -33,6 +33,23 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
   return {name, [=](Participants& all, int client) { all.post(client, name, wanted, meaning); }};
 }
 
+/// While z still decelerates at the configured jerk it gets a target, for which it may have to turn
+/// at a lower jerk, and is stopped again. The pauses differ with the steps before.
+std::deque<Turn> turns(std::size_t steps) {
+  constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
+  const auto pause = static_cast<pulse::Nanoseconds>(20 + steps % 7 * 5) * kMillisecond;
+  const auto short_pause = static_cast<pulse::Nanoseconds>(1 + steps % 5 * 4) * kMillisecond;
+  axis::AxisLimits smooth;
+  smooth.jerk = 5.0;
+  const Meaning slows_down = quiet(Meaning::Quiet::kSlowsDown, {kZ});
+  const machine::MoveTo move{kZ, 0.012, false, 0.0};
+  return {{0, "smooth limits of z", machine::SetLimits{kZ, smooth}, {}},
+          {0, "jog z", machine::Jog{kZ, 0.05, {}}, moving({kZ})},
+          {230 * kMillisecond, "stop z", machine::StopAxis{kZ}, slows_down},
+          {pause, "move z to 12 mm", move, moving({kZ})},
+          {short_pause, "stop z", machine::StopAxis{kZ}, slows_down}};
+}
+
 std::vector<Act> makeActs() {
   using Quiet = Meaning::Quiet;
   const std::vector<std::size_t> every = {kX, kY, kZ};
@@ -61,6 +78,8 @@ std::vector<Act> makeActs() {
               moving({kX, kY})),
       request("line of y and z by", machine::MoveLine{{kY, kZ}, {-0.005, 0.005}, true, 0.0, 0.0},
               moving({kY, kZ})),
+      {"stop z, move it at a lower jerk, and stop it",
+       [=](Participants& all, int client) { all.postInTurn(client, turns(all.steps())); }},
       {"trajectory of x and y",
        [](Participants& all, int client) {
          all.postTrajectory(client, {kX, kY}, 0.008);
@@ -119,6 +138,7 @@ std::vector<Act> makeActs() {
          all.pressSwitch(kX, true);
        }},
       {"chip fault of x", [](Participants& all, int) { all.breakChip(kX); }},
+      {"z is never in position", [](Participants& all, int) { all.neverInPosition(); }},
       {"steps of x fail", [](Participants& all, int) { all.failSteps(kX); }},
       {"turns of y fail", [](Participants& all, int) { all.failTurns(kY); }},
       {"switch of x can't be read", [](Participants& all, int) { all.failSwitch(kX); }},
@@ -137,6 +157,8 @@ const std::vector<Act>& acts() {
   static const std::vector<Act> all = makeActs();
   return all;
 }
+
+const Act& actOf(const Item& item) { return item.own ? *item.own : acts().at(item.act); }
 
 std::size_t actNamed(const std::string& name) {
   for (std::size_t i = 0; i < acts().size(); ++i) {

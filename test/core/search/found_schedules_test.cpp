@@ -78,6 +78,68 @@ TEST(FoundSchedules, AnAxisThatCouldNotJoinATrajectoryInTimeComesToRest) {
       {0, {does(0, 0, "move z to 6 mm"), does(1, 4, "trajectory of z")}, {{5, Who::kEngine, 10}}});
 }
 
+TEST(FoundSchedules, AMoveThatIsAboutToTurnIsStoppedWithoutGoingToItsTarget) {
+  for (std::size_t after = 0; after < 35; ++after) {
+    expectGood(
+        {0,
+         {does(1, 0, "jog x"), does(0, after, "stop z, move it at a lower jerk, and stop it")},
+         {}});
+  }
+}
+
+// What is refused for one axis leaves all others held.
+TEST(FoundSchedules, AResumeThatIsRefusedForOneAxisResumesNone) {
+  for (int variant = 0; variant < 3; ++variant) {
+    expectGood({variant,
+                {does(0, 0, "move x to 8 mm"), does(0, 0, "move z to 6 mm"), does(1, 60, "hold"),
+                 does(1, 200, "press x"), does(1, 8, "resume")},
+                {}});
+  }
+}
+
+// The engine refuses the order to continue, because it comes too late, and then a switch is in the
+// way.
+TEST(FoundSchedules, AMoveThatCanNoLongerBeResumedEndsAndItsCallerIsTold) {
+  for (std::size_t from = 64; from < 72; ++from) {
+    expectGood({0,
+                {does(0, 0, "move x to 8 mm"), does(1, 30, "hold"), does(1, 40, "resume"),
+                 does(0, 0, "press x")},
+                {{from, Who::kEngine, 40}}});
+  }
+}
+
+// The order to continue comes when the axis has just come to rest.
+TEST(FoundSchedules, AMoveIsResumedWhileItStillSlowsDown) {
+  for (std::size_t from = 58; from < 68; ++from) {
+    expectGood({0,
+                {does(0, 0, "move x to 8 mm"), does(1, 30, "hold"), does(1, 28, "resume"),
+                 does(0, 0, "plan x")},
+                {{from, Who::kEngine, 40}}});
+  }
+}
+
+// The other axis of the trajectory then has two goals, and comes to rest once.
+TEST(FoundSchedules, AnAxisHasOneOwnerIfItsTrajectoryIsTakenOverBeforeItBegan) {
+  for (std::size_t after = 0; after < 4; ++after) {
+    for (const char* ending : {"hold", "stop"}) {
+      expectGood({0,
+                  {does(0, 0, "move y to -5 mm"), does(0, 4, "trajectory of x and y"),
+                   does(1, 0, "move x to 8 mm"), does(0, after, "move y by 7 mm"),
+                   does(1, 30, ending), does(0, 100, "stop")},
+                  {{9, Who::kEngine, 12}}});
+    }
+  }
+}
+
+TEST(FoundSchedules, AHeldTrajectoryDoesNotReachItsEndIfAMoveTakesOverBeforeItGoesOn) {
+  for (int variant = 0; variant < 3; ++variant) {
+    expectGood({variant,
+                {does(0, 1, "trajectory of x and y"), does(0, 1, "hold"), does(0, 1, "resume"),
+                 does(1, 0, "move y to -5 mm")},
+                {{11, Who::kEngine, 200}}});
+  }
+}
+
 TEST(FoundSchedules, ATrajectoryThatTheEngineNeverTookDoesNotSucceedIfAJogTakesOver) {
   expectGood({0,
               {does(0, 0, "stream a jog of x"), does(1, 4, "trajectory of x and z")},

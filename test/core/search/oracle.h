@@ -63,6 +63,9 @@ class Oracle {
       return;
     }
     const Meaning& meaning = ended.meaning;
+    if (meaning.resumes) resumed_ = std::max(resumed_, ended.order);
+    // A resume that came after this hold was answered before it.
+    if (meaning.quiet == Meaning::Quiet::kHeld && ended.order < resumed_) return;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (!meaning.axes[axis]) continue;
       // A recover may have ended the fault of this axis while it still waits for another axis.
@@ -220,7 +223,9 @@ class Oracle {
   bool mayHaveBegun(std::size_t axis, const Quiet& quiet) const {
     return std::any_of(open_.begin(), open_.end(), [&](std::uint64_t id) {
       const Call& call = calls_.at(id);
-      return call.order > quiet.order && call.meaning.axes[axis] && ends(call.meaning, quiet);
+      if (call.order < quiet.order || !call.meaning.axes[axis]) return false;
+      if (quiet.kind != Meaning::Quiet::kEmergency) return ends(call.meaning, quiet);
+      return call.meaning.moves && isRecoveredFrom(quiet.order, call.order);
     });
   }
 
@@ -229,6 +234,7 @@ class Oracle {
   const std::function<pulse::Nanoseconds()> slipped_;
   std::uint64_t order_ = 0;
   std::uint64_t hold_ended_ = 0;
+  std::uint64_t resumed_ = 0;  // by the last resume that was answered
   std::map<std::uint64_t, Call> calls_;
   std::vector<std::uint64_t> open_;
   std::array<std::vector<Quiet>, kAxes> quiets_;

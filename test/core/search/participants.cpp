@@ -29,6 +29,8 @@ constexpr int kJogs = 12;
 constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
 constexpr pulse::Nanoseconds kQuietIsWatched = 250 * kMillisecond;
 constexpr std::size_t kMostSteps = 200'000;
+/// Of an axis with a brake. [mm/s]
+constexpr double kLoadFalls = 20.0;
 
 std::vector<config::AxisConfig> configsOf(int variant) {
   std::vector<config::AxisConfig> configs;
@@ -36,6 +38,7 @@ std::vector<config::AxisConfig> configsOf(int variant) {
     config::AxisConfig config = test::linearAxis(name, 20'000.0, 0.1, 2.0);
     config.steps_per_round = 100.0;
     config.fault = config::FaultPin{config.name + ".fault"};
+    config.driver.fault_end = driver::FaultEnd::kReset;
     configs.push_back(config);
   }
   config::HomingConfig homing;
@@ -49,9 +52,27 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   configs[1].align_on_microstep_change = true;
   configs[2].jerk = 50.0;
   configs[2].idle_timeout = 0.03;
-  if (variant == 0) configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
-  if (variant == 1) configs[2].idle_action = config::IdleAction::kSleep;
+  configs[2].driver.in_position_active = true;
+  configs[2].in_position = config::InPositionPin{"z.in_position", Bias::kAsIs, 0.05};
+  if (variant != 1) configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
+  if (variant != 0) configs[2].idle_action = config::IdleAction::kSleep;
+  if (variant == 1) {
+    configs[0].driver.fault_end = driver::FaultEnd::kEnable;
+    configs[0].fault->ramps = true;
+  }
+  if (variant == 2) {
+    for (config::AxisConfig* config : {&configs[0], &configs[2]}) {
+      config->brake =
+          config::BrakeConfig{config->name + ".brake", true, 6 * kMillisecond, 4 * kMillisecond};
+    }
+  }
   return configs;
+}
+
+machine::MachineOptions withButton() {
+  machine::MachineOptions options;
+  options.emergency_stop = config::InputSwitch{kEmergencyStop, true};
+  return options;
 }
 
 std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& configs) {
@@ -60,6 +81,8 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
     specs.push_back(test::rigAxis(config));
     specs.back().min_switch->position = -9.0;
     specs.back().max_switch->position = 16.0;
+    specs.back().settling_ns = 5 * kMillisecond;
+    if (config.brake) specs.back().load_falls = kLoadFalls;
   }
   return specs;
 }
@@ -88,6 +111,10 @@ std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisCo
   return slowing;
 }
 
+bool endsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
 }  // namespace
 
 const char* nameOf(Who who) {
@@ -105,7 +132,7 @@ Participants::Participants(const Schedule& schedule)
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
       rig_(rigOf(configs_), trace_),
       backend_(rig_, [this] { return clock_.now(); }),
-      wiring_(configs_, config::InputSwitch{kEmergencyStop, true}),
+      wiring_(configs_, withButton()),
       lines_(std::make_shared<FailingReads>(backend_.request(wiring_.outputs, wiring_.inputs))) {
   axis::LineNames names;
   for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
@@ -462,8 +489,9 @@ bool Participants::itemReady() const {
 void Participants::beginItem() {
   const Item item = schedule_.items[next_item_++];
   item_step_ = steps_;
-  note("begin " + acts()[item.act].name);
-  acts()[item.act].begin(*this, item.client);
+  const Act& act = actOf(item);
+  note("begin " + act.name);
+  act.begin(*this, item.client);
 }
 
 void Participants::post(int client, const std::string& name, machine::Request request,
@@ -532,20 +560,21 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   if (!now.state.moving) return now.memory.position;
   const machine::AxisSnapshot::Motion& last = now.motions.back();
   if (!last.target && !last.slows_down) return std::nullopt;
-  // Each turn on the way takes up the backlash again.
-  double motor = static_cast<double>(now.channel.count);
-  double slack = static_cast<double>(now.channel.slack);
-  const auto move_to = [&](double position) {
-    slack = std::clamp(slack + position - motor, 0.0, static_cast<double>(now.backlash));
-    motor = position;
+  // Each turn on the way takes up the backlash again. The motor turns by whole microsteps.
+  std::int64_t motor = now.channel.count;
+  std::int64_t slack = now.channel.slack;
+  const auto move_to = [&](motion::DoubleDouble position) {
+    const std::int64_t count = std::llround(position.value());
+    slack = std::clamp<std::int64_t>(slack + count - motor, 0, now.backlash);
+    motor = count;
   };
   constexpr pulse::Nanoseconds kStep = 1'000'000;
   for (auto time = clock_.now() - engine_->state().slipped; time < last.profile->endNs();
        time += kStep) {
-    move_to(last.profile->stateAt(time).position.value());
+    move_to(last.profile->stateAt(time).position);
   }
-  move_to(last.profile->endPosition().value());
-  return now.origin + (motor - slack) / now.steps_per_unit;
+  move_to(last.profile->endPosition());
+  return now.origin + static_cast<double>(motor - slack) / now.steps_per_unit;
 }
 
 // Checks the motions that a call has begun against its answer.
@@ -599,6 +628,22 @@ void Participants::checkSlowing(const Ask& asked) {
       oracle_.complain(configs_[axis].name + " doesn't slow down after " + asked.name);
     }
   }
+}
+
+void Participants::postInTurn(int client, std::deque<Turn> turns) {
+  if (turns.empty()) return;
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.from = clock_.now() + turns.front().after;
+  who.next = [this, client, turns = std::move(turns)]() mutable {
+    const Turn turn = std::move(turns.front());
+    turns.pop_front();
+    post(client, turn.name, turn.request, turn.meaning);
+    clients_[static_cast<std::size_t>(client)].on_answer =
+        [this, client, turns = std::move(turns)](const activity::Reply& /*reply*/) {
+          // A request that was held is answered by the stop that ends the script.
+          if (script_) postInTurn(client, turns);
+        };
+  };
 }
 
 void Participants::streamJog(int client, std::size_t axis) {
@@ -726,8 +771,16 @@ void Participants::pressSwitch(std::size_t axis, bool pressed) {
 
 void Participants::breakChip(std::size_t axis) {
   sim::RigFaults faults;
+  chip_broke_[axis] = true;
   faults.chip_fault_after = 5;
   rig_.setFaults(configs_[axis].name, faults);
+}
+
+void Participants::neverInPosition() {
+  sim::RigFaults faults;
+  faults.never_in_position = true;
+  rig_.setFaults(configs_[2].name, faults);
+  if (!never_in_position_) never_in_position_ = moves_.size();
 }
 
 void Participants::pressEmergencyStop(bool pressed) {
@@ -822,6 +875,10 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
   }
   const std::string violations = test::violationsOf(report);
   if (!violations.empty()) oracle_.complain(who + ": " + violations);
+  // Nothing holds the load while the brake takes hold after a fault of the chip.
+  if (report.fell > 0.0 && !chip_broke_[axis]) {
+    oracle_.complain(who + ": the load has fallen by " + std::to_string(report.fell) + " mm");
+  }
 }
 
 // If a position is said to be valid, the carriage is there.
@@ -847,6 +904,8 @@ void Participants::checkOutcomes() {
     const auto result = move.outcome->get();
     if (!result) {
       oracle_.complain("the outcome of " + name + " is not set");
+    } else if (endsWith(result->message, ": ")) {
+      oracle_.complain(name + " ends without a reason: " + result->message);
     } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
                std::abs(result->position - move.rest) > 1e-9) {
       oracle_.complain(name + " has reached " + std::to_string(result->position) +
@@ -857,6 +916,16 @@ void Participants::checkOutcomes() {
   for (const activity::AcceptedHoming& homing : homings_) {
     for (const auto& outcome : homing.outcomes) {
       if (!outcome->get()) oracle_.complain("the outcome of a homing is not set");
+    }
+  }
+}
+
+void Participants::checkInPosition() {
+  for (std::size_t i = never_in_position_.value_or(moves_.size()); i < moves_.size(); ++i) {
+    const auto& [name, move] = moves_[i];
+    const auto result = move.outcome->get();
+    if (name.rfind("move z", 0) == 0 && result && result->end == axis::MoveEnd::kReached) {
+      oracle_.complain(name + " is said to be done, but the driver was never in position");
     }
   }
 }
@@ -943,6 +1012,7 @@ std::vector<std::string> Participants::run() {
   }
   script_ = false;
   if (oracle_.complaints.empty()) {
+    checkInPosition();
     for (std::size_t i = 0; i < kAxes; ++i) rig_.setFaults(configs_[i].name, {});
     pressEmergencyStop(false);
     mendLines();

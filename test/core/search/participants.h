@@ -50,11 +50,14 @@ struct Deviation {
   std::size_t steps = 0;
 };
 
+struct Act;
+
 /// A line of a script: an action of a client, or an event of the machine.
 struct Item {
-  std::size_t act = 0;    ///< index in acts()
-  int client = 0;         ///< 0 or 1
-  std::size_t after = 0;  ///< steps after the item before it
+  std::size_t act = 0;               ///< index in acts()
+  int client = 0;                    ///< 0 or 1
+  std::size_t after = 0;             ///< steps after the item before it
+  std::shared_ptr<const Act> own{};  ///< done instead of the one in acts(), if there is any
 };
 
 /// Everything that determines the course of a run.
@@ -66,12 +69,21 @@ struct Schedule {
 
 class Participants;
 
+/// One of several requests of a client.
+struct Turn {
+  pulse::Nanoseconds after = 0;  ///< time since the answer to the request before it
+  std::string name;
+  machine::Request request;
+  Meaning meaning;
+};
+
 /// An action of a client, or an event.
 struct Act {
   std::string name;
   std::function<void(Participants&, int client)> begin;
 };
 const std::vector<Act>& acts();
+const Act& actOf(const Item& item);
 /// @return its index. @throw std::out_of_range
 std::size_t actNamed(const std::string& name);
 
@@ -93,6 +105,8 @@ class Participants {
   /// @name Actions of the acts
   /// @{
   void post(int client, const std::string& name, machine::Request request, const Meaning& meaning);
+  /// Posts each request when the one before it has been answered.
+  void postInTurn(int client, std::deque<Turn> turns);
   /// Jogs as a joystick does, without waiting for a result.
   void streamJog(int client, std::size_t axis);
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
@@ -103,6 +117,8 @@ class Participants {
   void pressSwitch(std::size_t axis, bool pressed);
   void pressEmergencyStop(bool pressed);
   void breakChip(std::size_t axis);
+  /// From now on z's driver isn't in position, whatever it does.
+  void neverInPosition();
   void failSteps(std::size_t axis);
   void failTurns(std::size_t axis);
   void failSwitch(std::size_t axis);
@@ -192,6 +208,7 @@ class Participants {
   void checkCount(std::size_t axis, const std::string& when);
   void checkRest();
   void checkOutcomes();
+  void checkInPosition();
   void probe();
   void probeAxis(std::size_t axis);
   void judgeDone();
@@ -237,9 +254,11 @@ class Participants {
   std::size_t item_step_ = 0;
   bool closed_ = false;
   std::vector<std::pair<std::string, axis::Move>> moves_;
+  std::optional<std::size_t> never_in_position_;  // how many moves there were by then
   std::array<std::uint64_t, kAxes> last_move_{};
   std::array<std::vector<Ordered>, kAxes> ordered_;
   std::array<bool, kAxes> steps_failed_{};
+  std::array<bool, kAxes> chip_broke_{};
   std::uint64_t input_stops_ = 0;
   bool engine_reads_inputs_ = false;
   std::vector<activity::AcceptedHoming> homings_;

@@ -9,7 +9,6 @@
 namespace stepdriver::sim {
 namespace {
 
-using driver::Model;
 using test::HandRig;
 using test::plainAxis;
 
@@ -17,7 +16,7 @@ constexpr double kTravel = 0.2;  // [mm] a full step, as in plainAxis()
 
 /// A max switch at 1 mm and a min switch at -1 mm: 5 full steps in either direction.
 RigAxisSpec axisWithSwitches() {
-  RigAxisSpec spec = plainAxis(Model::kTb6600);
+  RigAxisSpec spec = plainAxis("tb6600");
   spec.max_switch.emplace();
   spec.max_switch->line = "x.max";
   spec.max_switch->active_level = true;
@@ -133,6 +132,24 @@ TEST(RigSwitch, CountsStepsTowardsItWhileItReadsActive) {
   bench.pulse();
   EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 3}}))
       << "the min switch blocks the other direction; " << bench.report().carriage << " mm";
+}
+
+// Nobody can read a switch and step at the same instant.
+TEST(RigSwitch, CountsNoStepIfItIsPressedBetweenTheReadingAndTheStep) {
+  HandRig bench(axisWithSwitches());
+  RigFaults pressed;
+  pressed.max_stuck = true;
+  bench.ready().pulse(2);
+  EXPECT_FALSE(bench.reads("x.max"));
+  bench.rig.setFaults("x", pressed);
+  bench.pulse();
+  EXPECT_EQ(bench.report().totalViolations(), 0);
+  bench.pulse();
+  EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 1}}))
+      << "it wasn't read before this step";
+  EXPECT_TRUE(bench.reads("x.max"));
+  bench.pulse();
+  EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 2}}));
 }
 
 TEST(RigSwitch, SharesALineWithAnother) {

@@ -11,7 +11,6 @@
 namespace stepdriver::sim {
 namespace {
 
-using driver::Model;
 using test::HandRig;
 using test::plainAxis;
 
@@ -26,7 +25,7 @@ std::string beginningOf(const MemoryTrace& trace) {
 }
 
 RigAxisSpec axisWithBouncingSwitch() {
-  RigAxisSpec spec = plainAxis(Model::kTb6600);
+  RigAxisSpec spec = plainAxis("tb6600");
   spec.max_switch.emplace();
   spec.max_switch->line = "x.max";
   spec.max_switch->active_level = true;
@@ -37,7 +36,7 @@ RigAxisSpec axisWithBouncingSwitch() {
 }
 
 TEST(RigTrace, BeginsWithTheLevelsOfTheRequests) {
-  HandRig bench({plainAxis(Model::kA4988), plainAxis(Model::kTb6600, "y")});
+  HandRig bench({plainAxis("a4988"), plainAxis("tb6600", "y")});
   bench.request("x.step", false).request("x.dir", true).request("x.enable", true);
   bench.request("x.ms1", true).request("x.sleep", true).request("x.reset", true);
   bench.request("y.dir", true);
@@ -50,14 +49,14 @@ TEST(RigTrace, BeginsWithTheLevelsOfTheRequests) {
 }
 
 TEST(RigTrace, ShowsALaterRequestAsAnEdge) {
-  HandRig bench(plainAxis(Model::kTb6600));
+  HandRig bench(plainAxis("tb6600"));
   bench.request("x.step", false).wait(500).request("x.dir", true).request("x.enable", true);
   EXPECT_EQ(bench.trace->times("x", "dir", true), (std::vector<std::int64_t>{bench.now}));
   EXPECT_TRUE(bench.trace->times("x", "enable", true).empty()) << "it was high before";
 }
 
 TEST(RigTrace, HasOnlyWiredPinsAndLevelsOfTheLine) {
-  RigAxisSpec spec = plainAxis(Model::kTb6600);
+  RigAxisSpec spec = plainAxis("tb6600");
   spec.enable = Wire{};
   spec.step.inverted = true;
   HandRig bench(spec);

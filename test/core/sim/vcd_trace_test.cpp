@@ -1,10 +1,8 @@
 #include "sim/vcd_trace.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
-#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -15,6 +13,8 @@
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
+#include "support/contents_of.h"
+#include "support/full_disk.h"
 #include "support/hand_rig.h"
 
 namespace stepdriver::sim {
@@ -30,12 +30,7 @@ class VcdTraceTest : public testing::Test {
   ~VcdTraceTest() override { std::remove(path_.c_str()); }
 
  protected:
-  std::string text() const {
-    std::ifstream file(path_);
-    std::ostringstream all;
-    all << file.rdbuf();
-    return all.str();
-  }
+  std::string text() const { return test::contentsOf(path_); }
 
   static std::string whyNot(const std::string& path,
                             VcdTrace::Replaces replaces = VcdTrace::Replaces::kTraces) {
@@ -143,7 +138,7 @@ TEST_F(VcdTraceTest, HasNoBlanksOrSeparatorsInNames) {
 TEST_F(VcdTraceTest, IsTheSameForTheSameEdges) {
   const auto run = [&] {
     const auto trace = std::make_shared<VcdTrace>(path_);
-    Rig rig({test::plainAxis(driver::Model::kA4988)}, trace);
+    Rig rig({test::plainAxis("a4988")}, trace);
     const int step = rig.lineIndex("x.step");
     rig.onRequest(step, false, 42);
     for (int i = 0; i < 10; ++i) rig.onEdge(step, i % 2 == 0, 42 + 1'000 * i);
@@ -212,16 +207,11 @@ TEST_F(VcdTraceTest, EndsWithTheLastWriteThatSucceededIfTheDiskIsFull) {
     trace.begin({{"x", "step"}}, {false}, 0);
     trace.flush();
     so_far = text();
-    const auto before = std::signal(SIGXFSZ, SIG_IGN);
-    rlimit limit{};
-    getrlimit(RLIMIT_FSIZE, &limit);
-    rlimit full = limit;
-    full.rlim_cur = so_far.size() + 3;  // in the middle of a time stamp
-    setrlimit(RLIMIT_FSIZE, &full);
-    trace.edge(0, true, 123'456'789);
-    why = whyIncomplete(trace);
-    setrlimit(RLIMIT_FSIZE, &limit);
-    std::signal(SIGXFSZ, before);
+    {
+      const test::FullDisk full(so_far.size() + 3);  // in the middle of a time stamp
+      trace.edge(0, true, 123'456'789);
+      why = whyIncomplete(trace);
+    }
     trace.edge(0, false, 123'456'790);  // not without the one before
   }
   EXPECT_EQ(why, "the trace file " + path_ +

@@ -15,16 +15,15 @@ namespace stepdriver::test {
 /// A linear axis with every pin wired, two endstops, 1/16 microsteps, 80 microsteps/mm, 100 mm/s,
 /// 1000 mm/s^2, enabled on start.
 inline config::AxisConfig linearAxis(const std::string& name,
-                                     driver::Model model = driver::Model::kA4988) {
+                                     const std::string& driver_name = "a4988") {
   config::AxisConfig config;
   config.name = name;
   config.joint = name;
-  config.driver = model;
-  config.timing = driver::driverChipOf(model).timing;
+  config.driver = driver::driverChip(driver_name);
   config.pins.step.line = name + ".step";
   config.pins.dir.line = name + ".dir";
   config.pins.enable.line = name + ".enable";
-  if (model != driver::Model::kTb6600) {
+  if (driver_name != "tb6600") {
     config.pins.ms1.line = name + ".ms1";
     config.pins.ms2.line = name + ".ms2";
     config.pins.ms3.line = name + ".ms3";
@@ -58,8 +57,7 @@ inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
   const auto wire = [](const config::Pin& pin) { return sim::Wire{pin.line, pin.inverted}; };
   sim::RigAxisSpec spec;
   spec.name = config.name;
-  spec.model = config.driver;
-  spec.timing = config.timing;
+  spec.chip = config.driver;
   spec.step = wire(config.pins.step);
   spec.dir = wire(config.pins.dir);
   spec.enable = wire(config.pins.enable);
@@ -81,6 +79,11 @@ inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
     return spec_of;
   };
   if (config.fault) spec.fault_line = config.fault->line;
+  if (config.in_position) spec.in_position_line = config.in_position->line;
+  if (config.brake) {
+    spec.brake = sim::BrakeSpec{config.brake->line, config.brake->release_level,
+                                config.brake->release_ns, config.brake->engage_ns};
+  }
   spec.min_switch = endstop(config.endstop_min, -100.0);
   spec.max_switch = endstop(config.endstop_max, 100.0);
   return spec;

@@ -14,12 +14,11 @@ namespace stepdriver::test {
 
 /// An axis `x` with every pin that its chip has, without inversion, 0.2 mm for a full step, no
 /// switches.
-inline sim::RigAxisSpec plainAxis(driver::Model model, const std::string& name = "x") {
-  const driver::DriverChip& chip = driver::driverChipOf(model);
+inline sim::RigAxisSpec plainAxis(const std::string& model, const std::string& name = "x") {
+  const driver::DriverChip& chip = driver::driverChip(model);
   sim::RigAxisSpec spec;
   spec.name = name;
-  spec.model = model;
-  spec.timing = chip.timing;
+  spec.chip = chip;
   spec.step.line = name + ".step";
   spec.dir.line = name + ".dir";
   spec.enable.line = name + ".enable";
@@ -28,8 +27,8 @@ inline sim::RigAxisSpec plainAxis(driver::Model model, const std::string& name =
     spec.ms2.line = name + ".ms2";
     spec.ms3.line = name + ".ms3";
   }
-  if (chip.has_sleep) spec.sleep.line = name + ".sleep";
-  if (chip.has_reset) spec.reset.line = name + ".reset";
+  if (chip.sleep_asleep) spec.sleep.line = name + ".sleep";
+  if (chip.reset_held) spec.reset.line = name + ".reset";
   spec.full_step_travel = 0.2;
   return spec;
 }
@@ -50,7 +49,7 @@ struct HandRig {
   explicit HandRig(const std::vector<sim::RigAxisSpec>& specs)
       : trace(std::make_shared<sim::MemoryTrace>()), rig(specs, trace) {}
   explicit HandRig(const sim::RigAxisSpec& spec) : HandRig(std::vector<sim::RigAxisSpec>{spec}) {}
-  explicit HandRig(driver::Model model) : HandRig(plainAxis(model)) {}
+  explicit HandRig(const std::string& model) : HandRig(plainAxis(model)) {}
 
   /// Requests all lines of an axis so that it can make full steps, and waits until it is ready.
   HandRig& ready(const std::string& axis = "x") {

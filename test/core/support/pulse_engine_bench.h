@@ -40,11 +40,23 @@ class PulseEngineTest : public testing::Test {
 
   /// @param continues serial of the profile that this one continues.
   std::uint64_t follow(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
-    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
-    follows.push_back({channel, ++serial, profiles.back().get(), continues, restart_interval, 0,
-                       engine->stopsServed()});
+    plan(std::move(profile), channel, continues);
     postFollows(1);
     return serial;
+  }
+
+  // Adds the same to `follows`, for postFollows().
+  Follow& plan(motion::Profile profile, int channel = 0, std::uint64_t continues = 0) {
+    profiles.push_back(std::make_unique<motion::Profile>(std::move(profile)));
+    Follow& order = follows.emplace_back();
+    order.channel = channel;
+    order.serial = ++serial;
+    order.profile = profiles.back().get();
+    order.continues = continues;
+    order.restart_interval = restart_interval;
+    order.stops = engine->stopsServed();
+    order.faults = engine->channel(channel).faults();
+    return order;
   }
 
   // Puts the last elements of `follows`, this many, into one order.

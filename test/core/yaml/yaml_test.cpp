@@ -74,6 +74,22 @@ TEST(Yaml, TellsDoublesAsPyYamlDoes) {
   EXPECT_EQ(*valueOf("-.inf").as<double>(), -INFINITY);
 }
 
+TEST(Yaml, WritesNumbersThatAreNotFiniteAsItReadsThem) {
+  const std::string text = "a: .nan\nb: .inf\nc: -.inf\n";
+  EXPECT_EQ(textOf(parse(text, "axis.yaml")), text);
+}
+
+TEST(Yaml, WritesEveryTextSoThatItIsReadAsTheSame) {
+  for (const std::string text : {"a\r", "\r", "a\r\nb", "\x7f", "\xc3\xbc\x7f\xf0\x9f\x98\x80",
+                                 "\xef\xbf\xbe", "\x1b[2K", "a\tb ", "\xc2\x85", ""}) {
+    const ConfigValue value(ConfigValue::Map{{"a", ConfigValue(text)}});
+    const ConfigValue again = parse(textOf(value), "axis.yaml");
+    const auto* read = again.as<ConfigValue::Map>()->at("a").as<std::string>();
+    ASSERT_NE(read, nullptr);
+    EXPECT_EQ(*read, text);
+  }
+}
+
 TEST(Yaml, TellsBooleansAndNothing) {
   for (const char* text : {"true", "True", "yes", "on", "ON", "!!bool yes"}) {
     ASSERT_NE(valueOf(text).as<bool>(), nullptr) << text;
@@ -136,6 +152,13 @@ TEST(Yaml, SaysWhereItIsWrong) {
   EXPECT_NE(errorOf("a: &a [*a]\n").find("alias for a node that contains it"), std::string::npos);
 }
 
+// YAML::LoadAll() would return empty documents for ever.
+TEST(Yaml, RefusesATextThatContinuesWhereItMustEnd) {
+  const std::string why = "a second document begins here; only one is allowed";
+  EXPECT_EQ(errorOf(", a"), "axis.yaml:1:1: " + why);
+  EXPECT_EQ(errorOf("{a: 1}, b"), "axis.yaml:1:7: " + why);
+}
+
 TEST(Yaml, SaysWhichFileCannotBeRead) {
   for (const std::string path : {"/nowhere/at/all.yaml", "/"}) {
     try {
@@ -165,6 +188,27 @@ TEST(Yaml, RefusesAliasesThatStandForTooMuch) {
   EXPECT_NE(errorOf(merges).find(wanted), std::string::npos) << errorOf(merges);
   EXPECT_NE(errorOf("a: {<<: &a [*a]}\n").find("alias for a node that contains it"),
             std::string::npos);
+}
+
+TEST(Yaml, RefusesWhatIsNoTextAndTellsWhere) {
+  const std::string why = " is no text: a configuration is UTF-8 without control characters";
+  EXPECT_EQ(errorOf({"\x01\0\0\0\0\0\0\x0f", 8}), "axis.yaml:1:1: the byte 0x01" + why);
+  EXPECT_EQ(errorOf({"a: b\0c", 6}), "axis.yaml:1:5: the byte 0x00" + why);
+  EXPECT_EQ(errorOf("a: 1\nm\xc3\xbc: \x1b[2J"), "axis.yaml:2:5: the byte 0x1b" + why);
+  EXPECT_EQ(errorOf("\xff\xfe"
+                    "a"),
+            "axis.yaml:1:1: the byte 0xff" + why);
+  for (const char* not_utf8 :
+       {"\x80", "\xc3", "\xc0\xaf", "\xe0\x9f\xbf", "\xed\xa0\x80", "\xe2\x82", "\xf0\x8f\xbf\xbf",
+        "\xf4\x90\x80\x80", "\xf5\x80\x80\x80"}) {
+    EXPECT_NE(errorOf(not_utf8).find(why), std::string::npos) << testing::PrintToString(not_utf8);
+  }
+  for (const char* text : {"\xef\xbb\xbf"
+                           "a: b",
+                           "a: \xc3\xbc\xe2\x82\xac\xed\x9f\xbf\xf0\x9f\x98\x80",
+                           "a: b\t# \xc2\x85", "a: \"\\0\\x1b\""}) {
+    EXPECT_EQ(errorOf(text), "none");
+  }
 }
 
 TEST(Yaml, RefusesTooLongAText) {

@@ -27,7 +27,7 @@ TEST_F(TooFast, DoesNotStartWhereThatIsEnforcedAndLeavesEveryLineSafe) {
   node->set("realtime/policy", "enforce");
   node->launch();
   EXPECT_EQ(node->process().waitForExit(kBound).value_or(-1), 3) << node->process().output();
-  expectSays(node->process().output(), "x: asks for 1000000 steps/s");
+  expectSays(node->process().output(), "x needs 1000000 steps/s");
   const auto trace = record->read();
   EXPECT_TRUE(trace.edges(number(HardwareNode::kX.step)).empty());
   EXPECT_TRUE(timesSet(trace, number(HardwareNode::kX.enable), false).empty()) << "it was enabled";
@@ -36,7 +36,7 @@ TEST_F(TooFast, DoesNotStartWhereThatIsEnforcedAndLeavesEveryLineSafe) {
 
 TEST_F(TooFast, SaysSoAndStartsElse) {
   node->start();
-  expectSays(node->process().output(), "x: asks for 1000000 steps/s");
+  expectSays(node->process().output(), "x needs 1000000 steps/s");
   EXPECT_TRUE(record->read().edges(number(HardwareNode::kX.step)).empty())
       << "it measured with edges";
   node->process().signal(SIGTERM);

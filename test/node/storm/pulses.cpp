@@ -54,8 +54,9 @@ std::vector<Pulse> pulsesOf(const std::map<std::string, node_test::Waveform>& tr
   std::vector<Pulse> pulses;
   std::int64_t count = 0;
   const auto& step = waveform("step").edges;
+  const bool both_edges = waveform("step").both_edges;
   for (std::size_t i = 1; i < step.size(); ++i) {
-    if (!step[i].level) continue;
+    if (!step[i].level && !both_edges) continue;
     const std::int64_t time = step[i].time_ns;
     const int size = sixteenths(ms1.at(time), ms2.at(time), ms3.at(time));
     count += dir.at(time) ? size : -size;

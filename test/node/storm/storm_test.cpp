@@ -46,6 +46,7 @@ constexpr int kClients = 4;
 constexpr int kResets = 20;
 constexpr double kLongestStorm = 2.5;       // [s] between two calms
 constexpr double kLongestBackground = 0.8;  // [s] from the last motion that is asked for to its end
+constexpr double kRecording = 2.0;          // [s] until a flight recording is written
 // [MB] of the node, from the first quarter of the storm on. A node with a sanitizer needs another
 // `~most_growth`.
 constexpr double kMostGrowth = 8.0;
@@ -113,8 +114,13 @@ class Storm : public testing::Test {
 
   void TearDown() override {
     weather_ = Weather::kOver;
-    // A call that a node never answers would not return.
-    if (failed_) node_.process().signal(SIGKILL);
+    if (failed_) {
+      // Its flight recorder tells what it was asked and did.
+      node_.process().signal(SIGUSR1);
+      sleepFor(kRecording);
+      // A call that a node never answers would not return.
+      node_.process().signal(SIGKILL);
+    }
     for (std::thread& thread : threads_) thread.join();
   }
 
@@ -195,11 +201,14 @@ void Storm::endMotions() {
 
 void Storm::stopAll() {
   ender_->trigger(Kind::kStop, kAllAxes, "stop");
+  const int states = states_->count();
   const bool idle = waitUntil([&] {
     return !isAlive() || std::all_of(clients_.begin(), clients_.end(),
                                      [](const StormClient& client) { return client.isIdle(); });
   });
-  if (!idle) fail("calls have no answer after a stop: " + unanswered());
+  if (idle) return;
+  fail("calls have no answer after a stop, but " + std::to_string(states_->count() - states) +
+       " axis_states have come: " + unanswered());
 }
 
 void Storm::calm() {

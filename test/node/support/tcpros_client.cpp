@@ -42,14 +42,18 @@ std::string serviceUri(const std::string& service) {
   return found ? static_cast<std::string>(uri) : std::string();
 }
 
-TcprosClient::TcprosClient(const std::string& service, int receive_buffer)
+std::uint16_t servicePort(const std::string& service) {
+  std::string host;
+  std::uint32_t port = 0;
+  EXPECT_TRUE(ros::network::splitURI(serviceUri(service), host, port)) << service;
+  return static_cast<std::uint16_t>(port);
+}
+
+TcprosClient::TcprosClient(std::uint16_t port, int receive_buffer)
     : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
   if (receive_buffer > 0) {
     setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof(receive_buffer));
   }
-  std::string host;
-  std::uint32_t port = 0;
-  EXPECT_TRUE(ros::network::splitURI(serviceUri(service), host, port));
   timeval bound{};
   bound.tv_sec = kBound.count();
   setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &bound, sizeof(bound));
@@ -57,12 +61,17 @@ TcprosClient::TcprosClient(const std::string& service, int receive_buffer)
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_port = htons(port);
   EXPECT_EQ(connect(socket_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0)
-      << service << " takes no connection at port " << port << ", errno " << errno;
+      << "no connection to port " << port << ", errno " << errno;
 }
 
 TcprosClient::~TcprosClient() { close(socket_); }
+
+void TcprosClient::resetAtEnd() const {
+  const linger at_once{1, 0};
+  setsockopt(socket_, SOL_SOCKET, SO_LINGER, &at_once, sizeof(at_once));
+}
 
 bool TcprosClient::send(const std::string& bytes) const {
   std::size_t sent = 0;
@@ -119,13 +128,23 @@ bool TcprosClient::introduce(const std::string& service, bool persistent) const 
   return !header.empty() && header.count("error") == 0;
 }
 
-bool TcprosClient::call() const {
-  if (!send(lengthBytes(0))) return false;
+bool TcprosClient::request(const std::string& fields) const {
+  return send(lengthBytes(static_cast<std::uint32_t>(fields.size())) + fields);
+}
+
+std::optional<std::string> TcprosClient::answer() const {
   const std::string begin = receive(5);
-  if (begin.size() < 5 || begin[0] != 1 || lengthOf(begin.substr(1)) > kMostReceived) return false;
+  if (begin.size() < 5 || begin[0] != 1 || lengthOf(begin.substr(1)) > kMostReceived) return {};
   const std::uint32_t length = lengthOf(begin.substr(1));
-  const std::string answer = receive(length);
-  return answer.size() == length && length >= 5 && answer[0] == 1;
+  std::string fields = receive(length);
+  if (fields.size() != length) return {};
+  return fields;
+}
+
+bool TcprosClient::call() const {
+  if (!request({})) return false;
+  const std::optional<std::string> fields = answer();
+  return fields && fields->size() >= 5 && fields->front() == 1;
 }
 
 std::string lengthBytes(std::uint32_t length) {

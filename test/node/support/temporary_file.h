@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
+
+#include "support/contents_of.h"
 
 namespace stepdriver::node_test {
 
@@ -25,10 +25,7 @@ class TemporaryFile {
 
   std::string path() const { return path_.string(); }
   bool exists() const { return std::filesystem::exists(path_); }
-  std::string text() const {
-    std::ifstream file(path_);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string text() const { return test::contentsOf(path()); }
 
  private:
   /// A test's name; if the test has a parameter, without the slash in front of it.

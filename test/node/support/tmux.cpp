@@ -17,6 +17,12 @@ std::string quoted(const std::string& text) {
   return shell + "'";
 }
 
+// Each server has a socket of its own: the one before it may still be ending.
+std::string socketName() {
+  static int servers = 0;
+  return "stepdriver_" + std::to_string(getpid()) + "_" + std::to_string(++servers);
+}
+
 }  // namespace
 
 bool Tmux::possible() {
@@ -30,7 +36,7 @@ bool Tmux::possible() {
 
 // tmux starts in a UTF-8 locale only. The shell ends by itself in case a crashed test can't end it.
 Tmux::Tmux(int columns, int rows)
-    : command_("LC_ALL=C.UTF-8 tmux -L stepdriver_" + std::to_string(getpid()) + " -f /dev/null ") {
+    : command_("LC_ALL=C.UTF-8 tmux -L " + socketName() + " -f /dev/null ") {
   if (!there_) return;  // the test is skipped
   run("new-session -d -x " + std::to_string(columns) + " -y " + std::to_string(rows) +
       " 'timeout --foreground 300 env PS1=\"shell> \" sh'");

@@ -30,6 +30,13 @@ std::map<std::string, Waveform> readVcd(const std::string& path) {
       std::string variable;
       words >> type >> width >> id >> variable;
       names[id] = std::string(scope).append("/").append(variable);
+    } else if (first == "$comment") {
+      std::string pin;
+      std::string level;
+      words >> pin >> first >> level;
+      const auto dot = pin.rfind('.');
+      if (level != "both" || dot == std::string::npos) continue;
+      waveforms[pin.substr(0, dot) + "/" + pin.substr(dot + 1)].both_edges = true;
     } else if (!first.empty() && first[0] == '#') {
       time = std::stoll(first.substr(1));
     } else if (!first.empty() && (first[0] == '0' || first[0] == '1')) {

@@ -14,6 +14,7 @@ struct Waveform {
     bool level;
   };
   std::vector<Edge> edges;  ///< the first is the initial level
+  bool both_edges = false;  ///< each edge is a step, as the file says
 
   bool last() const { return edges.back().level; }
   std::int64_t lastEdgeTime() const { return edges.back().time_ns; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -25,9 +26,17 @@ constexpr double configUnitsPerUnit(Kind kind) {
   return kind == Kind::kLinear ? 1000.0 : 180.0 / 3.14159265358979323846;
 }
 
+/// The axis's unit in messages and on every ROS interface: "m" or "rad".
+constexpr const char* unitOf(Kind kind) { return kind == Kind::kLinear ? "m" : "rad"; }
+
 /// A place of an axis with its unit, as messages show it: rounded to what a microstep is worth, so
 /// that the rounding of sums doesn't show. "0.05 m"
 std::string placeText(double position, Kind kind, double steps_per_unit);
+
+/// A distance between two places of an axis, with its unit: rounded like a place. One that is
+/// shorter than a microstep keeps two digits, because a target need not be on a whole microstep.
+/// "0.0000063 m"
+std::string distanceText(double distance, Kind kind, double steps_per_unit);
 
 /// A line of the driver chip. An empty name: the pin isn't wired.
 struct Pin {
@@ -37,7 +46,8 @@ struct Pin {
   bool wired() const { return !line.empty(); }
 };
 
-/// The lines to the pins of a driver chip. ms1 to ms3 are M0 to M2 on a DRV8825.
+/// The lines to the pins of a driver chip. ms1 to ms3 are M0 to M2 on a DRV8825. On a driver with
+/// CW and CCW inputs, step is CW and dir is CCW.
 struct Pins {
   Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
 };
@@ -52,10 +62,29 @@ struct InputSwitch {
 /// A switch at one end of an axis.
 using Endstop = InputSwitch;
 
-/// The chip's nFAULT: an open drain that is pulled low at over-current or over-temperature.
+/// The driver's fault or alarm output, such as nFAULT: an open drain that is pulled low at
+/// over-current or over-temperature.
 struct FaultPin {
   std::string line;
   Bias bias = Bias::kAsIs;
+  /// At a fault in motion the axis decelerates to rest; false: its steps end at once.
+  bool ramps = false;
+};
+
+/// The in-position output of a closed-loop driver, which a motion waits for at its end.
+struct InPositionPin {
+  std::string line;
+  Bias bias = Bias::kAsIs;
+  double timeout = 1.0;  ///< [s] after the last step; if it is missing by then, that is a fault
+};
+
+/// A brake that holds the load while the motor can't, such as that of a vertical axis. It is
+/// engaged before the motor loses its current, and released after the current has come.
+struct BrakeConfig {
+  std::string line;
+  bool release_level = true;    ///< level of the line that releases it; the other one engages it
+  std::int64_t release_ns = 0;  ///< [ns] from that level until the motor can turn
+  std::int64_t engage_ns = 0;   ///< [ns] from the other level until it holds the load
 };
 
 /// How the motor's current is switched off at rest.
@@ -92,8 +121,7 @@ struct AxisConfig {
   std::string name;
   std::string joint;  ///< its name in joint_states and in the URDF
   Kind kind = Kind::kLinear;
-  driver::Model driver = driver::Model::kA4988;
-  driver::Timing timing{};
+  driver::DriverChip driver;  ///< with the overrides of the configuration
   Pins pins;
 
   int microsteps = 1;            ///< microsteps per full step, as counted by steps_per_unit
@@ -117,6 +145,9 @@ struct AxisConfig {
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
   std::optional<FaultPin> fault;
+  std::optional<InPositionPin> in_position;
+  /// ENABLE or SLEEP is wired if there is a brake.
+  std::optional<BrakeConfig> brake;
 
   std::optional<HomingConfig> homing;
   bool require_homing = false;  ///< absolute moves are refused until the axis is homed

@@ -121,19 +121,24 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 /// @code{.yaml}
 /// axes:
 ///   x:                          # [a-zA-Z][a-zA-Z0-9_]*
-///     driver: a4988             # a4988, drv8825 or tb6600
+///     driver: a4988             # a name of driverChipNames(), or step_dir: see `chip`
 ///     joint: x_joint            # default: the axis's name
 ///     pins:                     # `chip:offset` or the name of a line; each once, except enable
 ///       step: "gpiochip0:17"
 ///       dir: "gpiochip0:27"
 ///       enable: "gpiochip0:22"  # optional, like all pins below
-///       ms1: "gpiochip0:5"      # ms1 to ms3 all or none; m0 to m2 on a drv8825; not on a tb6600
+///       ms1: "gpiochip0:5"      # all microstep pins or none; m0 to m2 on a drv8825 or drv8434
 ///       ms2: "gpiochip0:6"
 ///       ms3: "gpiochip0:13"
-///       sleep: "gpiochip0:19"   # not on a tb6600
-///       reset: "gpiochip0:26"   # not on a tb6600
+///       sleep: "gpiochip0:19"   # on drivers that have it
+///       reset: "gpiochip0:26"   # on drivers that have it
+///     fault_bias: as_is         # of pins/fault
+///     fault_stop: at_once       # or ramp: how a fault of the driver ends a motion
+///     in_position_bias: as_is   # of pins/in_position
+///     in_position_timeout_ms: 1000.0  # it must become active within this time after a motion
 ///     invert: {dir: true}       # of wired pins; default: false
-///     common_anode: false       # tb6600: step, dir and enable inverted; then only dir in `invert`
+///     common_anode: false       # optocouplers: step, dir and enable inverted; then only dir in
+///                               # `invert`
 ///     microsteps: 16
 ///     # two ways to scale the axis; `degree` and `deg` instead of `mm` on a rotary axis:
 ///     steps_per_mm: 80.0        # [microsteps/mm] at `microsteps`; steps_per_degree
@@ -154,6 +159,15 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     endstops:                 # both optional
 ///       min: {pin: "gpiochip0:20", active_level: low}   # low or high
 ///       max: {pin: "gpiochip0:21", active_level: low}
+///     brake:                    # default: no brake; needs pins/enable or pins/sleep
+///       {pin: "gpiochip0:12", release_level: high, release_ms: 60.0, engage_ms: 30.0}
+///     chip:                     # each overrides the named chip's
+///       {step_inputs: step_dir,   # or cw_ccw: the pins are cw and ccw instead of step and dir
+///        step_edges: one,          # or both: each edge of step is a step
+///        step_active: high, enable_active: low, sleep_active: low, reset_active: none,
+///        fault_active: none, fault_ended_by: power, in_position_active: none, when_disabled: held,
+///        when_asleep: home,
+///        microstep_codes: "1 LLL, 2 HLL"}
 ///     timing:                   # each overrides the chip's
 ///       {step_high_us: 1.0, step_low_us: 1.0, dir_setup_us: 0.2, dir_hold_us: 0.2,
 ///        mode_setup_us: 0.2, mode_hold_us: 0.2, enable_ms: 0.0, wake_ms: 1.0,

@@ -1,24 +1,22 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-/// The requirements of the driver chips. Data, no I/O.
-///
-/// Sources: A4988: Allegro datasheet 4988-DS. DRV8825: TI datasheet SLVSA73F. TB6600 module:
-/// DFRobot's TB6600 manual V1.2; if it gives no figure, the needs of slower clones.
+/// What step/dir drivers require, as data: a chip that a configuration describes and a named one
+/// are the same thing. No I/O.
 namespace stepdriver::driver {
 
-/// The known driver chips.
-enum class Model { kA4988, kDrv8825, kTb6600 };
-
-/// The levels of the microstep pins MS1 MS2 MS3 (M0 M1 M2 on the DRV8825); true is high.
+/// The levels of the microstep pins, in the order of their numbers (MS1 MS2 MS3, M0 M1 M2); true is
+/// high. A chip with two of them leaves the third one low.
 using ModeCode = std::array<bool, 3>;
+constexpr std::size_t kMostModePins = std::tuple_size_v<ModeCode>;
 
-/// One microstep mode and the code that selects it.
+/// One code of the microstep pins and the mode that it selects.
 struct Mode {
   int microsteps;  ///< microsteps per full step
   ModeCode code;
@@ -26,44 +24,78 @@ struct Mode {
 
 /// The times that the chip requires, in nanoseconds. The configuration can override each of them.
 struct Timing {
-  std::int64_t step_high_ns;   ///< shortest active STEP pulse
-  std::int64_t step_low_ns;    ///< shortest gap between two pulses
-  std::int64_t dir_setup_ns;   ///< DIR stable before the active STEP edge
-  std::int64_t dir_hold_ns;    ///< DIR stable after the active STEP edge
-  std::int64_t mode_setup_ns;  ///< microstep pins stable before the active STEP edge
-  std::int64_t mode_hold_ns;   ///< microstep pins stable after the active STEP edge
-  std::int64_t enable_ns;      ///< from enabling to the first STEP
-  std::int64_t wake_ns;        ///< from the end of SLEEP to the first STEP
-  std::int64_t reset_low_ns;   ///< how long RESET is held
-  std::int64_t reset_wait_ns;  ///< from the end of RESET to the first STEP
+  std::int64_t step_high_ns = 0;   ///< shortest active STEP pulse
+  std::int64_t step_low_ns = 0;    ///< shortest gap between two pulses
+  std::int64_t dir_setup_ns = 0;   ///< DIR stable before the active STEP edge
+  std::int64_t dir_hold_ns = 0;    ///< DIR stable after the active STEP edge
+  std::int64_t mode_setup_ns = 0;  ///< microstep pins stable before the active STEP edge
+  std::int64_t mode_hold_ns = 0;   ///< microstep pins stable after the active STEP edge
+  std::int64_t enable_ns = 0;      ///< from enabling to the first STEP
+  std::int64_t wake_ns = 0;        ///< from the end of SLEEP to the first STEP
+  std::int64_t reset_low_ns = 0;   ///< how long RESET is held, or ENABLE off to end a fault
+  std::int64_t reset_wait_ns = 0;  ///< from the end of RESET to the first STEP
 };
 
-/// A driver chip according to its datasheet, wired without inversions.
+/// What a chip does with STEP and with its translator while it is disabled or asleep.
+enum class TranslatorState {
+  kHeld,    ///< it ignores STEP, and its translator stays
+  kCounts,  ///< STEP moves the translator although the outputs are off
+  kHome,    ///< it ignores STEP, and its translator goes to Home
+};
+
+/// What ends the report of a fault when its cause is gone.
+enum class FaultEnd {
+  kItself,  ///< nothing is needed: it isn't latched
+  kReset,   ///< a pulse on RESET
+  kEnable,  ///< ENABLE switched off for Timing::reset_low_ns, and on again
+  kPower,   ///< no line: only switching the driver's power off
+};
+
+/// How the steps reach a driver.
+enum class StepInputs {
+  kStepDir,  ///< pulses on STEP, in the direction of DIR
+  kCwCcw,    ///< pulses on CW are steps forward, pulses on CCW steps backward
+};
+
+/// A driver chip or a driver box according to its datasheet, wired without inversions.
 struct DriverChip {
-  Model model;
-  std::string name;   ///< as in configurations: a4988, drv8825, tb6600
+  std::string name;   ///< as in configurations: a4988
   std::string title;  ///< as in messages: A4988
   Timing timing;
-  std::vector<Mode> modes;      ///< codes that software can select; empty: set by DIP switches
-  std::vector<int> microsteps;  ///< the available modes, set by pins or by switches
-  bool has_sleep;
-  bool has_reset;
-  bool has_fault;              ///< nFAULT: open drain, low at a fault, latched until RESET
-  bool counts_while_disabled;  ///< STEP moves the translator although the outputs are off
-  bool step_active;            ///< the level of STEP after its active edge
-  bool enable_on;              ///< level of ENABLE that energizes the motor
-  bool sleep_asleep;           ///< level of SLEEP that puts the chip to sleep
-  bool reset_held;             ///< level of RESET that holds the translator at Home
+
+  /// Codes that software can select; empty: the mode is set by switches or straps. If several codes
+  /// select the same mode, software uses the first.
+  std::vector<Mode> modes;
+  int mode_pins = 0;                 ///< how many microstep pins there are
+  bool mode_pins_from_0 = false;     ///< their names are M0 M1 M2, not MS1 MS2 MS3
+  std::vector<int> microsteps;       ///< the available modes, set by pins, straps or switches
+  bool opto_inputs = false;          ///< the inputs are LEDs, which can be wired to a common anode
+  bool step_active = true;           ///< the level of STEP after its active edge
+  bool enable_on = false;            ///< level of ENABLE that energizes the motor
+  std::optional<bool> sleep_asleep;  ///< level of SLEEP that puts it to sleep; empty: no such pin
+  std::optional<bool> reset_held;    ///< level of RESET that holds the translator at Home
+  std::optional<bool> fault_active;  ///< level of its fault output at a fault; empty: no such pin
+  FaultEnd fault_end = FaultEnd::kPower;
+  std::string fault_name = "its fault output";  ///< as in messages: nFAULT
+  /// Level of its in-position output while the motor is in position; empty: no such pin.
+  std::optional<bool> in_position_active;
+  std::string in_position_name = "its in-position output";  ///< as in messages: PEND
+  StepInputs step_inputs = StepInputs::kStepDir;
+  /// Each edge of STEP is a step; step_high_ns and step_low_ns are the shortest times between them.
+  bool both_edges = false;
+  TranslatorState disabled = TranslatorState::kHeld;
+  TranslatorState asleep = TranslatorState::kHome;
 };
 
-/// The data of a chip, which live as long as the program.
-const DriverChip& driverChipOf(Model model);
-
 /// @param name in upper or lower case.
-/// @return nullptr if there is no driver of that name.
+/// @return a named chip, which lives as long as the program; nullptr if there is no such name.
 const DriverChip* findDriverChip(const std::string& name);
 
-/// Names of all drivers, for messages and checks.
+/// @param name in upper or lower case.
+/// @throw std::out_of_range if there is no driver of that name.
+const DriverChip& driverChip(const std::string& name);
+
+/// Names of all named chips, for messages and checks.
 std::vector<std::string> driverChipNames();
 
 /// @return the code with which software selects this mode; empty if the mode is unknown or is set
@@ -71,16 +103,25 @@ std::vector<std::string> driverChipNames();
 std::optional<ModeCode> codeOf(const DriverChip& chip, int microsteps);
 
 /// @return the mode that the chip selects at these levels; empty if the datasheet leaves the code
-///   undefined or the chip has no microstep pins. Chips decode more codes than codeOf() uses.
+///   undefined or the chip has no microstep pins.
 std::optional<int> microstepsOf(const DriverChip& chip, const ModeCode& code);
+
+/// @return the modes that software can select, in the order of their first codes.
+std::vector<int> selectableMicrosteps(const DriverChip& chip);
 
 /// The path from one mode to another on which each code differs from the one before it in one pin,
 /// and every code is defined. A kernel driver may set pins one after the other; on this path no
 /// undefined code appears in passing. The first code is left out; the path is empty if both modes
 /// are the same.
 ///
-/// @throw std::invalid_argument if a mode has no code on this chip.
+/// @throw std::invalid_argument if a mode has no code on this chip, or no such path leads to it.
 std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int to_microsteps);
+
+/// Whether there is such a path. @throw std::invalid_argument if a mode has no code on this chip.
+bool hasModePath(const DriverChip& chip, int from_microsteps, int to_microsteps);
+
+/// [ns] The shortest time from one step to the next one.
+std::int64_t shortestStepNs(const DriverChip& chip);
 
 /// Full steps in an electrical cycle; after one, the coil currents are the same again. After
 /// power-up, RESET and SLEEP the translator stands at Home, a full-step position (45 degrees).

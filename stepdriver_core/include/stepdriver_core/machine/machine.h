@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -11,10 +13,19 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/recording.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::machine {
+
+/// An output whose level changes at a fixed rate as long as the pulse thread works, and stays as it
+/// is if that thread stands still: an external monostable or safety relay that watches it can take
+/// the motors' power away then. It isn't a certified safety function.
+struct HeartbeatConfig {
+  std::string line;     ///< low before its first edge, and again once the machine has released it
+  double rate = 100.0;  ///< [Hz] of whole periods, of two edges each
+};
 
 /// What a Machine is made with, in addition to its axes.
 struct MachineOptions {
@@ -27,17 +38,24 @@ struct MachineOptions {
   bool measure = false;
   /// Don't start if that is less than the axes need, or if real-time permissions are refused.
   bool enforce = false;
-  /// If a line other than STEP and DIR can't be written in this time, its axis has a fault that
-  /// names the line.
+  /// If a line can't be written in this time, its axis has a fault that names the line. The pulse
+  /// thread writes STEP and DIR: if it hangs, all axes have a fault, see Machine::whyHung().
   double write_timeout = 0.5;  ///< [s]
   /// An input that does what Machine::emergencyStop() does, if it becomes active or can't be read.
   std::optional<config::InputSwitch> emergency_stop{};
+  /// If it can't be written, all axes have a fault.
+  std::optional<HeartbeatConfig> heartbeat{};
   /// Absolute path of the file that keeps positions across a restart; empty: no file. A position
   /// in it that Axis::setPosition() would refuse isn't restored.
   std::string state_file{};
-  /// Held open on a real clock to keep the processors awake, see pulse::kCpuLatencyDevice; empty:
-  /// they may sleep.
-  std::string latency_device = pulse::kCpuLatencyDevice;
+  /// What the pulse thread requests on a real clock. If it is refused, the machine works without
+  /// it, and EngineFigures::realtime says so.
+  pulse::RealtimeRequest realtime{};
+  /// [s] How much of the past recording() returns; 0: nothing is recorded.
+  double record_seconds = 0.0;
+  /// [bytes] Memory for recorded edges, 8 bytes each. The recorder takes less if the top speeds of
+  /// the axes need less.
+  std::size_t record_bytes = 16'000'000;
 };
 
 /// What the pulse engine has done since the start.
@@ -107,6 +125,9 @@ class Machine {
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
   /// Returns when it has ended.
   CoordinatedResult wait(const CoordinatedMove& move) const;
+  /// Stops the axes that still make this move or hold it; they decelerate along its path. A motion
+  /// that has replaced the move continues.
+  void stop(const CoordinatedMove& move);
 
   /// Feed hold: every axis decelerates to rest along its path, and keeps its goal; a jog ends. It
   /// lasts until resume() or stop(), also if nothing moves; new motions are refused until then, and
@@ -114,6 +135,8 @@ class Machine {
   void hold();
 
   /// Ends the hold: held motions continue.
+  ///
+  /// @throw Refused if one of them can't; then all axes stay on hold.
   void resume();
 
   /// Homes several axes, by HomingConfig::order: the lowest first, those with the same at once.
@@ -139,6 +162,9 @@ class Machine {
   /// Completes the current pulse, sends no more, and then returns. Every axis is at fault until
   /// recover(); motors stay energized. MachineOptions::emergency_stop does the same; if it is
   /// active at the start, no motor is energized.
+  ///
+  /// @throw GpioError if the pulse thread hangs, see whyHung(): then no other pulse goes out when
+  ///   the chip answers again, except for those of the write that hangs.
   void emergencyStop();
   /// True from an emergency stop until recover().
   bool emergencyStopped() const;
@@ -158,8 +184,30 @@ class Machine {
   /// @throw StateFileError if all lines were written, but not the state file.
   void shutdown();
 
+  /// Whether the thread that all axes wait for still works: for watchdogs. Waits for it for at most
+  /// this time. Always true without threads, and after shutdown().
+  bool responds(std::chrono::nanoseconds longest) const;
+
   /// What the pulse engine has done so far.
   EngineFigures figures() const;
+
+  /// The line of STEP, DIR or an input for which the pulse thread has waited for more than the
+  /// write_timeout (at least 0.5 s), because its GPIO chip doesn't answer; empty: it works. While
+  /// it hangs, every axis is at fault, its position is invalid, each waiting call ends with a
+  /// fault, and new calls throw GpioError. When the chip answers again, no motion continues;
+  /// recover() ends the faults. The destructor waits for the chip.
+  std::string whyHung() const;
+  /// The last MachineOptions::record_seconds of the clock: what every output did, and why. Nothing
+  /// waits for this, however long it takes.
+  ///
+  /// @throw Refused if nothing is recorded.
+  Recording recording() const;
+  /// [s] How long the recording is at least, if all axes move at their top speeds all the time.
+  double recordedSeconds() const;
+  /// @param told called when an axis gets a fault, also by an emergency stop, by the thread that
+  ///   all axes wait for: it returns at once and calls nothing of this machine. Called now if an
+  ///   axis had a fault before. Never called if nothing is recorded.
+  void onFault(std::function<void()> told);
 
   /// Why the last write of the state file failed; empty if it succeeded, or if there is no file.
   std::string stateFileError() const;

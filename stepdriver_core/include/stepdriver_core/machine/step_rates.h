@@ -20,7 +20,7 @@ struct StepRate {
 
   /// Whether the computer can sustain the rate that the axis needs.
   bool holds() const { return asked <= held; }
-  /// "x: asks for 8000 steps/s, and this machine holds 12500 steps/s: ..."
+  /// "x needs 8000 steps/s, and this computer can sustain 12500 steps/s: ..."
   std::string text() const;
 };
 
@@ -71,10 +71,9 @@ std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
 /// Requests the lines of the axes like a Machine, measures, and releases them. Nothing moves, and
 /// ENABLE isn't asserted.
 ///
-/// @param latency_device see MachineOptions.
+/// @param request see MachineOptions.
 /// @throw GpioError if a line can't be requested, written or read; no line is held then.
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
-                          pulse::Clock& clock,
-                          const std::string& latency_device = pulse::kCpuLatencyDevice);
+                          pulse::Clock& clock, const pulse::RealtimeRequest& request = {});
 
 }  // namespace stepdriver::machine

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@ namespace stepdriver::pulse {
 /// While a program keeps this device open with a latency of 0, no processor enters an idle state
 /// that takes time to wake up from. This costs power.
 constexpr const char* kCpuLatencyDevice = "/dev/cpu_dma_latency";
+
+/// What a pulse thread requests on a real clock, in addition to SCHED_FIFO and locked memory.
+struct RealtimeRequest {
+  std::string latency_device = kCpuLatencyDevice;  ///< held open; empty: processors may sleep
+  std::optional<int> cpu{};  ///< the processor that it runs on, from 0; empty: any of them
+};
 
 /// The distribution of measured times: half of them are at most the median, and so on.
 struct Spread {
@@ -43,11 +50,15 @@ struct RealtimeRights {
   int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not requested
   int memory_error = -1;     ///< of the request to lock the memory
   int latency_error = -1;    ///< of the request to keep the processors awake, see kCpuLatencyDevice
+  int cpu_error = -1;        ///< of the request to run on one processor
+  int cpu = -1;              ///< that processor
 
-  /// Without these two, pulses may be late by any time. The processors' idle states don't count:
-  /// their cost is measured with the wake-ups, and some computers have none.
-  bool granted() const { return scheduler_error == 0 && memory_error == 0; }
-  bool anyRefused() const { return scheduler_error > 0 || memory_error > 0 || latency_error > 0; }
+  /// Without these, pulses may be late by any time. The processors' idle states don't count: their
+  /// cost is measured with the wake-ups, and some computers have none.
+  bool granted() const { return scheduler_error == 0 && memory_error == 0 && cpu_error <= 0; }
+  bool anyRefused() const {
+    return scheduler_error > 0 || memory_error > 0 || latency_error > 0 || cpu_error > 0;
+  }
 
   /// A sentence, with the remedy if something was refused.
   std::string text() const;
@@ -66,8 +77,7 @@ struct Capability {
 /// thread. Takes about 0.4 s of the clock, up to 2 s if the computer stalls.
 ///
 /// @param clock nobody else may wait on it meanwhile.
-/// @param latency_device see kCpuLatencyDevice; empty: the processors may sleep.
 /// @return without channels.
-Capability measureWakeUps(Clock& clock, const std::string& latency_device = kCpuLatencyDevice);
+Capability measureWakeUps(Clock& clock, const RealtimeRequest& request = {});
 
 }  // namespace stepdriver::pulse

@@ -20,6 +20,14 @@ enum class GpioBackend {
   kLibgpiod,   ///< the GPIO lines of this computer
 };
 
+/// The flight recorder.
+struct RecorderConfig {
+  double seconds = 10.0;    ///< [s] that it keeps; 0: nothing is recorded
+  double memory_mb = 16.0;  ///< [MB] for edges, at most
+  std::string folder;       ///< absolute path of its files; empty: the program decides
+  int keep = 20;            ///< recordings in that folder
+};
+
 /// The configuration of a machine. The node reads it from its parameters, and yaml::readFile() from
 /// a file.
 struct MachineConfig {
@@ -29,9 +37,12 @@ struct MachineConfig {
   double max_lateness = 0.005;           ///< [s] a pulse that is later is a fault
   double write_timeout = 0.5;            ///< [s] of a line other than STEP and DIR
   bool enforce_realtime = false;         ///< don't start if the computer is too slow for the axes
-  bool keep_cpus_awake = true;           ///< see machine::MachineOptions::latency_device
+  bool keep_cpus_awake = true;           ///< see pulse::kCpuLatencyDevice
+  std::optional<int> cpu;                ///< see pulse::RealtimeRequest
   std::optional<config::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
+  std::optional<machine::HeartbeatConfig> heartbeat;  ///< see machine::MachineOptions
   std::string state_file;                             ///< see machine::MachineOptions
+  RecorderConfig recorder;
 
   /// What a machine::Machine of this configuration takes, in addition to the axes.
   machine::MachineOptions options() const;
@@ -48,9 +59,17 @@ struct MachineConfig {
 ///                                # don't start
 ///   max_lateness_ms: 5.0
 ///   keep_cpus_awake: true        # with libgpiod; false: they may sleep, and wake late
+///   cpu: 3                       # the processor of the pulse thread; left out: any
 /// emergency_stop:                # optional; so is its bias: as_is, pull_up, pull_down or disabled
 ///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
+/// heartbeat:                     # optional: an output for an external monostable or safety relay
+///   {pin: "gpiochip0:24", rate_hz: 100.0}
 /// state_file: ""                 # absolute path of the file that keeps positions; empty: no file
+/// recorder:                      # the flight recorder
+///   seconds: 10.0                # that it keeps; 0: nothing is recorded
+///   memory_mb: 16.0              # for edges, at most
+///   folder: ""                   # absolute path of its files; empty: the program decides
+///   keep: 20                     # recordings in that folder
 /// simulation: {...}              # see readSimulation(); only a simulated machine reads it
 /// axes: {...}                    # see config::readAxes()
 /// @endcode

@@ -33,6 +33,8 @@ struct SimulatedAxis {
   /// [mm|deg] Position of the switch; empty: outside the soft limit.
   std::optional<double> min_switch;
   std::optional<double> max_switch;
+  double settling_ms = 10.0;  ///< [ms] from the last pulse until the driver is in position
+  double load_falls = 0.0;    ///< [mm/s|deg/s] of a load that nothing holds, towards min
   SimulatedWiring wiring;
   sim::RigFaults faults;
   /// How many writes to STEP succeed before all others fail.
@@ -65,6 +67,9 @@ struct SimulationConfig {
 ///       switch_hysteresis_mm: 0.0
 ///       bounces: 0
 ///       bounce_ms: 0.2
+///       settling_ms: 10.0        # until the in-position output is active after a pulse
+///       never_in_position: false # true: it stays inactive
+///       load_falls_mm_s: 0.0     # how fast the load sinks towards min while nothing holds it
 ///       wiring:                # what the configuration is wrong about; default: nothing
 ///         dir_inverted: true
 ///         steps_per_mm: 100.0  # steps_per_degree
@@ -76,6 +81,7 @@ struct SimulationConfig {
 ///       max_stuck: none
 ///       lose_every: 0            # every n-th step slips; 0: no step
 ///       chip_fault_after: 1000        # steps of the motor; then the chip reports over-current
+///       chip_fault_ms: 0.0       # how long its cause lasts if a fault ends by itself; 0: for ever
 ///       fail_step_write_after: 1000   # writes to STEP; those after them fail. Default: none fails
 /// @endcode
 ///

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,7 +10,12 @@ namespace stepdriver::sim {
 /// A pin of the rig in a trace: one scope for each axis.
 struct TracePin {
   std::string scope;     ///< name of the axis
-  std::string variable;  ///< step, dir, enable, ms1, ms2, ms3, sleep, reset, endstop_min or _max
+  std::string variable;  ///< step, dir (or cw, ccw), enable, ms1, ms2, ms3, sleep, reset,
+                         ///< endstop_min or _max, fault, in_position
+  /// The level of a pulse, of forward, of an energized motor and so on. If it is known, a file says
+  /// so; otherwise its readers take the first level for the inactive one.
+  std::optional<bool> active = {};
+  bool both_edges = false;  ///< each edge of this line is a step, which a file says
 };
 
 /// Receives the rig's edges: the levels are those of the line, the times are in nanoseconds and

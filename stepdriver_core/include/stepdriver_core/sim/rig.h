@@ -36,17 +36,32 @@ struct SwitchSpec {
   std::int64_t bounce_ns = 0;  ///< time from one bounce edge to the next
 };
 
+/// A brake that holds the load of an axis while its line doesn't have the level that releases it.
+struct BrakeSpec {
+  std::string line;
+  bool release_level = true;    ///< level of the line that releases it
+  std::int64_t release_ns = 0;  ///< how long it drags after that level
+  std::int64_t engage_ns = 0;   ///< from the other level until it holds the load
+};
+
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
-  driver::Model model = driver::Model::kA4988;
-  driver::Timing timing{};  ///< what counts as a violation
+  driver::DriverChip chip;  ///< its times are what counts as a violation
+  /// On a chip with CW and CCW inputs, step is CW and dir is CCW.
   Wire step, dir, enable, ms1, ms2, ms3, sleep, reset;
   int microsteps = 1;             ///< the DIP switches, or how unwired microstep pins are strapped
   double full_step_travel = 0.0;  ///< [mm|deg] travel of the carriage per full step; above 0
   double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
   std::optional<SwitchSpec> min_switch, max_switch;
-  std::string fault_line;  ///< the chip's nFAULT, with a pull-up; empty: not wired
+  /// The driver's in-position output; empty: not wired. It is active while current flows, from
+  /// settling_ns after the last pulse on.
+  std::string in_position_line;
+  std::int64_t settling_ns = 0;
+  std::string fault_line;  ///< the chip's fault output, with a pull-up; empty: not wired
+  std::optional<BrakeSpec> brake;
+  /// [mm/s|deg/s] how fast the load sinks towards min while neither the motor nor a brake holds it
+  double load_falls = 0.0;
 };
 
 /// Everything that the chip must never see. One edge may violate several of these. A time of
@@ -62,9 +77,12 @@ enum class Violation {
   kStepWhileDisabled,  ///< whether the chip counts it or not
   kStepAfterEnable,    ///< before the enable time is over
   kStepWhileAsleep,
-  kStepAfterWake,   ///< before the wake-up time is over
-  kStepInReset,     ///< while RESET is held, or before the time after it is over
-  kStepIntoSwitch,  ///< a step towards a switch whose line reads active
+  kStepAfterWake,  ///< before the wake-up time is over
+  kStepInReset,    ///< while RESET is held, or before the time after it is over
+  kBothInputs,     ///< a pulse on CW while CCW is active, or the other way round
+  /// A step towards a switch that is active, unless it was read as inactive since the step before.
+  kStepIntoSwitch,
+  kStepAgainstBrake,  ///< before the brake is released and its release time is over
 };
 
 /// In words, as in reports: `short step high`.
@@ -79,6 +97,7 @@ struct RigAxisReport {
                                 ///< RESET and SLEEP take it to the nearest Home
   double carriage = 0.0;        ///< [mm|deg]
   int microsteps = 1;           ///< the mode at the last STEP edge
+  double fell = 0.0;            ///< [mm|deg] how far the load has sunk, in total
   bool energized = false;       ///< current flows: enabled, awake and not in RESET
   bool min_pressed = false;     ///< the reading of its line at the rig's latest time
   bool max_pressed = false;
@@ -94,9 +113,13 @@ struct RigFaults {
   std::optional<bool> max_stuck;
   std::int64_t lose_every = 0;  ///< every n-th motor step, counted from setFaults() on, slips: the
                                 ///< carriage stays behind permanently; 0: no step slips
-  /// Over-current after this many steps of the motor, counted from setFaults() on: outputs off and
-  /// nFAULT low until RESET.
+  /// Over-current after this many steps of the motor, counted from setFaults() on: the outputs are
+  /// off and the fault output is active, until what ends a fault of the chip
+  /// (driver::DriverChip::fault_end).
   std::optional<std::int64_t> chip_fault_after;
+  /// How long its cause lasts, for a chip whose fault ends by itself; 0: for ever.
+  std::int64_t chip_fault_lasts_ns = 0;
+  bool never_in_position = false;  ///< the in-position output stays inactive
 };
 
 /// The model of an axis. STEP's active edge moves the translator to the next index of the mode if
@@ -104,7 +127,10 @@ struct RigFaults {
 /// disabled. While current flows, the rotor follows the translator, and the carriage follows the
 /// rotor. When current starts to flow, the rotor snaps to the nearest position with the
 /// translator's phase, a multiple of an electrical cycle away from the translator's own count. DIR
-/// high at the chip is forward: the carriage's position grows.
+/// high at the chip is forward: the carriage's position grows. On a chip with CW and CCW inputs,
+/// pulses on CW are forward, and those on CCW backward. While a brake is engaged the rotor doesn't
+/// turn; when it is released, the rotor snaps as above. A load turns the rotor back while neither
+/// current nor the brake holds it.
 ///
 /// Lines. Before its first request a line has the level of a pull resistor towards the safe side:
 /// disabled, asleep, in RESET, everything else inactive or low. The first request makes no edge:

@@ -44,7 +44,7 @@ void askPosition(Dialogue& dialogue, MachineAtHand& machine, const config::AxisC
       dialogue,
       "The driver doesn't know the position, and its soft limits count from the position at which "
       "it was started. About which position is it? (Enter: leave it)",
-      unitOf(config.kind));
+      configUnitOf(config.kind));
   if (!position) return;
   const client::Answer answer = machine.setPosition(config.name, *position);
   dialogue.say((answer.success ? "" : "The driver refuses: ") + inTableUnits(answer.message));
@@ -57,7 +57,8 @@ Findings bringUp(Dialogue& dialogue, MachineAtHand& machine, const config::AxisC
   findings.axis = config.name;
   const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
   dialogue.say(fmt::format("\n==== Axis {}: {} steps per {} at {} microsteps", config.name,
-                           ros_node::roundedText(steps), unitOf(config.kind), config.microsteps));
+                           ros_node::roundedText(steps), configUnitOf(config.kind),
+                           config.microsteps));
   dialogue.say("\n-- 1. Do the switches read correctly?");
   checkSwitches(dialogue, machine, config, findings);
   Current current(machine, config.name);

@@ -64,7 +64,7 @@ std::optional<double> askWay(Dialogue& dialogue, HandMove& hand_move,
 /// @return empty if a move wasn't completed, or its length isn't known.
 std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
                                 const config::AxisConfig& config, bool wrong_way) {
-  const std::string unit = unitOf(config.kind);
+  const std::string unit = configUnitOf(config.kind);
   SmallMove move = measurableMove(config);
   SmallMove play = visibleMove(config);
   move.distance =
@@ -102,7 +102,7 @@ void checkDistance(Dialogue& dialogue, MachineAtHand& machine, const config::Axi
   }
   const double factor = measured->commanded / measured->really;
   const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
-  const std::string unit = unitOf(config.kind);
+  const std::string unit = configUnitOf(config.kind);
   const std::string commanded = roundedText(measured->commanded);
   const std::string really = roundedText(measured->really);
   dialogue.say(

@@ -60,7 +60,8 @@ std::optional<double> askLength(Dialogue& dialogue, const std::string& question,
     const auto length = askNumber(dialogue, shown, unit);
     if (!length) return fallback;
     if (*length > 0.0) return length;
-    dialogue.say("It must be above 0.");
+    dialogue.say(fmt::format("{} {} is no length: it must be above 0.",
+                             ros_node::roundedText(*length), unit));
   }
 }
 

@@ -72,7 +72,7 @@ client::Answer DriverAtHand::setPosition(const std::string& axis, double positio
   const auto response = client::respondedBy<SetPosition>(service(axis, "set_position"), request);
   if (response.success == 0) return {false, response.message};
   const double units = unitsOf(axis);
-  const std::string unit = unitOf(session_.driver().config(axis)->kind);
+  const std::string unit = configUnitOf(session_.driver().config(axis)->kind);
   return {true, fmt::format("{}: this position is {} from now on", axis,
                             TableUnits{units, unit}.place(response.position))};
 }

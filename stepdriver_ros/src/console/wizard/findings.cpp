@@ -33,6 +33,11 @@ std::optional<double> numberAt(const Map& map, const std::string& key) {
 }
 
 void invertDirection(Map& axis) {
+  const auto found = axis.find("pins");
+  Map* const pins = found != axis.end() ? found->second.as<Map>() : nullptr;
+  if (pins != nullptr && pins->count("cw") > 0 && pins->count("ccw") > 0) {
+    return std::swap((*pins)["cw"], (*pins)["ccw"]);
+  }
   Map& invert = below(axis, "invert");
   const bool* const inverted = invert["dir"].as<bool>();
   invert["dir"] = inverted == nullptr || !*inverted;
@@ -93,8 +98,12 @@ ConfigValue corrected(ConfigValue parameters, const Findings& findings) {
 std::vector<std::string> changesText(const Findings& findings, const config::AxisConfig& config) {
   std::vector<std::string> changes;
   const std::string& axis = findings.axis;
-  if (findings.wrong_way)
-    changes.push_back(axis + ": invert/dir is changed, because its plus was your minus");
+  if (findings.wrong_way) {
+    const bool cw_ccw = config.driver.step_inputs == driver::StepInputs::kCwCcw;
+    changes.push_back(axis +
+                      (cw_ccw ? ": pins/cw and pins/ccw are swapped" : ": invert/dir is changed") +
+                      ", because its plus was your minus");
+  }
   if (findings.min_inverted) {
     changes.push_back(axis +
                       ": endstops/min/active_level is changed, because the switch was inverted");
@@ -109,7 +118,7 @@ std::vector<std::string> changesText(const Findings& findings, const config::Axi
   if (findings.scale) {
     const double steps = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
     changes.push_back(fmt::format("{}: {} steps per {} instead of {}", axis,
-                                  roundedText(steps * *findings.scale), unitOf(config.kind),
+                                  roundedText(steps * *findings.scale), configUnitOf(config.kind),
                                   roundedText(steps)));
   }
   return changes;

@@ -33,7 +33,7 @@ SmallMove measurableMove(const config::AxisConfig& config) {
 }
 
 std::string distanceText(const config::AxisConfig& config, double distance) {
-  return fmt::format("{} {} towards {}", roundedText(std::abs(distance)), unitOf(config.kind),
+  return fmt::format("{} {} towards {}", roundedText(std::abs(distance)), configUnitOf(config.kind),
                      distance < 0.0 ? "minus" : "plus");
 }
 
@@ -53,7 +53,7 @@ std::string knownRefusal(const config::AxisConfig& config, const AxisView& state
   const bool below = config.min_position && target < *config.min_position * units - doubt;
   const bool above = config.max_position && target > *config.max_position * units + doubt;
   if (!below && !above) return {};
-  const std::string unit = unitOf(config.kind);
+  const std::string unit = configUnitOf(config.kind);
   const double limit = below ? *config.min_position : *config.max_position;
   return fmt::format("it stands at {}, and would then be beyond its soft limit {}",
                      positionText(state.position, unit), positionText(limit * units, unit));
@@ -73,7 +73,7 @@ double HandMove::ask(const SmallMove& move) {
   const std::string what = fmt::format(
       "{0} will move {1}, as the configuration defines it now, at {2} {3}/s. Enter stops it. Move "
       "{0} now?",
-      config_.name, way, roundedText(move.speed), unitOf(config_.kind));
+      config_.name, way, roundedText(move.speed), configUnitOf(config_.kind));
   if (!askYesNo(dialogue_, what, false)) return 0.0;
   const double start = machine_.state(config_.name).position;
   const client::Answer answer = machine_.move(config_.name, move.distance, move.speed);

@@ -7,6 +7,8 @@
 #include <ros/publisher.h>
 #include <ros/subscriber.h>
 
+#include <algorithm>
+#include <boost/make_shared.hpp>
 #include <functional>
 #include <string>
 
@@ -16,7 +18,9 @@
 namespace stepdriver::ros_node {
 
 /// An action's topics, like actionlib::ActionServer, but one timer publishes the statuses of all
-/// actions.
+/// actions. A stamp in the future counts as the time of arrival: actionlib applies a cancel to all
+/// goals up to its stamp, and doesn't check whether a sum of stamps is beyond the last time that
+/// ros::Time can represent.
 template <typename Action>
 class ActionServer : public actionlib::ActionServerBase<Action> {
   using Base = actionlib::ActionServerBase<Action>;
@@ -45,13 +49,22 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
     status_publisher_ =
         node_.advertise<actionlib_msgs::GoalStatusArray>("status", kQueueSize, true);
     const boost::function<void(const boost::shared_ptr<const Bounded<ActionGoal>>&)> take =
-        [this](const auto& goal) { this->goalCallback(goal); };
+        [this](const auto& goal) {
+          if (goal->goal_id.stamp <= ros::Time::now()) return this->goalCallback(goal);
+          const auto arrived = boost::make_shared<Bounded<ActionGoal>>(*goal);
+          arrived->goal_id.stamp = ros::Time::now();
+          this->goalCallback(arrived);
+        };
+    const boost::function<void(const boost::shared_ptr<const actionlib_msgs::GoalID>&)> cancel =
+        [this](const auto& id) {
+          const auto arrived = boost::make_shared<actionlib_msgs::GoalID>(*id);
+          arrived->stamp = std::min(id->stamp, ros::Time::now());
+          this->cancelCallback(arrived);
+        };
     goal_subscriber_ = node_.subscribe("goal", kQueueSize, take);
-    cancel_subscriber_ = node_.subscribe("cancel", kQueueSize, &Base::cancelCallback, asBase());
+    cancel_subscriber_ = node_.subscribe("cancel", kQueueSize, cancel);
     statuses_.add([this] { beat(); });
   }
-  Base* asBase() { return this; }
-
   // Without goals or subscribers nothing is published: later subscribers get the last status.
   void beat() {
     const Lock lock(this->lock_);
@@ -83,8 +96,10 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   void publishStatus() override {
     const Lock lock(this->lock_);
     const ros::Time now = ros::Time::now();
-    this->status_list_.remove_if([&](const actionlib::StatusTracker<Action>& goal) {
-      const ros::Time end = goal.handle_destruction_time_;
+    this->status_list_.remove_if([&](actionlib::StatusTracker<Action>& goal) {
+      ros::Time& end = goal.handle_destruction_time_;
+      // A cancel of an unknown goal has no handle that would set the time. Most have no stamp.
+      if (end.isZero() && goal.handle_tracker_.expired()) end = now;
       return !end.isZero() && end + this->status_list_timeout_ < now;
     });
     actionlib_msgs::GoalStatusArray message;

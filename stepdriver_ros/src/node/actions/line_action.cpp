@@ -1,7 +1,5 @@
 #include "line_action.h"
 
-#include <ros/console.h>
-
 #include <algorithm>
 
 #include "move_end.h"
@@ -36,25 +34,13 @@ void LineAction::reject(GoalHandle& handle, const Error& error) {
   handle.setRejected(result, result.message);
 }
 
-// All axes of a line stop with one of them.
-void LineAction::stop(const FollowingLine& following) {
-  try {
-    const auto& first = following.move.members.front();
-    machine_.axis(first.axis).stop(first.move);
-  } catch (const Error& error) {
-    ROS_ERROR_NAMED("line", "move_line: %s", error.what());
-  }
-}
+void LineAction::stop(const FollowingLine& following) { machine_.stop(following.move); }
 
 // A line whose axes are stopped before it begins is refused.
 void LineAction::cancelBeginning(const GoalHandle& handle) {
   const auto& names = handle.getGoal()->name;
-  try {
-    for (const auto& axis : machine_.axes()) {
-      if (std::find(names.begin(), names.end(), axis->config().name) != names.end()) axis->stop();
-    }
-  } catch (const Error& error) {
-    ROS_ERROR_NAMED("line", "move_line: %s", error.what());
+  for (const auto& axis : machine_.axes()) {
+    if (std::find(names.begin(), names.end(), axis->config().name) != names.end()) axis->stop();
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <actionlib_msgs/GoalStatus.h>
+#include <ros/console.h>
 #include <ros/duration.h>
 #include <ros/node_handle.h>
 
@@ -59,13 +60,19 @@ class MotionAction {
   /// @param begun is called when a goal has begun.
   MotionAction(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
                std::function<void()> begun)
-      : begun_(std::move(begun)),
+      : name_(node.resolveName(name)),
+        begun_(std::move(begun)),
         server_(
             node, name, statuses, [this](const GoalHandle& handle) { take(handle); },
             [this](const GoalHandle& handle) { cancel(handle); }) {}
 
   /// Call it when the action is fully constructed.
   void start() { server_.start(); }
+
+  /// Calls stop(). If it fails, the log says why, and the goal stays current until its motion ends.
+  void stopMotion(const Following& following) {
+    logFailure([&] { stop(following); });
+  }
 
  private:
   static constexpr int kPollsPerFeedback = 5;
@@ -75,7 +82,7 @@ class MotionAction {
   virtual void reject(GoalHandle& handle, const Error& error) = 0;
   /// A newer goal has begun.
   virtual void takeOver(const Following& newer, Following& older) = 0;
-  /// Decelerates the axes that still follow this goal.
+  /// Decelerates the axes that still follow this goal. @throw Error
   virtual void stop(const Following& following) = 0;
   /// Reports the end of the motion to the client. @return whether it has ended.
   virtual bool conclude(Following& following) = 0;
@@ -83,6 +90,7 @@ class MotionAction {
   virtual void watch(Following& following, bool tell) = 0;
 
   /// A cancel of the goal that begin() is about to begin. Its motion is stopped when it has begun.
+  /// @throw Error
   virtual void cancelBeginning(const GoalHandle& /*handle*/) {}
 
   // Goals come one after another. One may wait for a chip to wake up or for axes to come to rest,
@@ -125,7 +133,7 @@ class MotionAction {
 
   void cancel(const GoalHandle& handle) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (beginning_ && *beginning_ == handle) cancelBeginning(handle);
+    if (beginning_ && *beginning_ == handle) logFailure([&] { cancelBeginning(handle); });
     for (Following& following : under_way_) {
       if (following.handle == handle) cancel(following);
     }
@@ -133,7 +141,16 @@ class MotionAction {
 
   void cancel(Following& following) {
     following.preempted_by = "it was cancelled";
-    stop(following);
+    stopMotion(following);
+  }
+
+  template <typename Stop>
+  void logFailure(const Stop& stop) {
+    try {
+      stop();
+    } catch (const Error& error) {
+      ROS_ERROR_NAMED("move", "%s can't be stopped: %s", name_.c_str(), error.what());
+    }
   }
 
   // While a goal begins, nothing is concluded: it may be what ended an older one.
@@ -146,6 +163,7 @@ class MotionAction {
 
   static constexpr const char* kCancelledBefore = "it was cancelled before it began";
 
+  const std::string name_;
   const std::function<void()> begun_;
   std::mutex mutex_;
   Server server_;

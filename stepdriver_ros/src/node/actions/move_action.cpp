@@ -1,7 +1,5 @@
 #include "move_action.h"
 
-#include <ros/console.h>
-
 #include <utility>
 
 #include "move_end.h"
@@ -31,13 +29,7 @@ void AxisMoveAction::reject(GoalHandle& handle, const Error& error) {
   handle.setRejected(result, result.message);
 }
 
-void AxisMoveAction::stop(const FollowingMove& following) {
-  try {
-    axis_.stop(following.move);
-  } catch (const Error& error) {
-    ROS_ERROR_NAMED("move", "%s/move: %s", axis_.config().name.c_str(), error.what());
-  }
-}
+void AxisMoveAction::stop(const FollowingMove& following) { axis_.stop(following.move); }
 
 bool AxisMoveAction::conclude(FollowingMove& following) {
   const auto ended = axis_.result(following.move);

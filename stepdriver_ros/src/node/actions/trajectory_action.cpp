@@ -1,7 +1,6 @@
 #include "trajectory_action.h"
 
 #include <fmt/format.h>
-#include <ros/console.h>
 
 #include <algorithm>
 #include <utility>
@@ -48,14 +47,22 @@ TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine
 
 // ---- goals and cancels ----
 
+TrajectoryJoint TrajectoryAction::jointOf(const std::string& name) const {
+  const axis::Axis& axis = machine_.axis(axes_.at(name));
+  const config::AxisConfig& config = axis.config();
+  return {name, config.kind, config.steps_per_unit * axis.state().microsteps / config.microsteps};
+}
+
 FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
   const auto goal = handle.getGoal();
   Following following;
   following.handle = handle;
-  following.joints = goal->trajectory.joint_names;
   following.tolerances = readTolerances(*goal);
   following.slipped_before = machine_.figures().slipped;
   following.move = followMessage(machine_, goal->trajectory, axes_);
+  for (const std::string& joint : goal->trajectory.joint_names) {
+    following.joints.push_back(jointOf(joint));
+  }
   following.goal = goal->trajectory.points.back().positions;
   following.began = ros::Time::now();
   return following;
@@ -69,21 +76,14 @@ void TrajectoryAction::reject(GoalHandle& handle, const Error& error) {
 
 void TrajectoryAction::takeOver(const Following& newer, Following& older) {
   const bool shared =
-      std::any_of(older.joints.begin(), older.joints.end(), [&newer](const std::string& joint) {
-        return std::find(newer.joints.begin(), newer.joints.end(), joint) != newer.joints.end();
+      std::any_of(older.joints.begin(), older.joints.end(), [&newer](const auto& joint) {
+        return std::any_of(newer.joints.begin(), newer.joints.end(),
+                           [&joint](const auto& other) { return other.name == joint.name; });
       });
   if (shared) older.preempted_by = "a newer goal took over";
 }
 
-// The axes that move together with it stop with it.
-void TrajectoryAction::stop(const Following& following) {
-  try {
-    const auto& first = following.move.members.front();
-    machine_.axis(first.axis).stop(first.move);
-  } catch (const Error& error) {
-    ROS_ERROR_NAMED("trajectory", "follow_joint_trajectory: %s", error.what());
-  }
-}
+void TrajectoryAction::stop(const Following& following) { machine_.stop(following.move); }
 
 // ---- current goals ----
 
@@ -124,7 +124,8 @@ std::string TrajectoryAction::shortOfGoal(const Following& following,
     return fmt::format("it ended {} s later than planned; goal_time_tolerance is {} s",
                        roundedText(late), roundedText(following.tolerances.goal_time));
   }
-  return violation(following.joints, following.tolerances.goal, following.goal, result.positions);
+  return violation("goal_tolerance", following.joints, following.tolerances.goal, following.goal,
+                   result.positions);
 }
 
 TrajectoryAction::Places TrajectoryAction::placesOf(const Following& following) const {
@@ -140,15 +141,17 @@ TrajectoryAction::Places TrajectoryAction::placesOf(const Following& following) 
 
 void TrajectoryAction::keepToPath(Following& following, const Places& places) {
   if (!following.violated.empty() || !following.preempted_by.empty()) return;
-  following.violated =
-      violation(following.joints, following.tolerances.path, places.planned, places.actual);
-  if (!following.violated.empty()) stop(following);
+  following.violated = violation("path_tolerance", following.joints, following.tolerances.path,
+                                 places.planned, places.actual);
+  if (!following.violated.empty()) stopMotion(following);
 }
 
 void TrajectoryAction::publishFeedback(Following& following, const Places& places) {
   Feedback feedback;
   feedback.header.stamp = ros::Time::now();
-  feedback.joint_names = following.joints;
+  for (const TrajectoryJoint& joint : following.joints) {
+    feedback.joint_names.push_back(joint.name);
+  }
   const ros::Duration time = feedback.header.stamp - following.began;
   for (auto* point : {&feedback.desired, &feedback.actual, &feedback.error}) {
     point->time_from_start = time;

@@ -20,7 +20,7 @@ namespace stepdriver::ros_node {
 struct FollowingTrajectory {
   actionlib::ServerGoalHandle<action_msgs::FollowJointTrajectoryAction> handle;
   machine::CoordinatedMove move;
-  std::vector<std::string> joints;
+  std::vector<TrajectoryJoint> joints;
   TrajectoryTolerances tolerances;
   std::vector<double> goal;  // [unit] the last point
   ros::Time began;
@@ -49,6 +49,7 @@ class TrajectoryAction
     std::vector<double> velocities;
   };
 
+  TrajectoryJoint jointOf(const std::string& name) const;
   Following begin(const GoalHandle& handle) override;
   void reject(GoalHandle& handle, const Error& error) override;
   void takeOver(const Following& newer, Following& older) override;

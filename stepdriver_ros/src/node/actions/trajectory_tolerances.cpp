@@ -1,18 +1,19 @@
 #include "trajectory_tolerances.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "common/text.h"
 #include "node/topics/trajectory_message.h"
 
 namespace stepdriver::ros_node {
 namespace {
 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr double kPartsOfAMicrostep = 100.0;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw BadTrajectory(BadTrajectory::Kind::kInvalid, why);
@@ -28,11 +29,11 @@ std::vector<double> limitsOf(const std::vector<std::string>& joints, const Toler
   for (const auto& tolerance : tolerances) {
     const auto joint = std::find(joints.begin(), joints.end(), tolerance.name);
     if (joint == joints.end()) {
-      refuse(fmt::format("{} names the joint {}, which isn't in the trajectory", name,
-                         tolerance.name));
+      refuse(fmt::format("{} names the joint {}, but the trajectory has {}", name, tolerance.name,
+                         fmt::join(joints, ", ")));
     }
     if (std::isnan(tolerance.position)) {
-      refuse(fmt::format("{} of the joint {} isn't a number", name, tolerance.name));
+      refuse(fmt::format("{} of the joint {} is nan, but must be a number", name, tolerance.name));
     }
     limits[static_cast<std::size_t>(joint - joints.begin())] = limitOf(tolerance.position);
   }
@@ -48,14 +49,19 @@ TrajectoryTolerances readTolerances(const action_msgs::FollowJointTrajectoryGoal
           limitsOf(joints, goal.goal_tolerance, "goal_tolerance"), limitOf(time)};
 }
 
-std::string violation(const std::vector<std::string>& joints, const std::vector<double>& limits,
-                      const std::vector<double>& wanted, const std::vector<double>& actual) {
+std::string violation(const char* tolerance, const std::vector<TrajectoryJoint>& joints,
+                      const std::vector<double>& limits, const std::vector<double>& wanted,
+                      const std::vector<double>& actual) {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const double off = std::abs(wanted[i] - actual[i]);
     if (off <= limits[i]) continue;
-    return fmt::format("{} is at {}, {} from {}; the tolerance is {}", joints[i],
-                       roundedText(actual[i]), roundedText(off), roundedText(wanted[i]),
-                       roundedText(limits[i]));
+    const auto& [name, kind, scale] = joints[i];
+    // A goal need not be on a whole microstep.
+    return fmt::format("{} is at {}, {} from {}; {} is {:.9g} {}", name,
+                       config::placeText(actual[i], kind, scale),
+                       config::distanceText(off, kind, scale),
+                       config::placeText(wanted[i], kind, scale * kPartsOfAMicrostep), tolerance,
+                       limits[i], config::unitOf(kind));
   }
   return {};
 }

@@ -17,6 +17,7 @@ constexpr std::chrono::milliseconds kPoll{5};
 CallQueues::CallQueues(std::size_t axes)
     : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
       trajectories_(waiting_pool_, kTrajectoryThreads),
+      recordings_(waiting_pool_, 1),
       control_(control_pool_, kControlThreads),
       stops_("stops"),
       emergency_("emergency stop") {
@@ -52,7 +53,7 @@ void CallQueues::stop() {
 
 bool CallQueues::allAnswered() {
   // A queue is empty when it contains no call and none of its calls is running.
-  bool empty = control_.isEmpty() && lines_.isEmpty();
+  bool empty = control_.isEmpty() && lines_.isEmpty() && recordings_.isEmpty();
   for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
   for (ros::CallbackQueue& queue : power_) empty = empty && queue.isEmpty();
   return empty;

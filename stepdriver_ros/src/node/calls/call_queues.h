@@ -46,6 +46,8 @@ class CallQueues {
   ros::CallbackQueue& lines() { return lines_; }
   /// Trajectories: goals, messages, cancels and results. Planning one takes a while.
   ros::CallbackQueue& trajectories() { return trajectories_; }
+  /// Calls that write files, one after another.
+  ros::CallbackQueue& recordings() { return recordings_; }
   /// Calls that enable or disable this axis.
   ros::CallbackQueue& power(std::size_t axis) { return power_.at(axis); }
   /// Recover, resume, and everything that answers at once.
@@ -71,6 +73,7 @@ class CallQueues {
   std::deque<PooledQueue> power_;
   PooledQueue lines_;
   PooledQueue trajectories_;
+  PooledQueue recordings_;
   PooledQueue control_;
   TriggerServer stops_;
   TriggerServer emergency_;

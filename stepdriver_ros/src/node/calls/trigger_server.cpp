@@ -234,7 +234,7 @@ bool TriggerServer::Connection::send() {
 
 void TriggerServer::accept() {
   if (!reserve_) reserve_ = openReserve();
-  if (connections_.size() >= kMostConnections) disconnectLongestSilent();
+  if (connections_.size() >= kMostConnections) disconnectOne();
   Descriptor socket = acceptFrom(listening_);
   if (!socket && errno == EMFILE && makeRoom()) socket = acceptFrom(listening_);
   if (socket) {
@@ -250,14 +250,23 @@ bool TriggerServer::makeRoom() {
     return true;
   }
   if (connections_.empty()) return false;
-  disconnectLongestSilent();
+  disconnectOne();
   return true;
 }
 
-void TriggerServer::disconnectLongestSilent() {
-  connections_.erase(std::min_element(
-      connections_.begin(), connections_.end(),
-      [](const Connection& one, const Connection& other) { return one.since < other.since; }));
+void TriggerServer::disconnectOne() {
+  const auto busy =
+      std::count_if(connections_.begin(), connections_.end(),
+                    [](const Connection& connection) { return !connection.session.isIdle(); });
+  const bool lose_idle = static_cast<std::size_t>(2 * busy) <= connections_.size();
+  auto longest_silent = connections_.end();
+  for (auto one = connections_.begin(); one != connections_.end(); ++one) {
+    if (one->session.isIdle() != lose_idle) continue;
+    if (longest_silent == connections_.end() || one->since < longest_silent->since) {
+      longest_silent = one;
+    }
+  }
+  connections_.erase(longest_silent);
 }
 
 }  // namespace stepdriver::ros_node

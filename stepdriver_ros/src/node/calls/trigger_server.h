@@ -22,7 +22,8 @@ namespace stepdriver::ros_node {
 ///
 /// Calls are carried out one after another. A slow, silent or hostile client delays no other: a
 /// client never has more memory than a header takes, it must finish what it begins in time, and if
-/// there are too many clients, the one that has been silent for the longest time is disconnected.
+/// there are too many clients, one is disconnected. Clients that wait for their next call lose no
+/// place to those who never finish a header.
 ///
 /// To be used by one thread.
 class TriggerServer {
@@ -81,7 +82,9 @@ class TriggerServer {
   void serveConnections(Clock::time_point now);
   void accept();
   bool makeRoom();
-  void disconnectLongestSilent();
+  /// Of the idle clients and of the others, the larger group loses the one that has been silent for
+  /// the longest time.
+  void disconnectOne();
 
   const std::string name_;
   Descriptor reserve_;  ///< lets a client in when the process has no other descriptor left

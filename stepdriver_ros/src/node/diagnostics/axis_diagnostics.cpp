@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "common/place_text.h"
 #include "common/text.h"
 
 namespace stepdriver::ros_node {
@@ -16,7 +17,7 @@ std::string doingOf(const axis::AxisState& state) {
   if (state.homing != axis::HomingPhase::kNone) {
     return std::string("is being homed: ") + axis::nameOf(state.homing);
   }
-  if (state.held) return "held";
+  if (state.held) return "on hold";
   if (state.moving) return "moves";
   if (state.idle) return "idle";
   if (state.asleep) return "asleep";
@@ -31,7 +32,7 @@ void warnNearLimit(const config::AxisConfig& config, double position,
   const auto warn = [&](const char* which, double limit) {
     status.mergeSummary(DiagnosticStatus::WARN,
                         fmt::format("near the soft limit {}, {} {}", which, roundedText(limit),
-                                    unitOf(config.kind)));
+                                    config::unitOf(config.kind)));
   };
   if (config.min_position && position <= *config.min_position + near) {
     warn("min_position", *config.min_position);
@@ -45,13 +46,14 @@ void addValues(const config::AxisConfig& config, const AxisReading& reading,
                DiagnosticStatusWrapper& status) {
   const axis::AxisState& state = reading.state;
   const axis::AxisLimits& limits = reading.limits;
-  const std::string unit = unitOf(config.kind);
+  const std::string unit = config::unitOf(config.kind);
   const auto add_switch = [&](const char* key, const std::optional<bool>& active) {
     status.add(key, active ? (*active ? "active" : "inactive") : "none");
   };
-  status.add("position [" + unit + "]", state.position);
-  status.add("velocity [" + unit + "/s]", state.velocity);
-  status.add("target [" + unit + "]", state.target);
+  const double scale = config.steps_per_unit * state.microsteps / config.microsteps;
+  status.add("position [" + unit + "]", placeNumber(state.position, scale));
+  status.add("velocity [" + unit + "/s]", roundedText(state.velocity));
+  status.add("target [" + unit + "]", placeNumber(state.target, scale));
   status.add("enabled", state.enabled);
   status.add("homed", state.homed);
   status.add("position valid", state.position_valid);

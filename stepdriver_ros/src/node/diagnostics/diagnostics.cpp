@@ -8,7 +8,6 @@
 
 #include "axis_diagnostics.h"
 #include "engine_diagnostics.h"
-#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 
@@ -20,6 +19,7 @@ constexpr const char* kEngineName = "pulse engine";
 constexpr const char* kMasterName = "ROS master";
 constexpr const char* kDescriptorsName = "file descriptors";
 constexpr const char* kStateFileName = "state file";
+constexpr const char* kRecorderName = "flight recorder";
 
 /// For the current limits, and for the current motions.
 void readRates(const machine::Machine& machine, EngineReading& reading) {
@@ -40,10 +40,12 @@ void readRates(const machine::Machine& machine, EngineReading& reading) {
 Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
                          const machine::Machine& machine, CallQueues& queues,
                          const MasterWatch& master, const DescriptorWatch& descriptors,
-                         const std::string& hardware_id, const NodeConfig& config)
+                         const std::string& hardware_id, const NodeConfig& config,
+                         const FlightRecorderService& recorder)
     : machine_(machine),
       master_(master),
       descriptors_(descriptors),
+      recorder_(recorder),
       max_lateness_(config.max_lateness),
       state_file_(config.state_file),
       updater_(node, private_node) {
@@ -56,6 +58,9 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   updater_.add(kDescriptorsName, [this](Status& status) { tellDescriptors(status); });
   if (!state_file_.empty()) {
     updater_.add(kStateFileName, [this](Status& status) { tellStateFile(status); });
+  }
+  if (config.recorder.seconds > 0.0) {
+    updater_.add(kRecorderName, [this](Status& status) { tellRecorder(status); });
   }
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
@@ -118,12 +123,25 @@ void Diagnostics::tellStateFile(Status& status) const {
   status.add("file", state_file_);
 }
 
+void Diagnostics::tellRecorder(Status& status) const {
+  const std::string error = recorder_.error();
+  if (error.empty()) {
+    status.summary(Status::OK, "records");
+  } else {
+    status.summary(Status::WARN, error);
+  }
+  const recorder::Dump last = recorder_.last();
+  status.add("last recording", last.trace);
+  status.add("its reason", last.reason);
+  status.add("at top speed it keeps [s]", fmt::format("{:.3g}", machine_.recordedSeconds()));
+}
+
 std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::string& on) {
   std::array<char, 256> host{};
   gethostname(host.data(), host.size() - 1);
   std::string text = std::string(host.data()) + ": ";
   for (const config::AxisConfig& axis : axes) {
-    text += fmt::format("{} {}, ", axis.name, driver::driverChipOf(axis.driver).title);
+    text += fmt::format("{} {}, ", axis.name, axis.driver.title);
   }
   return text + "on " + on;
 }

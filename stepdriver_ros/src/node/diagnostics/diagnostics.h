@@ -11,6 +11,7 @@
 #include "common/node_config.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
+#include "node/flight_recorder_service.h"
 #include "node/master/master_watch.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/machine.h"
@@ -27,7 +28,7 @@ class Diagnostics {
   Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
               const machine::Machine& machine, CallQueues& queues, const MasterWatch& master,
               const DescriptorWatch& descriptors, const std::string& hardware_id,
-              const NodeConfig& config);
+              const NodeConfig& config, const FlightRecorderService& recorder);
   Diagnostics(const Diagnostics&) = delete;
   Diagnostics& operator=(const Diagnostics&) = delete;
 
@@ -39,10 +40,12 @@ class Diagnostics {
   void tellMaster(Status& status) const;
   void tellDescriptors(Status& status) const;
   void tellStateFile(Status& status) const;
+  void tellRecorder(Status& status) const;
 
   const machine::Machine& machine_;
   const MasterWatch& master_;
   const DescriptorWatch& descriptors_;
+  const FlightRecorderService& recorder_;
   const double max_lateness_;
   const std::string state_file_;
   std::uint64_t slips_before_ = 0;  // for the timer only

@@ -66,7 +66,7 @@ void addMargins(const EngineReading& reading, DiagnosticStatusWrapper& status) {
     status.add(rate.axis + ": margin",
                now != nullptr ? roundedText(now->held / now->asked) : "at rest");
     status.add(rate.axis + ": steps/s at top speed", roundedText(rate.asked));
-    status.add(rate.axis + ": steps/s held while all move", roundedText(rate.held));
+    status.add(rate.axis + ": steps/s that this computer sustains", roundedText(rate.held));
     status.add(rate.axis + ": margin at top speed", roundedText(rate.held / rate.asked));
   }
   if (reading.rates.empty()) status.add("margin", "not measured: the lines are simulated");

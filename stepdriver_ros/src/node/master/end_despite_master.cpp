@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <system_error>
 
 #include "xmlrpc_caller.h"
 
@@ -26,7 +27,7 @@ EndDespiteMaster::~EndDespiteMaster() {
   if (thread_.joinable()) thread_.join();
 }
 
-void EndDespiteMaster::begin(int exit_code) {
+void EndDespiteMaster::begin(int exit_code) try {
   thread_ = std::thread([this, exit_code, name = ros::this_node::getName()] {
     XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kPatience);
     std::unique_lock<std::mutex> lock(mutex_);
@@ -39,6 +40,9 @@ void EndDespiteMaster::begin(int exit_code) {
       lock.lock();
     }
   });
+} catch (const std::system_error& error) {
+  std::fprintf(stderr, "If the ROS master hangs, so does the end of this node: no thread: %s\n",
+               error.what());
 }
 
 }  // namespace stepdriver::ros_node

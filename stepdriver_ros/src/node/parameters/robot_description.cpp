@@ -4,9 +4,12 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "common/text.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/farthest_limit.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -81,7 +84,7 @@ class JointFitter {
   bool checkLimits(const urdf::Joint& joint) {
     const bool limited = joint.type != urdf::Joint::CONTINUOUS;
     if (!joint.limits) {
-      if (limited) issueOfJoint("has no <limit>");
+      if (limited) issueOfJoint("has no <limit>, which a joint of that type must have");
       return !limited;
     }
     const urdf::JointLimits& limits = *joint.limits;
@@ -93,7 +96,7 @@ class JointFitter {
     } else if (const double lowest = lowestSpeed(); limits.velocity < lowest) {
       issueOfJoint(fmt::format(
           "has the velocity limit {}, but it must be at least {} {}/s, which is {} steps/s",
-          roundedText(limits.velocity), roundedText(lowest), unitOf(axis_.kind),
+          roundedText(limits.velocity), roundedText(lowest), config::unitOf(axis_.kind),
           roundedText(config::kLowestRate)));
       right = false;
     }
@@ -102,8 +105,26 @@ class JointFitter {
           "has lower={} and upper={}, but lower must be below upper (a missing one is 0)",
           roundedText(limits.lower), roundedText(limits.upper)));
       right = false;
+    } else if (limited && isTooFar(limits)) {
+      const double farthest = config::kFarthestLimit / axis_.steps_per_unit;
+      issueOfJoint(fmt::format(
+          "has lower={} and upper={}, but they must be from -{} to {} {}, which is as far as steps "
+          "are counted",
+          roundedText(limits.lower), roundedText(limits.upper), roundedText(farthest),
+          roundedText(farthest), config::unitOf(axis_.kind)));
+      right = false;
     }
     return right;
+  }
+
+  /// Whether a limit that the axis would get is beyond the steps that are counted.
+  bool isTooFar(const urdf::JointLimits& limits) const {
+    const double farthest = config::kFarthestLimit * (1.0 + kRounding);
+    const auto is_too_far = [&](const std::optional<double>& own, double limit) {
+      return !own && std::abs(limit) * axis_.steps_per_unit > farthest;
+    };
+    return is_too_far(axis_.min_position, limits.lower) ||
+           is_too_far(axis_.max_position, limits.upper);
   }
 
   /// [unit/s] 0 if the scale of the axis is not known.
@@ -134,7 +155,7 @@ class JointFitter {
     if (*axis_.min_position < *axis_.max_position) return;
     issueOfJoint(fmt::format("goes from {} to {} {}, which doesn't overlap the axis's own range",
                              roundedText(limits.lower), roundedText(limits.upper),
-                             unitOf(axis_.kind)));
+                             config::unitOf(axis_.kind)));
   }
 
   AxisConfig& axis_;
@@ -143,8 +164,9 @@ class JointFitter {
 };
 
 std::string positionText(const std::optional<double>& position, Kind kind, LimitSource source) {
-  if (!position) return "without limit";
-  return fmt::format("{} {} (from {})", roundedText(*position), unitOf(kind), sourceText(source));
+  if (!position) return "none";
+  return fmt::format("{} {} (from {})", roundedText(*position), config::unitOf(kind),
+                     sourceText(source));
 }
 
 std::string continuousJointText(const AxisConfig& axis) {
@@ -183,10 +205,10 @@ std::vector<std::string> applyRobotDescription(const std::string& urdf, const st
 
 std::string limitsText(const AxisConfig& axis) {
   return fmt::format(
-      "axis {} (joint {}) is limited: min position {}, max position {}, speed {} {}/s (from {})",
+      "limits of axis {} (joint {}): min position {}, max position {}, speed {} {}/s (from {})",
       axis.name, axis.joint, positionText(axis.min_position, axis.kind, axis.min_position_source),
       positionText(axis.max_position, axis.kind, axis.max_position_source),
-      roundedText(axis.max_speed), unitOf(axis.kind), sourceText(axis.max_speed_source));
+      roundedText(axis.max_speed), config::unitOf(axis.kind), sourceText(axis.max_speed_source));
 }
 
 }  // namespace stepdriver::ros_node

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/place_text.h"
 #include "common/text.h"
 #include "respond.h"
 
@@ -98,10 +99,13 @@ bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
   });
 }
 
-std::string AxisServices::placeText(double position) const {
+double AxisServices::stepsPerUnit() const {
   const config::AxisConfig& config = axis_.config();
-  const double scale = config.steps_per_unit * axis_.state().microsteps / config.microsteps;
-  return config::placeText(position, config.kind, scale);
+  return config.steps_per_unit * axis_.state().microsteps / config.microsteps;
+}
+
+std::string AxisServices::placeText(double position) const {
+  return config::placeText(position, axis_.config().kind, stepsPerUnit());
 }
 
 std::string AxisServices::wayText(const axis::Move& move) const {
@@ -110,8 +114,8 @@ std::string AxisServices::wayText(const axis::Move& move) const {
   std::string text = fmt::format("to {} in {} s", target, roundedText(move.duration));
   if (rest != target) text += fmt::format("; it comes to rest at {}, the nearest microstep", rest);
   if (move.overshoot > 0.0) {
-    text += fmt::format("; it can't stop before that, overshoots by {} {}, and comes back",
-                        roundedText(move.overshoot), unitOf(axis_.config().kind));
+    text += fmt::format("; it can't stop before that, overshoots by {}, and comes back",
+                        config::distanceText(move.overshoot, axis_.config().kind, stepsPerUnit()));
   }
   return text;
 }
@@ -149,7 +153,7 @@ bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& r
     axis_.setLimits({request.max_speed, request.acceleration, request.deceleration, request.jerk});
     response.message =
         fmt::format("{}: {}", axis_.config().name,
-                    changesText(before, axis_.limits(), unitOf(axis_.config().kind)));
+                    changesText(before, axis_.limits(), config::unitOf(axis_.config().kind)));
   });
   const axis::AxisLimits holding = axis_.limits();
   response.max_speed = holding.max_speed;

@@ -51,6 +51,7 @@ class AxisServices {
   template <typename Response>
   void respondToMove(const axis::Move& move, bool wait, Response& response);
 
+  double stepsPerUnit() const;
   /// Rounded to a microstep of the current mode.
   std::string placeText(double position) const;
   /// "to 0.1 m in 1.2 s"

@@ -69,6 +69,7 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
     response.pulses_forward.push_back(report.pulses_forward);
     response.pulses_backward.push_back(report.pulses_backward);
     response.carriage.push_back(report.carriage / config::configUnitsPerUnit(axis.kind));
+    response.fell.push_back(report.fell / config::configUnitsPerUnit(axis.kind));
     response.microsteps.push_back(report.microsteps);
     response.violations.push_back(report.totalViolations());
     response.violation_kinds.push_back(kindsText(report));

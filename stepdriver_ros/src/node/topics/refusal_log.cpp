@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cctype>
 
-#include "stepdriver_core/printable.h"
-
 namespace stepdriver::ros_node {
 namespace {
 
@@ -29,7 +27,7 @@ void RefusalLog::warn(const std::string& reason) {
     }
     if (!said_.emplace(withoutNumbers(reason), now).second) return;
   }
-  ROS_WARN_NAMED("trajectory", "%s: %s", source_.c_str(), printable(reason).c_str());
+  ROS_WARN_NAMED("trajectory", "%s: %s", source_.c_str(), reason.c_str());
 }
 
 }  // namespace stepdriver::ros_node

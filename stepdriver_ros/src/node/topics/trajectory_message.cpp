@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
 
 #include "common/text.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -19,6 +19,12 @@ std::string namesOf(const AxisOfJoint& axes) {
   std::string names;
   for (const auto& [joint, axis] : axes) names += (names.empty() ? "" : ", ") + joint;
   return names;
+}
+
+/// [s] A difference of two times can be more than a ros::Duration, which then throws, can hold.
+double secondsFrom(ros::Time begin, ros::Time end) {
+  return 1e-9 * static_cast<double>(static_cast<std::int64_t>(end.toNSec()) -
+                                    static_cast<std::int64_t>(begin.toNSec()));
 }
 
 /// [s] A point's time after the start of a trajectory that began `late` ago.
@@ -76,8 +82,8 @@ std::vector<std::string> axesOf(const std::vector<std::string>& joints, const Ax
   for (const std::string& joint : joints) {
     const auto axis = axes.find(joint);
     if (axis == axes.end()) {
-      throw BadTrajectory(Kind::kJoints, fmt::format("there is no joint {}; there are {}",
-                                                     printable(joint), namesOf(axes)));
+      throw BadTrajectory(Kind::kJoints,
+                          fmt::format("there is no joint {}; there are {}", joint, namesOf(axes)));
     }
     if (std::find(found.begin(), found.end(), axis->second) != found.end()) {
       throw BadTrajectory(Kind::kJoints, "the joint " + joint + " is named twice");
@@ -92,7 +98,7 @@ TimedTrajectory timedTrajectory(const trajectory_msgs::JointTrajectory& message,
   TimedTrajectory trajectory;
   trajectory.request.names = axesOf(message.joint_names, axes);
   if (message.points.empty()) throw BadTrajectory(Kind::kInvalid, "it has no points");
-  const double ahead = message.header.stamp.isZero() ? 0.0 : (message.header.stamp - now).toSec();
+  const double ahead = message.header.stamp.isZero() ? 0.0 : secondsFrom(now, message.header.stamp);
   if (ahead > kShortestDelay) trajectory.delay = ahead;
   const double late = std::max(0.0, -ahead);
   for (std::size_t i = 0; i < message.points.size(); ++i) {

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <optional>
+
+#include "stepdriver_core/config/config_reader.h"
+
+namespace stepdriver::config {
+
+/// Reads `driver`, `chip` and `timing`: a named chip with the overrides of the configuration, or,
+/// for `driver: step_dir`, a chip that is described by the configuration alone.
+///
+/// @return empty if there is no such driver; then nothing that depends on it is checked.
+std::optional<driver::DriverChip> readChip(ConfigReader& axis);
+
+}  // namespace stepdriver::config

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/random_motion.h"
+
+namespace stepdriver::soak {
+
+/// How far from 0 the axes of a soak are sent [m].
+constexpr double kReach = 0.09;
+
+/// How often each kind of command was accepted and refused.
+struct Accepted {
+  std::int64_t accepted = 0;
+  std::int64_t refused = 0;
+};
+using Counts = std::map<std::string, Accepted>;
+
+/// A client that sends random commands of every kind to a machine. For one thread.
+class RandomCommands {
+ public:
+  /// @param axes the names of the axes to command.
+  RandomCommands(machine::Machine& machine, std::vector<std::string> axes, unsigned seed)
+      : machine_(machine), names_(std::move(axes)), random_(seed) {}
+
+  /// Sends one. A refusal is an answer like any other. @throw Error of any other kind
+  void send();
+
+  const Counts& counts() const { return counts_; }
+  motion::Random& random() { return random_; }
+
+ private:
+  std::string choose();
+  double place() { return random_.within(-kReach, kReach); }
+  double velocity(const axis::Axis& axis);
+  axis::Axis& anyAxis();
+  void trajectory();
+
+  machine::Machine& machine_;
+  const std::vector<std::string> names_;
+  motion::Random random_;
+  Counts counts_;
+};
+
+}  // namespace stepdriver::soak

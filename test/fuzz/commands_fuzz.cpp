@@ -1,0 +1,199 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fuzz/fuzz_input.h"
+#include "search/participants.h"
+
+// The input is a schedule of test/core/search: acts of two clients and of the machine, some of them
+// with numbers of the input, and turns that come late. The oracle of the search judges what the rig
+// sees.
+
+namespace stepdriver::fuzz {
+namespace {
+
+using search::Act;
+using search::Meaning;
+using search::Participants;
+
+constexpr std::size_t kMostItems = 8;
+constexpr std::size_t kMostDeviations = 3;
+/// Steps between two items, and the steps that a participant has to wait.
+constexpr std::array<std::size_t, 12> kSteps = {0, 1, 2, 3, 4, 8, 16, 40, 60, 120, 200, 500};
+
+/// Takes the input from its beginning; 0 after its end.
+class Input {
+ public:
+  Input(const std::uint8_t* data, std::size_t size) : next_(data), left_(size) {}
+
+  bool isOver() const { return left_ == 0; }
+
+  std::uint8_t byte() {
+    if (left_ == 0) return 0;
+    --left_;
+    return *next_++;
+  }
+
+  std::size_t any(std::size_t count) { return byte() % count; }
+
+  /// From -size to size; a few are any double that isn't tiny.
+  double number(double size) {
+    const int kind = byte();
+    if (kind < 250) return size * (kind - 125) / 125.0;
+    std::array<std::uint8_t, sizeof(double)> bytes{};
+    for (std::uint8_t& each : bytes) each = byte();
+    double number = 0.0;
+    std::memcpy(&number, bytes.data(), sizeof number);
+    // A motion that takes longer than a run would be correct, but would show nothing.
+    return std::abs(number) < size / 1000.0 ? 0.0 : number;
+  }
+
+  /// From least to most.
+  double between(double least, double most) { return least + (most - least) * byte() / 255.0; }
+
+ private:
+  const std::uint8_t* next_;
+  std::size_t left_;
+};
+
+Meaning moving(const std::vector<std::size_t>& axes) {
+  Meaning meaning;
+  meaning.moves = true;
+  for (const std::size_t axis : axes) meaning.axes[axis] = true;
+  return meaning;
+}
+
+Act request(const std::string& name, const machine::Request& wanted, const Meaning& meaning) {
+  return {name, [=](Participants& all, int client) { all.post(client, name, wanted, meaning); }};
+}
+
+/// An act with numbers of the input, as machine::Machine hands them over: it refuses some itself.
+/// The last act of a run moves each axis by 2 mm in two minutes, so the limits are at least that
+/// high.
+Act readAct(Input& input) {
+  constexpr std::size_t kKinds = 9;
+  const std::size_t kind = input.any(kKinds);
+  const std::size_t axis = input.any(search::kAxes);
+  switch (kind) {
+    case 0: {
+      const machine::MoveTo move{axis, input.number(0.02), input.any(2) == 1, input.number(0.1)};
+      return request(fmt::format("move {} {} {} at {}", axis, move.relative ? "by" : "to",
+                                 move.position, move.velocity),
+                     move, moving({axis}));
+    }
+    case 1: {
+      const machine::MoveRounds move{axis, input.number(3.0), input.number(0.1)};
+      return request(fmt::format("move {} by {} rounds at {}", axis, move.rounds, move.velocity),
+                     move, moving({axis}));
+    }
+    case 2: {
+      const std::size_t other = (axis + 1 + input.any(2)) % search::kAxes;
+      const machine::MoveLine line{{axis, other},
+                                   {input.number(0.02), input.number(0.02)},
+                                   input.any(2) == 1,
+                                   input.any(4) == 0 ? input.number(0.1) : 0.0,
+                                   input.any(4) == 0 ? input.number(3.0) : 0.0};
+      return request(fmt::format("line of {} and {}", axis, other), line, moving({axis, other}));
+    }
+    case 3: {
+      const double velocity = input.number(0.1);
+      return request(fmt::format("jog {} at {}", axis, velocity), machine::Jog{axis, velocity, {}},
+                     moving({axis}));
+    }
+    case 4: {
+      axis::AxisLimits limits;
+      limits.max_speed = input.between(0.01, 0.11);
+      limits.acceleration = input.between(0.05, 2.1);
+      limits.deceleration = input.between(0.05, 2.1);
+      if (input.any(2) == 1) limits.jerk = input.between(1.0, 60.0);
+      return request(fmt::format("limits of {}", axis), machine::SetLimits{axis, limits}, {});
+    }
+    case 5: {
+      const double position = input.number(0.02);
+      return request(fmt::format("position of {} is {}", axis, position),
+                     machine::SetPosition{axis, position}, {});
+    }
+    case 6: {
+      const double factor = input.between(0.1, 2.0);
+      return request(fmt::format("override {}", factor), machine::SetSpeedOverride{factor}, {});
+    }
+    case 7: {
+      const double size = input.number(0.012);
+      const std::size_t other = (axis + 1) % search::kAxes;
+      return {fmt::format("trajectory of {} and {}, {}", axis, other, size),
+              [=](Participants& all, int client) {
+                all.postTrajectory(client, {axis, other}, size);
+              }};
+    }
+    default: {
+      const int microsteps = static_cast<int>(input.any(34)) - 1;
+      return request(fmt::format("{} microsteps of {}", microsteps, axis),
+                     machine::SetMicrosteps{axis, microsteps}, moving({axis}));
+    }
+  }
+}
+
+search::Schedule readSchedule(Input input) {
+  search::Schedule schedule;
+  schedule.variant = static_cast<int>(input.any(2));
+  while (!input.isOver() && schedule.items.size() < kMostItems) {
+    const std::uint8_t what = input.byte();
+    if (what >= 240 && schedule.deviations.size() < kMostDeviations) {
+      search::Deviation deviation;
+      deviation.from = 4 * static_cast<std::size_t>(input.byte());
+      deviation.who = static_cast<search::Who>(input.any(search::kParticipants));
+      deviation.steps = 1 + kSteps.at(input.any(kSteps.size()));
+      schedule.deviations.push_back(deviation);
+      continue;
+    }
+    search::Item item;
+    item.client = static_cast<int>(input.any(2));
+    item.after = kSteps.at(input.any(kSteps.size()));
+    if (what < 2 * search::acts().size()) {
+      item.act = what / 2;
+    } else {
+      item.own = std::make_shared<const Act>(readAct(input));
+    }
+    schedule.items.push_back(item);
+  }
+  return schedule;
+}
+
+/// What happened, step by step.
+std::string storyOf(const search::Schedule& schedule, const std::vector<std::string>& complaints) {
+  std::string story;
+  for (const std::string& complaint : complaints) story += complaint + "\n";
+  story += fmt::format("variant {}\n", schedule.variant);
+  for (const search::Item& item : schedule.items) {
+    story += fmt::format("  client {}, after {} steps: {}\n", item.client == 0 ? "A" : "B",
+                         item.after, search::actOf(item).name);
+  }
+  for (const search::Deviation& deviation : schedule.deviations) {
+    story += fmt::format("  from step {} on {} waits for {} steps\n", deviation.from,
+                         search::nameOf(deviation.who), deviation.steps);
+  }
+  Participants again(schedule);
+  again.keepLog();
+  again.run();
+  for (const std::string& line : again.log()) story += "    " + line + "\n";
+  return story;
+}
+
+}  // namespace
+}  // namespace stepdriver::fuzz
+
+// NOLINTNEXTLINE(readability-identifier-naming): the name that libFuzzer calls
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace stepdriver;
+  const search::Schedule schedule = fuzz::readSchedule(fuzz::Input(data, size));
+  const auto complaints = search::Participants(schedule).run();
+  if (!complaints.empty()) fuzz::require(false, fuzz::storyOf(schedule, complaints));
+  return 0;
+}
