@@ -15,14 +15,6 @@ constexpr std::int64_t kForever = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kMillisecond = 1'000'000;
 /// If two requests are sent this far apart, the first one arrives first.
 constexpr std::int64_t kArrival = 250 * kMillisecond;
-/// The largest delay of the rig's clock while the computer doesn't stall.
-constexpr std::int64_t kLag = 200 * kMillisecond;
-/// Stalls this close to a request matter for the beginning of its motion.
-constexpr std::int64_t kStallReach = 10 * kLag;
-/// A motion seems to begin at most this long before its request on the rig's clock.
-constexpr std::int64_t kEarliest = kLag + 2 * kStallReach;
-/// Uncertainty of the offset of the clocks, which is measured by calls.
-constexpr std::int64_t kOffsetError = 2 * kMillisecond;
 constexpr double kStopMargin = 1.1;
 /// A trajectory keeps half of the limits here, so that its path leaves the other half for a stop.
 constexpr double kTrajectoryStops = 2.0;
@@ -39,7 +31,7 @@ std::string formatted(const char* format, double number) {
   return text;
 }
 
-/// The time in which a motion may send pulses, in CLOCK_MONOTONIC.
+/// The time in which a motion may send pulses, on the rig's clock.
 struct Span {
   std::int64_t begin;
   std::int64_t end;
@@ -86,7 +78,10 @@ struct AxisRequests {
 class Judge {
  public:
   explicit Judge(const Observation& observation)
-      : seen_(observation), stalls_(observation.stalls), of_axis_(observation.axes.size()) {
+      : seen_(observation),
+        stalls_(observation.stalls),
+        clock_(observation.clock),
+        of_axis_(observation.axes.size()) {
     for (const Request& request : seen_.requests) {
       for (std::size_t axis = 0; axis < of_axis_.size(); ++axis) {
         if (!isOf(request, axis)) continue;
@@ -165,22 +160,15 @@ class Judge {
     }
   }
 
-  /// The time in which this motion may send pulses, on the rig's clock; it can't have begun before
-  /// `earliest`.
+  /// The time in which this motion may send pulses; it can't have begun before `earliest`.
   Span spanOf(const Request& motion, std::int64_t earliest, std::size_t axis) const {
-    const std::int64_t begin = std::max(motion.sent, earliest);
+    const std::int64_t begin = clock_.earliestAt(std::max(motion.sent, earliest));
     // A line that didn't begin may have moved its axes to take up their backlash.
     if (motion.answered && (motion.waits || !motion.success)) {
-      const std::int64_t end = *motion.answered + longestStop(motion, axis, *motion.answered);
-      return {mayBegin(begin), end - seen_.clock_offset + kOffsetError};
+      return {begin,
+              clock_.latestAt(*motion.answered) + longestStop(motion, axis, *motion.answered)};
     }
-    return {mayBegin(begin), kForever};
-  }
-
-  /// The rig's clock may be late when a motion begins.
-  std::int64_t mayBegin(std::int64_t asked) const {
-    return asked - seen_.clock_offset - kLag -
-           stalls_.between(asked - kStallReach, asked + kStallReach);
+    return {begin, kForever};
   }
 
   /// The explained pulses after an ending: all pulses after `end`, and those in `passing`.
@@ -199,8 +187,7 @@ class Judge {
 
   /// Whether no request from this one on can explain a pulse before `explained.end`.
   bool isBeyond(const Request& request, const Explained& explained) const {
-    return explained.end != kForever &&
-           request.sent - seen_.clock_offset - kEarliest > explained.end;
+    return explained.end != kForever && clock_.earliestAt(request.sent) > explained.end;
   }
 
   void explainByMotions(const Request& after, std::size_t axis, Explained& explained) const {
@@ -221,7 +208,9 @@ class Judge {
     for (auto request = firstAfter(ending); request != seen_.requests.end(); ++request) {
       if (isBeyond(*request, explained)) break;
       if (!allowsAgain(*request, ending, axis)) continue;
-      if (request->kind == Kind::kResume) explained.add({mayBegin(request->sent), kForever});
+      if (request->kind == Kind::kResume) {
+        explained.add({clock_.earliestAt(request->sent), kForever});
+      }
       explainByMotions(*request, axis, explained);
     }
     return explained;
@@ -237,16 +226,18 @@ class Judge {
                                          ending.sent - kLongestTrajectory);
     if (recent != trajectories.end() && *recent <= *ending.answered) seconds *= kTrajectoryStops;
     const std::int64_t longest = std::llround(seconds * kStopMargin * 1e9);
-    // What is late in a stall, and all that comes after it, is late by as much.
+    // The rig's clock doesn't excuse a long stall: what is late in it, and all that comes after it,
+    // is late by as much.
     std::int64_t late = 0;
     for (;;) {
-      const std::int64_t more = stalls_.between(begin - kLag, begin + longest + late);
+      const std::int64_t more = stalls_.between(begin - kArrival, begin + longest + late);
       if (more == late) return longest + late;
       late = more;
     }
   }
 
-  /// How many pulses came in each tenth of a second around an ending, and the stalls there.
+  /// How many pulses came in each tenth of a second around an ending, and the stalls there; with
+  /// times of the rig's clock.
   std::string courseAround(std::int64_t answered, std::size_t axis, std::int64_t last) const {
     constexpr std::int64_t kTenth = 100 * kMillisecond;
     std::string text = "pulses in each 0.1 s from 0.5 s before the answer on:";
@@ -258,14 +249,15 @@ class Judge {
       text += ' ' + std::to_string(count);
     }
     const std::int64_t stalled =
-        stalls_.between(answered + seen_.clock_offset - 5 * kTenth, last + seen_.clock_offset);
+        stalls_.between(clock_.whenItShows(answered - 5 * kTenth), clock_.whenItShows(last));
     return text + "; stalled for " + formatted("%.3f s", inSeconds(stalled));
   }
 
   void judgeEnd(const Request& ending, std::size_t axis) {
     const bool decelerates = ending.kind == Kind::kStop || ending.kind == Kind::kHold;
     const std::int64_t allowed = decelerates ? longestStop(ending, axis, *ending.answered) : 0;
-    const std::int64_t begin = *ending.answered - seen_.clock_offset + kOffsetError + allowed;
+    const std::int64_t answered = clock_.latestAt(*ending.answered);
+    const std::int64_t begin = answered + allowed;
     const auto [end, passing] = explainedAfter(ending, axis);
     std::size_t count = 0;
     std::int64_t first = 0;
@@ -283,14 +275,13 @@ class Judge {
       ++count;
     }
     if (count == 0) return;
-    const std::int64_t answered = *ending.answered - seen_.clock_offset;
-    broken_.push_back(seen_.axes[axis].name + ": " + std::to_string(count) +
-                      " pulses after the answer of " + ending.text + ", from " +
-                      formatted("%.3f s", inSeconds(first - answered)) + " to " +
-                      formatted("%.3f s", inSeconds(last - answered)) + " after it (" +
-                      formatted("%.3f s", inSeconds(allowed)) + " are allowed); " +
-                      courseAround(answered, axis, last) + "; requests before and after it:" +
-                      requestsAround(ending.sent, first + seen_.clock_offset));
+    broken_.push_back(
+        seen_.axes[axis].name + ": " + std::to_string(count) + " pulses after the answer of " +
+        ending.text + ", from " + formatted("%.3f s", inSeconds(first - answered)) + " to " +
+        formatted("%.3f s", inSeconds(last - answered)) + " after it (" +
+        formatted("%.3f s", inSeconds(allowed)) + " are allowed); " +
+        courseAround(answered, axis, last) +
+        "; requests before and after it:" + requestsAround(ending.sent, clock_.whenItShows(first)));
   }
 
   std::string requestsAround(std::int64_t begin, std::int64_t end) const {
@@ -319,7 +310,7 @@ class Judge {
   std::int64_t countAt(std::size_t axis, std::int64_t time) const {
     const auto& pulses = seen_.pulses[axis];
     const auto after =
-        std::upper_bound(pulses.begin(), pulses.end(), time - seen_.clock_offset,
+        std::upper_bound(pulses.begin(), pulses.end(), clock_.latestAt(time),
                          [](std::int64_t t, const Pulse& pulse) { return t < pulse.time; });
     return after == pulses.begin() ? 0 : std::prev(after)->count;
   }
@@ -351,6 +342,7 @@ class Judge {
 
   const Observation& seen_;
   const Stalls stalls_;
+  const RigClock clock_;
   std::vector<AxisRequests> of_axis_;
   std::vector<std::string> broken_;
 };

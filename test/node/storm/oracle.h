@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "storm/request_log.h"
+#include "storm/rig_clock.h"
 
 namespace stepdriver::storm {
 
@@ -34,15 +35,14 @@ struct Stall {
   std::int64_t end = 0;
 };
 
-/// What happened. The rig's clock is never ahead of CLOCK_MONOTONIC less `clock_offset`; it may
-/// fall behind for as long as the node plans or the computer stalls, and then catches up.
+/// What happened.
 struct Observation {
   std::vector<AxisFacts> axes;
   std::vector<Request> requests;
   std::vector<std::vector<Pulse>> pulses;  ///< of each axis
   std::vector<RestPoint> rests;
   std::vector<Stall> stalls;
-  std::int64_t clock_offset = 0;
+  std::vector<ClockReading> clock;  ///< of the rig
 };
 
 /// Compares an observation with the node's promises:

@@ -7,7 +7,7 @@
 #include <vector>
 
 // Each promise of the oracle, kept and broken. Times are in milliseconds; the rig's clock began at
-// 1000.
+// 1000, and is read every 10 ms until 6000.
 
 namespace stepdriver::storm {
 namespace {
@@ -38,7 +38,10 @@ class OneAxis {
     facts.steps_per_metre = kStepsPerMetre;
     seen_.axes = {facts};
     seen_.pulses.resize(1);
-    seen_.clock_offset = kOffset * kMs;
+    for (std::int64_t time = kOffset; time <= 6000; time += 10) {
+      const std::int64_t at = time * kMs;
+      seen_.clock.push_back({at, at - kOffset * kMs, at});
+    }
   }
 
   void move(std::int64_t begin, std::int64_t end) {
@@ -51,6 +54,13 @@ class OneAxis {
   void rest(std::int64_t time, double position) { seen_.rests.push_back({time * kMs, {position}}); }
   void stall(std::int64_t begin, std::int64_t end) {
     seen_.stalls.push_back({begin * kMs, end * kMs});
+  }
+  /// The rig's clock stands still in between, and catches up at once.
+  void fallBehind(std::int64_t begin, std::int64_t end) {
+    for (ClockReading& reading : seen_.clock) {
+      if (reading.before < begin * kMs || reading.after >= end * kMs) continue;
+      reading.rig = (begin - kOffset) * kMs;
+    }
   }
   std::size_t broken() const { return brokenPromises(seen_).size(); }
 
@@ -108,6 +118,24 @@ TEST(Oracle, DoesNotTrustTheOrderWhileTheComputerStalls) {
   axis.stall(2650, 2950);
   axis.move(2500, 2600);
   EXPECT_EQ(axis.broken(), 0U);
+}
+
+TEST(Oracle, KnowsHowFarTheRigsClockIsBehind) {
+  for (const bool behind : {true, false}) {
+    OneAxis axis = endedBy(Kind::kStop, 2200);
+    if (behind) axis.fallBehind(3300, 4300);
+    axis.ask(requestOf(Kind::kMotion, 4200, 4205));
+    axis.move(2301, 2600);
+    EXPECT_EQ(axis.broken(), behind ? 0U : 1U);
+  }
+}
+
+TEST(Oracle, FindsPulsesAfterAnEndingThoughTheRigsClockIsBehind) {
+  for (const bool behind : {true, false}) {
+    OneAxis axis = endedBy(Kind::kDisable, 2005);
+    if (behind) axis.fallBehind(2950, 3100);
+    EXPECT_EQ(axis.broken(), behind ? 1U : 0U);
+  }
 }
 
 TEST(Oracle, LetsNoMotionFollowUntilItIsAllowedAgain) {

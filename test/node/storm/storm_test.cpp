@@ -12,7 +12,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <deque>
-#include <limits>
 #include <mutex>
 #include <optional>
 #include <random>
@@ -24,6 +23,7 @@
 #include "storm/oracle.h"
 #include "storm/pulses.h"
 #include "storm/request_log.h"
+#include "storm/rig_clock_watch.h"
 #include "storm/stall_watch.h"
 #include "storm/storm_client.h"
 #include "storm/storm_machine.h"
@@ -43,7 +43,6 @@ using node_test::NodeUnderTest;
 using node_test::waitUntil;
 
 constexpr int kClients = 4;
-constexpr int kResets = 20;
 constexpr double kLongestStorm = 2.5;       // [s] between two calms
 constexpr double kLongestBackground = 0.8;  // [s] from the last motion that is asked for to its end
 constexpr double kRecording = 2.0;          // [s] until a flight recording is written
@@ -104,6 +103,7 @@ class Storm : public testing::Test {
     node_.start();
     topics_.emplace(node_.name(), log_);
     states_.emplace(node_.full("axis_states"));
+    clock_watch_.emplace(node_.full("rig/report"));
     ender_.emplace(node_.name(), kClients, log_);
     ASSERT_TRUE(waitUntil([&] { return topics_->connected() && states_->count() > 0; }));
     for (int i = 0; i < kClients; ++i) {
@@ -124,7 +124,6 @@ class Storm : public testing::Test {
     for (std::thread& thread : threads_) thread.join();
   }
 
-  void resetForOffset();
   void storm();
   /// Ends all motions, and waits until every call has its answer.
   void calm();
@@ -150,6 +149,7 @@ class Storm : public testing::Test {
   std::mt19937_64 random_;
   NodeUnderTest node_;
   StallWatch stall_watch_;
+  std::optional<RigClockWatch> clock_watch_;
   std::string trace_;
   RequestLog log_;
   std::optional<DriverTopics> topics_;
@@ -158,17 +158,10 @@ class Storm : public testing::Test {
   std::atomic<Weather> weather_{Weather::kCalm};
   std::deque<StormClient> clients_;
   std::deque<std::thread> threads_;
-  std::vector<std::int64_t> resets_;  // times at which x was asked to reset, to compare the clocks
-  std::vector<double> memory_;        // [MB] of the node at each calm
+  std::vector<double> memory_;  // [MB] of the node at each calm
   Observation seen_;
   bool failed_ = false;
 };
-
-/// The rig's time of the first edge of RESET is after this time.
-void Storm::resetForOffset() {
-  resets_.push_back(steadyNow());
-  ASSERT_TRUE(ender_->trigger(Kind::kOther, 1, "x/reset"));
-}
 
 void Storm::storm() {
   weather_ = Weather::kStorm;
@@ -239,8 +232,8 @@ void Storm::noteRest() {
     return;
   }
   // States that are received from now on are states of rest. The rest is noted with the time of its
-  // first state: the offset of the rig's clock is known only to within the latency of a call, and
-  // the next motion may begin right after the last state.
+  // first state: the rig's clock is known only to within a few milliseconds, and the next motion
+  // may begin right after the last state.
   const int before = states_->count();
   const std::int64_t at_rest = steadyNow();
   if (!waitUntil([&] { return !isAlive() || states_->count() > before + 1; })) {
@@ -253,6 +246,7 @@ void Storm::noteRest() {
 
 void Storm::end() {
   weather_ = Weather::kOver;
+  seen_.clock = clock_watch_->end();
   const auto report = node_.rig();
   for (std::size_t axis = 0; axis < report.name.size(); ++axis) {
     if (report.violations[axis] == 0) continue;
@@ -266,24 +260,16 @@ void Storm::end() {
 void Storm::judge() {
   const auto trace = node_test::readVcd(trace_);
   for (const AxisFacts& axis : seen_.axes) seen_.pulses.push_back(pulsesOf(trace, axis.name));
-  // RESET is active low; each call makes one falling edge.
-  std::vector<std::int64_t> begins;
-  for (const auto& edge : trace.at("x/reset").edges) {
-    if (!edge.level && edge.time_ns > 0) begins.push_back(edge.time_ns);
-  }
-  ASSERT_GE(begins.size(), resets_.size());
-  seen_.clock_offset = std::numeric_limits<std::int64_t>::max();
-  for (std::size_t i = 0; i < resets_.size(); ++i) {
-    seen_.clock_offset = std::min(seen_.clock_offset, resets_[i] - begins[i]);
-  }
   seen_.requests = log_.requests();
   seen_.stalls = stall_watch_.stalls();
   std::size_t pulses = 0;
   for (const auto& each : seen_.pulses) pulses += each.size();
   std::printf(
-      "storm: seed %llu, %zu requests, %zu pulses, %zu calms, %zu stalls, %.1f to %.1f MB\n",
+      "storm: seed %llu, %zu requests, %zu pulses, %zu calms, %zu stalls, %zu readings of the "
+      "rig's "
+      "clock, %.1f to %.1f MB\n",
       static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, seen_.rests.size(),
-      seen_.stalls.size(), *std::min_element(memory_.begin(), memory_.end()),
+      seen_.stalls.size(), seen_.clock.size(), *std::min_element(memory_.begin(), memory_.end()),
       *std::max_element(memory_.begin(), memory_.end()));
   const auto broken = brokenPromises(seen_);
   for (std::size_t i = 0; i < std::min(broken.size(), kMostReported); ++i) fail(broken[i]);
@@ -314,7 +300,6 @@ std::string Storm::unanswered() const {
 }
 
 TEST_F(Storm, KeepsThePromises) {
-  for (int i = 0; i < kResets; ++i) resetForOffset();
   const auto end_time = std::chrono::steady_clock::now() +
                         std::chrono::duration<double>(ros::param::param("~seconds", 25.0));
   while (std::chrono::steady_clock::now() < end_time && isAlive() && !failed_) {

@@ -57,6 +57,7 @@ std::string kindsText(const sim::RigAxisReport& report) {
 
 RigReport::Response reportOf(setup::Simulation& simulation) {
   RigReport::Response response;
+  response.time = static_cast<double>(simulation.clock().now()) * 1e-9;
   try {
     simulation.rig().flushTrace();
   } catch (const Error& error) {
