@@ -173,11 +173,15 @@ discard_foreign_build() {
   grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$from" "$into/CMakeCache.txt" || rm -rf "$into"
 }
 
+# With -g1 a backtrace names each line, and the compiler is a third faster than with all that a debugger
+# could show.
+build_type=(-DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG")
+
 configure() {
   local from=$1 into=$2
   shift 2
   discard_foreign_build "$from" "$into"
-  cmake -S "$from" -B "$into" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+  cmake -S "$from" -B "$into" "${build_type[@]}" \
     -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "$@"
 }
 

@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/fuzz.sh [--seconds SECONDS] [--seed SEED] [TARGET...]
+usage: scripts/fuzz.sh [--build] [--seconds SECONDS] [--seed SEED] [TARGET...]
 
 Installs missing packages, builds the targets of test/fuzz with clang, and runs each of them for SECONDS
 (default: 60) from SEED (default: a new one each time, which is printed), as many at a time as there are
@@ -19,7 +19,7 @@ END
 Without a TARGET all of them are run. The inputs begin with those of test/fuzz/corpus and with those that
 earlier runs have found, which remain in the folder fuzz of the build folder. Prints a line for each
 target. If one breaks a promise, it also prints why, and the file of the input. To try such a file again,
-give it as the argument of the target's program.
+give it as the argument of the target's program. With --build it only builds.
 
 Exit code 0: nothing was found.
 END
@@ -28,10 +28,11 @@ END
 # A target has a folder of inputs. Those without a C++ source are in test/fuzz/readers_fuzz.py.
 targets() { (cd "$root/test/fuzz/corpus" && printf '%s\n' *); }
 
-seconds=60 seed=$((RANDOM * 32768 + RANDOM)) wanted=()
+seconds=60 seed=$((RANDOM * 32768 + RANDOM)) only_build='' wanted=()
 while (($# > 0)); do
   case $1 in
     -h | --help) usage && exit ;;
+    --build) only_build=1 ;;
     --seconds | --seed)
       [[ ${2:-} =~ ^[0-9]+$ ]] || { usage >&2 && exit 2; }
       printf -v "${1#--}" %s "$2"
@@ -110,6 +111,7 @@ run_targets() {
 
 say "Building"
 quietly fuzz-build build_targets
+[[ -z $only_build ]] || exit 0
 say "Seed $seed, $seconds seconds for each target"
 run run_targets
 ((run_status == 0))

@@ -85,6 +85,38 @@ stage() {
   fi
 }
 
+# clang-tidy and the builds with sanitizers take longest. They run in the background with low priority,
+# one after the other, from the kernel's stages on: many tests leave them a processor. The stage that needs
+# one waits for its end.
+background_group=
+begin_background() {
+  (($# > 0)) || return 0
+  rm -f "$build"/log/background-*.status
+  set -m
+  (
+    set +m
+    renice -n 19 -p "$BASHPID" >/dev/null
+    for function; do
+      status=0
+      (set -e; "$function") >"$build/log/background-$function.log" 2>&1 &
+      wait "$!" || status=$?
+      say "$status" >"$build/log/background-$function.status"
+    done
+  ) </dev/null &
+  set +m
+  background_group=$!
+}
+# await FUNCTION: shows its output if it failed.
+await() {
+  local log=$build/log/background-$1
+  while [[ ! -s $log.status ]] && kill -0 "$background_group" 2>/dev/null; do sleep 1; done
+  [[ $(cat "$log.status" 2>/dev/null) != 0 ]] || return 0
+  [[ ! -f $log.log ]] || tail -n 200 "$log.log"
+  return 1
+}
+end_background() { [[ -z $background_group ]] || end_group "$background_group" 5; }
+at_exit end_background
+
 # The project's own files that match the given patterns, as paths in the checkout.
 own_files() {
   local pattern names=()
@@ -153,32 +185,7 @@ tidy() {
       --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
 }
 
-# clang-tidy takes longest. It runs in the background with low priority from the kernel's stages on:
-# they and the tests of the node leave it a processor. The stage `tidy` waits for its end.
-tidy_group=
-begin_tidy() {
-  rm -f "$build/log/tidy-status"
-  set -m
-  (
-    renice -n 19 -p "$BASHPID" >/dev/null
-    status=0
-    tidy_all || status=1
-    say "$status" >"$build/log/tidy-status"
-  ) </dev/null >"$build/log/tidy-found.log" 2>&1 &
-  set +m
-  tidy_group=$!
-}
-check_tidy() {
-  local i
-  for ((i = 0; i < 3600; i++)); do
-    [[ ! -s $build/log/tidy-status ]] || break
-    sleep 1
-  done
-  cat "$build/log/tidy-found.log"
-  [[ $(cat "$build/log/tidy-status") == 0 ]]
-}
-end_tidy() { [[ -z $tidy_group ]] || end_group "$tidy_group" 5; }
-at_exit end_tidy
+check_tidy() { await tidy_all; }
 
 build_core() {
   quietly core-build build_core_quietly
@@ -242,7 +249,7 @@ test_kernel_gpiod2() {
   test_waveform_in_kernel "$build/gpiod2"
 }
 build_gpiod2() {
-  cmake -S "$src/stepdriver_core" -B "$build/gpiod2" -DCMAKE_BUILD_TYPE=RelWithDebInfo "$strict" \
+  cmake -S "$src/stepdriver_core" -B "$build/gpiod2" "${build_type[@]}" "$strict" \
     -DSTEPDRIVER_GPIOD=2 -DSTEPDRIVER_GPIOD_ROOT="$1" &&
     cmake --build "$build/gpiod2" -j "$jobs" --target gpio_tests machine_waveform_test \
       step_times_test write_cost
@@ -351,27 +358,36 @@ for key, value in next(p for p in presets if p["name"] == name)["environment"].i
   eval "$exports"
 }
 
-# sanitize_core PRESET EXCLUDED PROGRAM...: runs the programs' tests, except those whose names match.
+build_core_asan() {
+  build_sanitized "$src/stepdriver_core" core asan machine_tests pulse_tests recorder_tests search_tests
+}
+build_core_tsan() {
+  build_sanitized "$src/stepdriver_core" core tsan gpio_tests machine_tests pulse_tests recorder_tests
+}
+build_node_asan() { build_sanitized "$src" catkin asan stepdriver_node; }
+build_node_tsan() { build_sanitized "$src" catkin tsan stepdriver_node; }
+
+# sanitize_core PRESET: runs the tests of the programs that are built.
 sanitize_core() {
-  local preset=$1 excluded=$2
-  quietly "$preset-core-build" build_sanitized "$src/stepdriver_core" core "$preset" "${@:3}"
+  local preset=$1
+  await "build_core_$preset"
   use_test_preset "$preset"
   # The number of schedules of each kind that the search samples.
   STEPDRIVER_SCHEDULES=2000 ctest --test-dir "$build/core-$preset" -j "$jobs" --timeout 300 \
-    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$excluded"
+    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$slow_tests"
 }
 # Tests that take minutes with a sanitizer are excluded. The search has one thread, so ThreadSanitizer has
 # nothing to find in it.
 slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess'
-sanitize_core_asan() { sanitize_core asan "$slow_tests" machine_tests pulse_tests recorder_tests search_tests; }
-sanitize_core_tsan() { sanitize_core tsan "$slow_tests" gpio_tests machine_tests pulse_tests recorder_tests; }
+sanitize_core_asan() { sanitize_core asan; }
+sanitize_core_tsan() { sanitize_core tsan; }
 
 # sanitize_node PRESET TEST...: runs a storm and tests of --ros. Only the node that they start has the
 # sanitizer. It writes its findings to files, because not every test reads all that its node prints.
 sanitize_node() {
   local preset=$1 findings=$build/log/$1-findings name status=0
   shift
-  quietly "$preset-node-build" build_sanitized "$src" catkin "$preset" stepdriver_node
+  await "build_node_$preset"
   quietly "$preset-tests-build" build_node_tests storm_test "$@"
   rm -f "$findings".*
   use_test_preset "$preset"
@@ -411,7 +427,8 @@ test_bad_days() {
 }
 
 # The same inputs each time: new ones are tried by hand, so that a change fails only for what it did.
-check_fuzz() { bash "$root/scripts/fuzz.sh" --seed 1; }
+check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --seed 1; }
+build_fuzz() { bash "$root/scripts/fuzz.sh" --build; }
 
 choose_build_folder
 rm -rf "$build/ros"
@@ -423,6 +440,7 @@ install_packages core ccache "${parts[@]}" "$(wants ros && echo trace)" \
 strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
 [[ $(c++ -dumpversion) != 12* ]] || strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=ON
 
+later=()  # what runs in the background
 if wants lint; then
   stage shell check_shell
   stage doxygen check_doxygen
@@ -446,8 +464,11 @@ if wants core; then
 fi
 if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
   stage tidy-setup check_tidy_setup
-  [[ ${outcome[tidy-setup]} != passed ]] || begin_tidy
+  [[ ${outcome[tidy-setup]} != passed ]] || later+=(tidy_all)
 fi
+! wants sanitize || later+=(build_core_asan build_node_asan build_core_tsan build_node_tsan)
+! wants fuzz || later+=(build_fuzz)
+begin_background "${later[@]}"
 if wants kernel; then
   stage kernel test_kernel core-build
   stage kernel-gpiod2 test_kernel_gpiod2 kernel
