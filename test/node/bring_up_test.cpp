@@ -158,6 +158,28 @@ const std::vector<BadBringUp> kBadBringUps = {
      setting("simulation/emergency_stop", true),
      "simulation/emergency_stop",
      {"true", "is missing"}},
+    {"ButtonOfAnEmergencyStopWithoutOne",
+     [](NodeUnderTest& node) {
+       node.set("simulation/emergency_stop", true);
+       node.set("emergency_stop/disable", "hold");
+     },
+     "simulation/emergency_stop",
+     {"true", "emergency_stop/pin is missing"}},
+    {"UnknownDisable",
+     setting("emergency_stop/disable", "of"),
+     "emergency_stop/disable",
+     {"\"of\"", "did you mean off"}},
+    {"DisableThatIsTrue",
+     setting("emergency_stop/disable", true),
+     "emergency_stop/disable",
+     {"true", "hold or off"}},
+    {"MotorThatAnEmergencyStopCannotSwitchOff",
+     [](NodeUnderTest& node) {
+       node.set("emergency_stop/disable", "off");
+       node.erase("axes/x/pins/enable");
+     },
+     "emergency_stop/disable",
+     {"is off", "axes/x/pins/enable is missing"}},
     {"LatenessOfZero",
      setting("realtime/max_lateness_ms", 0.0),
      "realtime/max_lateness_ms",

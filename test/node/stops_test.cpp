@@ -89,6 +89,25 @@ TEST(EmergencyStop, SendsNoOtherPulseAndHoldsUntilRecover) {
   EXPECT_EQ(node.pulses(), 2 * pulses);
 }
 
+// YAML 1.1, which rosparam reads, takes off for false.
+TEST(EmergencyStop, SwitchesTheMotorsOffIfItIsConfiguredSo) {
+  for (const bool as_text : {true, false}) {
+    NodeUnderTest node;
+    if (as_text) {
+      node.set("emergency_stop/disable", "off");
+    } else {
+      node.set("emergency_stop/disable", false);
+    }
+    node.start();
+    const Recorder<AxisStates> states(node.full("axis_states"));
+    EXPECT_TRUE(trigger(node, "emergency_stop").success);
+    EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return !s.enabled.at(0); }));
+    EXPECT_TRUE(trigger(node, "recover").success);
+    expectSays(node.moveTo(0.01, true).message, "disabled");
+    EXPECT_EQ(node.pulses(), 0);
+  }
+}
+
 TEST(EmergencyStop, AtRestStopsWhatComesLater) {
   NodeUnderTest node;
   node.start();

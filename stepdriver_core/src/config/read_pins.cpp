@@ -330,15 +330,11 @@ std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedL
   return readLine(reader, key, Presence::kRequired, used).value_or("");
 }
 
-std::optional<InputSwitch> readInputSwitch(ConfigReader& parent, const std::string& key,
-                                           UsedLines& used) {
-  ConfigReader reader = parent.map(key);
-  if (!parent.has(key)) return {};
+InputSwitch readInputSwitch(ConfigReader& reader, UsedLines& used) {
   InputSwitch input;
   input.line = readRequiredLine(reader, "pin", used);
   input.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
   input.bias = readBias(reader, "bias");
-  reader.rejectUnknown();
   return input;
 }
 
@@ -367,8 +363,15 @@ void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, Used
 
 void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used) {
   ConfigReader endstops = axis.map("endstops");
-  config.endstop_min = readInputSwitch(endstops, "min", used);
-  config.endstop_max = readInputSwitch(endstops, "max", used);
+  const auto read = [&](const char* end) -> std::optional<Endstop> {
+    ConfigReader reader = endstops.map(end);
+    if (!endstops.has(end)) return {};
+    const Endstop endstop = readInputSwitch(reader, used);
+    reader.rejectUnknown();
+    return endstop;
+  };
+  config.endstop_min = read("min");
+  config.endstop_max = read("max");
   endstops.rejectUnknown();
 }
 

@@ -65,8 +65,12 @@ void refuseBadNumber(const axis::AxisModel& axis, const char* what, double value
 
 Controller::Controller(const std::vector<config::AxisConfig>& axes,
                        const std::vector<motor::MotorLines>& lines, axis::LineNames names,
-                       const std::optional<pulse::Signal>& emergency_stop)
-    : context_(names.inputs.size()), activities_(context_), emergency_stop_(emergency_stop) {
+                       const std::optional<pulse::Signal>& emergency_stop,
+                       EmergencyDisable emergency_disable)
+    : context_(names.inputs.size()),
+      activities_(context_),
+      emergency_stop_(emergency_stop),
+      emergency_disable_(emergency_disable) {
   context_.out = &last_;
   context_.lines = std::move(names);
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -114,6 +118,7 @@ void Controller::takeStops(const EngineNews& news) {
   if (news.stops_served == context_.stops_handled) return;
   context_.stops_handled = news.stops_served;
   input_stops_seen_ = news.input_stops;
+  disables_all_ = emergency_disable_ == EmergencyDisable::kOff;
   for (const auto& axis : context_.axes) {
     if (!axis->fault) axis->noteStop();
     axis->fault.latchEmergencyStop(by_input);
@@ -191,6 +196,9 @@ void Controller::supervise() {
           axis->fault.isEmergencyStop() ? axis::MoveEnd::kEmergencyStop : axis::MoveEnd::kFault;
       activities_.end(*axis, {end, axis->fault.what()});
     }
+    if (disables_all_ && axis->motor.pins().hasEnable()) {
+      disable(*axis, {axis::MoveEnd::kEmergencyStop, axis->fault.what()}, nullptr);
+    }
     // The outputs of a chip at fault are off, and a motor that was stopped at speed may have
     // stalled.
     if (axis->fault && axis->motor.brake().isReleased() && activities_.isFree(*axis)) {
@@ -199,6 +207,7 @@ void Controller::supervise() {
     }
     superviseIdle(*axis);
   }
+  disables_all_ = false;
   activities_.look();
 }
 

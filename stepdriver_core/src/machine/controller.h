@@ -10,6 +10,7 @@
 #include "requests.h"
 #include "snapshot.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::machine {
 
@@ -19,7 +20,8 @@ class Controller {
  public:
   Controller(const std::vector<config::AxisConfig>& axes,
              const std::vector<motor::MotorLines>& lines, axis::LineNames names,
-             const std::optional<pulse::Signal>& emergency_stop);
+             const std::optional<pulse::Signal>& emergency_stop,
+             EmergencyDisable emergency_disable);
   ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
@@ -101,6 +103,8 @@ class Controller {
   activity::Context context_;
   activity::Activities activities_;
   const std::optional<pulse::Signal> emergency_stop_;
+  const EmergencyDisable emergency_disable_;
+  bool disables_all_ = false;  // an emergency stop has come, and all motors must be disabled
   std::uint64_t input_stops_seen_ = 0;
   std::uint64_t homings_ = 0;
   std::vector<Ack> awaiting_rest_;

@@ -53,8 +53,8 @@ class Machine::Impl {
     }
     engine_ = std::make_unique<pulse::PulseEngine>(
         *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
-    controller_ =
-        std::make_unique<Controller>(configs, wiring.motor_lines, names_, wiring.emergency_stop);
+    controller_ = std::make_unique<Controller>(configs, wiring.motor_lines, names_,
+                                               wiring.emergency_stop, options.emergency_disable);
     if (wiring.heartbeat) engine_->beat(*wiring.heartbeat);
     if (options.record_seconds > 0.0) {
       recorder_ = std::make_unique<FlightRecorder>(

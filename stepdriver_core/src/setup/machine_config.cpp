@@ -83,6 +83,36 @@ std::optional<machine::HeartbeatConfig> readHeartbeat(ConfigReader& machine,
   return heartbeat;
 }
 
+machine::EmergencyDisable readDisable(ConfigReader& reader) {
+  // YAML 1.1 takes off for a boolean.
+  const bool* flag = reader.value("disable").as<bool>();
+  const bool is_off = flag != nullptr && !*flag;
+  if (is_off) reader.allow("disable");
+  return is_off || reader.oneOf("disable", {"hold", "off"}, "hold") == "off"
+             ? machine::EmergencyDisable::kOff
+             : machine::EmergencyDisable::kHold;
+}
+
+void readEmergencyStop(ConfigReader& machine, bool axes_are_right, MachineConfig& config,
+                       config::UsedLines& used) {
+  ConfigReader reader = machine.map("emergency_stop");
+  if (!machine.has("emergency_stop")) return;
+  config.emergency_disable = readDisable(reader);
+  const bool has_button = !reader.has("disable") || reader.has("pin") ||
+                          reader.has("active_level") || reader.has("bias");
+  if (has_button) config.emergency_stop = config::readInputSwitch(reader, used);
+  reader.rejectUnknown();
+  if (!axes_are_right || config.emergency_disable != machine::EmergencyDisable::kOff) return;
+  for (const config::AxisConfig& axis : config.axes) {
+    if (axis.pins.enable.wired()) continue;
+    reader.contradiction(
+        "disable",
+        fmt::format("is off, but axes/{}/pins/enable is missing: nothing could switch the "
+                    "current of this motor off",
+                    axis.name));
+  }
+}
+
 }  // namespace
 
 machine::MachineOptions MachineConfig::options() const {
@@ -92,6 +122,7 @@ machine::MachineOptions MachineConfig::options() const {
   options.measure = true;
   options.enforce = enforce_realtime;
   options.emergency_stop = emergency_stop;
+  options.emergency_disable = emergency_disable;
   options.heartbeat = heartbeat;
   options.state_file = state_file;
   options.record_seconds = recorder.seconds;
@@ -119,13 +150,13 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   config.axes =
       config::readAxes(reader.value("axes"), reader.fullName("axes"), reader.issues(), used);
   const bool axes_are_right = reader.issues().size() == issues_before;
-  config.emergency_stop = config::readInputSwitch(reader, "emergency_stop", used);
+  readEmergencyStop(reader, axes_are_right, config, used);
   config.heartbeat = readHeartbeat(reader, used);
   ConfigReader simulation = reader.map("simulation");
-  if (simulation.has("emergency_stop") && !reader.has("emergency_stop")) {
+  if (simulation.has("emergency_stop") && !config.emergency_stop) {
     simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",
                                                            simulation.shown("emergency_stop"),
-                                                           reader.fullName("emergency_stop")));
+                                                           reader.fullName("emergency_stop/pin")));
   }
   const std::string simulation_speed = simulation.fullName("speed");
   config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right);

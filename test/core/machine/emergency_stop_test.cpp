@@ -277,6 +277,87 @@ TEST(EmergencyStop, HasEndedAllPulsesWhenItAnswers) {
   }
 }
 
+/// Two axes whose motors lose their current at an emergency stop; both have a load that falls, and
+/// a brake.
+class EmergencyDisable : public testing::Test {
+ protected:
+  EmergencyDisable() {
+    machine::MachineOptions options = withInput(true);
+    options.emergency_disable = machine::EmergencyDisable::kOff;
+    std::vector<config::AxisConfig> axes = {linearAxis("x", "drv8825"), linearAxis("y")};
+    axes[0].fault = config::FaultPin{"x.fault"};
+    for (config::AxisConfig& config : axes) {
+      config.brake = config::BrakeConfig{config.name + ".brake", true, 30'000'000, 40'000'000};
+    }
+    std::vector<sim::RigAxisSpec> rig = Bench::rigAxes(axes);
+    for (sim::RigAxisSpec& spec : rig) spec.load_falls = 10.0;
+    bench = std::make_unique<Bench>(axes, rig, false, 0.0, options);
+    bench->axis("x").setPosition(0.0);
+  }
+
+  /// Gives the brakes time.
+  void expectOff() {
+    bench->machine->advance(0.2);
+    for (const char* name : {"x", "y"}) {
+      EXPECT_FALSE(bench->axis(name).state().enabled) << name;
+      EXPECT_FALSE(bench->report(name).energized) << name;
+      EXPECT_EQ(bench->report(name).fell, 0.0) << name;
+      EXPECT_EQ(violationsOf(bench->report(name)), "") << name;
+    }
+  }
+
+  std::unique_ptr<Bench> bench;
+};
+
+TEST_F(EmergencyDisable, TakesTheCurrentFromEveryMotorOnceItsBrakeHolds) {
+  axis::Axis& x = bench->axis("x");
+  const axis::Move move = x.moveTo(0.08);
+  bench->machine->advance(0.3);
+  bench->machine->emergencyStop();
+  const std::int64_t pulses = bench->pulses();
+  EXPECT_TRUE(bench->report().energized) << "the brake doesn't hold yet";
+  EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kEmergencyStop);
+  expectOff();
+  EXPECT_EQ(bench->pulses(), pulses);
+  EXPECT_EQ(x.state().fault, "emergency stop");
+}
+
+TEST_F(EmergencyDisable, LastsBeyondARecoverUntilTheAxisIsEnabled) {
+  axis::Axis& x = bench->axis("x");
+  bench->machine->emergencyStop();
+  bench->machine->recover();
+  expectOff();
+  EXPECT_REFUSED(x.moveTo(0.001), "disabled; enable it first");
+  x.enable(true);
+  EXPECT_EQ(x.wait(x.moveTo(0.001)).end, axis::MoveEnd::kReached);
+  EXPECT_EQ(bench->report().fell, 0.0);
+}
+
+TEST_F(EmergencyDisable, ComesAgainWithEachEmergencyStop) {
+  for (int i = 0; i < 3; ++i) {
+    bench->rig.setInput(kLine, true, bench->clock.now());
+    expectOff();
+    bench->rig.setInput(kLine, false, bench->clock.now());
+    bench->machine->recover();
+    for (const char* name : {"x", "y"}) bench->axis(name).enable(true);
+    EXPECT_TRUE(bench->report().energized);
+  }
+}
+
+TEST_F(EmergencyDisable, AlsoSwitchesOffAnAxisThatIsAtFaultAlready) {
+  axis::Axis& x = bench->axis("x");
+  sim::RigFaults faults;
+  faults.chip_fault_after = 20;
+  bench->rig.setFaults("x", faults);
+  x.wait(x.moveTo(0.01));
+  bench->machine->advance(0.5);
+  EXPECT_NE(x.state().fault.find("nFAULT"), std::string::npos) << x.state().fault;
+  EXPECT_TRUE(x.state().enabled);
+  bench->machine->emergencyStop();
+  bench->machine->advance(0.2);
+  EXPECT_FALSE(x.state().enabled);
+}
+
 TEST(EmergencyStopLine, ThatCantBeReadCountsAsActive) {
   pulse::VirtualClock clock;
   test::RecordingLines lines(clock);

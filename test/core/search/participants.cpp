@@ -60,13 +60,17 @@ std::vector<config::AxisConfig> configsOf(int variant) {
     configs[0].driver.fault_end = driver::FaultEnd::kEnable;
     configs[0].fault->ramps = true;
   }
-  if (variant == 2) {
-    for (config::AxisConfig* config : {&configs[0], &configs[2]}) {
-      config->brake =
-          config::BrakeConfig{config->name + ".brake", true, 6 * kMillisecond, 4 * kMillisecond};
-    }
-  }
+  const auto add_brake = [](config::AxisConfig& config) {
+    config.brake =
+        config::BrakeConfig{config.name + ".brake", true, 6 * kMillisecond, 4 * kMillisecond};
+  };
+  if (variant != 0) add_brake(configs[0]);
+  if (variant == 2) add_brake(configs[2]);
   return configs;
+}
+
+machine::EmergencyDisable emergencyDisableOf(int variant) {
+  return variant == 1 ? machine::EmergencyDisable::kOff : machine::EmergencyDisable::kHold;
 }
 
 machine::MachineOptions withButton() {
@@ -140,7 +144,8 @@ Participants::Participants(const Schedule& schedule)
   engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
                                                  wiring_.emergency_stop);
   controller_ = std::make_unique<machine::Controller>(configs_, wiring_.motor_lines,
-                                                      std::move(names), wiring_.emergency_stop);
+                                                      std::move(names), wiring_.emergency_stop,
+                                                      emergencyDisableOf(schedule.variant));
   engine_->listen(news_);
   told_levels_ = machine::ToldLevels(wiring_.inputs.size());
   const machine::InputReading first = readInputs();
@@ -184,6 +189,7 @@ void Participants::carryOut(activity::Outputs& out) {
     written.deadline = clock_.now() + kWriteTimeout;
     written.returns = clock_.now() + std::exchange(next_pin_hang_, 0);
     written.error = std::exchange(next_pin_error_, 0);
+    pins_failed_ = pins_failed_ || written.error != 0 || written.returns != clock_.now();
     jobs_.push_back(written);
   }
 }
@@ -899,6 +905,20 @@ void Participants::checkRest() {
   }
 }
 
+// An emergency stop that nothing has ended leaves no motor with current, if it is configured so.
+void Participants::checkPower() {
+  const bool off = emergencyDisableOf(schedule_.variant) == machine::EmergencyDisable::kOff;
+  if (!off || !engine_->emergencyStopped() || pins_failed_) return;
+  const auto has_current = [this](const config::AxisConfig& config) {
+    return rig_.report(config.name).energized;
+  };
+  const auto all_are_off = [&] {
+    return std::none_of(configs_.begin(), configs_.end(), has_current);
+  };
+  if (playUntil(all_are_off, kLongestCall)) return;
+  oracle_.complain("a motor has current long after an emergency stop");
+}
+
 void Participants::checkOutcomes() {
   for (const auto& [name, move] : moves_) {
     const auto result = move.outcome->get();
@@ -1013,6 +1033,7 @@ std::vector<std::string> Participants::run() {
   script_ = false;
   if (oracle_.complaints.empty()) {
     checkInPosition();
+    checkPower();
     for (std::size_t i = 0; i < kAxes; ++i) rig_.setFaults(configs_[i].name, {});
     pressEmergencyStop(false);
     mendLines();

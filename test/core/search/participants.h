@@ -207,6 +207,7 @@ class Participants {
   void checkCounts(const std::string& when);
   void checkCount(std::size_t axis, const std::string& when);
   void checkRest();
+  void checkPower();
   void checkOutcomes();
   void checkInPosition();
   void probe();
@@ -242,6 +243,7 @@ class Participants {
   pulse::Nanoseconds watch_due_ = pulse::kNever;
   bool loses_edges_ = false;
   int next_pin_error_ = 0;
+  bool pins_failed_ = false;  // or took long
   pulse::Nanoseconds next_pin_hang_ = 0;
 
   // The clients: the two of the script, and one that begins and ends the run.

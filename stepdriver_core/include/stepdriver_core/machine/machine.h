@@ -27,6 +27,14 @@ struct HeartbeatConfig {
   double rate = 100.0;  ///< [Hz] of whole periods, of two edges each
 };
 
+/// What an emergency stop does to the motors, once the last pulse has ended.
+enum class EmergencyDisable {
+  kHold,  ///< they stay energized
+  /// They are disabled until Axis::enable(), as by Axis::disable(): each brake takes hold first. A
+  /// motor without ENABLE stays energized.
+  kOff,
+};
+
 /// What a Machine is made with, in addition to its axes.
 struct MachineOptions {
   /// Threads of the machine serve its pulses and calls. If false, waiting calls and advance() serve
@@ -43,6 +51,7 @@ struct MachineOptions {
   double write_timeout = 0.5;  ///< [s]
   /// An input that does what Machine::emergencyStop() does, if it becomes active or can't be read.
   std::optional<config::InputSwitch> emergency_stop{};
+  EmergencyDisable emergency_disable = EmergencyDisable::kHold;
   /// If it can't be written, all axes have a fault.
   std::optional<HeartbeatConfig> heartbeat{};
   /// Absolute path of the file that keeps positions across a restart; empty: no file. A position
@@ -160,8 +169,9 @@ class Machine {
   void setSpeedOverride(double factor);
 
   /// Completes the current pulse, sends no more, and then returns. Every axis is at fault until
-  /// recover(); motors stay energized. MachineOptions::emergency_stop does the same; if it is
-  /// active at the start, no motor is energized.
+  /// recover(). MachineOptions::emergency_disable may disable the motors then; this doesn't wait
+  /// until they are disabled. MachineOptions::emergency_stop does the same; if it is active at the
+  /// start, no motor is energized.
   ///
   /// @throw GpioError if the pulse thread hangs, see whyHung(): then no other pulse goes out when
   ///   the chip answers again, except for those of the write that hangs.

@@ -40,6 +40,7 @@ struct MachineConfig {
   bool keep_cpus_awake = true;           ///< see pulse::kCpuLatencyDevice
   std::optional<int> cpu;                ///< see pulse::RealtimeRequest
   std::optional<config::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
+  machine::EmergencyDisable emergency_disable{};
   std::optional<machine::HeartbeatConfig> heartbeat;  ///< see machine::MachineOptions
   std::string state_file;                             ///< see machine::MachineOptions
   RecorderConfig recorder;
@@ -60,8 +61,11 @@ struct MachineConfig {
 ///   max_lateness_ms: 5.0
 ///   keep_cpus_awake: true        # with libgpiod; false: they may sleep, and wake late
 ///   cpu: 3                       # the processor of the pulse thread; left out: any
-/// emergency_stop:                # optional; so is its bias: as_is, pull_up, pull_down or disabled
-///   {pin: "gpiochip0:25", active_level: high, bias: pull_up}
+/// emergency_stop:
+///   disable: hold                # what it does to the motors: hold, or off (also false: YAML 1.1)
+///   pin: "gpiochip0:25"          # optional: a button
+///   active_level: high
+///   bias: pull_up                # optional: as_is, pull_up, pull_down or disabled
 /// heartbeat:                     # optional: an output for an external monostable or safety relay
 ///   {pin: "gpiochip0:24", rate_hz: 100.0}
 /// state_file: ""                 # absolute path of the file that keeps positions; empty: no file
