@@ -37,6 +37,8 @@ class Draw : public testing::Test {
 
 TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   node.traced();
+  node.set("axes/x/chip/step_active", "low");
+  node.set("axes/y/invert/dir", true);
   node.start();
   ASSERT_TRUE(node.moveTo(0.005, true).success) << "pulses before the drawing aren't of it";
   write("10 10\n30 10\n30 25\n10 10\n");

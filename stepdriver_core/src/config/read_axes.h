@@ -19,7 +19,8 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
 /// @return the required name of a line; empty if there is an issue.
 std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedLines& used);
 
-/// Reads `pin: "gpiochip0:25"`, `active_level: high` and `bias: as_is` from a map; bias is optional.
+/// Reads `pin: "gpiochip0:25"`, `active_level: high` and `bias: as_is` from a map; bias is
+/// optional.
 InputSwitch readInputSwitch(ConfigReader& reader, UsedLines& used);
 
 }  // namespace stepdriver::config

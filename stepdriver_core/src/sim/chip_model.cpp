@@ -37,6 +37,12 @@ const char* nameOf(const RigAxisSpec& spec, Pin pin) {
   return kPinNames[static_cast<std::size_t>(pin)];
 }
 
+std::optional<bool> activeLevel(const RigAxisSpec& spec, Pin pin) {
+  if (pin != Pin::kStep && pin != Pin::kDir) return {};
+  const bool pulses = pin == Pin::kStep || spec.chip.step_inputs == driver::StepInputs::kCwCcw;
+  return (!pulses || spec.chip.step_active) != wireOf(spec, pin).inverted;
+}
+
 const Wire& wireOf(const RigAxisSpec& spec, Pin pin) {
   return spec.*kWires[static_cast<std::size_t>(pin)];
 }

@@ -17,6 +17,9 @@ constexpr std::size_t kPinCount = 8;
 
 /// The name of a pin in traces.
 const char* nameOf(const RigAxisSpec& spec, Pin pin);
+/// The level of its line that is a pulse on STEP, CW or CCW, and forward on DIR; nothing for
+/// others.
+std::optional<bool> activeLevel(const RigAxisSpec& spec, Pin pin);
 const Wire& wireOf(const RigAxisSpec& spec, Pin pin);
 
 /// A driver chip: pins in, translator out. It knows the times of all edges and counts violations of

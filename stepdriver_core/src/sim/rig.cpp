@@ -130,6 +130,7 @@ class Rig::Impl {
       const std::string& line = wireOf(axis.spec(), pin).line;
       if (line.empty()) continue;
       TracePin trace_pin{axis.spec().name, nameOf(axis.spec(), pin)};
+      trace_pin.active = activeLevel(axis.spec(), pin);
       trace_pin.both_edges = pin == Pin::kStep && axis.spec().chip.both_edges;
       const int index = feed.addPin(trace_pin, axis.chip().lineLevel(pin));
       lineOf(line).pins.push_back({&axis, pin, index});

@@ -51,10 +51,3 @@ class DriverNode:
         raise NodeError(f"{self.name} has no axis {axis}: its axes are {axes}" if axes else
                         f"the parameter {self.name}/axes has no axis; it must have {axis}. Is {self.name} the "
                         "name of the node, and is it running?")
-
-    def wiring(self, axis):
-        """Whether the lines of STEP and DIR, or of CW and CCW, are inverted."""
-        both = bool(self.axis_param(axis, "common_anode", False))
-        return [both != bool(self.axis_param(axis, f"invert/{pin}", False))
-                for pin in (("cw", "ccw") if self.axis_param(axis, "chip/step_inputs") == "cw_ccw"
-                            else ("step", "dir"))]

@@ -66,6 +66,20 @@ TEST(RigTrace, HasOnlyWiredPinsAndLevelsOfTheLine) {
   EXPECT_EQ(bench.report().pulses_backward, 1);
 }
 
+TEST(RigTrace, SaysWhichLevelsAreAPulseAndForward) {
+  for (const bool step_active : {true, false}) {
+    RigAxisSpec spec = plainAxis("tb6600");
+    spec.chip.step_active = step_active;
+    spec.dir.inverted = true;
+    HandRig bench(spec);
+    bench.request("x.step", !step_active);
+    bench.rig.flushTrace();
+    EXPECT_EQ(bench.trace->pins().at(0).active, step_active);
+    EXPECT_EQ(bench.trace->pins().at(1).active, false) << "low is forward, because it is inverted";
+    EXPECT_FALSE(bench.trace->pins().at(2).active.has_value());
+  }
+}
+
 TEST(RigTrace, BringsBouncesInTheOrderOfTime) {
   HandRig bench(axisWithBouncingSwitch());
   bench.ready();

@@ -57,7 +57,8 @@ std::string kindsText(const sim::RigAxisReport& report) {
 
 RigReport::Response reportOf(setup::Simulation& simulation) {
   RigReport::Response response;
-  response.time = static_cast<double>(simulation.clock().now()) * 1e-9;
+  // Divided, so that it is the nearest number, which is shown without dust.
+  response.time = static_cast<double>(simulation.clock().now()) / 1e9;
   try {
     simulation.rig().flushTrace();
   } catch (const Error& error) {
