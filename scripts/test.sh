@@ -428,7 +428,8 @@ test_bad_days() {
 
 # The same inputs each time: new ones are tried by hand, so that a change fails only for what it did.
 check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --seed 1; }
-build_fuzz() { bash "$root/scripts/fuzz.sh" --build; }
+# All of it stays in the group that an interrupt ends.
+build_fuzz() { in_group=1 bash "$root/scripts/fuzz.sh" --build; }
 
 choose_build_folder
 rm -rf "$build/ros"
