@@ -450,6 +450,8 @@ void Manoeuvre::rested() {
     if (why_.text.empty()) return;
     return fail({Failure::Kind::kRefused, orders_.front().axis->name() + ": " + why_.text});
   }
+  // An emergency stop has come before it continued, and will say so.
+  if (from_rest_ && why_.text.empty()) return;
   if (accepted_mode_ == Mode::kHold && mode_ == Mode::kHold && isDone()) {
     held_ = true;
     return calls_.clear();

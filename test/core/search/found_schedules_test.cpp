@@ -149,5 +149,14 @@ TEST(FoundSchedules, ATrajectoryThatTheEngineNeverTookDoesNotSucceedIfAJogTakesO
               {{8, Who::kEngine, 10}}});
 }
 
+TEST(FoundSchedules, AHeldMoveWhoseResumeComesDuringAnEmergencyStopEndsWithThatReason) {
+  expectGood(
+      {1,
+       {does(1, 1, "move y to -5 mm"), does(1, 1, "move z to 6 mm"),
+        does(0, 4, "release the emergency stop"), does(0, 0, "move y by 7 mm"), does(1, 16, "hold"),
+        does(1, 16, "emergency stop can't be read"), does(0, 1, "resume")},
+       {{27, Who::kNews, 40}}});
+}
+
 }  // namespace
 }  // namespace stepdriver::search
