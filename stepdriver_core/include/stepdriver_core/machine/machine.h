@@ -30,8 +30,8 @@ struct HeartbeatConfig {
 /// What an emergency stop does to the motors, once the last pulse has ended.
 enum class EmergencyDisable {
   kHold,  ///< they stay energized
-  /// They are disabled until Axis::enable(), as by Axis::disable(): each brake takes hold first. A
-  /// motor without ENABLE stays energized.
+  /// They are disabled, as by Axis::enable(false), until Axis::enable(true): each brake takes hold
+  /// first. A motor without ENABLE stays energized.
   kOff,
 };
 
