@@ -113,6 +113,17 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   pins.clear();
   for (const NamedLine& line : linesOf({other})) pins += line.pin + "=" + line.line + " ";
   EXPECT_EQ(pins, "y/cw=S y/ccw=D y/enable=N y/m0=M y/endstops/min=E y/fault=F y/in_position=P ");
+  config::MotorConfig twin;
+  twin.motor = "right";
+  twin.pins.step.line = "R";
+  twin.pins.enable.line = "N";
+  config.twins.push_back(twin);
+  config.motor = "left";
+  pins.clear();
+  for (const NamedLine& line : linesOf({config})) pins += line.pin + "=" + line.line + " ";
+  EXPECT_EQ(pins,
+            "x/left/step=S x/left/enable, x/right/enable=N x/left/m0=M x/left/endstops/min=E "
+            "x/left/fault=F x/right/step=R ");
   machine::MachineOptions options;
   options.emergency_stop = config::InputSwitch{"T", true, Bias::kAsIs};
   options.heartbeat = machine::HeartbeatConfig{"H"};

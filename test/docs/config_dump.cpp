@@ -54,15 +54,19 @@ class Dump {
   void add(const config::Pins& pins) {
     all(pins.step, pins.dir, pins.enable, pins.ms1, pins.ms2, pins.ms3, pins.sleep, pins.reset);
   }
+  void add(const config::MotorConfig& motor) {
+    all(motor.motor, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,
+        motor.in_position, motor.offset);
+  }
   void add(const config::AxisConfig& axis) {
-    all(axis.name, axis.joint, static_cast<int>(axis.kind), axis.driver, axis.pins, axis.microsteps,
-        axis.steps_per_unit, axis.steps_per_round);
+    all(axis.name, axis.joint, static_cast<int>(axis.kind), axis.driver, axis.microsteps,
+        axis.steps_per_unit, axis.steps_per_round, axis.max_skew);
+    for (std::size_t i = 0; i < axis.motors(); ++i) add(axis.motorAt(i));
     all(axis.max_speed, axis.start_speed, axis.acceleration, axis.deceleration,
         axis.stop_deceleration, axis.jerk, axis.backlash, axis.min_position, axis.max_position);
-    all(axis.endstop_min, axis.endstop_max, axis.fault, axis.in_position, axis.brake, axis.homing,
-        axis.require_homing, axis.enable_on_start, axis.disable_on_shutdown,
-        axis.align_on_microstep_change, axis.idle_timeout, static_cast<int>(axis.idle_action),
-        axis.holds_position_unpowered);
+    all(axis.brake, axis.homing, axis.require_homing, axis.enable_on_start,
+        axis.disable_on_shutdown, axis.align_on_microstep_change, axis.idle_timeout,
+        static_cast<int>(axis.idle_action), axis.holds_position_unpowered);
   }
   void add(const setup::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
@@ -72,6 +76,7 @@ class Dump {
         rig.wiring.min_active_level, rig.wiring.max_active_level);
     all(rig.faults.min_stuck, rig.faults.max_stuck, rig.faults.lose_every,
         rig.faults.chip_fault_after, rig.faults.chip_fault_lasts_ns);
+    for (const auto& [name, motor] : rig.motors) all(name, motor);
   }
   void add(const joystick::JogAxis& axis) {
     all(axis.name, axis.joystick_axis, static_cast<int>(axis.kind), axis.max_speed,

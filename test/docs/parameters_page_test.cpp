@@ -113,6 +113,23 @@ ConfigValue with(const ConfigValue& tree, const std::string& path, const ConfigV
   return map;
 }
 
+const std::string kMotorMap =
+    "{pins: {step: A1, dir: A2, enable: A3, fault: A4, in_position: A5}, "
+    "endstops: {min: {pin: A6, active_level: low}}}";
+
+/// An axis with two motors that a homing squares.
+Node gantry() {
+  ConfigValue::Map tree = *driver(false).base.as<ConfigValue::Map>();
+  ConfigValue axis = tree.at("axes").as<ConfigValue::Map>()->at("x");
+  for (const char* of_a_motor : {"pins", "invert", "endstops"})
+    axis = with(axis, of_a_motor, nullptr);
+  const ConfigValue motors =
+      yaml::parse("left: " + kMotorMap + "\nright: " + replaced(kMotorMap, "A", "B"), "motors");
+  const ConfigValue max_skew(4.0);
+  axis = with(with(axis, "motors", &motors), "max_skew_mm", &max_skew);
+  return {"gantry", false, readNode, with(tree, "axes/x", &axis)};
+}
+
 ConfigValue scaledByRounds(const Node& node) {
   const ConfigValue steps(200);
   const ConfigValue travel(40.0);
@@ -134,7 +151,8 @@ std::vector<Parameter> parametersUnder(const std::string& heading, const std::st
   for (const Cells& row : tableRows("docs/parameters.md", heading)) {
     if (row.size() != 5) throw std::runtime_error("a row without its five cells: " + row[0]);
     const std::string type = split(row[1], ' ').at(0);
-    for (const std::string& key : expanded(prefix + replaced(row[0], "<name>", "x"))) {
+    const std::string name = replaced(replaced(row[0], "<name>", "x"), "<motor>", "left");
+    for (const std::string& key : expanded(prefix + name)) {
       if (key != "axes/x/invert/<pin>") {
         parameters.push_back({key, type, row[2], row[3]});
         continue;
@@ -152,6 +170,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   if (std::string(node.name) == "joystick") {
     return parametersUnder("The joystick's node", "");
   }
+  if (std::string(node.name) == "gantry") return parametersUnder("Several motors", "axes/x/");
   std::vector<Parameter> all = parametersUnder("The node", "");
   for (const auto& [heading, prefix] :
        {std::pair("An axis", "axes/x/"), std::pair("The simulated rig", "simulation/")}) {
@@ -246,10 +265,15 @@ class ParametersPage : public testing::TestWithParam<Node> {};
 TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
   const std::vector<Parameter> parameters = parametersOf(GetParam());
   for (auto& [map, on_page] : mapsOf(parameters)) {
+    // Its other maps are those of every axis.
+    if (GetParam().name == std::string("gantry") && map != "axes/x/motors/left") continue;
     std::set<std::string> expected = on_page;
     // An axis can be of either kind, and the message about keys of both kinds says so.
+    const bool is_of_any_kind = map == "axes/x" || map == "axes/x/motors/left";
+    for (const std::string& key : on_page) {
+      if (is_of_any_kind) expected.insert(rotaryKey(key));
+    }
     if (map == "axes/x") {
-      for (const std::string& key : on_page) expected.insert(rotaryKey(key));
       for (const Cells& row : tableRows("docs/parameters.md", "An axis")) {
         if (!GetParam().rotary) break;
         for (const std::string& key : expanded(row[0])) expected.insert(split(key, '/').at(0));
@@ -307,7 +331,8 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
 std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param.name; }
 
 INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
-                         testing::Values(driver(false), driver(true), joystickNode()), nameOf);
+                         testing::Values(driver(false), driver(true), gantry(), joystickNode()),
+                         nameOf);
 
 }  // namespace
 }  // namespace stepdriver::docs

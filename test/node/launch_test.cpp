@@ -4,6 +4,7 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
+#include <stepdriver/Home.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/RigReport.h>
@@ -46,6 +47,27 @@ TEST(Launch, BringsUpEachExampleWithItsOwnScale) {
   expectMoves("/screw/stepdriver", "x", 0.01, 8000);
   expectMoves("/module/stepdriver", "x", 0.01, 3200);
   expectMoves("/cart/stepdriver", "x", 0.5, std::llround(0.5 * 1600 / (0.1 * std::acos(-1.0))));
+}
+
+TEST(Launch, BringsUpAGantryAndMakesItSquare) {
+  const std::string node = "/gantry/stepdriver";
+  const auto before = callWhenThere<RigReport>(node + "/rig/report");
+  ASSERT_EQ(before.name, (std::vector<std::string>{"y", "y.right"}));
+  EXPECT_NEAR(before.carriage[1] - before.carriage[0], 0.003, 1e-9);
+  Home::Request waiting;
+  waiting.wait = true;
+  const auto homed = callWhenThere<Home>(node + "/y/home", waiting);
+  EXPECT_TRUE(homed.success) << homed.message;
+  EXPECT_NE(homed.message.find("y is homed, its motors were 0.003"), std::string::npos)
+      << homed.message;
+  MoveTo::Request request;
+  request.position = 0.02;
+  request.wait = true;
+  EXPECT_TRUE(callWhenThere<MoveTo>(node + "/y/move_to", request).success);
+  const auto after = callWhenThere<RigReport>(node + "/rig/report");
+  EXPECT_NEAR(after.carriage[0], 0.02, 2.0 / 80'000.0);
+  EXPECT_NEAR(after.carriage[1], after.carriage[0], 1.01 / 80'000.0);
+  EXPECT_EQ(after.violations, (std::vector<std::int64_t>{0, 0}));
 }
 
 TEST(Launch, KeepsNodesInNamespacesApart) {

@@ -122,14 +122,11 @@ Steps Recover::plan() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
   if (axis.motor.pinsAreDoubtful()) {
-    const motor::Power& power = axis.motor.power();
-    const motor::DriverPins& pins = axis.motor.pins();
-    add(steps, pinsStep(context(), axis,
-                        pins.restore(power.isEnabled() || axis.motor.enableIsHeldByOthers(),
-                                     power.isAsleep())));
+    add(steps, pinsStep(context(), axis, axis.motor.restore()));
     // Each pin on the way back that the failed change did not reach is already right.
     if (const int failed = axis.motor.failedMode(); failed != 0) {
-      add(steps, pinsStep(context(), axis, pins.mode(failed, axis.motor.microsteps())));
+      add(steps,
+          pinsStep(context(), axis, axis.motor.pins().mode(failed, axis.motor.microsteps())));
     }
     add(steps, std::make_unique<RunStep>([&axis] { axis.motor.pinsRestored(); }));
   }
@@ -141,8 +138,13 @@ Steps Recover::plan() {
 bool Recover::isFaulty() {
   axis::AxisModel& axis = *axes().front();
   if (!axis.config.fault || axis.motor.power().isAsleep()) return false;
-  const bool level = axis.readInput(axis.motor.lines().fault) != 0;
-  return level == axis.config.driver.fault_active.value_or(false);
+  const motor::MotorLines& lines = axis.motor.lines();
+  for (std::size_t i = 0; i < lines.motors(); ++i) {
+    if (lines.motorAt(i).fault < 0) continue;
+    const bool level = axis.readInput(lines.motorAt(i).fault) != 0;
+    if (level == axis.config.driver.fault_active.value_or(false)) return true;
+  }
+  return false;
 }
 
 Steps Recover::endFaultOfDriver() {

@@ -15,6 +15,13 @@
 
 namespace stepdriver::activity {
 
+/// What the motors of an axis with several do in a motion, see pulse::Follow.
+struct MotorsTogether {
+  pulse::MotorSet still = 0;
+  bool square = false;
+  bool are_square = false;
+};
+
 /// A command for an axis: everything that a plan needs, from any state of the axis.
 struct Goal {
   enum class Kind { kMove, kJog, kTogether };
@@ -26,6 +33,7 @@ struct Goal {
   double remainder = 0.0;  ///< [microsteps] of a move: the commanded position minus the target
   double velocity = 0.0;   ///< [unit/s] as requested, without the override; of a jog with its sign
   bool of_motor = false;   ///< true: the target is the motor's; false: the joint's
+  MotorsTogether motors;
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
   pulse::Nanoseconds slipped_ns = 0;  ///< how far the timeline had slid by then

@@ -46,6 +46,16 @@ constexpr int kMostDebounces = 50;
 // The polling period while a switch settles.
 constexpr pulse::Nanoseconds kSamplePeriod = 1'000'000;
 
+/// The motors that have a switch at the home end.
+std::vector<std::size_t> homeSwitchesOf(const config::AxisConfig& axis) {
+  std::vector<std::size_t> motors;
+  for (std::size_t i = 0; i < axis.motors(); ++i) {
+    const config::MotorConfig& motor = axis.motorAt(i);
+    if (axis.homing->at_max ? motor.endstop_max : motor.endstop_min) motors.push_back(i);
+  }
+  return motors;
+}
+
 }  // namespace
 
 Homing::Homing(Context& context, axis::AxisModel& axis, std::uint64_t id,
@@ -53,13 +63,34 @@ Homing::Homing(Context& context, axis::AxisModel& axis, std::uint64_t id,
     : Activity(context, {&axis}, Handover::kAfterRest),
       axis_(axis),
       config_(*axis.config.homing),
-      endstop_(config_.at_max ? axis.config.endstop_max : axis.config.endstop_min),
-      line_(config_.at_max ? axis.motor.lines().endstop_max : axis.motor.lines().endstop_min),
+      sides_(homeSwitchesOf(axis.config)),
+      squares_(axis.config.motors() > 1 && sides_.size() == axis.config.motors()),
       towards_(config_.at_max ? 1.0 : -1.0),
       switch_(config_.at_max ? "the max switch" : "the min switch"),
       debounce_(nanoseconds(config_.debounce)),
       id_(id),
       outcome_(std::move(outcome)) {}
+
+int Homing::lineOf(std::size_t side) const {
+  const motor::ChipLines& lines = axis_.motor.lines().motorAt(side);
+  return config_.at_max ? lines.endstop_max : lines.endstop_min;
+}
+
+// On the way off the switches all of them must open, on the way to them all must close.
+bool Homing::isClosed() const {
+  const bool arrives = phase_ == HomingPhase::kSeeking || phase_ == HomingPhase::kLatching;
+  const auto closed = [this](std::size_t side) { return isClosed(side); };
+  return arrives ? std::all_of(sides_.begin(), sides_.end(), closed)
+                 : std::any_of(sides_.begin(), sides_.end(), closed);
+}
+
+std::string Homing::switchThatIs(bool closed) const {
+  if (axis_.config.motors() == 1) return switch_;
+  const auto found = std::find_if(sides_.begin(), sides_.end(),
+                                  [&](std::size_t side) { return isClosed(side) == closed; });
+  const std::size_t side = found != sides_.end() ? *found : sides_.front();
+  return switch_ + " of motor " + axis_.config.motorAt(side).motor;
+}
 
 void Homing::refuseUnlessReady(const axis::AxisModel& axis) {
   if (!axis.config.homing) axis.refuse("homing isn't configured: homing/switch is missing");
@@ -182,6 +213,11 @@ bool Homing::leaves() const {
 
 void Homing::strokeEnded() {
   if (stroke_->failure()) throw Refused(stroke_->failure()->text);
+  if (axis_.motor.state().end == pulse::EndReason::kSkewed) {
+    fail(fmt::format("{} didn't close within max_skew, {}, of another motor's", switchThatIs(false),
+                     axis_.show(axis_.config.max_skew)));
+    return onLook();
+  }
   const axis::MoveEnd end = stroke_->result().end;
   const axis::MoveEnd own =
       config_.at_max ? axis::MoveEnd::kEndstopMax : axis::MoveEnd::kEndstopMin;
@@ -202,16 +238,16 @@ void Homing::rested() {
     case HomingPhase::kLeaving:
     case HomingPhase::kBackingOff:
       if (slowing_) return settle();
-      why = switch_ + " didn't open" + travel;
+      why = switchThatIs(true) + " didn't open" + travel;
       break;
     case HomingPhase::kSeeking:
-      why = switch_ + " didn't close" + travel;
+      why = switchThatIs(false) + " didn't close" + travel;
       break;
     case HomingPhase::kLatching:
-      why = switch_ + " didn't close again" + travel;
+      why = switchThatIs(false) + " didn't close again" + travel;
       break;
     default:
-      return succeed();
+      return squares_ && stroke_->goalOf(axis_)->motors.still != 0 ? align() : succeed();
   }
   fail(why);
   onLook();
@@ -228,14 +264,15 @@ void Homing::enter(HomingPhase phase) {
 void Homing::goOn() {
   slowing_ = false;
   slipped_before_ = context().slipped;
-  stroke(bound_, phase_ == HomingPhase::kSeeking ? config_.seek_speed : config_.latch_speed);
+  Goal goal;
+  goal.target = bound_;
+  goal.velocity = phase_ == HomingPhase::kSeeking ? config_.seek_speed : config_.latch_speed;
+  goal.motors.square = squares_ && !leaves();
+  stroke(std::move(goal));
 }
 
-void Homing::stroke(std::int64_t target, double speed) {
+void Homing::stroke(Goal goal) {
   axis_.refuseUnlessReady();
-  Goal goal;
-  goal.target = target;
-  goal.velocity = speed;
   stroke_ = std::make_unique<Manoeuvre>(context(), std::vector<Order>{{&axis_, goal}});
   stroke_->prepare();
   stroke_->begin({}, nullptr);
@@ -255,8 +292,10 @@ void Homing::sample() {
   const bool closed = isClosed();
   if (closed != closed_) steady_since_ = context().now;
   closed_ = closed;
-  for (const gpio::EdgeEvent& edge : axis_.inputs.since(line_, steady_since_)) {
-    steady_since_ = std::max<pulse::Nanoseconds>(steady_since_, edge.time_ns);
+  for (const std::size_t side : sides_) {
+    for (const gpio::EdgeEvent& edge : axis_.inputs.since(lineOf(side), steady_since_)) {
+      steady_since_ = std::max<pulse::Nanoseconds>(steady_since_, edge.time_ns);
+    }
   }
   if (context().now - steady_since_ >= debounce_) return settled();
   if (context().now - settle_began_ > kMostDebounces * debounce_) {
@@ -278,7 +317,7 @@ void Homing::settled() {
     case HomingPhase::kBackingOff:
       return closed_ ? goOn() : enter(HomingPhase::kLatching);
     default:
-      return closed_ ? pullOff() : goOn();
+      return closed_ ? align() : goOn();
   }
 }
 
@@ -296,9 +335,12 @@ void Homing::keepLatch() {
 std::optional<std::int64_t> Homing::triggerEdge() const {
   const std::int64_t end = latched_.end_time + slipped_;
   std::optional<std::int64_t> first;
-  const auto edges = axis_.inputs.since(line_, phase_began_);
+  const std::size_t side = sides_.front();
+  const auto edges = axis_.inputs.since(lineOf(side), phase_began_);
+  const config::MotorConfig& motor = axis_.config.motorAt(side);
+  const auto& endstop = config_.at_max ? motor.endstop_max : motor.endstop_min;
   for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) {
-    if (edge->level != endstop_->active_level || edge->time_ns > end) continue;
+    if (edge->level != endstop->active_level || edge->time_ns > end) continue;
     if (first && *first - edge->time_ns > debounce_) break;
     first = edge->time_ns;
   }
@@ -308,7 +350,7 @@ std::optional<std::int64_t> Homing::triggerEdge() const {
 double Homing::triggerCount() const {
   const auto slack = static_cast<double>(latched_.slack);
   const double count = towards_ * static_cast<double>(latched_.count);
-  const auto edge = triggerEdge();
+  const auto edge = squares_ ? std::nullopt : triggerEdge();
   // An edge may be lost. The switch has closed between the last step and the one that wasn't made.
   if (!edge || !latch_profile_) return towards_ * count - slack;
   double at = towards_ * latch_profile_->stateAt(*edge - slipped_).position.value();
@@ -318,11 +360,48 @@ double Homing::triggerCount() const {
   return towards_ * at - slack;
 }
 
+// Each motor that squares stands at its own switch. Those whose switch closes earlier on the way
+// than another's move off it, alone, until all are square.
+void Homing::align() {
+  if (phase_ != HomingPhase::kPullingOff) {
+    phase_ = HomingPhase::kPullingOff;
+    trigger_ = triggerCount();
+    if (squares_) to_align_ = sides_;
+  }
+  const auto away = [this](std::size_t side) {
+    return -towards_ * axis_.config.motorAt(side).offset;
+  };
+  double farthest = away(sides_.front());
+  for (const std::size_t side : sides_) farthest = std::max(farthest, away(side));
+  while (!to_align_.empty()) {
+    const std::size_t side = to_align_.back();
+    to_align_.pop_back();
+    const std::int64_t steps = std::llround((farthest - away(side)) * axis_.stepsPerUnit());
+    if (steps == 0) continue;
+    const std::int64_t by = towards_ > 0.0 ? -steps : steps;
+    trigger_ += static_cast<double>(by);
+    Goal goal;
+    goal.target = axis_.motor.state().count + by;
+    goal.of_motor = true;
+    goal.velocity = config_.latch_speed;
+    goal.motors.still =
+        axis_.motor.allMotors() & static_cast<pulse::MotorSet>(~pulse::motorBit(side));
+    return stroke(std::move(goal));
+  }
+  if (squares_) {
+    trigger_ += towards_ * farthest * axis_.stepsPerUnit();
+    skew_ = axis_.motor.skew();
+    axis_.motor.noteSquare();
+  }
+  pullOff();
+}
+
 void Homing::pullOff() {
-  trigger_ = triggerCount();
-  phase_ = HomingPhase::kPullingOff;
-  stroke(std::llround(trigger_ - towards_ * config_.pull_off * axis_.stepsPerUnit()),
-         config_.seek_speed);
+  Goal goal;
+  goal.target = std::llround(trigger_ - towards_ * config_.pull_off * axis_.stepsPerUnit());
+  goal.velocity = config_.seek_speed;
+  goal.motors.are_square = squares_;
+  stroke(std::move(goal));
 }
 
 // ---- the end ----
@@ -331,7 +410,7 @@ std::string Homing::timeOver() const {
   const std::string within = fmt::format("within timeout_s, {} s", numberText(config_.timeout));
   if (phase_ == HomingPhase::kPullingOff) return "it didn't come to its end " + within;
   const bool leaving = phase_ == HomingPhase::kLeaving || phase_ == HomingPhase::kBackingOff;
-  return fmt::format("{} didn't {} {}", switch_, leaving ? "open" : "close", within);
+  return fmt::format("{} didn't {} {}", switchThatIs(leaving), leaving ? "open" : "close", within);
 }
 
 void Homing::fail(const std::string& why, HomingEnd end, const Ack& call) {
@@ -347,7 +426,13 @@ void Homing::fail(const std::string& why, HomingEnd end, const Ack& call) {
 void Homing::succeed() {
   axis_.position.home(config_.offset - trigger_ / axis_.stepsPerUnit());
   result_.end = HomingEnd::kHomed;
-  conclude(axis_.name() + " is homed, and stands at ", true);
+  result_.skew = static_cast<double>(skew_) / axis_.stepsPerUnit();
+  const std::string squared =
+      squares_
+          ? fmt::format(", its motors were {} apart",
+                        config::distanceText(result_.skew, axis_.config.kind, axis_.stepsPerUnit()))
+          : "";
+  conclude(axis_.name() + " is homed" + squared + ", and stands at ", true);
 }
 
 void Homing::conclude(const std::string& message, bool stands) {

@@ -16,6 +16,9 @@ namespace stepdriver::activity {
 
 /// A homing: a sequence of strokes, each an ordinary move of the axis, and the actions at the end
 /// of each. It is a state machine driven by the engine's news, the switch and the time.
+///
+/// If the axis has several motors, each with a home switch, the homing squares them: on the way to
+/// the switches each motor stops at its own.
 class Homing : public Activity {
  public:
   using Result = axis::Outcome<axis::HomingResult>;
@@ -52,13 +55,14 @@ class Homing : public Activity {
   void rested();
   void enter(axis::HomingPhase phase);
   void goOn();
-  void stroke(std::int64_t target, double speed);
+  void stroke(Goal goal);
   void settle();
   void sample();
   void settled();
   void keepLatch();
   std::optional<std::int64_t> triggerEdge() const;
   double triggerCount() const;
+  void align();
   void pullOff();
   void fail(const std::string& why, axis::HomingEnd end = axis::HomingEnd::kFailed,
             const Ack& call = {});
@@ -66,13 +70,17 @@ class Homing : public Activity {
   void conclude(const std::string& message, bool stands);
 
   bool leaves() const;
-  bool isClosed() const { return *axis_.endstopActive(line_, endstop_); }
+  bool isClosed() const;
+  bool isClosed(std::size_t side) const { return *axis_.endstopActive(side, config_.at_max); }
+  int lineOf(std::size_t side) const;
+  /// The first motor whose switch is closed or open, in words.
+  std::string switchThatIs(bool closed) const;
   std::string timeOver() const;
 
   axis::AxisModel& axis_;
   const config::HomingConfig& config_;
-  const std::optional<config::Endstop>& endstop_;
-  const int line_;
+  std::vector<std::size_t> sides_;  // the motors that have the home switch
+  const bool squares_;
   const double towards_;  // 1: the count rises towards the switch; -1: it falls
   const std::string switch_;
   const pulse::Nanoseconds debounce_;
@@ -103,6 +111,10 @@ class Homing : public Activity {
   pulse::Nanoseconds slipped_before_ = 0;
   pulse::Nanoseconds slipped_ = 0;
   double trigger_ = 0.0;  // [microsteps] of the joint
+
+  // Of motors that are made square.
+  std::vector<std::size_t> to_align_;  // those that still have to move alone
+  std::int64_t skew_ = 0;              // [microsteps] that this homing has made up
 };
 
 }  // namespace stepdriver::activity

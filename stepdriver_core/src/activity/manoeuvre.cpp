@@ -45,6 +45,8 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
     case pulse::EndReason::kTooLate:
     case pulse::EndReason::kLineError:
       return {axis::MoveEnd::kFault, axis.fault.what()};
+    case pulse::EndReason::kSkewed:
+      return {axis::MoveEnd::kStopped, "its motors got too far apart"};
     case pulse::EndReason::kCompanion:
       break;
   }
@@ -78,6 +80,12 @@ void conclude(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) 
   const bool reached = result.end == axis::MoveEnd::kReached;
   axis.position.reached(reached ? goal.remainder / axis.stepsPerUnit() : 0.0);
   tell(goal, std::move(result));
+}
+
+// Motors that square stop at their own endstops.
+void refuseIntoEndstop(const Order& order) {
+  if (order.goal.motors.square) return;
+  order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
 }
 
 Failure neverBegun(const Predecessor& left) {
@@ -203,6 +211,9 @@ void Manoeuvre::order(Plans plans) {
     follow.stops = context_.stops_handled;
     follow.faults = axis.motor.state().faults();
     follow.settles = mode_ == Mode::kRun;
+    follow.still = orders_[i].goal.motors.still;
+    follow.squares = orders_[i].goal.motors.square;
+    follow.is_square = orders_[i].goal.motors.are_square;
   }
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     Order& order = orders_[i];
@@ -289,7 +300,7 @@ void Manoeuvre::refuseUnlessResumable() const {
   if (over_ || mode_ != Mode::kHold || anyMoves()) return;
   for (const Order& order : orders_) {
     order.axis->refuseUnlessReady();
-    order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
+    refuseIntoEndstop(order);
   }
 }
 
@@ -410,9 +421,7 @@ void Manoeuvre::tryAgain() {
     if (!slowsDown()) {
       for (const Order& order : orders_) {
         order.axis->refuseUnlessReady();
-        if (!order.axis->moving()) {
-          order.axis->refuseIntoEndstop(stepsTo(*order.axis, order.goal));
-        }
+        if (!order.axis->moving()) refuseIntoEndstop(order);
       }
     }
     order(plan(lead_));

@@ -96,7 +96,7 @@ std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool o
                                  std::function<void()> then) {
   return std::make_unique<PinsStep>(context, axis, [&context, &axis, on, then = std::move(then)] {
     PinsStep::Writes writes;
-    if (on || !axis.motor.enableIsHeldByOthers()) writes.sequence = axis.motor.pins().enable(on);
+    writes.sequence = axis.motor.enable(on);
     axis.motor.noteEnable(on);
     for (const auto& other : context.axes) {
       if (other->motor.takeReleases()) other->noteDisabled();

@@ -188,17 +188,22 @@ double AxisModel::checkedVelocity(double velocity) const {
 }
 
 void AxisModel::refuseIntoEndstop(std::int64_t steps) const {
-  const motor::MotorLines& own = motor.lines();
-  if (steps > 0 && endstopActive(own.endstop_max, config.endstop_max).value_or(false)) {
+  if (steps > 0 && anyEndstopActive(true)) {
     refuse("the max endstop is active; it moves only towards min");
   }
-  if (steps < 0 && endstopActive(own.endstop_min, config.endstop_min).value_or(false)) {
+  if (steps < 0 && anyEndstopActive(false)) {
     refuse("the min endstop is active; it moves only towards max");
   }
 }
 
 void AxisModel::refuseMicrosteps(int wanted) const {
   const driver::DriverChip& chip = config.driver;
+  if (config.motors() > 1) {
+    refuse(
+        fmt::format("it has {} motors, and keeps its microsteps, 1/{}: after a squaring the "
+                    "motors may be at different microsteps, which another mode doesn't have",
+                    config.motors(), motor.microsteps()));
+  }
   const std::vector<int> known = driver::selectableMicrosteps(chip);
   if (chip.modes.empty()) {
     refuse(
@@ -220,10 +225,24 @@ void AxisModel::refuseMicrosteps(int wanted) const {
 
 // ---- lines ----
 
-std::optional<bool> AxisModel::endstopActive(int line,
-                                             const std::optional<config::Endstop>& endstop) const {
+std::optional<bool> AxisModel::endstopActive(std::size_t motor_index, bool at_max) const {
+  const config::MotorConfig& side = config.motorAt(motor_index);
+  const motor::ChipLines& own = motor.lines().motorAt(motor_index);
+  const auto& endstop = at_max ? side.endstop_max : side.endstop_min;
   if (!endstop) return std::nullopt;
-  return (readInput(line) != 0) == endstop->active_level;
+  return (readInput(at_max ? own.endstop_max : own.endstop_min) != 0) == endstop->active_level;
+}
+
+bool AxisModel::anyEndstopActive(bool at_max) const {
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    if (endstopActive(i, at_max).value_or(false)) return true;
+  }
+  return false;
+}
+
+std::string AxisModel::chipText(std::size_t motor_index) const {
+  const std::string& name = config.motorAt(motor_index).motor;
+  return "the " + config.driver.title + (name.empty() ? "" : " of motor " + name);
 }
 
 int AxisModel::readInput(int line) const {
@@ -249,8 +268,8 @@ void AxisModel::noteUnpowered() {
 }
 
 void AxisModel::noteHome() {
-  if (!motor.translator().isAtHome(motor.state().count)) position.distrust();
-  motor.translator().wentHome(motor.state().count);
+  if (!motor.areAtHome()) position.distrust();
+  motor.wentHome();
 }
 
 void AxisModel::noteAsleep() {
@@ -279,7 +298,7 @@ void AxisModel::rememberRest() {
   rest_.slack = static_cast<double>(motor.state().slack) / stepsPerUnit();
   rest_.valid = position.isValid();
   rest_.homed = position.isHomed();
-  rest_.at_home = motor.translator().isAtHome(motor.state().count);
+  rest_.at_home = motor.areAtHome();
 }
 
 std::string AxisModel::whyImpossible(const AxisMemory& kept, const std::string& source) const {

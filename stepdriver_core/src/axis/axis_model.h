@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -105,13 +106,18 @@ class AxisModel {
   AxisLimits checkedLimits(const AxisLimits& wanted) const;
   /// @}
 
-  /// Whether an endstop is active. @throw GpioError if a line can't be read.
-  std::optional<bool> endstopActive(int line, const std::optional<config::Endstop>& endstop) const;
+  /// Whether an endstop of a motor is active; empty if it has none. @throw GpioError if its line
+  /// can't be read.
+  std::optional<bool> endstopActive(std::size_t motor_index, bool at_max) const;
+  /// Whether that of any motor is. @throw GpioError
+  bool anyEndstopActive(bool at_max) const;
   /// @throw GpioError
   int readInput(int line) const;
+  /// "the A4988", and of which motor if there are several.
+  std::string chipText(std::size_t motor_index) const;
   /// A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const {
-    return lineFailureText(failure, motor.lines(), lines);
+    return lineFailureText(failure, config, motor.lines(), lines);
   }
 
   /// @name The driver chip

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cerrno>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "stepdriver_core/gpio/chip_table.h"
 
@@ -17,38 +17,51 @@ std::string remedyFor(int error) {
                          : "check the cable and the supply of its chip";
 }
 
-/// What the line of an index is for.
-template <std::size_t kCount>
-const char* roleOf(int line, const std::array<std::pair<int, const char*>, kCount>& roles) {
-  for (const auto& [index, role] : roles) {
-    if (index == line) return role;
+using Roles = std::vector<std::pair<int, const char*>>;
+
+Roles inputRoles(const motor::ChipLines& own) {
+  return {{own.endstop_min, "min endstop's"},
+          {own.endstop_max, "max endstop's"},
+          {own.fault, "fault"},
+          {own.in_position, "in-position"}};
+}
+
+Roles outputRoles(const motor::ChipLines& own, bool cw_ccw) {
+  return {{own.step, cw_ccw ? "CW" : "STEP"},
+          {own.dir, cw_ccw ? "CCW" : "DIR"},
+          {own.enable, "ENABLE"},
+          {own.sleep, "SLEEP"},
+          {own.reset, "RESET"},
+          {own.mode[0], "microstep"},
+          {own.mode[1], "microstep"},
+          {own.mode[2], "microstep"}};
+}
+
+/// What a line of an axis is for, and of which motor if there are several.
+std::pair<std::string, std::string> roleOf(const pulse::LineFailure& failure,
+                                           const config::AxisConfig& axis,
+                                           const motor::MotorLines& own) {
+  if (!failure.input && failure.line == own.brake) return {"brake", ""};
+  for (std::size_t i = 0; i < own.motors(); ++i) {
+    const motor::ChipLines& lines = own.motorAt(i);
+    for (const auto& [line, role] :
+         failure.input ? inputRoles(lines) : outputRoles(lines, own.cw_ccw)) {
+      if (line != failure.line) continue;
+      const std::string& name = axis.motorAt(i).motor;
+      return {role, name.empty() ? "" : " of motor " + name};
+    }
   }
-  return "GPIO";
+  return {"GPIO", ""};
 }
 
 }  // namespace
 
-std::string lineFailureText(const pulse::LineFailure& failure, const motor::MotorLines& own,
-                            const LineNames& names) {
-  const std::array<std::pair<int, const char*>, 4> input_roles{{{own.endstop_min, "min endstop's"},
-                                                                {own.endstop_max, "max endstop's"},
-                                                                {own.fault, "fault"},
-                                                                {own.in_position, "in-position"}}};
-  const std::array<std::pair<int, const char*>, 9> output_roles{
-      {{own.step, own.cw_ccw ? "CW" : "STEP"},
-       {own.dir, own.cw_ccw ? "CCW" : "DIR"},
-       {own.enable, "ENABLE"},
-       {own.sleep, "SLEEP"},
-       {own.reset, "RESET"},
-       {own.brake, "brake"},
-       {own.mode[0], "microstep"},
-       {own.mode[1], "microstep"},
-       {own.mode[2], "microstep"}}};
-  const char* role =
-      failure.input ? roleOf(failure.line, input_roles) : roleOf(failure.line, output_roles);
+std::string lineFailureText(const pulse::LineFailure& failure, const config::AxisConfig& axis,
+                            const motor::MotorLines& own, const LineNames& names) {
   const std::string& line_name =
       failure.input ? names.input(failure.line) : names.output(failure.line);
-  return fmt::format("the {} line {} can't be {}: {}; {}", role, line_name,
+  const auto [role, of_motor] = roleOf(failure, axis, own);
+  return fmt::format("the {} line {}{} can't be {}: {}; {}", role, line_name, of_motor,
                      failure.input ? "read" : "written", gpio::errorText(failure.error),
                      remedyFor(failure.error));
 }

@@ -9,7 +9,7 @@
 namespace stepdriver::axis {
 
 /// A line of an axis that could not be read or written, in words, with what to do about it.
-std::string lineFailureText(const pulse::LineFailure& failure, const motor::MotorLines& own,
-                            const LineNames& names);
+std::string lineFailureText(const pulse::LineFailure& failure, const config::AxisConfig& axis,
+                            const motor::MotorLines& own, const LineNames& names);
 
 }  // namespace stepdriver::axis

@@ -86,6 +86,13 @@ bool ConfigReader::has(const std::string& key) const {
   return map_ != nullptr && map_->count(key) > 0;
 }
 
+std::vector<std::string> ConfigReader::keys() const {
+  std::vector<std::string> keys;
+  if (map_ == nullptr) return keys;
+  for (const auto& entry : *map_) keys.push_back(entry.first);
+  return keys;
+}
+
 const ConfigValue& ConfigReader::value(const std::string& key) const {
   static const ConfigValue nothing;
   return has(key) ? map_->at(key) : nothing;

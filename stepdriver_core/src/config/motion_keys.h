@@ -19,11 +19,12 @@ struct MotionKeys {
   std::string acceleration, deceleration, stop_deceleration, jerk;
   std::string backlash;
   std::string min_position, max_position;
+  std::string max_skew;
 
   std::vector<std::string> all() const {
     std::vector<std::string> keys{steps_per_unit, max_speed,         start_speed, acceleration,
                                   deceleration,   stop_deceleration, jerk,        backlash,
-                                  min_position,   max_position};
+                                  min_position,   max_position,      max_skew};
     for (const std::string& key : {per_round, wheel_diameter}) {
       if (!key.empty()) keys.push_back(key);
     }
@@ -49,7 +50,8 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "jerk_mm_s3",
                                  "backlash_mm",
                                  "min_position_mm",
-                                 "max_position_mm"};
+                                 "max_position_mm",
+                                 "max_skew_mm"};
   static const MotionKeys rotary{Kind::kRotary,
                                  "degree",
                                  180.0L / kPi,
@@ -65,7 +67,8 @@ inline const MotionKeys& motionKeys(Kind kind) {
                                  "jerk_deg_s3",
                                  "backlash_deg",
                                  "min_position_deg",
-                                 "max_position_deg"};
+                                 "max_position_deg",
+                                 "max_skew_deg"};
   return kind == Kind::kLinear ? linear : rotary;
 }
 

@@ -11,6 +11,7 @@
 #include "read_chip.h"
 #include "read_homing.h"
 #include "read_motion.h"
+#include "read_motors.h"
 #include "read_pins.h"
 #include "read_power.h"
 #include "stepdriver_core/config/config_reader.h"
@@ -74,13 +75,14 @@ class AxesReader {
     config.microsteps = context.microsteps.value_or(1);
     config.joint = readJoint(name, axis);
     const std::size_t issues_before = issues_.size();
-    readPins(axis, chip ? &*chip : nullptr, config, used_);
+    readMotors(axis, chip ? &*chip : nullptr, config, used_);
     if (chip && context.microsteps) checkSelectable(axis, config);
     const bool pins_are_right = issues_.size() == issues_before;
     readPower(axis, pins_are_right, config);
     readBrake(axis, pins_are_right, config, used_);
-    readEndstops(axis, config, used_);
-    readHoming(axis, readMotion(axis, context, config), config);
+    const std::optional<Kind> kind = readMotion(axis, context, config);
+    readHoming(axis, kind, config);
+    readSquaring(axis, kind, config);
     config.align_on_microstep_change =
         axis.boolean("align_on_microstep_change", config.align_on_microstep_change);
     axis.rejectUnknown();

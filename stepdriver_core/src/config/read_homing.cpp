@@ -52,7 +52,7 @@ class HomingReader {
         homing_.findOneOf("switch", std::vector<std::string>{"min", "max"}, Presence::kRequired);
     if (!which) return false;
     homing.at_max = *which == "max";
-    if (homing.at_max ? config_.endstop_max : config_.endstop_min) return true;
+    if (config_.hasEndstop(homing.at_max)) return true;
     homing_.contradiction(
         "switch",
         fmt::format("is {}, but must be a switch that the axis has: endstops/{} is missing",

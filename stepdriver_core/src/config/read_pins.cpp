@@ -94,7 +94,7 @@ class PinsReader {
   PinsReader(ConfigReader& axis, const driver::DriverChip* chip, UsedLines& used)
       : axis_(axis), chip_(chip), used_(used), reader_(axis.map("pins")) {}
 
-  void read(AxisConfig& config) {
+  void read(MotorConfig& config) {
     for (const PinName& name : kPinNames) readPin(name);
     readFaultPin();
     readInPositionPin();
@@ -338,7 +338,7 @@ InputSwitch readInputSwitch(ConfigReader& reader, UsedLines& used) {
   return input;
 }
 
-void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
+void readPins(ConfigReader& axis, const driver::DriverChip* chip, MotorConfig& config,
               UsedLines& used) {
   PinsReader(axis, chip, used).read(config);
 }
@@ -361,7 +361,7 @@ void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, Used
                            axis.fullName("pins/enable"), axis.fullName("pins/sleep")));
 }
 
-void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used) {
+void readEndstops(ConfigReader& axis, MotorConfig& config, UsedLines& used) {
   ConfigReader endstops = axis.map("endstops");
   const auto read = [&](const char* end) -> std::optional<Endstop> {
     ConfigReader reader = endstops.map(end);

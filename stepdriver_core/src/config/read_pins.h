@@ -8,7 +8,7 @@ namespace stepdriver::config {
 /// Reads `pins`, `fault_bias`, `fault_stop`, `in_position_...`, `invert` and `common_anode`.
 ///
 /// @param chip nullptr if it isn't known; then nothing that depends on it is checked.
-void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
+void readPins(ConfigReader& axis, const driver::DriverChip* chip, MotorConfig& config,
               UsedLines& used);
 
 /// Reads `brake`.
@@ -17,6 +17,6 @@ void readPins(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& co
 void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, UsedLines& used);
 
 /// Reads `endstops`.
-void readEndstops(ConfigReader& axis, AxisConfig& config, UsedLines& used);
+void readEndstops(ConfigReader& axis, MotorConfig& config, UsedLines& used);
 
 }  // namespace stepdriver::config

@@ -136,9 +136,9 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
   }
   if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep()) {
     const driver::DriverChip& chip = axis.config.driver;
-    axis.fault.latch(fmt::format("the {} reports a fault on {}, such as over-current or "
+    axis.fault.latch(fmt::format("{} reports a fault on {}, such as over-current or "
                                  "over-temperature",
-                                 chip.title, chip.fault_name),
+                                 axis.chipText(state.chip_at_fault), chip.fault_name),
                      kChipRemedy);
     axis.position.distrust();
   }
@@ -154,11 +154,11 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     }
     if (state.end == pulse::EndReason::kNotInPosition) {
       const driver::DriverChip& chip = axis.config.driver;
-      axis.fault.latch(
-          fmt::format("the {} isn't in position: {} was still inactive {} after the "
-                      "end of the motion",
-                      chip.title, chip.in_position_name, millisecondsText(state.waited)),
-          kPositionRemedy);
+      axis.fault.latch(fmt::format("{} isn't in position: {} was still inactive {} after the "
+                                   "end of the motion",
+                                   axis.chipText(state.unsettled), chip.in_position_name,
+                                   millisecondsText(state.waited)),
+                       kPositionRemedy);
       axis.position.distrust();
     }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.position.distrust();
@@ -178,10 +178,16 @@ void Controller::on(const EngineHangs& hang) {
 
 std::string Controller::textOf(const pulse::LineFailure& failure) const {
   const auto has = [&failure](const auto& axis) {
-    const motor::MotorLines& own = axis->motor.lines();
-    if (!failure.input) return own.step == failure.line || own.dir == failure.line;
-    return own.endstop_min == failure.line || own.endstop_max == failure.line ||
-           own.fault == failure.line || own.in_position == failure.line;
+    const motor::MotorLines& all = axis->motor.lines();
+    for (std::size_t i = 0; i < all.motors(); ++i) {
+      const motor::ChipLines& own = all.motorAt(i);
+      const bool has_it =
+          failure.input ? own.endstop_min == failure.line || own.endstop_max == failure.line ||
+                              own.fault == failure.line || own.in_position == failure.line
+                        : own.step == failure.line || own.dir == failure.line;
+      if (has_it) return true;
+    }
+    return false;
   };
   const auto owner = std::find_if(context_.axes.begin(), context_.axes.end(), has);
   if (owner == context_.axes.end()) return context_.axes.front()->failureText(failure);
@@ -719,6 +725,8 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   shown.steps_per_unit = axis.stepsPerUnit();
   shown.origin = axis.position.origin();
   shown.backlash = axis.backlash();
+  shown.motors = axis.motor.lines().motors();
+  shown.square_lags = axis.motor.squareLags();
   shown.limits = axis.limitsOfNextMotion();
   for (const motor::Motion& motion : axis.motor.motions().all()) {
     AxisSnapshot::Motion view;

@@ -129,6 +129,8 @@ const char* textOf(pulse::EndReason reason) {
       return "was ended by a line that failed";
     case pulse::EndReason::kNotInPosition:
       return "was not in position in time after its end";
+    case pulse::EndReason::kSkewed:
+      return "was ended because its motors got too far apart";
     case pulse::EndReason::kCompanion:
       return "was ended together with another axis";
   }

@@ -27,7 +27,8 @@ double edgesPerSecond(const std::vector<config::AxisConfig>& axes, const Wiring&
   double rate = wiring.heartbeat ? 1e9 / static_cast<double>(wiring.heartbeat->interval) : 0.0;
   for (const config::AxisConfig& axis : axes) {
     const double edges_of_a_step = axis.driver.both_edges ? 1.0 : 2.0;
-    rate += edges_of_a_step * axis.max_speed * axis.steps_per_unit;
+    rate +=
+        edges_of_a_step * axis.max_speed * axis.steps_per_unit * static_cast<double>(axis.motors());
   }
   return rate;
 }
@@ -52,33 +53,42 @@ std::vector<bool> levelsOf(const Wiring& wiring) {
   return levels;
 }
 
+void addPins(const config::AxisConfig& axis, std::size_t motor, const motor::MotorLines& all_lines,
+             std::vector<Recording::Pin>& pins) {
+  const driver::DriverChip& chip = axis.driver;
+  const config::Pins& own = axis.motorAt(motor).pins;
+  const motor::ChipLines& lines = all_lines.motorAt(motor);
+  const std::string scope = axis.traceName(motor);
+  // A line whose level the chip doesn't know isn't wired.
+  const auto add = [&](const char* name, int output, const config::Pin& pin,
+                       std::optional<bool> at_chip) {
+    if (output < 0) return;
+    pins.push_back({scope, name, output, at_chip.value_or(true) != pin.inverted});
+    pins.back().both_edges = output == lines.step && chip.both_edges;
+  };
+  const bool cw_ccw = all_lines.cw_ccw;
+  add(cw_ccw ? "cw" : "step", lines.step, own.step, chip.step_active);
+  add(cw_ccw ? "ccw" : "dir", lines.dir, own.dir, chip.step_active || !cw_ccw);
+  add("enable", lines.enable, own.enable, chip.enable_on);
+  add("ms1", lines.mode[0], own.ms1, true);
+  add("ms2", lines.mode[1], own.ms2, true);
+  add("ms3", lines.mode[2], own.ms3, true);
+  add("sleep", lines.sleep, own.sleep, chip.sleep_asleep);
+  add("reset", lines.reset, own.reset, chip.reset_held);
+}
+
 std::vector<Recording::Pin> pinsOf(const std::vector<config::AxisConfig>& axes,
                                    const Wiring& wiring) {
   std::vector<Recording::Pin> pins;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     const config::AxisConfig& axis = axes[i];
     const motor::MotorLines& lines = wiring.motor_lines[i];
-    const driver::DriverChip& chip = axis.driver;
-    // A line whose level the chip doesn't know isn't wired.
-    const auto add = [&](const char* name, int output, const config::Pin& pin,
-                         std::optional<bool> at_chip) {
-      if (output >= 0) {
-        pins.push_back({axis.name, name, output, at_chip.value_or(true) != pin.inverted});
-      }
-    };
-    add(lines.cw_ccw ? "cw" : "step", lines.step, axis.pins.step, chip.step_active);
-    add(lines.cw_ccw ? "ccw" : "dir", lines.dir, axis.pins.dir, chip.step_active || !lines.cw_ccw);
-    for (Recording::Pin& pin : pins) {
-      if (pin.output == lines.step) pin.both_edges = chip.both_edges;
+    for (std::size_t motor = 0; motor < lines.motors(); ++motor) {
+      addPins(axis, motor, lines, pins);
     }
-    add("enable", lines.enable, axis.pins.enable, chip.enable_on);
-    add("ms1", lines.mode[0], axis.pins.ms1, true);
-    add("ms2", lines.mode[1], axis.pins.ms2, true);
-    add("ms3", lines.mode[2], axis.pins.ms3, true);
-    add("sleep", lines.sleep, axis.pins.sleep, chip.sleep_asleep);
-    add("reset", lines.reset, axis.pins.reset, chip.reset_held);
-    if (axis.brake)
-      add("brake", lines.brake, {axis.brake->line, false}, !axis.brake->release_level);
+    if (axis.brake) {
+      pins.push_back({axis.name, "brake", lines.brake, !axis.brake->release_level});
+    }
   }
   if (wiring.heartbeat) pins.push_back({"machine", "heartbeat", wiring.heartbeat->output, true});
   return pins;

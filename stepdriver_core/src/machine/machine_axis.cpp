@@ -182,19 +182,25 @@ axis::AxisState MachineAxis::state() const { return shell_.state(id_); }
 double MachineAxis::peakRate() const { return shell_.peakRate(id_); }
 
 axis::EndstopState MachineAxis::endstops() const {
-  return {endstopActive(motor_lines_.endstop_min, config_.endstop_min),
-          endstopActive(motor_lines_.endstop_max, config_.endstop_max)};
+  return {endstopActive(false), endstopActive(true)};
 }
 
-std::optional<bool> MachineAxis::endstopActive(
-    int line, const std::optional<config::Endstop>& endstop) const {
-  if (!endstop) return std::nullopt;
-  const int level = lines_.read(line);
-  if (level < 0) {
-    throw GpioError(config_.name + ": " +
-                    axis::lineFailureText({-level, line, true}, motor_lines_, names_));
+std::optional<bool> MachineAxis::endstopActive(bool at_max) const {
+  std::optional<bool> active;
+  for (std::size_t i = 0; i < config_.motors(); ++i) {
+    const config::MotorConfig& motor = config_.motorAt(i);
+    const motor::ChipLines& own = motor_lines_.motorAt(i);
+    const auto& endstop = at_max ? motor.endstop_max : motor.endstop_min;
+    if (!endstop) continue;
+    const int line = at_max ? own.endstop_max : own.endstop_min;
+    const int level = lines_.read(line);
+    if (level < 0) {
+      throw GpioError(config_.name + ": " +
+                      axis::lineFailureText({-level, line, true}, config_, motor_lines_, names_));
+    }
+    active = active.value_or(false) || (level != 0) == endstop->active_level;
   }
-  return (level != 0) == endstop->active_level;
+  return active;
 }
 
 }  // namespace stepdriver::machine

@@ -46,7 +46,7 @@ class MachineAxis : public axis::Axis {
   axis::EndstopState endstops() const override;
 
  private:
-  std::optional<bool> endstopActive(int line, const std::optional<config::Endstop>& endstop) const;
+  std::optional<bool> endstopActive(bool at_max) const;
 
   const config::AxisConfig config_;
   const AxisId id_;

@@ -26,6 +26,8 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
   state.position = position_of(static_cast<double>(channel.count - channel.slack));
   state.planned = state.position;
   state.slack = static_cast<double>(channel.slack) / axis.steps_per_unit;
+  state.skew = static_cast<double>(pulse::skewOf(channel.lags, axis.square_lags, axis.motors)) /
+               axis.steps_per_unit;
   state.target = axis.held_target.value_or(state.position);
   const AxisSnapshot::Motion* motion = followed(axis, channel);
   if (motion == nullptr) return state;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -29,6 +30,8 @@ struct AxisSnapshot {
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] position at count 0
   std::int64_t backlash = 0;    ///< [microsteps]
+  std::size_t motors = 1;
+  pulse::MotorCounts square_lags{};  ///< ChannelState::lags when the motors were square
   axis::AxisLimits limits;
   std::optional<double> held_target;  ///< [unit]
   std::vector<Motion> motions;

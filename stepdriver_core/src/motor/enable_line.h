@@ -7,7 +7,7 @@
 namespace stepdriver::motor {
 
 /// An ENABLE line and the axes that it energizes: one axis, or several that share it. It is
-/// asserted while any of them wants to be enabled. Protected by the mutex of the machine's axes.
+/// asserted while any of them wants to be enabled.
 class EnableLine {
  public:
   /// @return the number of the axis on this line.

@@ -1,5 +1,6 @@
 #include "motor.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace stepdriver::motor {
@@ -10,8 +11,16 @@ Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int chan
       pins_(config, lines),
       power_(config.idle_action, !pins_.hasEnable()),
       brake_(config, lines),
-      translator_(config.microsteps) {
-  if (pins_.hasEnable()) on_enable_line_ = lines_.enable_line->join();
+      translators_(config.motors(), Translator(config.microsteps)) {
+  for (std::size_t i = 0; i < lines_.motors(); ++i) {
+    const ChipLines& own = lines_.motorAt(i);
+    const bool is_known = std::any_of(enables_.begin(), enables_.end(), [&](const auto& enable) {
+      return enable.line == own.enable;
+    });
+    if (own.enable_line && !is_known) {
+      enables_.push_back({own.enable, own.enable_line, own.enable_line->join()});
+    }
+  }
 }
 
 void Motor::take(const pulse::ChannelState& state) {
@@ -29,16 +38,53 @@ motion::MotionState Motor::stateAt(std::int64_t at) const {
   return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
 }
 
-bool Motor::enableIsHeldByOthers() const {
-  return pins_.hasEnable() && lines_.enable_line->isWantedByOthers(on_enable_line_);
+bool Motor::areAtHome() const {
+  for (std::size_t i = 0; i < translators_.size(); ++i) {
+    if (!translators_[i].isAtHome(countOf(i))) return false;
+  }
+  return true;
 }
 
-void Motor::noteEnable(bool wanted) { lines_.enable_line->note(on_enable_line_, wanted); }
+void Motor::wentHome() {
+  for (std::size_t i = 0; i < translators_.size(); ++i) translators_[i].wentHome(countOf(i));
+}
+
+pulse::MotorSet Motor::allMotors() const {
+  return static_cast<pulse::MotorSet>(pulse::motorBit(lines_.motors()) - 1);
+}
+
+bool Motor::isHeldByOthers(int enable_line) const {
+  return std::any_of(enables_.begin(), enables_.end(), [&](const EnableShare& enable) {
+    return enable.line == enable_line && enable.shared->isWantedByOthers(enable.number);
+  });
+}
+
+bool Motor::enableIsHeldByOthers() const {
+  return !enables_.empty() &&
+         std::all_of(enables_.begin(), enables_.end(),
+                     [&](const EnableShare& enable) { return isHeldByOthers(enable.line); });
+}
+
+PinSequence Motor::enable(bool on) const {
+  return pins_.enable(on, [&](int line) { return on || !isHeldByOthers(line); });
+}
+
+PinSequence Motor::restore() const {
+  return pins_.restore([&](int line) { return power_.isEnabled() || isHeldByOthers(line); },
+                       power_.isAsleep());
+}
+
+void Motor::noteEnable(bool wanted) {
+  for (const EnableShare& enable : enables_) enable.shared->note(enable.number, wanted);
+}
 
 bool Motor::takeReleases() {
-  if (!pins_.hasEnable() || lines_.enable_line->releases() == releases_seen_) return false;
-  releases_seen_ = lines_.enable_line->releases();
-  return true;
+  bool released = false;
+  for (EnableShare& enable : enables_) {
+    released = released || enable.shared->releases() != enable.releases_seen;
+    enable.releases_seen = enable.shared->releases();
+  }
+  return released;
 }
 
 void Motor::pinsRestored() {

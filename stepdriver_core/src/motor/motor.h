@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "brake.h"
 #include "driver_pins.h"
@@ -15,8 +17,9 @@
 
 namespace stepdriver::motor {
 
-/// One driver chip and its channel of the pulse engine, as the controller knows them. It counts in
-/// microsteps and doesn't know the scale of the axis.
+/// The motor of an axis, or several that step together: their driver chips and their channel of the
+/// pulse engine, as the controller knows them. It counts in microsteps and doesn't know the scale
+/// of the axis.
 class Motor {
  public:
   /// @param config outlives the motor.
@@ -43,15 +46,39 @@ class Motor {
   const Power& power() const { return power_; }
   Brake& brake() { return brake_; }
   const Brake& brake() const { return brake_; }
-  Translator& translator() { return translator_; }
-  const Translator& translator() const { return translator_; }
-  int microsteps() const { return translator_.microsteps(); }
-
-  /// @name ENABLE, which several motors may share
+  /// @name The translators
   /// @{
+  /// That of an axis with one motor: only such a one changes its mode.
+  Translator& translator() { return translators_.front(); }
+  const Translator& translator() const { return translators_.front(); }
+  int microsteps() const { return translators_.front().microsteps(); }
+  /// Whether each translator is at Home.
+  bool areAtHome() const;
+  /// Each has gone Home.
+  void wentHome();
+  /// @}
+
+  /// @name Motors that step together
+  /// @{
+  pulse::MotorSet allMotors() const;
+  /// [microsteps] How far they have got apart since they were square.
+  std::int64_t skew() const { return pulse::skewOf(state_.lags, square_lags_, lines_.motors()); }
+  /// Their lags when they were square.
+  const pulse::MotorCounts& squareLags() const { return square_lags_; }
+  /// They are square now: each at the place of the others.
+  void noteSquare() { square_lags_ = state_.lags; }
+  /// @}
+
+  /// @name ENABLE, which several axes may share
+  /// @{
+  /// Whether all its lines stay asserted if this axis releases them.
   bool enableIsHeldByOthers() const;
+  /// Lines that another axis holds are not written.
+  PinSequence enable(bool on) const;
+  /// Writes STEP and all other pins but those of the microstep mode, see DriverPins::restore().
+  PinSequence restore() const;
   void noteEnable(bool wanted);
-  /// @return whether the shared line was released since the last call: nothing held the motor then.
+  /// @return whether a shared line was released since the last call: nothing held the motor then.
   bool takeReleases();
   /// @}
 
@@ -64,6 +91,18 @@ class Motor {
   void pinsRestored();
 
  private:
+  /// An ENABLE line, and the part of this axis in it.
+  struct EnableShare {
+    int line = -1;
+    std::shared_ptr<EnableLine> shared;
+    std::size_t number = 0;  // of this axis there
+    std::uint64_t releases_seen = 0;
+  };
+
+  bool isHeldByOthers(int enable_line) const;
+  /// The count of one of the motors.
+  std::int64_t countOf(std::size_t motor) const { return state_.count + state_.lags.at(motor); }
+
   const int channel_;
   const MotorLines lines_;
   const DriverPins pins_;
@@ -72,9 +111,9 @@ class Motor {
   std::uint64_t serial_ = 0;
   Power power_;
   Brake brake_;
-  Translator translator_;
-  std::size_t on_enable_line_ = 0;  // its number there
-  std::uint64_t releases_seen_ = 0;
+  std::vector<Translator> translators_;  // by motor
+  std::vector<EnableShare> enables_;
+  pulse::MotorCounts square_lags_{};
   bool pins_doubtful_ = false;
   int mode_failed_ = 0;
 };

@@ -1,19 +1,130 @@
 #include "motor_lines.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "nanoseconds.h"
 
 namespace stepdriver::motor {
 
+static_assert(config::kMostMotors == pulse::kMostMotors);
+
 namespace {
 
-/// The axis for which this ENABLE line was requested; nullptr: no axis yet.
-const MotorLines* sharerOf(const config::Pin& enable, const std::vector<MotorLines>& others,
-                           const std::vector<gpio::OutputRequest>& outputs) {
-  for (const MotorLines& other : others) {
-    if (other.enable < 0 || !enable.wired()) continue;
-    if (outputs[static_cast<std::size_t>(other.enable)].line == enable.line) return &other;
+/// Adds the lines of the motors of one axis to the requests.
+class LineRequests {
+ public:
+  LineRequests(const config::AxisConfig& config, const std::vector<MotorLines>& others,
+               std::vector<gpio::OutputRequest>& outputs, std::vector<gpio::InputRequest>& inputs)
+      : config_(config),
+        chip_(config.driver),
+        keep_(!config.disable_on_shutdown),
+        others_(others),
+        outputs_(outputs),
+        inputs_(inputs) {}
+
+  MotorLines add() {
+    static_cast<ChipLines&>(lines_) = addMotor(config_);
+    for (const config::MotorConfig& twin : config_.twins) lines_.twins.push_back(addMotor(twin));
+    lines_.cw_ccw = isCwCcw();
+    return lines_;
   }
-  return nullptr;
+
+ private:
+  bool isCwCcw() const { return chip_.step_inputs == driver::StepInputs::kCwCcw; }
+
+  ChipLines addMotor(const config::MotorConfig& motor) {
+    const config::Pins& pins = motor.pins;
+    ChipLines lines;
+    addEnable(pins.enable, lines);
+    lines.sleep = output(pins.sleep, chip_.sleep_asleep.value_or(false), keep_);
+    lines.reset = output(pins.reset, chip_.reset_held.value_or(false), keep_);
+    const auto code = driver::codeOf(chip_, config_.microsteps);
+    const std::array<const config::Pin*, 3> mode_pins = {&pins.ms1, &pins.ms2, &pins.ms3};
+    for (std::size_t i = 0; i < mode_pins.size(); ++i) {
+      lines.mode[i] = output(*mode_pins[i], code && (*code)[i], keep_);
+    }
+    if (config_.brake && lines_.brake < 0) {
+      lines_.brake = output({config_.brake->line, false}, !config_.brake->release_level, false);
+    }
+    lines.dir = output(pins.dir, isCwCcw() && !chip_.step_active, false);
+    // If each edge is a step, going back to the inactive level at the end could be one.
+    lines.step = output(pins.step, !chip_.step_active, chip_.both_edges);
+    lines.endstop_min = input(motor.endstop_min);
+    lines.endstop_max = input(motor.endstop_max);
+    lines.fault = input(motor.fault);
+    lines.in_position = input(motor.in_position);
+    return lines;
+  }
+
+  int output(const config::Pin& pin, bool chip_level, bool keep) {
+    if (!pin.wired()) return -1;
+    outputs_.push_back({pin.line, chip_level != pin.inverted, keep});
+    return static_cast<int>(outputs_.size()) - 1;
+  }
+
+  template <typename InputPin>
+  int input(const InputPin& pin) {
+    if (!pin) return -1;
+    inputs_.push_back({pin->line, pin->bias, true});
+    return static_cast<int>(inputs_.size()) - 1;
+  }
+
+  void addEnable(const config::Pin& enable, ChipLines& lines) {
+    if (!enable.wired()) return;
+    if (const ChipLines* sharer = sharerOf(enable)) {
+      lines.enable = sharer->enable;
+      lines.enable_line = sharer->enable_line;
+      bool& kept = outputs_[static_cast<std::size_t>(lines.enable)].keep_on_release;
+      kept = kept || keep_;
+      return;
+    }
+    lines.enable = output(enable, !chip_.enable_on, keep_);
+    lines.enable_line = std::make_shared<EnableLine>();
+  }
+
+  /// The motor for which this ENABLE line was requested; nullptr: none yet.
+  const ChipLines* sharerOf(const config::Pin& enable) const {
+    const auto among = [&](const MotorLines& axis) -> const ChipLines* {
+      for (std::size_t i = 0; i < axis.motors(); ++i) {
+        const int line = axis.motorAt(i).enable;
+        if (line >= 0 && outputs_[static_cast<std::size_t>(line)].line == enable.line) {
+          return &axis.motorAt(i);
+        }
+      }
+      return nullptr;
+    };
+    for (const MotorLines& other : others_) {
+      if (const ChipLines* sharer = among(other)) return sharer;
+    }
+    return among(lines_);
+  }
+
+  const config::AxisConfig& config_;
+  const driver::DriverChip& chip_;
+  const bool keep_;
+  const std::vector<MotorLines>& others_;
+  std::vector<gpio::OutputRequest>& outputs_;
+  std::vector<gpio::InputRequest>& inputs_;
+  MotorLines lines_;
+};
+
+pulse::MotorSignals signalsOf(const driver::DriverChip& chip, const config::MotorConfig& motor,
+                              const ChipLines& lines, bool cw_ccw) {
+  pulse::MotorSignals signals;
+  signals.step = {lines.step, chip.step_active != motor.pins.step.inverted};
+  signals.dir = {lines.dir, (chip.step_active || !cw_ccw) != motor.pins.dir.inverted};
+  if (motor.endstop_min) {
+    signals.endstop_min = pulse::Signal{lines.endstop_min, motor.endstop_min->active_level};
+  }
+  if (motor.endstop_max) {
+    signals.endstop_max = pulse::Signal{lines.endstop_max, motor.endstop_max->active_level};
+  }
+  if (motor.fault) signals.fault = pulse::Signal{lines.fault, chip.fault_active.value_or(false)};
+  if (motor.in_position) {
+    signals.in_position = pulse::Signal{lines.in_position, chip.in_position_active.value_or(false)};
+  }
+  return signals;
 }
 
 }  // namespace
@@ -21,77 +132,34 @@ const MotorLines* sharerOf(const config::Pin& enable, const std::vector<MotorLin
 MotorLines requestLines(const config::AxisConfig& config, const std::vector<MotorLines>& others,
                         std::vector<gpio::OutputRequest>& outputs,
                         std::vector<gpio::InputRequest>& inputs) {
-  const driver::DriverChip& chip = config.driver;
-  const auto output = [&outputs](const config::Pin& pin, bool chip_level, bool keep) {
-    if (!pin.wired()) return -1;
-    outputs.push_back({pin.line, chip_level != pin.inverted, keep});
-    return static_cast<int>(outputs.size()) - 1;
-  };
-  const auto input = [&inputs](const auto& pin) {
-    if (!pin) return -1;
-    inputs.push_back({pin->line, pin->bias, true});
-    return static_cast<int>(inputs.size()) - 1;
-  };
-
-  const bool keep = !config.disable_on_shutdown;
-  const config::Pins& pins = config.pins;
-  MotorLines lines;
-  if (const MotorLines* sharer = sharerOf(pins.enable, others, outputs)) {
-    lines.enable = sharer->enable;
-    lines.enable_line = sharer->enable_line;
-    bool& kept = outputs[static_cast<std::size_t>(lines.enable)].keep_on_release;
-    kept = kept || keep;
-  } else {
-    lines.enable = output(pins.enable, !chip.enable_on, keep);
-    if (pins.enable.wired()) lines.enable_line = std::make_shared<EnableLine>();
-  }
-  lines.sleep = output(pins.sleep, chip.sleep_asleep.value_or(false), keep);
-  lines.reset = output(pins.reset, chip.reset_held.value_or(false), keep);
-  const auto code = driver::codeOf(chip, config.microsteps);
-  const std::array<const config::Pin*, 3> mode_pins = {&pins.ms1, &pins.ms2, &pins.ms3};
-  for (std::size_t i = 0; i < mode_pins.size(); ++i) {
-    lines.mode[i] = output(*mode_pins[i], code && (*code)[i], keep);
-  }
-  if (config.brake) {
-    lines.brake = output({config.brake->line, false}, !config.brake->release_level, false);
-  }
-  lines.cw_ccw = chip.step_inputs == driver::StepInputs::kCwCcw;
-  lines.dir = output(pins.dir, lines.cw_ccw && !chip.step_active, false);
-  // If each edge is a step, going back to the inactive level at the end could be one.
-  lines.step = output(pins.step, !chip.step_active, chip.both_edges);
-  lines.endstop_min = input(config.endstop_min);
-  lines.endstop_max = input(config.endstop_max);
-  lines.fault = input(config.fault);
-  lines.in_position = input(config.in_position);
-  return lines;
+  return LineRequests(config, others, outputs, inputs).add();
 }
 
 pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const MotorLines& lines) {
   const driver::DriverChip& chip = config.driver;
   pulse::ChannelConfig channel;
-  channel.step = {lines.step, chip.step_active != config.pins.step.inverted};
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    const config::MotorConfig& motor = config.motorAt(i);
+    const pulse::MotorSignals signals = signalsOf(chip, motor, lines.motorAt(i), lines.cw_ccw);
+    if (i == 0) {
+      static_cast<pulse::MotorSignals&>(channel) = signals;
+    } else {
+      channel.twins.push_back(signals);
+    }
+    if (motor.fault) channel.ramps_at_fault = channel.ramps_at_fault || motor.fault->ramps;
+    if (motor.in_position) {
+      channel.in_position_timeout =
+          std::max(channel.in_position_timeout, nanoseconds(motor.in_position->timeout));
+    }
+  }
   channel.both_edges = chip.both_edges;
   channel.dir_steps = lines.cw_ccw;
-  channel.dir = {lines.dir, (chip.step_active || !lines.cw_ccw) != config.pins.dir.inverted};
-  if (config.endstop_min) {
-    channel.endstop_min = pulse::Signal{lines.endstop_min, config.endstop_min->active_level};
-  }
-  if (config.endstop_max) {
-    channel.endstop_max = pulse::Signal{lines.endstop_max, config.endstop_max->active_level};
-  }
-  if (config.fault) {
-    channel.fault = pulse::Signal{lines.fault, chip.fault_active.value_or(false)};
-    channel.ramps_at_fault = config.fault->ramps;
-  }
-  if (config.in_position) {
-    channel.in_position = pulse::Signal{lines.in_position, chip.in_position_active.value_or(false)};
-    channel.in_position_timeout = std::llround(config.in_position->timeout * 1e9);
-  }
-  channel.step_high = config.driver.timing.step_high_ns;
-  channel.step_low = config.driver.timing.step_low_ns;
-  channel.dir_setup = config.driver.timing.dir_setup_ns;
-  channel.dir_hold = config.driver.timing.dir_hold_ns;
+  channel.step_high = chip.timing.step_high_ns;
+  channel.step_low = chip.timing.step_low_ns;
+  channel.dir_setup = chip.timing.dir_setup_ns;
+  channel.dir_hold = chip.timing.dir_hold_ns;
   channel.backlash = std::llround(config.backlash * config.steps_per_unit);
+  channel.max_skew = std::llround(config.max_skew * config.steps_per_unit);
   return channel;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -11,26 +12,36 @@
 
 namespace stepdriver::motor {
 
-/// The indices of an axis's lines in the request for all axes. -1: not wired.
-struct MotorLines {
+/// The indices of the lines of a motor in the request for all axes. -1: not wired.
+struct ChipLines {
   int step = -1;
   int dir = -1;
   int enable = -1;
-  std::shared_ptr<EnableLine> enable_line;  ///< of `enable`, shared with other axes or not
+  std::shared_ptr<EnableLine> enable_line;  ///< of `enable`, shared with other motors or not
   std::array<int, 3> mode = {-1, -1, -1};
   int sleep = -1;
   int reset = -1;
-  int brake = -1;
   int endstop_min = -1;
   int endstop_max = -1;
   int fault = -1;
   int in_position = -1;
+};
+
+/// The lines of an axis: those of its first motor, and all others.
+struct MotorLines : ChipLines {
+  std::vector<ChipLines> twins;
+  int brake = -1;
   bool cw_ccw = false;  ///< `step` is CW, and `dir` is CCW
+
+  std::size_t motors() const { return 1 + twins.size(); }
+  const ChipLines& motorAt(std::size_t index) const {
+    return index == 0 ? *this : twins[index - 1];
+  }
 };
 
 /// Adds the lines of an axis to a request. Safe levels: no pulse, disabled, asleep, in reset, and
 /// the configured microstep mode, and the brake engaged. An axis that stays enabled after a
-/// shutdown keeps its chip awake.
+/// shutdown keeps its chips awake.
 ///
 /// @param others the axes that are already in the request: their ENABLE lines can be shared.
 MotorLines requestLines(const config::AxisConfig& config, const std::vector<MotorLines>& others,

@@ -3,12 +3,13 @@
 #include <array>
 #include <cstddef>
 
+#include "pulse/channel.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::motor {
 
 /// Writes to pins other than STEP and DIR, one after the other, each with the time that must pass
-/// before the next write or the first step.
+/// before the next write or the first step. There is room for all motors of an axis.
 struct PinSequence {
   /// One write of a pin, and how long nothing else may be written to the chip after it.
   struct Write {
@@ -17,7 +18,7 @@ struct PinSequence {
     pulse::Nanoseconds then_wait;
   };
 
-  static constexpr std::size_t kCapacity = 8;
+  static constexpr std::size_t kCapacity = 8 * pulse::kMostMotors;
   std::array<Write, kCapacity> writes{};
   std::size_t size = 0;
 

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "stepdriver_core/pulse/clock.h"
 
@@ -13,19 +17,51 @@ struct Signal {
   bool active = true;
 };
 
-/// What the engine needs to know about an axis.
-struct ChannelConfig {
+/// The lines of a motor of an axis.
+struct MotorSignals {
   Signal step;
   Signal dir;  ///< active: forward, the count rises
   std::optional<Signal> endstop_min;
   std::optional<Signal> endstop_max;
   std::optional<Signal> fault;  ///< the chip's fault output
+  /// The driver's in-position output: a motion that settles (Follow::settles) ends when it is
+  /// active, on every motor that has one. If one isn't within the timeout after the end of the
+  /// profile, the motion ends as kNotInPosition.
+  std::optional<Signal> in_position;
+};
+
+/// The most motors that an axis can have.
+constexpr std::size_t kMostMotors = 4;
+
+/// Motors of an axis, a bit for each: the first motor's is the lowest.
+using MotorSet = std::uint8_t;
+constexpr MotorSet motorBit(std::size_t motor) { return static_cast<MotorSet>(1U << motor); }
+
+/// [microsteps] By motor of an axis.
+using MotorCounts = std::array<std::int32_t, kMostMotors>;
+
+/// [microsteps] How far apart some motors are that were square with other counts.
+inline std::int64_t skewOf(const MotorCounts& now, const MotorCounts& square, std::size_t motors) {
+  std::int64_t least = 0;
+  std::int64_t most = 0;
+  for (std::size_t i = 0; i < motors; ++i) {
+    const std::int64_t moved = std::int64_t{now[i]} - square[i];
+    least = i == 0 ? moved : std::min(least, moved);
+    most = i == 0 ? moved : std::max(most, moved);
+  }
+  return most - least;
+}
+
+/// What the engine needs to know about an axis: its first motor, and all else.
+struct ChannelConfig : MotorSignals {
+  /// Further motors, at most kMostMotors - 1: they step in the same write as the first one, with
+  /// the same times, unless the motion leaves them out (Follow::still).
+  std::vector<MotorSignals> twins;
+  /// [microsteps] While the motors square (Follow::squares), how far apart the counts of two may
+  /// get since they were square.
+  std::int64_t max_skew = 0;
   /// A fault doesn't end a motion that has made a step: it is only counted, and a stop is expected.
   bool ramps_at_fault = false;
-  /// The driver's in-position output: a motion that settles (Follow::settles) ends when it is
-  /// active. If it isn't within the timeout after the end of the profile, the motion ends as
-  /// kNotInPosition.
-  std::optional<Signal> in_position;
   Nanoseconds in_position_timeout = 0;
   /// `step` makes steps forward, and pulses on `dir`, which is no level then, make steps backward.
   /// dir_setup and dir_hold are kept between the pulses of the two.
@@ -48,6 +84,7 @@ enum class EndReason {
   kLineError,      ///< a line could not be written or read
   kNotInPosition,  ///< the in-position output didn't become active in time
   kCompanion,      ///< another channel of the group was ended
+  kSkewed,         ///< motors that square got too far apart: those that still move met no switch
 };
 
 /// A write or a read that failed.
@@ -79,6 +116,12 @@ struct ChannelState {
   std::uint64_t chip_faults = 0;  ///< how many times the fault line became active
   std::uint64_t line_errors = 0;  ///< failed writes and reads
   Nanoseconds ready = 0;          ///< clock time before which no step goes out
+  /// By motor: its own edges forward minus those backward, less `count`. 0 for motors that have
+  /// made every step of the axis.
+  MotorCounts lags{};
+  MotorSet still = 0;  ///< the motors that make no steps in this motion, or the last one
+  std::uint8_t chip_at_fault = 0;  ///< the motor whose chip has reported the last of chip_faults
+  std::uint8_t unsettled = 0;      ///< the motor that kNotInPosition is about
 
   std::uint64_t faults() const { return chip_faults + line_errors; }
 };

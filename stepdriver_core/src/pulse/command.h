@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "channel.h"
 #include "motion/profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -30,8 +31,18 @@ struct Follow {
   /// ChannelState::faults() as it was known when this was planned. If a fault has come since, this
   /// one is refused.
   std::uint64_t faults = 0;
-  /// At its end it waits for the in-position output, if the channel has one.
+  /// At its end it waits for the in-position outputs, if the channel has any.
   bool settles = false;
+  /// @name Of an order from rest, for an axis with several motors; profiles that continue it keep
+  ///   these
+  /// @{
+  MotorSet still = 0;  ///< these motors make no steps
+  /// Each motor stops at its own endstop, and the others continue. The motion ends as at an endstop
+  /// when all motors have stopped, and as kSkewed if they get too far apart
+  /// (ChannelConfig::max_skew). A motor without an endstop in the direction continues to the end.
+  bool squares = false;
+  bool is_square = false;  ///< the motors are square: their skew counts from here
+  /// @}
 };
 
 /// An order to the pulse thread. Serials rise by one on each channel.

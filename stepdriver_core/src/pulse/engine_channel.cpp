@@ -4,6 +4,21 @@
 
 namespace stepdriver::pulse {
 
+bool EngineChannel::has(std::optional<Signal> MotorSignals::*signal) const {
+  for (std::size_t i = 0; i < motors(); ++i) {
+    if (motor(i).*signal) return true;
+  }
+  return false;
+}
+
+std::int64_t EngineChannel::skewAfter(int step_direction) const {
+  MotorCounts lags = state.lags;
+  for (std::size_t i = 0; i < motors(); ++i) {
+    if (isStill(i)) lags[i] -= step_direction;
+  }
+  return skewOf(lags, square_lags, motors());
+}
+
 void EngineChannel::pullNext() {
   motion::Step step;
   next.reset();
@@ -14,7 +29,7 @@ void EngineChannel::adopt(const Successors::Entry& followed) {
   profile = followed.profile;
   finder = motion::StepFinder(*followed.profile, state.count);
   state.following = followed.serial;
-  settles = followed.settles && config.in_position;
+  settles = followed.settles && has(&MotorSignals::in_position);
   pullNext();
   // A plan without a step, as for another speed, doesn't begin the wait again.
   if (next) settling = false;
@@ -25,6 +40,9 @@ void EngineChannel::follow(const Follow& order) {
   restart_interval = order.restart_interval;
   group = order.group;
   if (profile == nullptr) {
+    state.still = order.still;
+    squares = order.squares;
+    if (order.is_square) square_lags = state.lags;
     adopt({order.profile, order.serial, order.settles});
     last_planned = order.profile->startNs();
     late = 0;
@@ -37,13 +55,13 @@ void EngineChannel::follow(const Follow& order) {
 bool EngineChannel::reserve() {
   if (profile != nullptr || reserved) return false;
   reserved = true;
-  faulty = false;  // it must be read again when the pins have been written
+  faulty = 0;  // it must be read again when the pins have been written
   return true;
 }
 
 void EngineChannel::release(const Command& command) {
   reserved = false;
-  unchecked = config.fault.has_value();
+  unchecked = has(&MotorSignals::fault);
   state.ready = std::max(state.ready, command.ready);
   if (const auto& scale = command.scale) {
     state.count = scale->count;
@@ -56,6 +74,11 @@ void EngineChannel::release(const Command& command) {
 void EngineChannel::countStep() {
   state.count += direction;
   state.slack = std::clamp<std::int64_t>(state.slack + direction, 0, config.backlash);
+  if (pulsed != all_motors) {
+    for (std::size_t i = 0; i < motors(); ++i) {
+      if ((pulsed & motorBit(i)) == 0) state.lags[i] -= direction;
+    }
+  }
   ++state.pulses;
   state.rose = rose;
   running = true;
@@ -75,6 +98,7 @@ void EngineChannel::endMotion(EndReason reason, Nanoseconds motion_now) {
   }
   state.following = 0;
   profile = nullptr;
+  squares = false;
   settling = false;
   successors.clear();
   next.reset();

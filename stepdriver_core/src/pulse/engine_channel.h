@@ -39,9 +39,26 @@ struct EngineChannel {
     return successors.empty() ? state.following : successors.last().serial;
   }
 
-  /// The line of pulses in a direction.
-  const Signal& stepOf(int forward) const {
-    return config.dir_steps && forward < 0 ? config.dir : config.step;
+  std::size_t motors() const { return 1 + config.twins.size(); }
+  const MotorSignals& motor(std::size_t number) const {
+    return number == 0 ? config : config.twins[number - 1];
+  }
+  bool isStill(std::size_t number) const { return (state.still & motorBit(number)) != 0; }
+  /// Whether any motor's signals have this one.
+  bool has(std::optional<Signal> MotorSignals::*signal) const;
+  /// [microsteps] How far apart the motors are, since they were square.
+  /// @param step_direction of a step that would be made before; 0: none.
+  std::int64_t skewAfter(int step_direction) const;
+  /// The next step would get them farther apart than they may be.
+  bool wouldSkew() const {
+    const std::int64_t after = skewAfter(next->direction);
+    return after > config.max_skew && after > skewAfter(0);
+  }
+
+  /// A motor's line of pulses in a direction.
+  const Signal& stepOf(std::size_t number, int forward) const {
+    const MotorSignals& signals = motor(number);
+    return config.dir_steps && forward < 0 ? signals.dir : signals.step;
   }
 
   void publish() { published.store(state); }
@@ -56,15 +73,18 @@ struct EngineChannel {
   void endMotion(EndReason reason, Nanoseconds motion_now);
 
   std::size_t index = 0;
-  bool high = false;       // the pulse is out; never so if both edges are steps
-  bool toggled = false;    // both edges are steps, and the line is at its active level
-  bool running = false;    // the current motion has made a step
-  bool changed = false;    // it must be scheduled
-  bool faulty = false;     // the last reading of the fault line
+  bool high = false;  // the pulse is out; never so if both edges are steps
+  MotorSet all_motors = 1;
+  MotorSet pulsed = 1;   // the motors that took part in the last edge
+  MotorSet toggled = 0;  // both edges are steps, and these motors' lines are at their active level
+  bool squares = false;  // the current motion does
+  bool running = false;  // the current motion has made a step
+  bool changed = false;  // it must be scheduled
+  MotorSet faulty = 0;   // by the last readings of the fault lines
   bool unchecked = false;  // its fault line must be read before the next step
   bool reserved = false;   // the chip's other pins are being written
   int direction = -1;      // the direction on the DIR line, or of pulse_line
-  Signal pulse_line;       // the line of steps in that direction
+  Signal pulse_line;       // the first motor's line of steps in that direction
   std::optional<motion::Step> next;
   Nanoseconds last_planned = 0;  // motion time of the step before, or of the profile's start
   Nanoseconds late = 0;          // of the next step, so far
@@ -84,6 +104,7 @@ struct EngineChannel {
   const motion::Profile* profile = nullptr;  // the one that is followed
   std::uint64_t group = 0;                   // of the last order; 0: no group
   Nanoseconds restart_interval = 0;
+  MotorCounts square_lags{};  // ChannelState::lags when it was square
   ChannelState state;
   Snapshot<ChannelState> published;
   motion::StepFinder finder;

@@ -1,6 +1,7 @@
 #include "pulse/pulse_engine.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 
 #include "engine_channel.h"
@@ -25,16 +26,19 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
       emergency_input_(emergency_stop),
       channels_(channels.size()),
       dues_(channels.size()) {
+  std::size_t motors = 0;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     channels_[i].index = i;
     channels_[i].config = channels[i];
-    channels_[i].pulse_line = channels_[i].stepOf(channels_[i].direction);
+    channels_[i].pulse_line = channels_[i].stepOf(0, channels_[i].direction);
+    channels_[i].all_motors = static_cast<MotorSet>(motorBit(channels_[i].motors()) - 1);
+    motors += channels_[i].motors();
   }
   due_.reserve(channels.size());
   changed_.reserve(channels.size());
-  writes_.reserve(channels.size());
-  writers_.reserve(channels.size());
-  errors_.resize(channels.size());
+  writes_.reserve(motors);
+  writers_.reserve(motors);
+  errors_.resize(motors);
   readEmergencyStop();
 }
 
@@ -186,7 +190,7 @@ void PulseEngine::readInputs(Nanoseconds now) {
   readEmergencyStop();
   if (emergencyStopped()) stopAll(now);
   for (Channel& channel : channels_) {
-    if (channel.config.fault) readFault(channel, now);
+    readFault(channel, now);
     if (channel.next) mayStep(channel, now);
     if (channel.settling) {
       channel.look_at = now;
@@ -198,22 +202,28 @@ void PulseEngine::readInputs(Nanoseconds now) {
 void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
   // While its pins change, and while it wakes, a chip's fault line means nothing.
   if (channel.reserved || now < channel.state.ready) return;
-  const int level = readLine(channel.config.fault->line);
-  const bool faulty = level < 0 || (level != 0) == channel.config.fault->active;
-  if (faulty && !channel.faulty) {
+  for (std::size_t i = 0; i < channel.motors(); ++i) {
+    const auto& fault = channel.motor(i).fault;
+    if (!fault) continue;
+    const int level = readLine(fault->line);
+    const bool faulty = level < 0 || (level != 0) == fault->active;
+    const bool was_faulty = (channel.faulty & motorBit(i)) != 0;
+    if (faulty == was_faulty) continue;
+    channel.faulty ^= motorBit(i);
+    if (!faulty) continue;
     if (level < 0) {
-      fail(channel, {-level, channel.config.fault->line, true}, now);
+      fail(channel, {-level, fault->line, true}, now);
+      continue;
+    }
+    ++channel.state.chip_faults;
+    channel.state.chip_at_fault = static_cast<std::uint8_t>(i);
+    if (channel.config.ramps_at_fault && channel.profile != nullptr && channel.running) {
+      channel.publish();
+      news_ = true;
     } else {
-      ++channel.state.chip_faults;
-      if (channel.config.ramps_at_fault && channel.profile != nullptr && channel.running) {
-        channel.publish();
-        news_ = true;
-      } else {
-        end(channel, EndReason::kChipFault, now);
-      }
+      end(channel, EndReason::kChipFault, now);
     }
   }
-  channel.faulty = faulty;
 }
 
 bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
@@ -223,15 +233,30 @@ bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
     readFault(channel, now);
     if (!channel.next) return false;
   }
+  for (std::size_t i = 0; i < channel.motors(); ++i) {
+    if (!mayStepOn(channel, i, now)) return false;
+  }
+  if (channel.squares && channel.state.still != 0 && channel.wouldSkew()) {
+    end(channel, EndReason::kSkewed, now);
+    return false;
+  }
+  return true;
+}
+
+// Whether the endstop of a motor allows a step of the axis.
+bool PulseEngine::mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now) {
   const bool forward = channel.next->direction > 0;
-  const auto& endstop = forward ? channel.config.endstop_max : channel.config.endstop_min;
-  if (!endstop) return true;
+  const MotorSignals& signals = channel.motor(motor);
+  const auto& endstop = forward ? signals.endstop_max : signals.endstop_min;
+  if (!endstop || channel.isStill(motor)) return true;
   const int level = readLine(endstop->line);
   if (level < 0) {
     fail(channel, {-level, endstop->line, true}, now);
     return false;
   }
   if ((level != 0) != endstop->active) return true;
+  if (channel.squares) channel.state.still |= motorBit(motor);
+  if (channel.squares && channel.state.still != channel.all_motors) return true;
   end(channel, forward ? EndReason::kEndstopMax : EndReason::kEndstopMin, now);
   return false;
 }
@@ -293,12 +318,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     const Action action = channel.action();
     const bool fall = action == Action::kFall;
     if (!fall && !(action == Action::kRise && mayStep(channel, now))) continue;
-    const Signal& step = channel.pulse_line;
-    // Member by member: copying a complete pair would make the processor wait.
-    gpio::LineWrite& write = writes_.emplace_back();
-    write.output = step.line;
-    write.level = step.active != (fall || channel.toggled);
-    writers_.push_back(&channel);
+    addPulse(channel, fall);
   }
   // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
   // may have ended others.
@@ -311,9 +331,32 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     writeOneByOne(error, now);
   } else {
     const Nanoseconds done = clock_.now();
-    for (Channel* channel : writers_) written(*channel, done);
+    for (std::size_t i = 0; i < writers_.size(); ++i) {
+      record(writes_[i], done);
+      if (i == 0 || writers_[i] != writers_[i - 1]) written(*writers_[i], done);
+    }
   }
   if (state_.pulses != pulses) figures_.store(state_);
+}
+
+// The motors of an axis follow each other in the write. A pulse ends on each motor on which it has
+// begun, also if one has become still meanwhile.
+void PulseEngine::addPulse(Channel& channel, bool fall) {
+  if (!fall) channel.pulsed = channel.all_motors & static_cast<MotorSet>(~channel.state.still);
+  const auto add = [&](std::size_t motor, const Signal& step) {
+    if ((channel.pulsed & motorBit(motor)) == 0) return;
+    // Member by member: copying a complete pair would make the processor wait.
+    gpio::LineWrite& write = writes_.emplace_back();
+    write.output = step.line;
+    write.level = step.active != (fall || (channel.toggled & motorBit(motor)) != 0);
+    writers_.push_back(&channel);
+  };
+  add(0, channel.pulse_line);
+  for (std::size_t i = 1; i < channel.motors(); ++i) add(i, channel.stepOf(i, channel.direction));
+}
+
+void PulseEngine::record(const gpio::LineWrite& write, Nanoseconds now) {
+  if (ring_ != nullptr) ring_->add(write.output, write.level, now);
 }
 
 void PulseEngine::dropEnded() {
@@ -328,12 +371,14 @@ void PulseEngine::dropEnded() {
 }
 
 // Writing one by one shows whose line fails. Lines that the failed write has already set keep their
-// level.
+// level. The count is that of the first motor in the write, even if another's line fails.
 void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     Channel& channel = *writers_[i];
     errors_[i] = writers_.size() > 1 ? writeLines(&writes_[i], 1) : error;
     const Nanoseconds done = clock_.now();
+    if (errors_[i] == 0) record(writes_[i], done);
+    if (i > 0 && writers_[i] == writers_[i - 1]) continue;
     if (errors_[i] == 0) {
       written(channel, done);
     } else {
@@ -352,14 +397,11 @@ void PulseEngine::writeOneByOne(int error, Nanoseconds now) {
 
 void PulseEngine::written(Channel& channel, Nanoseconds now) {
   changed(channel);
-  const Signal& step = channel.pulse_line;
   if (channel.config.both_edges) {
-    channel.toggled = !channel.toggled;
-    if (ring_ != nullptr) ring_->add(step.line, channel.toggled == step.active, now);
+    channel.toggled ^= channel.pulsed;
     channel.fell = now;
   } else {
     channel.high = !channel.high;
-    if (ring_ != nullptr) ring_->add(step.line, channel.high == step.active, now);
     if (!channel.high) {
       channel.fell = now;
       return;
@@ -392,7 +434,7 @@ void PulseEngine::writeHeartbeat(Nanoseconds now) {
   if (!heartbeat_ || now < heartbeat_->due()) return;
   const gpio::LineWrite write = heartbeat_->next();
   const int error = writeLines(&write, 1);
-  if (error == 0 && ring_ != nullptr) ring_->add(write.output, write.level, clock_.now());
+  if (error == 0) record(write, clock_.now());
   if (!heartbeat_->done(error == 0, now)) return;
   // Whatever watches the line now takes the motors' power away.
   for (Channel& channel : channels_) fail(channel, {error, write.output}, now);
@@ -402,28 +444,40 @@ void PulseEngine::turn(Channel& channel, Nanoseconds now) {
   if (channel.config.dir_steps) {
     channel.turned = clock_.now();  // the last pulse may have ended in this pass
     channel.direction = channel.next->direction;
-    channel.pulse_line = channel.stepOf(channel.direction);
+    channel.pulse_line = channel.stepOf(0, channel.direction);
     return changed(channel);
   }
   const bool forward = channel.next->direction > 0;
-  const Signal& dir = channel.config.dir;
-  const gpio::LineWrite write{dir.line, forward ? dir.active : !dir.active};
-  if (const int error = writeLines(&write, 1)) {
-    fail(channel, {error, write.output}, now);
+  std::array<gpio::LineWrite, kMostMotors> writes{};
+  for (std::size_t i = 0; i < channel.motors(); ++i) {
+    const Signal& dir = channel.motor(i).dir;
+    writes[i] = {dir.line, forward ? dir.active : !dir.active};
+  }
+  if (const int error = writeLines(writes.data(), channel.motors())) {
+    // Writing one by one shows whose line fails.
+    std::size_t failing = 0;
+    while (failing + 1 < channel.motors() && writeLines(&writes[failing], 1) == 0) ++failing;
+    fail(channel, {error, writes[failing].output}, now);
     return;
   }
   channel.turned = clock_.now();
-  if (ring_ != nullptr) ring_->add(write.output, write.level, channel.turned);
+  for (std::size_t i = 0; i < channel.motors(); ++i) record(writes[i], channel.turned);
   channel.direction = channel.next->direction;
   changed(channel);
 }
 
 void PulseEngine::finish(Channel& channel, Nanoseconds now) {
   if (!channel.settles) return end(channel, EndReason::kDone, now);
-  const Signal& in_position = *channel.config.in_position;
-  const int level = readLine(in_position.line);
-  if (level < 0) return fail(channel, {-level, in_position.line, true}, now);
-  if ((level != 0) == in_position.active) return end(channel, EndReason::kDone, now);
+  std::size_t unsettled = channel.motors();
+  for (std::size_t i = channel.motors(); i-- > 0;) {
+    const auto& in_position = channel.motor(i).in_position;
+    if (!in_position) continue;
+    const int level = readLine(in_position->line);
+    if (level < 0) return fail(channel, {-level, in_position->line, true}, now);
+    if ((level != 0) != in_position->active) unsettled = i;
+  }
+  if (unsettled == channel.motors()) return end(channel, EndReason::kDone, now);
+  channel.state.unsettled = static_cast<std::uint8_t>(unsettled);
   if (!channel.settling) channel.settling_since = now;
   channel.settling = true;
   const Nanoseconds latest = channel.settling_since + channel.config.in_position_timeout;
@@ -527,7 +581,10 @@ bool PulseEngine::scheduleRise(Channel& channel) {
   Nanoseconds earliest = std::max(channel.state.ready, channel.turned + config.dir_setup);
   if (channel.state.pulses != 0) {
     // Both edges being steps, the last one was the beginning of the active time, or its end.
-    const Nanoseconds gap = channel.toggled ? config.step_high : config.step_low;
+    const Nanoseconds after_high =
+        (channel.toggled & channel.all_motors) != 0 ? config.step_high : 0;
+    const Nanoseconds after_low = channel.toggled != channel.all_motors ? config.step_low : 0;
+    const Nanoseconds gap = std::max(after_high, after_low);
     earliest = std::max({earliest, channel.fell + gap, closestRise(channel)});
   }
   const Nanoseconds planned = channel.next->time_ns + state_.slipped;

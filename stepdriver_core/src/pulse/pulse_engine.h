@@ -144,6 +144,7 @@ class PulseEngine {
   void readEmergencyStop();
   void readFault(Channel& channel, Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
+  bool mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now);
 
   // Lines.
   int writeLines(const gpio::LineWrite* writes, std::size_t count);
@@ -151,10 +152,12 @@ class PulseEngine {
 
   // Edges.
   void collectDue(Nanoseconds now);
+  void addPulse(Channel& channel, bool fall);
   bool meetLateness(Nanoseconds now);
   void writeSteps(Nanoseconds now);
   void dropEnded();
   void writeOneByOne(int error, Nanoseconds now);
+  void record(const gpio::LineWrite& write, Nanoseconds now);
   void written(Channel& channel, Nanoseconds now);
   void writeOthers(Nanoseconds now);
   void writeHeartbeat(Nanoseconds now);

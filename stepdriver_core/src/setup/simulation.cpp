@@ -36,6 +36,7 @@ SwitchPlaces switchPlaces(const AxisConfig& axis, const SimulatedAxis& simulated
   if (axis.max_position) places.max = *axis.max_position * scale + kSwitchMargin;
   if (!axis.min_position) places.min = std::min(places.min, places.max - 2 * far);
   if (!axis.max_position) places.max = std::max(places.max, places.min + 2 * far);
+  if (axis.homing) (axis.homing->at_max ? places.max : places.min) += axis.offset * scale;
   places.min = simulated.min_switch.value_or(places.min);
   places.max = simulated.max_switch.value_or(places.max);
   return places;
@@ -75,6 +76,15 @@ AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
   return axis;
 }
 
+/// Of an axis with several motors: one of them, as if it had no other.
+AxisConfig motorAlone(const AxisConfig& axis, std::size_t motor) {
+  AxisConfig alone = axis;
+  alone.twins.clear();
+  static_cast<config::MotorConfig&>(alone) = axis.motorAt(motor);
+  alone.name = axis.traceName(motor);
+  return alone;
+}
+
 sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& simulated) {
   const AxisConfig axis = wired(configured, simulated.wiring);
   sim::RigAxisSpec spec;
@@ -110,7 +120,12 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
                                     const SimulationConfig& config) {
   std::vector<sim::RigAxisSpec> rig;
   rig.reserve(axes.size());
-  for (const AxisConfig& axis : axes) rig.push_back(rigAxisOf(axis, config.axes.at(axis.name)));
+  for (const AxisConfig& axis : axes) {
+    for (std::size_t i = 0; i < axis.motors(); ++i) {
+      const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(axis.motorAt(i).motor);
+      rig.push_back(rigAxisOf(motorAlone(axis, i), simulated));
+    }
+  }
   return rig;
 }
 
@@ -126,14 +141,19 @@ std::shared_ptr<sim::PinTrace> traceOf(const SimulationConfig& config) {
 void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config,
                      const std::string& name, std::vector<ConfigIssue>& issues) {
   for (const AxisConfig& axis : axes) {
-    if (!axis.endstop_min || !axis.endstop_max) continue;
-    const SwitchPlaces places = switchPlaces(axis, config.axes.at(axis.name));
-    if (places.min < places.max) continue;
-    issues.push_back(
-        {name + "/axes/" + axis.name,
-         fmt::format(
-             "has the min switch at {}, but it must be below the max switch, which is at {}",
-             roughText(places.min), roughText(places.max))});
+    for (std::size_t i = 0; i < axis.motors(); ++i) {
+      const config::MotorConfig& motor = axis.motorAt(i);
+      if (!motor.endstop_min || !motor.endstop_max) continue;
+      const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(motor.motor);
+      const SwitchPlaces places = switchPlaces(motorAlone(axis, i), simulated);
+      if (places.min < places.max) continue;
+      issues.push_back(
+          {fmt::format("{}/axes/{}{}{}", name, axis.name, motor.motor.empty() ? "" : "/motors/",
+                       motor.motor),
+           fmt::format(
+               "has the min switch at {}, but it must be below the max switch, which is at {}",
+               roughText(places.min), roughText(places.max))});
+    }
   }
 }
 
@@ -146,11 +166,14 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
       rig_(rigOf(axes, config), traceOf(config)),
       backend_(rig_, [this] { return clock_.now(); }) {
   for (const AxisConfig& axis : axes) {
-    const SimulatedAxis& simulated = config.axes.at(axis.name);
-    faults_[axis.name] = simulated.faults;
-    rig_.setFaults(axis.name, simulated.faults);
-    if (simulated.fail_step_write_after) {
-      rig_.failWrites(axis.pins.step.line, *simulated.fail_step_write_after, EIO);
+    for (std::size_t i = 0; i < axis.motors(); ++i) {
+      const config::MotorConfig& motor = axis.motorAt(i);
+      const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(motor.motor);
+      faults_[axis.traceName(i)] = simulated.faults;
+      rig_.setFaults(axis.traceName(i), simulated.faults);
+      if (simulated.fail_step_write_after) {
+        rig_.failWrites(motor.pins.step.line, *simulated.fail_step_write_after, EIO);
+      }
     }
   }
   if (emergency_stop_) pressEmergencyStop(config.emergency_stop);
@@ -163,11 +186,16 @@ void Simulation::pressEmergencyStop(bool pressed) {
 
 void Simulation::pressEndstop(const std::string& axis, End end, bool pressed) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  sim::RigFaults& now = pressed_.try_emplace(axis, faults_.at(axis)).first->second;
-  const sim::RigFaults& always = faults_.at(axis);
-  if (end == End::kMin) now.min_stuck = pressed ? std::optional<bool>(true) : always.min_stuck;
-  if (end == End::kMax) now.max_stuck = pressed ? std::optional<bool>(true) : always.max_stuck;
-  rig_.setFaults(axis, now);
+  const auto pressed_axis = std::find_if(
+      axes_.begin(), axes_.end(), [&](const AxisConfig& known) { return known.name == axis; });
+  for (std::size_t i = 0; i < pressed_axis->motors(); ++i) {
+    const std::string rig_axis = pressed_axis->traceName(i);
+    const sim::RigFaults& always = faults_.at(rig_axis);
+    sim::RigFaults& now = pressed_.try_emplace(rig_axis, always).first->second;
+    if (end == End::kMin) now.min_stuck = pressed ? std::optional<bool>(true) : always.min_stuck;
+    if (end == End::kMax) now.max_stuck = pressed ? std::optional<bool>(true) : always.max_stuck;
+    rig_.setFaults(rig_axis, now);
+  }
 }
 
 }  // namespace stepdriver::setup

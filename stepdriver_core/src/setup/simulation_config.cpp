@@ -18,20 +18,20 @@ constexpr double kLongestSettlingMs = 60'000.0;
 constexpr double kLongestFaultMs = 3.6e6;
 constexpr int kMostWrites = std::numeric_limits<int>::max();
 
-/// Reads the rig of one axis.
+/// Reads the rig of one axis, or of one of its motors.
 class SimulatedAxisReader {
  public:
   /// @param unit suffix of the keys with a length; empty: uncertain, so both are accepted.
   SimulatedAxisReader(ConfigReader reader, std::string unit)
       : reader_(std::move(reader)), unit_(std::move(unit)) {}
 
-  SimulatedAxis read() {
-    SimulatedAxis axis;
+  /// @param axis what it is without the keys of the map.
+  SimulatedAxis read(SimulatedAxis axis = {}) {
     axis.start = length("start", Range{}).value_or(axis.start);
     axis.switch_hysteresis =
         length("switch_hysteresis", Range::notNegative()).value_or(axis.switch_hysteresis);
-    axis.min_switch = length("min_switch", Range{});
-    axis.max_switch = length("max_switch", Range{});
+    if (const auto place = length("min_switch", Range{})) axis.min_switch = place;
+    if (const auto place = length("max_switch", Range{})) axis.max_switch = place;
     axis.bounces = reader_.integer("bounces", 0, kMostBounces, axis.bounces);
     axis.bounce_ms =
         reader_.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, axis.bounce_ms);
@@ -51,6 +51,26 @@ class SimulatedAxisReader {
         std::llround(reader_.number("chip_fault_ms", Range{0.0, kLongestFaultMs}, 0.0) * 1e6);
     axis.fail_step_write_after =
         reader_.findInteger("fail_step_write_after", 0, kMostWrites, Presence::kOptional);
+    return axis;
+  }
+
+  /// @param motors the names of several; empty if there is only one.
+  SimulatedAxis readWithMotors(const std::vector<std::string>& motors) {
+    SimulatedAxis axis = read();
+    if (!motors.empty()) {
+      ConfigReader reader = reader_.map("motors");
+      for (const std::string& motor : motors) {
+        if (!reader.has(motor)) continue;
+        SimulatedAxisReader own(reader.map(motor), unit_);
+        SimulatedAxis without_faults = axis;
+        without_faults.faults = {};
+        without_faults.wiring = {};
+        axis.motors[motor] = own.read(without_faults);
+        own.reader_.rejectUnknown();
+      }
+      for (const std::string& motor : motors) reader.allow(motor);
+      reader.rejectUnknown();
+    }
     reader_.rejectUnknown();
     return axis;
   }
@@ -106,6 +126,15 @@ class SimulatedAxisReader {
   std::string unit_;
 };
 
+/// The names of several motors; empty if the axis has only one.
+std::vector<std::string> motorsOf(const config::AxisConfig& axis) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; axis.motors() > 1 && i < axis.motors(); ++i) {
+    names.push_back(axis.motorAt(i).motor);
+  }
+  return names;
+}
+
 }  // namespace
 
 SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::AxisConfig>& axes,
@@ -120,7 +149,8 @@ SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::A
   for (const config::AxisConfig& axis : axes) {
     std::string unit;
     if (axes_are_right) unit = axis.kind == config::Kind::kLinear ? "mm" : "deg";
-    config.axes[axis.name] = SimulatedAxisReader(rigs.map(axis.name), unit).read();
+    config.axes[axis.name] =
+        SimulatedAxisReader(rigs.map(axis.name), unit).readWithMotors(motorsOf(axis));
   }
   if (!axes.empty()) rigs.rejectUnknown();
   reader.rejectUnknown();

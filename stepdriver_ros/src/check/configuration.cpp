@@ -19,9 +19,11 @@ std::string speedText(const config::AxisConfig& axis) {
 }
 
 std::string endstopsText(const config::AxisConfig& axis) {
-  if (axis.endstop_min && axis.endstop_max) return "min and max";
-  if (axis.endstop_min) return "min";
-  return axis.endstop_max ? "max" : "none";
+  const bool has_min = axis.hasEndstop(false);
+  const bool has_max = axis.hasEndstop(true);
+  if (has_min && has_max) return "min and max";
+  if (has_min) return "min";
+  return has_max ? "max" : "none";
 }
 
 }  // namespace

@@ -55,40 +55,47 @@ std::string holderOf(const gpio::LineInfo& info) {
   return info.consumer.empty() ? "held by the kernel" : "held by \"" + info.consumer + '"';
 }
 
+/// @param enables the indices of the ENABLE lines so far, which motors may share.
+void addLines(const config::AxisConfig& axis, const config::MotorConfig& motor,
+              std::vector<NamedLine>& lines, std::vector<std::size_t>& enables) {
+  const std::string name = axis.name + "/" + (motor.motor.empty() ? "" : motor.motor + "/");
+  const auto add = [&](const char* pin, const std::string& line) {
+    if (!line.empty()) lines.push_back({name + pin, line});
+  };
+  const config::Pins& pins = motor.pins;
+  const bool cw_ccw = axis.driver.step_inputs == driver::StepInputs::kCwCcw;
+  add(cw_ccw ? "cw" : "step", pins.step.line);
+  add(cw_ccw ? "ccw" : "dir", pins.dir.line);
+  const auto shared = std::find_if(enables.begin(), enables.end(), [&](std::size_t i) {
+    return lines[i].line == pins.enable.line;
+  });
+  if (shared != enables.end()) {
+    lines[*shared].pin += ", " + name + "enable";
+  } else if (pins.enable.wired()) {
+    enables.push_back(lines.size());
+    add("enable", pins.enable.line);
+  }
+  const bool numbered_from_0 = axis.driver.mode_pins_from_0;
+  add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
+  add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
+  add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);
+  add("sleep", pins.sleep.line);
+  add("reset", pins.reset.line);
+  if (motor.endstop_min) add("endstops/min", motor.endstop_min->line);
+  if (motor.endstop_max) add("endstops/max", motor.endstop_max->line);
+  if (motor.fault) add("fault", motor.fault->line);
+  if (motor.in_position) add("in_position", motor.in_position->line);
+}
+
 }  // namespace
 
 std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
                                const machine::MachineOptions& machine) {
   std::vector<NamedLine> lines;
-  std::vector<std::size_t> enables;  // the lines that axes may share
+  std::vector<std::size_t> enables;
   for (const config::AxisConfig& axis : axes) {
-    const auto add = [&](const char* pin, const std::string& line) {
-      if (!line.empty()) lines.push_back({axis.name + "/" + pin, line});
-    };
-    const config::Pins& pins = axis.pins;
-    const bool cw_ccw = axis.driver.step_inputs == driver::StepInputs::kCwCcw;
-    add(cw_ccw ? "cw" : "step", pins.step.line);
-    add(cw_ccw ? "ccw" : "dir", pins.dir.line);
-    const auto shared = std::find_if(enables.begin(), enables.end(), [&](std::size_t i) {
-      return lines[i].line == pins.enable.line;
-    });
-    if (shared != enables.end()) {
-      lines[*shared].pin += ", " + axis.name + "/enable";
-    } else if (pins.enable.wired()) {
-      enables.push_back(lines.size());
-      add("enable", pins.enable.line);
-    }
-    const bool numbered_from_0 = axis.driver.mode_pins_from_0;
-    add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
-    add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
-    add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);
-    add("sleep", pins.sleep.line);
-    add("reset", pins.reset.line);
-    if (axis.brake) add("brake", axis.brake->line);
-    if (axis.endstop_min) add("endstops/min", axis.endstop_min->line);
-    if (axis.endstop_max) add("endstops/max", axis.endstop_max->line);
-    if (axis.fault) add("fault", axis.fault->line);
-    if (axis.in_position) add("in_position", axis.in_position->line);
+    for (std::size_t i = 0; i < axis.motors(); ++i) addLines(axis, axis.motorAt(i), lines, enables);
+    if (axis.brake) lines.push_back({axis.name + "/brake", axis.brake->line});
   }
   if (machine.emergency_stop) lines.push_back({"emergency_stop", machine.emergency_stop->line});
   if (machine.heartbeat) lines.push_back({"heartbeat", machine.heartbeat->line});

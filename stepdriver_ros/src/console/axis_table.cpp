@@ -55,15 +55,16 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
     const std::string unit = config == nullptr ? "?" : configUnitOf(config->kind);
     const bool chosen = axis.name == session.chosen();
     const auto old = [&](const std::string& text) { return live ? text : "(" + text + ")"; };
-    const std::vector<std::string> cells = {(chosen ? "> " : "  ") + axis.name,
-                                            old(positionText(axis.position, unit)),
-                                            old(fmt::format("{:.2f} {}/s", axis.velocity, unit)),
-                                            old(switchText(config != nullptr && config->endstop_min,
-                                                           axis.switches_known, axis.min_active)),
-                                            old(switchText(config != nullptr && config->endstop_max,
-                                                           axis.switches_known, axis.max_active)),
-                                            old(motorText(axis)),
-                                            live ? stateText(axis) : "STALE"};
+    const std::vector<std::string> cells = {
+        (chosen ? "> " : "  ") + axis.name,
+        old(positionText(axis.position, unit)),
+        old(fmt::format("{:.2f} {}/s", axis.velocity, unit)),
+        old(switchText(config != nullptr && config->hasEndstop(false), axis.switches_known,
+                       axis.min_active)),
+        old(switchText(config != nullptr && config->hasEndstop(true), axis.switches_known,
+                       axis.max_active)),
+        old(motorText(axis)),
+        live ? stateText(axis) : "STALE"};
     for (std::size_t i = 0; i < cells.size(); ++i) {
       all[i].width = std::max(all[i].width, cells[i].size());
       all[i].cells.push_back(cells[i]);

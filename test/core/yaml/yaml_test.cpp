@@ -296,5 +296,24 @@ TEST_F(ConfigurationFile, IsRefusedIfItsRigCannotBeBuilt) {
   EXPECT_THROW(readFile(file(kAxis + crossed), setup::BackendChoice::kSimulated), ConfigError);
 }
 
+TEST_F(ConfigurationFile, MayDescribeTheRigOfOneMotor) {
+  const std::string gantry =
+      "axes: {y: {driver: a4988, microsteps: 16, steps_per_mm: 80.0, max_speed_mm_s: 100.0,\n"
+      "  acceleration_mm_s2: 500.0, motors: {left: {pins: {step: A, dir: B}},\n"
+      "  right: {pins: {step: C, dir: D}}}}}\n"
+      "simulation: {axes: {y: {start_mm: 1.0, bounces: 3, lose_every: 7, motors: {";
+  const auto read = [&](const std::string& motor) {
+    return readFile(file(gantry + motor + "}}}}\n"), setup::BackendChoice::kSimulated).simulation;
+  };
+  const setup::SimulatedAxis y = read("right: {start_mm: 4.0}").axes.at("y");
+  EXPECT_EQ(y.ofMotor("left").start, 1.0);
+  EXPECT_EQ(y.ofMotor("left").faults.lose_every, 7);
+  EXPECT_EQ(y.ofMotor("right").start, 4.0);
+  EXPECT_EQ(y.ofMotor("right").bounces, 3);
+  EXPECT_EQ(y.ofMotor("right").faults.lose_every, 0);
+  EXPECT_THROW(read("middle: {start_mm: 4.0}"), ConfigError);
+  EXPECT_THROW(read("right: {start_cm: 4.0}"), ConfigError);
+}
+
 }  // namespace
 }  // namespace stepdriver::yaml

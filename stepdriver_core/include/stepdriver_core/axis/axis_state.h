@@ -64,6 +64,9 @@ struct HomingResult {
   HomingEnd end = HomingEnd::kFailed;
   std::string message;    ///< a sentence that says how it ended and where
   double position = 0.0;  ///< [unit] where the axis stands
+  /// [unit] How far its motors were apart before this homing made them square; 0 if it has only
+  /// one.
+  double skew = 0.0;
 };
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
@@ -85,6 +88,7 @@ struct AxisState {
   double planned = 0.0;
   double velocity = 0.0;  ///< [unit/s] of the plan
   double slack = 0.0;     ///< [unit] the part of the backlash that is taken up towards max
+  double skew = 0.0;      ///< [unit] how far its motors have got apart since they were square
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
   double target = 0.0;
   /// [s] Until the motion under way ends, as planned; 0 at rest and in a jog without an end.

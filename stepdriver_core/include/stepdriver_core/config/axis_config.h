@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/bias.h"
 #include "stepdriver_core/driver/driver_chip.h"
@@ -115,14 +117,33 @@ enum class LimitSource {
 /// The source as messages name it: "the configuration".
 const char* sourceText(LimitSource source);
 
+/// The most motors that an axis can have.
+constexpr std::size_t kMostMotors = 4;
+
+/// A motor of an axis: its driver's pins, and the switches at its side.
+struct MotorConfig {
+  std::string motor;  ///< its name; empty: it is the only one
+  Pins pins;
+  std::optional<Endstop> endstop_min;
+  std::optional<Endstop> endstop_max;
+  std::optional<FaultPin> fault;
+  std::optional<InPositionPin> in_position;
+  /// [unit] Where its home switch closes, relative to HomingConfig::offset, when the motors are
+  /// square.
+  double offset = 0.0;
+};
+
 /// The complete configuration of an axis, checked by readAxes(). A unit is m on a linear axis, rad
 /// on a rotary one; a step is a microstep of the configured mode.
-struct AxisConfig {
+///
+/// An axis with several motors, such as a gantry, has those of the first one here and all others in
+/// `twins`. They have the same driver chip and the same pins wired, and step together.
+struct AxisConfig : MotorConfig {
   std::string name;
   std::string joint;  ///< its name in joint_states and in the URDF
   Kind kind = Kind::kLinear;
   driver::DriverChip driver;  ///< with the overrides of the configuration
-  Pins pins;
+  std::vector<MotorConfig> twins;
 
   int microsteps = 1;            ///< microsteps per full step, as counted by steps_per_unit
   double steps_per_unit = 0.0;   ///< [steps/unit]
@@ -142,14 +163,12 @@ struct AxisConfig {
   LimitSource min_position_source = LimitSource::kConfiguration;
   LimitSource max_position_source = LimitSource::kConfiguration;
 
-  std::optional<Endstop> endstop_min;
-  std::optional<Endstop> endstop_max;
-  std::optional<FaultPin> fault;
-  std::optional<InPositionPin> in_position;
   /// ENABLE or SLEEP is wired if there is a brake.
   std::optional<BrakeConfig> brake;
 
   std::optional<HomingConfig> homing;
+  /// [unit] How far the motors may get apart while a homing squares them.
+  double max_skew = 0.0;
   bool require_homing = false;  ///< absolute moves are refused until the axis is homed
 
   bool enable_on_start = false;
@@ -162,6 +181,23 @@ struct AxisConfig {
   IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired if there is a timeout
   /// The carriage stays where it is without current, as with a self-locking screw.
   bool holds_position_unpowered = false;
+
+  std::size_t motors() const { return 1 + twins.size(); }
+  const MotorConfig& motorAt(std::size_t index) const {
+    return index == 0 ? *this : twins[index - 1];
+  }
+  /// Whether any of its motors has an endstop at that end.
+  bool hasEndstop(bool at_max) const {
+    for (std::size_t i = 0; i < motors(); ++i) {
+      if (at_max ? motorAt(i).endstop_max : motorAt(i).endstop_min) return true;
+    }
+    return false;
+  }
+  /// The name of a motor on the simulated rig and in traces of pins: "y", the axis's, for the first
+  /// one, and "y.right" for another.
+  std::string traceName(std::size_t index) const {
+    return index == 0 ? name : name + "." + motorAt(index).motor;
+  }
 };
 
 }  // namespace stepdriver::config

@@ -81,6 +81,9 @@ class ConfigReader {
                                        const std::vector<std::string>& allowed, Presence presence);
   /// @}
 
+  /// The keys of the map, in their order. They are not known by that.
+  std::vector<std::string> keys() const;
+
   /// A map below this one; an empty one if the key is missing.
   ConfigReader map(const std::string& key);
 
@@ -159,6 +162,9 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     endstops:                 # both optional
 ///       min: {pin: "gpiochip0:20", active_level: low}   # low or high
 ///       max: {pin: "gpiochip0:21", active_level: low}
+///     motors:                   # 2 to 4 that step together, in place of pins and endstops above:
+///       left: {pins: ..., endstops: ..., offset_mm: 0.0}  # and all keys about them
+///     max_skew_mm: 5.0          # how far they may get apart while a homing squares them
 ///     brake:                    # default: no brake; needs pins/enable or pins/sleep
 ///       {pin: "gpiochip0:12", release_level: high, release_ms: 60.0, engage_ms: 30.0}
 ///     chip:                     # each overrides the named chip's

@@ -42,7 +42,8 @@ class Simulation {
   /// configured faults.
   ///
   /// @param axis of the configuration.
-  /// @param end of the axis; the wiring determines which line changes.
+  /// @param end of the axis; the wiring determines which lines change: all motors of an axis press
+  ///   theirs.
   void pressEndstop(const std::string& axis, End end, bool pressed);
 
  private:

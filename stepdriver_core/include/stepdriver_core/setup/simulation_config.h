@@ -39,6 +39,13 @@ struct SimulatedAxis {
   sim::RigFaults faults;
   /// How many writes to STEP succeed before all others fail.
   std::optional<int> fail_step_write_after;
+  /// By name, the rigs of those motors of an axis with several that differ from the axis's.
+  std::map<std::string, SimulatedAxis> motors;
+
+  const SimulatedAxis& ofMotor(const std::string& motor) const {
+    const auto own = motors.find(motor);
+    return own != motors.end() ? own->second : *this;
+  }
 };
 
 /// The configuration of the simulated rig.
@@ -83,6 +90,9 @@ struct SimulationConfig {
 ///       chip_fault_after: 1000        # steps of the motor; then the chip reports over-current
 ///       chip_fault_ms: 0.0       # how long its cause lasts if a fault ends by itself; 0: for ever
 ///       fail_step_write_after: 1000   # writes to STEP; those after them fail. Default: none fails
+///       motors:                  # of an axis with several: what is different at one of them
+///         right: {start_mm: 3.5} # any of the keys above; no other fault or wrong wire applies
+///         then
 /// @endcode
 ///
 /// @param reader of that map.

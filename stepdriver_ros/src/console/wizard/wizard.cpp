@@ -69,6 +69,12 @@ Result bringUpAll(Dialogue& dialogue, MachineAtHand& machine,
                   const std::vector<config::AxisConfig>& axes) {
   Result result;
   for (const config::AxisConfig& axis : axes) {
+    if (axis.motors() > 1) {
+      dialogue.say("Axis " + axis.name +
+                   " has several motors, and the wizard checks only axes with one. Try it by hand: "
+                   "a short move turns all its motors in the same direction of the axis.");
+      continue;
+    }
     if (axes.size() > 1 && !askYesNo(dialogue, "Check axis " + axis.name + "?", true)) continue;
     const Findings findings = bringUp(dialogue, machine, axis);
     result.findings.push_back(findings);

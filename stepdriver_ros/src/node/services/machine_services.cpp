@@ -66,15 +66,18 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
     response.trace_error = error.what();
   }
   for (const config::AxisConfig& axis : simulation.axes()) {
-    const sim::RigAxisReport report = simulation.rig().report(axis.name);
-    response.name.push_back(axis.name);
-    response.pulses_forward.push_back(report.pulses_forward);
-    response.pulses_backward.push_back(report.pulses_backward);
-    response.carriage.push_back(report.carriage / config::configUnitsPerUnit(axis.kind));
-    response.fell.push_back(report.fell / config::configUnitsPerUnit(axis.kind));
-    response.microsteps.push_back(report.microsteps);
-    response.violations.push_back(report.totalViolations());
-    response.violation_kinds.push_back(kindsText(report));
+    for (std::size_t i = 0; i < axis.motors(); ++i) {
+      const std::string name = axis.traceName(i);
+      const sim::RigAxisReport report = simulation.rig().report(name);
+      response.name.push_back(name);
+      response.pulses_forward.push_back(report.pulses_forward);
+      response.pulses_backward.push_back(report.pulses_backward);
+      response.carriage.push_back(report.carriage / config::configUnitsPerUnit(axis.kind));
+      response.fell.push_back(report.fell / config::configUnitsPerUnit(axis.kind));
+      response.microsteps.push_back(report.microsteps);
+      response.violations.push_back(report.totalViolations());
+      response.violation_kinds.push_back(kindsText(report));
+    }
   }
   return response;
 }
@@ -165,8 +168,10 @@ void MachineServices::advertiseRig(setup::Simulation& simulation) {
       };
   servers_.push_back(node_.advertiseService("rig/emergency_stop", press));
   for (const config::AxisConfig& axis : simulation.axes()) {
-    if (axis.endstop_min) advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMin);
-    if (axis.endstop_max) advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMax);
+    if (axis.hasEndstop(false))
+      advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMin);
+    if (axis.hasEndstop(true))
+      advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMax);
   }
 }
 

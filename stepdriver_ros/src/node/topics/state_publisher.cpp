@@ -218,6 +218,7 @@ void StatePublisher::publishStateOfEachAxis(bool due) {
     message.microsteps = state.microsteps;
     message.position = state.position;
     message.planned = state.planned;
+    message.skew = state.skew;
     message.velocity = state.velocity;
     message.speed_override = state.speed_override;
     message.target = state.target;
