@@ -106,22 +106,22 @@ struct ChannelState {
   std::uint64_t following = 0;  ///< serial of the current profile; 0: at rest
   std::uint64_t ended = 0;      ///< serial of the last profile that ended
   EndReason end = EndReason::kDone;
-  LineFailure failure;            ///< the last one
-  Nanoseconds end_time = 0;       ///< motion time at which it ended
-  bool end_abrupt = false;        ///< it ended at a speed that the motor can't stop from at once
-  Nanoseconds waited = 0;         ///< for the in-position output, before kNotInPosition
-  Nanoseconds end_lateness = 0;   ///< of the pulse that was not sent, for kTooLate
-  std::uint64_t epoch = 0;        ///< how many times the scale of `count` has changed
-  Nanoseconds rose = 0;           ///< clock time by which the last active STEP edge had happened
-  std::uint64_t chip_faults = 0;  ///< how many times the fault line became active
-  std::uint64_t line_errors = 0;  ///< failed writes and reads
-  Nanoseconds ready = 0;          ///< clock time before which no step goes out
+  LineFailure failure;       ///< the last one
+  Nanoseconds end_time = 0;  ///< motion time at which it ended
+  bool end_abrupt = false;   ///< it ended at a speed that the motor can't stop from at once
+  MotorSet still = 0;        ///< the motors that make no steps in this motion, or the last one
+  std::uint8_t chip_at_fault = 0;  ///< the motor whose chip has reported the last of chip_faults
+  std::uint8_t unsettled = 0;      ///< the motor that kNotInPosition is about
+  Nanoseconds waited = 0;          ///< for the in-position output, before kNotInPosition
+  Nanoseconds end_lateness = 0;    ///< of the pulse that was not sent, for kTooLate
+  std::uint64_t epoch = 0;         ///< how many times the scale of `count` has changed
+  Nanoseconds rose = 0;            ///< clock time by which the last active STEP edge had happened
+  std::uint64_t chip_faults = 0;   ///< how many times the fault line became active
+  std::uint64_t line_errors = 0;   ///< failed writes and reads
+  Nanoseconds ready = 0;           ///< clock time before which no step goes out
   /// By motor: its own edges forward minus those backward, less `count`. 0 for motors that have
   /// made every step of the axis.
   MotorCounts lags{};
-  MotorSet still = 0;  ///< the motors that make no steps in this motion, or the last one
-  std::uint8_t chip_at_fault = 0;  ///< the motor whose chip has reported the last of chip_faults
-  std::uint8_t unsettled = 0;      ///< the motor that kNotInPosition is about
 
   std::uint64_t faults() const { return chip_faults + line_errors; }
 };

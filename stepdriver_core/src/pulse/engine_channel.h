@@ -39,6 +39,7 @@ struct EngineChannel {
     return successors.empty() ? state.following : successors.last().serial;
   }
 
+  bool isAlone() const { return all_motors == 1; }
   std::size_t motors() const { return 1 + config.twins.size(); }
   const MotorSignals& motor(std::size_t number) const {
     return number == 0 ? config : config.twins[number - 1];
@@ -73,9 +74,9 @@ struct EngineChannel {
   void endMotion(EndReason reason, Nanoseconds motion_now);
 
   std::size_t index = 0;
-  bool high = false;  // the pulse is out; never so if both edges are steps
-  MotorSet all_motors = 1;
-  MotorSet pulsed = 1;   // the motors that took part in the last edge
+  bool high = false;        // the pulse is out; never so if both edges are steps
+  MotorSet all_motors = 1;  // 1: the axis has one motor
+  MotorSet pulsed = 1;      // the motors that took part in the last edge
   MotorSet toggled = 0;  // both edges are steps, and these motors' lines are at their active level
   bool squares = false;  // the current motion does
   bool running = false;  // the current motion has made a step

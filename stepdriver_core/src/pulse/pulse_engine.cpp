@@ -233,8 +233,15 @@ bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
     readFault(channel, now);
     if (!channel.next) return false;
   }
+  if (!channel.isAlone()) return mayStepTogether(channel, now);
+  const auto& endstop =
+      channel.next->direction > 0 ? channel.config.endstop_max : channel.config.endstop_min;
+  return !endstop || mayStepOn(channel, 0, now);
+}
+
+bool PulseEngine::mayStepTogether(Channel& channel, Nanoseconds now) {
   for (std::size_t i = 0; i < channel.motors(); ++i) {
-    if (!mayStepOn(channel, i, now)) return false;
+    if (!channel.isStill(i) && !mayStepOn(channel, i, now)) return false;
   }
   if (channel.squares && channel.state.still != 0 && channel.wouldSkew()) {
     end(channel, EndReason::kSkewed, now);
@@ -248,7 +255,7 @@ bool PulseEngine::mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now
   const bool forward = channel.next->direction > 0;
   const MotorSignals& signals = channel.motor(motor);
   const auto& endstop = forward ? signals.endstop_max : signals.endstop_min;
-  if (!endstop || channel.isStill(motor)) return true;
+  if (!endstop) return true;
   const int level = readLine(endstop->line);
   if (level < 0) {
     fail(channel, {-level, endstop->line, true}, now);
@@ -318,7 +325,16 @@ void PulseEngine::writeSteps(Nanoseconds now) {
     const Action action = channel.action();
     const bool fall = action == Action::kFall;
     if (!fall && !(action == Action::kRise && mayStep(channel, now))) continue;
-    addPulse(channel, fall);
+    if (!channel.isAlone()) {
+      addPulses(channel, fall);
+      continue;
+    }
+    const Signal& step = channel.pulse_line;
+    // Member by member: copying a complete pair would make the processor wait.
+    gpio::LineWrite& write = writes_.emplace_back();
+    write.output = step.line;
+    write.level = step.active != (fall || channel.toggled != 0);
+    writers_.push_back(&channel);
   }
   // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
   // may have ended others.
@@ -341,18 +357,15 @@ void PulseEngine::writeSteps(Nanoseconds now) {
 
 // The motors of an axis follow each other in the write. A pulse ends on each motor on which it has
 // begun, also if one has become still meanwhile.
-void PulseEngine::addPulse(Channel& channel, bool fall) {
+void PulseEngine::addPulses(Channel& channel, bool fall) {
   if (!fall) channel.pulsed = channel.all_motors & static_cast<MotorSet>(~channel.state.still);
-  const auto add = [&](std::size_t motor, const Signal& step) {
-    if ((channel.pulsed & motorBit(motor)) == 0) return;
-    // Member by member: copying a complete pair would make the processor wait.
-    gpio::LineWrite& write = writes_.emplace_back();
-    write.output = step.line;
-    write.level = step.active != (fall || (channel.toggled & motorBit(motor)) != 0);
+  for (std::size_t i = 0; i < channel.motors(); ++i) {
+    if ((channel.pulsed & motorBit(i)) == 0) continue;
+    const Signal& step = channel.stepOf(i, channel.direction);
+    const bool toggled = (channel.toggled & motorBit(i)) != 0;
+    writes_.push_back({step.line, step.active != (fall || toggled)});
     writers_.push_back(&channel);
-  };
-  add(0, channel.pulse_line);
-  for (std::size_t i = 1; i < channel.motors(); ++i) add(i, channel.stepOf(i, channel.direction));
+  }
 }
 
 void PulseEngine::record(const gpio::LineWrite& write, Nanoseconds now) {
@@ -581,10 +594,8 @@ bool PulseEngine::scheduleRise(Channel& channel) {
   Nanoseconds earliest = std::max(channel.state.ready, channel.turned + config.dir_setup);
   if (channel.state.pulses != 0) {
     // Both edges being steps, the last one was the beginning of the active time, or its end.
-    const Nanoseconds after_high =
-        (channel.toggled & channel.all_motors) != 0 ? config.step_high : 0;
-    const Nanoseconds after_low = channel.toggled != channel.all_motors ? config.step_low : 0;
-    const Nanoseconds gap = std::max(after_high, after_low);
+    Nanoseconds gap = channel.toggled != 0 ? config.step_high : config.step_low;
+    if (!channel.isAlone() && channel.toggled != 0) gap = std::max(gap, config.step_low);
     earliest = std::max({earliest, channel.fell + gap, closestRise(channel)});
   }
   const Nanoseconds planned = channel.next->time_ns + state_.slipped;

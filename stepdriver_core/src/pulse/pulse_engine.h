@@ -144,6 +144,7 @@ class PulseEngine {
   void readEmergencyStop();
   void readFault(Channel& channel, Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
+  bool mayStepTogether(Channel& channel, Nanoseconds now);
   bool mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now);
 
   // Lines.
@@ -152,7 +153,7 @@ class PulseEngine {
 
   // Edges.
   void collectDue(Nanoseconds now);
-  void addPulse(Channel& channel, bool fall);
+  void addPulses(Channel& channel, bool fall);
   bool meetLateness(Nanoseconds now);
   void writeSteps(Nanoseconds now);
   void dropEnded();
