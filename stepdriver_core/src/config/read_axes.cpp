@@ -30,8 +30,6 @@ bool isAxisName(const std::string& name) {
   return true;
 }
 
-constexpr int kFinestMicrosteps = 256;
-
 std::optional<int> readMicrosteps(ConfigReader& axis,
                                   const std::optional<driver::DriverChip>& chip) {
   if (chip && !chip->microsteps.empty()) {

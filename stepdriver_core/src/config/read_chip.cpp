@@ -34,7 +34,6 @@ constexpr double kLongestUs = 1e6;
 constexpr double kLongestMs = 1e4;
 // A nanosecond: a shorter pulse would be no pulse.
 constexpr double kShortestPulseUs = 1e-3;
-constexpr int kFinestMicrosteps = 256;
 
 /// The part of a chip that needs a time: if a chip has that part, and the configuration alone
 /// describes it, the time is required.

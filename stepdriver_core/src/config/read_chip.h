@@ -6,6 +6,8 @@
 
 namespace stepdriver::config {
 
+constexpr int kFinestMicrosteps = 256;
+
 /// Reads `driver`, `chip` and `timing`: a named chip with the overrides of the configuration, or,
 /// for `driver: step_dir`, a chip that is described by the configuration alone.
 ///

@@ -10,14 +10,14 @@
 #include "motion/planner.h"
 #include "motion/profile_parts.h"
 #include "nanoseconds.h"
+#include "no_time.h"
 #include "peak_tree.h"
 
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoTime = 1e-15;  // s
 constexpr double kNear = 1e-9;     // microsteps: rounding
-constexpr double kNoWay = 0.5;     // microsteps
+constexpr double kNoTravel = 0.5;  // microsteps
 constexpr double kNoRoom = 0.001;  // of a limit
 constexpr double kLonger = 1.1;
 
@@ -54,7 +54,7 @@ class Turns {
     if (sign_ != 0.0 && way * sign_ > 0.0) {
       furthest_ = position;
       time_s_ = time_s;
-    } else if (std::abs(way) >= kNoWay) {
+    } else if (std::abs(way) >= kNoTravel) {
       sign_ = std::copysign(1.0, way);
       found_.push_back({time_s_, sign_});
       furthest_ = position;
@@ -68,12 +68,8 @@ class Turns {
   std::vector<Turn> found_;
 };
 
-DoubleDouble startOf(const Profile& profile) {
-  return profile.pieceCount() == 0 ? profile.endPosition() : profile.piece(0).p0;
-}
-
 std::vector<Turn> turnsOf(const Profile& joint) {
-  Turns turns(startOf(joint));
+  Turns turns(joint.startPosition());
   for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
     turns.take(joint.piece(i), joint.pieceStart(i).value());
   }
@@ -157,7 +153,7 @@ class TakeUps {
 void append(std::vector<Piece>& pieces, DoubleDouble& time, const Profile& taken) {
   const DoubleDouble start = secondsOf(taken.startNs());
   if (const DoubleDouble rest = start - time; rest.hi > kNoTime) {
-    pieces.push_back({rest, startOf(taken)});
+    pieces.push_back({rest, taken.startPosition()});
   }
   for (const Piece& piece : taken.pieces()) pieces.push_back(piece);
   time = start + taken.duration();
@@ -196,7 +192,7 @@ struct MotorTail::Plan {
   PeakTree peaks;
 
   explicit Plan(const Profile& joint) : peaks(joint) {
-    Turns all(startOf(joint));
+    Turns all(joint.startPosition());
     for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
       giveWay(i);
       all.take(joint.piece(i), joint.pieceStart(i).value());
@@ -287,10 +283,10 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
                                            DoubleDouble begin, double slack) const {
   const double later = begin.value();
   // The turns from the start on, until they are those of the tail.
-  Turns all(startOf(*joint));
+  Turns all(joint->startPosition());
   const std::size_t head = joint->pieceAt(begin);
   for (std::size_t i = 0; i < head; ++i) all.take(joint->piece(i), joint->pieceStart(i).value());
-  Turns tail(startOf(joint_));
+  Turns tail(joint_.startPosition());
   const std::size_t first_move = plan_->moves_after;
   const std::size_t looked_at = std::min(joint_.pieceCount(), kMostPieces + first_move);
   bool coincide = false;

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "hermite.h"
+#include "no_time.h"
 #include "root.h"
 
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoTime = 1e-15;  // s
-constexpr int kSlices = 8;         // points of a part to examine
+constexpr int kSlices = 8;  // points of a part to examine
 
 DoubleDouble velocityOf(const Piece& piece) { return {piece.v0, piece.v0_rest}; }
 DoubleDouble accelerationOf(const Piece& piece) { return {piece.a, piece.a_rest}; }

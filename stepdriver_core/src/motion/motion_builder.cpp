@@ -12,8 +12,8 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kForever = 3.0e9;        // s, 95 years
-constexpr double kFarthest = 1.15292e18;  // microsteps, 2^60: fits into a Split, with room
+constexpr double kForever = 3.0e9;           // s, 95 years
+constexpr double kFarthestJog = 1.15292e18;  // microsteps, 2^60: fits into a Split, with room
 
 constexpr double kRounding = 1e-15;  // relative, of a state's doubles
 
@@ -82,7 +82,7 @@ void MotionBuilder::moveOn(double sign, const MotionLimits& limits) {
   unround(limits);
   Path path(v_, a_);
   changeToMaximum(path, sign, limits);
-  path.run(0.0, std::min(kForever, kFarthest / limits.max_speed));
+  path.run(0.0, std::min(kForever, kFarthestJog / limits.max_speed));
   DoubleDouble end = position_;
   for (std::size_t i = 0; i < path.size(); ++i) end = end + wayOf(path[i], path[i].duration);
   add({path, path.size()}, end);

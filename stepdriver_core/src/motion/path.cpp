@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "no_time.h"
 #include "reach.h"
 
 namespace stepdriver::motion {
@@ -24,7 +25,7 @@ Piece pieceOf(const Phase& phase, DoubleDouble position) {
 }
 
 void Path::run(double j, DoubleDouble duration) {
-  if (!(duration.hi > Reach<DoubleDouble>::kNoTime)) return;
+  if (!(duration.hi > kNoTime)) return;
   const Phase phase{duration, v_, a_, j};
   Phase* last = size_ > 0 ? &phases_[size_ - 1] : nullptr;
   if (last != nullptr && last->j == j && same(end_v_, v_, last->v) && same(end_a_, a_, last->a)) {

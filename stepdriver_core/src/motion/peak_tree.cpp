@@ -8,7 +8,7 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoTime = 1e-12;  // s: times are sums of doubles
+constexpr double kTimeRounding = 1e-12;  // s: times are sums of doubles
 
 }  // namespace
 
@@ -37,8 +37,8 @@ Highest PeakTree::between(DoubleDouble from, DoubleDouble to) const {
   // A piece that is only a rounding error is ignored.
   std::size_t first = profile_.pieceAt(from);
   std::size_t last = profile_.pieceAt(to);
-  if (first < last && !((profile_.pieceStart(first + 1) - from).hi > kNoTime)) ++first;
-  if (first < last && !((to - profile_.pieceStart(last)).hi > kNoTime)) --last;
+  if (first < last && !((profile_.pieceStart(first + 1) - from).hi > kTimeRounding)) ++first;
+  if (first < last && !((to - profile_.pieceStart(last)).hi > kTimeRounding)) --last;
   const auto of_part = [&](std::size_t index) {
     const DoubleDouble begin = std::max(from, profile_.pieceStart(index));
     const DoubleDouble end = std::min(to, profile_.pieceStart(index + 1));

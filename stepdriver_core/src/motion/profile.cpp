@@ -5,10 +5,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "no_time.h"
+
 namespace stepdriver::motion {
 namespace {
-
-constexpr double kNoTime = 1e-15;  // s
 
 double peakSpeedOf(const Piece& piece) {
   const auto speed = [&piece](DoubleDouble t) { return std::abs(piece.velocityAt(t).value()); };

@@ -89,6 +89,7 @@ class Profile {
   std::int64_t endNs() const { return end_ns_; }
   DoubleDouble duration() const { return duration_; }  ///< [s]
   /// The final position [microsteps].
+  DoubleDouble startPosition() const { return pieceCount() == 0 ? end_position_ : piece(0).p0; }
   DoubleDouble endPosition() const { return end_position_; }
   /// The highest speed [microsteps/s]. For an excerpt, the highest speed of its whole profile
   /// counts.

@@ -5,15 +5,10 @@
 #include <vector>
 
 #include "give_way.h"
+#include "no_time.h"
 
 namespace stepdriver::motion {
 namespace {
-
-constexpr double kNoTime = 1e-15;  // s
-
-DoubleDouble startOf(const Profile& profile) {
-  return profile.pieces().empty() ? profile.endPosition() : profile.pieces().front().p0;
-}
 
 // Goes through a profile from a time after its start on.
 class Walk {
@@ -69,7 +64,7 @@ Profile part(const Profile& profile, DoubleDouble from, DoubleDouble to) {
     pieces.push_back(walk.take(duration));
     time = time + duration;
   }
-  if (pieces.empty()) return {profile.startNs(), startOf(profile)};
+  if (pieces.empty()) return {profile.startNs(), profile.startPosition()};
   return {profile.startNs(), std::move(pieces)};
 }
 

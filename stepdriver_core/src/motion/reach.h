@@ -1,6 +1,7 @@
 #pragma once
 
 #include "motion/double_double.h"
+#include "no_time.h"
 
 namespace stepdriver::motion {
 
@@ -34,8 +35,6 @@ class Reach {
   Real v() const { return v_; }
   Real a() const { return a_; }
   Real length() const { return length_; }  ///< [microsteps] signed
-
-  static constexpr double kNoTime = 1e-15;  ///< [s]
 
  private:
   Real v_;

@@ -15,7 +15,7 @@
 namespace stepdriver::console {
 namespace {
 
-constexpr int kPoll = 20;            // [ms] for a key
+constexpr int kKeyPoll = 20;         // [ms] for a key
 constexpr double kDrawPeriod = 0.1;  // [s] if no key was pressed
 // Time for the last message, which roscpp sends in a thread of its own.
 constexpr std::chrono::milliseconds kLastWords{50};
@@ -25,7 +25,7 @@ void runScreen(Session& session, DriverClient& client, ros_node::EndRequests& en
   Terminal terminal;
   double drawn = 0.0;
   while (!session.ended() && end_requests.waitFor(std::chrono::milliseconds(0)).empty()) {
-    const auto keys = terminal.keys(kPoll);
+    const auto keys = terminal.keys(kKeyPoll);
     if (!keys) return;
     // First, so that keys are checked against the latest state.
     ros::getGlobalCallbackQueue()->callAvailable();

@@ -15,15 +15,15 @@
 namespace stepdriver::console {
 namespace {
 
-constexpr double kPoll = 0.02;        // [s]
-constexpr double kFirstState = 10.0;  // [s]
+constexpr double kCallbackPoll = 0.02;  // [s]
+constexpr double kFirstState = 10.0;    // [s]
 // Longer than the screen's limit for a stale state, because this ends the wizard.
 constexpr double kGone = 2.0;  // [s]
 
 }  // namespace
 
 void DriverAtHand::wait() {
-  ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kPoll));
+  ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kCallbackPoll));
   client_.poll();
 }
 

@@ -15,8 +15,8 @@
 namespace stepdriver::console {
 namespace {
 
-constexpr int kPoll = 20;     // [ms]
-constexpr int kColumns = 79;  // if the window doesn't say
+constexpr int kLinePoll = 20;  // [ms]
+constexpr int kColumns = 79;   // if the window doesn't say
 constexpr int kFewestColumns = 20;
 
 /// One column less than the window has: a terminal may start a new line after the last one.
@@ -52,7 +52,7 @@ std::string LineDialogue::ask(const std::string& question) {
     if (auto answer = line()) return *answer;
     meanwhile_();
     pollfd input{STDIN_FILENO, POLLIN, 0};
-    poll(&input, 1, kPoll);
+    poll(&input, 1, kLinePoll);
   }
 }
 

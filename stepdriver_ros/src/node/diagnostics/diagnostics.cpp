@@ -14,7 +14,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-const ros::WallDuration kPeriod(1.0);
+const ros::WallDuration kReportPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 constexpr const char* kMasterName = "ROS master";
 constexpr const char* kDescriptorsName = "file descriptors";
@@ -64,7 +64,8 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   }
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
-      kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); }, false);
+      kReportPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); },
+      false);
 }
 
 void Diagnostics::tellAxis(const axis::Axis& axis, Status& status) {

@@ -13,8 +13,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-constexpr std::chrono::milliseconds kPeriod{1000};
-constexpr std::chrono::milliseconds kPatience{1000};
+constexpr std::chrono::milliseconds kRetryPeriod{1000};
 
 }  // namespace
 
@@ -29,9 +28,9 @@ EndDespiteMaster::~EndDespiteMaster() {
 
 void EndDespiteMaster::begin(int exit_code) try {
   thread_ = std::thread([this, exit_code, name = ros::this_node::getName()] {
-    XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kPatience);
+    XmlRpcCaller master(ros::master::getHost(), ros::master::getPort(), kMasterPatience);
     std::unique_lock<std::mutex> lock(mutex_);
-    while (!change_.wait_for(lock, kPeriod, [this] { return ended_; })) {
+    while (!change_.wait_for(lock, kRetryPeriod, [this] { return ended_; })) {
       lock.unlock();
       if (!master.call("getPid", name)) {
         std::fputs("The ROS master doesn't answer: the node ends without telling it\n", stderr);

@@ -11,14 +11,13 @@
 namespace stepdriver::ros_node {
 namespace {
 
-constexpr std::chrono::milliseconds kPeriod{1000};
-constexpr std::chrono::milliseconds kPatience{1000};
+constexpr std::chrono::milliseconds kAskPeriod{1000};
 
 }  // namespace
 
 MasterWatch::MasterWatch(std::function<void()> on_lost)
     : on_lost_(std::move(on_lost)),
-      master_(ros::master::getHost(), ros::master::getPort(), kPatience) {}
+      master_(ros::master::getHost(), ros::master::getPort(), kMasterPatience) {}
 
 MasterWatch::~MasterWatch() { stop(); }
 
@@ -51,7 +50,7 @@ void MasterWatch::watch() {
     lock.unlock();
     look();
     lock.lock();
-    end_.wait_for(lock, kPeriod, [this] { return ending_; });
+    end_.wait_for(lock, kAskPeriod, [this] { return ending_; });
   }
 }
 

@@ -10,6 +10,9 @@
 
 namespace stepdriver::ros_node {
 
+/// How long a call waits for the ROS master.
+constexpr std::chrono::milliseconds kMasterPatience{1000};
+
 /// Calls the ROS API of a master or a node, over one connection that is kept, from one thread.
 /// No call takes much longer than the patience. ros::master::execute() waits for ever if a master
 /// accepts the connection and never answers.

@@ -7,8 +7,8 @@
 namespace stepdriver::ros_node {
 namespace {
 
-const ros::WallDuration kPeriod(0.01);
-constexpr int kQueueSize = 10;
+const ros::WallDuration kClockPeriod(0.01);
+constexpr int kQueuedTimes = 10;
 
 }  // namespace
 
@@ -16,9 +16,9 @@ ClockPublisher::ClockPublisher(ros::NodeHandle node, pulse::Clock& clock)
     : clock_(clock),
       began_(ros::WallTime::now()),
       began_at_(clock.now()),
-      publisher_(node.advertise<rosgraph_msgs::Clock>("/clock", kQueueSize)),
+      publisher_(node.advertise<rosgraph_msgs::Clock>("/clock", kQueuedTimes)),
       timer_(node.createSteadyTimer(
-          kPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { publish(); })) {}
+          kClockPeriod, [this](const ros::SteadyTimerEvent& /*event*/) { publish(); })) {}
 
 void ClockPublisher::publish() {
   rosgraph_msgs::Clock message;

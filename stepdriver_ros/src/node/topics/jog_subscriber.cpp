@@ -13,7 +13,7 @@ namespace stepdriver::ros_node {
 namespace {
 
 // A stream of messages: an old one is useless when the next has arrived.
-constexpr std::uint32_t kQueued = 1;
+constexpr std::uint32_t kQueuedJogs = 1;
 // The accuracy of the timeout, as a part of it.
 constexpr double kTimeoutPart = 0.05;
 
@@ -28,7 +28,7 @@ JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, Ca
       poll_(onQueue(queues.control(), node), ros::WallDuration(timeout * kTimeoutPart),
             [this] { return endWhatIsOver(); }) {
   node.setCallbackQueue(&queues.control());
-  subscriber_ = node.subscribe("jog", kQueued, &JogSubscriber::take, this,
+  subscriber_ = node.subscribe("jog", kQueuedJogs, &JogSubscriber::take, this,
                                ros::TransportHints().tcpNoDelay());
 }
 

@@ -8,7 +8,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-const ros::WallDuration kPeriod(1.0);
+const ros::WallDuration kSayPeriod(1.0);
 
 std::string withoutNumbers(std::string text) {
   const auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
@@ -23,7 +23,7 @@ void RefusalLog::warn(const std::string& reason) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (auto entry = said_.begin(); entry != said_.end();) {
-      entry = now - entry->second >= kPeriod ? said_.erase(entry) : std::next(entry);
+      entry = now - entry->second >= kSayPeriod ? said_.erase(entry) : std::next(entry);
     }
     if (!said_.emplace(withoutNumbers(reason), now).second) return;
   }

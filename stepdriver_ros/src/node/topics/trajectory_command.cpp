@@ -8,7 +8,7 @@ namespace stepdriver::ros_node {
 namespace {
 
 // A newer trajectory replaces an older one: only those of several clients can queue up.
-constexpr std::uint32_t kQueued = 10;
+constexpr std::uint32_t kQueuedTrajectories = 10;
 
 }  // namespace
 
@@ -16,7 +16,7 @@ TrajectoryCommand::TrajectoryCommand(ros::NodeHandle node, machine::Machine& mac
                                      CallQueues& queues)
     : machine_(machine), axes_(axisOfJoint(machine)) {
   node.setCallbackQueue(&queues.trajectories());
-  subscriber_ = node.subscribe("command", kQueued, &TrajectoryCommand::take, this,
+  subscriber_ = node.subscribe("command", kQueuedTrajectories, &TrajectoryCommand::take, this,
                                ros::TransportHints().tcpNoDelay());
 }
 

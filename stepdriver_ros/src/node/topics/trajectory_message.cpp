@@ -10,7 +10,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-using Kind = BadTrajectory::Kind;
+using Wrong = BadTrajectory::Kind;
 
 // [s] A shorter delay starts at once: plans begin this far in the future anyway.
 constexpr double kShortestDelay = 0.001;
@@ -34,7 +34,7 @@ double timeOf(const trajectory_msgs::JointTrajectory& message, std::size_t index
   const bool tells_where_it_begins = index == 0 && planned == 0.0 && message.points.size() > 1;
   if (tells_where_it_begins) return 0.0;
   if (planned <= late) {
-    throw BadTrajectory(Kind::kOldStamp,
+    throw BadTrajectory(Wrong::kOldStamp,
                         fmt::format("point {}, {} s after header.stamp, is in the past by {} s",
                                     index, roundedText(planned), roundedText(late - planned)));
   }
@@ -76,17 +76,17 @@ AxisOfJoint axisOfJoint(const machine::Machine& machine) {
 
 std::vector<std::string> axesOf(const std::vector<std::string>& joints, const AxisOfJoint& axes) {
   if (joints.empty()) {
-    throw BadTrajectory(Kind::kJoints, "it names no joint; there are " + namesOf(axes));
+    throw BadTrajectory(Wrong::kJoints, "it names no joint; there are " + namesOf(axes));
   }
   std::vector<std::string> found;
   for (const std::string& joint : joints) {
     const auto axis = axes.find(joint);
     if (axis == axes.end()) {
-      throw BadTrajectory(Kind::kJoints,
+      throw BadTrajectory(Wrong::kJoints,
                           fmt::format("there is no joint {}; there are {}", joint, namesOf(axes)));
     }
     if (std::find(found.begin(), found.end(), axis->second) != found.end()) {
-      throw BadTrajectory(Kind::kJoints, "the joint " + joint + " is named twice");
+      throw BadTrajectory(Wrong::kJoints, "the joint " + joint + " is named twice");
     }
     found.push_back(axis->second);
   }
@@ -97,7 +97,7 @@ TimedTrajectory timedTrajectory(const trajectory_msgs::JointTrajectory& message,
                                 const AxisOfJoint& axes, ros::Time now) {
   TimedTrajectory trajectory;
   trajectory.request.names = axesOf(message.joint_names, axes);
-  if (message.points.empty()) throw BadTrajectory(Kind::kInvalid, "it has no points");
+  if (message.points.empty()) throw BadTrajectory(Wrong::kInvalid, "it has no points");
   const double ahead = message.header.stamp.isZero() ? 0.0 : secondsFrom(now, message.header.stamp);
   if (ahead > kShortestDelay) trajectory.delay = ahead;
   const double late = std::max(0.0, -ahead);
