@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "axis/line_path.h"
 #include "motion/planner.h"
 #include "motion/step_finder.h"
 #include "support/allocations.h"
@@ -84,8 +85,44 @@ void planCase(const Case& one) {
   benchmark::DoNotOptimize(motion::planMove(0, one.from, one.target, one.limits));
 }
 
+/// A line of six axes to plan, from rest.
+struct Line {
+  std::vector<axis::PathAxis> axes;
+  std::vector<axis::PathStart> starts;
+  std::vector<std::int64_t> targets;
+};
+
+Line randomLine(std::mt19937_64& random) {
+  Line line;
+  for (const char* name : {"x", "y", "z", "a", "b", "c"}) {
+    const Case one = randomCase(Kind::kFromRest, random);
+    axis::PathAxis axis;
+    axis.name = name;
+    axis.microsteps = 16;
+    axis.steps_per_unit = 80'000.0;
+    axis.limits = one.limits;
+    axis.stop_limits = one.limits;
+    line.axes.push_back(axis);
+    axis::PathStart start;
+    start.motor = one.from;
+    line.starts.push_back(start);
+    line.targets.push_back(one.target);
+  }
+  return line;
+}
+
+/// The path, and the motions of its axes.
+void planCase(const Line& line) {
+  const axis::LinePath path(line.axes, line.starts, line.targets, 0.0, 0.0);
+  const motion::Profile profile = path.plan(0, path.begin(), 1.0);
+  for (std::size_t i = 0; i < line.axes.size(); ++i) {
+    benchmark::DoNotOptimize(path.profileOf(i, profile));
+  }
+}
+
 /// Each case's shortest time of several, so that only its own work counts.
-std::vector<double> shortestTimes(const std::vector<Case>& cases) {
+template <typename AnyCase>
+std::vector<double> shortestTimes(const std::vector<AnyCase>& cases) {
   using Clock = std::chrono::steady_clock;
   std::vector<double> shortest(cases.size(), std::numeric_limits<double>::max());
   for (int round = 0; round < 5; ++round) {
@@ -99,13 +136,14 @@ std::vector<double> shortestTimes(const std::vector<Case>& cases) {
   return shortest;
 }
 
-/// 10,000 random moves: their mean, and the 99th percentile over the mean.
-void planRandom(benchmark::State& state, Kind kind) {
+/// 10,000 random cases: their mean, and the 99th percentile over the mean.
+template <typename MakeCase>
+void planRandom(benchmark::State& state, const MakeCase& make) {
   std::mt19937_64 random(1);
-  std::vector<Case> cases(10'000);
-  for (Case& one : cases) one = randomCase(kind, random);
+  std::vector<decltype(make(random))> cases(10'000);
+  for (auto& one : cases) one = make(random);
   for (auto round : state) {
-    for (const Case& one : cases) planCase(one);
+    for (const auto& one : cases) planCase(one);
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(cases.size()));
   std::vector<double> times = shortestTimes(cases);
@@ -115,11 +153,17 @@ void planRandom(benchmark::State& state, Kind kind) {
   state.counters["p99_over_mean"] = times[times.size() * 99 / 100] / mean;
 }
 
-BENCHMARK_CAPTURE(planRandom, tr, Kind::kNoJerkFromRest)->Name("Plan/random/trapezoid_from_rest");
-BENCHMARK_CAPTURE(planRandom, tm, Kind::kNoJerk)->Name("Plan/random/trapezoid");
-BENCHMARK_CAPTURE(planRandom, sr, Kind::kFromRest)->Name("Plan/random/s_curve_from_rest");
-BENCHMARK_CAPTURE(planRandom, sm, Kind::kAny)->Name("Plan/random/s_curve");
-BENCHMARK_CAPTURE(planRandom, st, Kind::kTurning)->Name("Plan/random/s_curve_turning");
+void planMoves(benchmark::State& state, Kind kind) {
+  planRandom(state, [kind](std::mt19937_64& random) { return randomCase(kind, random); });
+}
+void planLines(benchmark::State& state) { planRandom(state, randomLine); }
+
+BENCHMARK_CAPTURE(planMoves, tr, Kind::kNoJerkFromRest)->Name("Plan/random/trapezoid_from_rest");
+BENCHMARK_CAPTURE(planMoves, tm, Kind::kNoJerk)->Name("Plan/random/trapezoid");
+BENCHMARK_CAPTURE(planMoves, sr, Kind::kFromRest)->Name("Plan/random/s_curve_from_rest");
+BENCHMARK_CAPTURE(planMoves, sm, Kind::kAny)->Name("Plan/random/s_curve");
+BENCHMARK_CAPTURE(planMoves, st, Kind::kTurning)->Name("Plan/random/s_curve_turning");
+BENCHMARK(planLines)->Name("Plan/random/line_of_6");
 
 /// The memory that a plan takes: its pieces, and nothing for each step.
 struct Memory {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "reach.h"
 #include "root.h"
@@ -10,8 +11,9 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoise = 1e-15;  // of a search in doubles, relative
-constexpr double kSure = 1e-8;    // relative; below this the sign of a rough value means nothing
+constexpr double kNoise = 4e-15;     // of a search in doubles, relative
+constexpr double kSure = 1e-8;       // relative; below this the sign of a rough value means nothing
+constexpr double kRounding = 1e-12;  // of an acceleration that is a limit, relative
 
 DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
   Reach<DoubleDouble> stop(v, a);
@@ -19,29 +21,98 @@ DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& 
   return stop.length();
 }
 
-// How much of a distance is missing if a motion leaves a phase at a time and stops as fast as
-// possible, as a function of that time. In the direction of the motion, so that it falls.
-template <typename Real>
-class Missing {
- public:
-  Missing(Real left, Real v, Real a, double j, double sign, const MotionLimits& limits)
-      : left_(left), v_(v), a_(a), j_(j), sign_(sign), limits_(limits) {}
-
-  Real operator()(Real t) const {
-    Reach<Real> reach(v_, a_);
-    reach.run(j_, t);
-    comeToRest(reach, limits_);
-    return Real(sign_) * (left_ - reach.length());
-  }
-
- private:
-  Real left_;
-  Real v_;
-  Real a_;
-  double j_;
-  double sign_;
-  const MotionLimits& limits_;
+// The fastest stop under a jerk limit, in doubles and as a formula.
+struct RoughStop {
+  double length = 0.0;   // microsteps, signed
+  double farther = 0.0;  // microsteps/s: how much farther it ends if the motion continues first
+  bool applies = true;   // otherwise the stop has another form
 };
+
+// In the direction of the stop: it is the stop from the speed w = v + a^2/(2 J) without
+// acceleration, begun a/J earlier, or later if the motion already slows down. From w it takes the
+// distance w/2 (w/d + d/J), or w sqrt(w/J) if the deceleration doesn't reach d. With a start speed,
+// the ramp ends there.
+RoughStop roughStop(double v, double a, double j, const MotionLimits& limits) {
+  const double start = startSpeed(limits);
+  const double level = v + a * std::abs(a) / (2.0 * limits.jerk);
+  const double sign = (start > 0.0 ? v : level) < 0.0 ? -1.0 : 1.0;
+  v *= sign;
+  a *= sign;
+  if (v <= start && start > 0.0) return {0.0, sign * v};
+  const double d = limits.deceleration;
+  const double t = a / limits.jerk;
+  const double w = v + 0.5 * a * t;
+  const double change = w - start;
+  const bool reaches = change * limits.jerk > d * d;
+  const double ramp =
+      reaches ? change / d + d / limits.jerk : 2.0 * std::sqrt(change / limits.jerk);
+  const double slope = reaches ? 1.0 / d : 0.5 * ramp / change;
+  const double mean = 0.5 * (w + start);
+  RoughStop stop;
+  stop.length = sign * (mean * ramp + t * (w - a * t / 6.0));
+  stop.farther = sign * (1.0 + sign * j / limits.jerk) * (v + a * (0.5 * ramp + mean * slope + t));
+  stop.applies = a >= -d * (1.0 + kRounding) && sign * level >= start;
+  return stop;
+}
+
+// The moment at which a motion leaves the change to the maximum speed to stop.
+struct Switch {
+  std::size_t phase = 0;
+  DoubleDouble time;  // s from the beginning of the phase
+};
+
+std::optional<Switch> switchWithJerk(const Path& path, DoubleDouble length, double missing_before,
+                                     double sign, const MotionLimits& limits) {
+  DoubleDouble left = length;  // of the distance, at the beginning of a phase
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Phase& phase = path[i];
+    // How much of the distance is missing if the motion leaves the phase at a time and stops as
+    // fast as possible: it falls with the time.
+    const auto rough = [&](double t) {
+      const Advance<double> end = advance(phase.v.hi, phase.a.hi, phase.j, t);
+      const RoughStop stop = roughStop(end.v, end.a, phase.j, limits);
+      return Value{sign * (left.hi - end.way - stop.length), -sign * stop.farther};
+    };
+    const auto exact = [&](DoubleDouble t) {
+      const Advance<DoubleDouble> end = advance(phase.v, phase.a, phase.j, t);
+      return (left - end.way - stoppingLength(end.v, end.a, limits)) * sign;
+    };
+    const bool last = i + 1 == path.size();
+    const DoubleDouble v = last ? path.v() : path[i + 1].v;
+    const DoubleDouble a = last ? path.a() : path[i + 1].a;
+    const RoughStop stop = roughStop(v.hi, a.hi, phase.j, limits);
+    const DoubleDouble left_after = left - phase.way;
+    const double scale = std::max(std::abs(left.hi), std::abs(phase.way.hi));
+    double missing = sign * (left_after.hi - stop.length);
+    if (!stop.applies || !(std::abs(missing) > kSure * scale)) {
+      missing = sign * (left_after - stoppingLength(v, a, limits)).hi;
+    }
+    if (missing <= 0.0) {
+      const Bracket bracket{0.0, phase.duration.hi, missing_before, missing};
+      return Switch{i, rootNear(exact, newtonRootOf(rough, bracket, kNoise * scale), bracket.high)};
+    }
+    left = left_after;
+    missing_before = missing;
+  }
+  return std::nullopt;
+}
+
+// Without a jerk limit the stop moves on only while the speed rises, which is the end of the path:
+// by w^2/(2 a) + w^2/(2 d) until the speed is w, if it begins at standstill or passes it.
+std::optional<Switch> switchWithoutJerk(const Path& path, DoubleDouble missing, double sign,
+                                        const MotionLimits& limits) {
+  if (path.size() == 0) return std::nullopt;
+  const std::size_t last = path.size() - 1;
+  const Phase& phase = path[last];
+  if (!(sign * phase.a.hi > 0.0)) return std::nullopt;
+  const double a = limits.acceleration;
+  const DoubleDouble ratio = exactSum(a, limits.deceleration) / limits.deceleration;
+  const DoubleDouble u = phase.v * sign;
+  const DoubleDouble square = u.hi > 0.0 ? u * u : DoubleDouble();
+  const DoubleDouble time = (sqrt(square + missing * (2.0 * a) / ratio) - u) / a;
+  if (!(time < phase.duration)) return std::nullopt;
+  return Switch{last, time};
+}
 
 void finish(Approach& motion, const MotionLimits& limits) {
   motion.first_part = motion.path.size();
@@ -75,30 +146,18 @@ Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const Sto
   const double sign = beyond.hi > 0.0 ? 1.0 : -1.0;
   Path& path = motion.path;
   changeToMaximum(path, sign, limits);
-  DoubleDouble left = length;  // of the distance, at the beginning of a phase
-  double missing_before = std::abs(beyond.hi);
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    const Phase& phase = path[i];
-    const Missing<double> rough(left.hi, phase.v.hi, phase.a.hi, phase.j, sign, limits);
-    const Missing<DoubleDouble> exact(left, phase.v, phase.a, phase.j, sign, limits);
-    const double duration = phase.duration.hi;
-    const DoubleDouble way = wayOf(phase, phase.duration);
-    const double scale = std::max(std::abs(left.hi), std::abs(way.hi));
-    double missing = rough(duration);
-    if (!(std::abs(missing) > kSure * scale)) missing = exact(phase.duration).hi;
-    if (missing <= 0.0) {
-      const double jerk = phase.j;
-      path.cut(i);
-      path.run(jerk,
-               rootOf(rough, exact, {0.0, duration, missing_before, missing}, kNoise * scale));
-      finish(motion, limits);
-      return motion;
-    }
-    left = left - way;
-    missing_before = missing;
+  const std::optional<Switch> leave =
+      limits.jerk > 0.0 ? switchWithJerk(path, length, std::abs(beyond.hi), sign, limits)
+                        : switchWithoutJerk(path, abs(beyond), sign, limits);
+  if (leave) {
+    const double jerk = path[leave->phase].j;
+    path.cut(leave->phase);
+    path.run(jerk, leave->time);
+  } else {
+    const DoubleDouble left = length - path.length();
+    const DoubleDouble cruise = left - stoppingLength(path.v(), path.a(), limits);
+    path.run(0.0, cruise / path.v());
   }
-  const DoubleDouble cruise = left - stoppingLength(path.v(), path.a(), limits);
-  path.run(0.0, cruise / path.v());
   finish(motion, limits);
   return motion;
 }

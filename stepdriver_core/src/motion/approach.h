@@ -39,7 +39,8 @@ struct Approach {
 /// fastest change to the maximum speed, and switches to the fastest stop at the last moment from
 /// which that ends at the target. (A time-optimal motion is always at one limit or another, and
 /// switches from one such arc to the next once.) The later it switches, the farther it goes, so
-/// there is only one such moment; it is found by bracketing within its phase.
+/// there is only one such moment. Without a jerk limit it is a closed form; with one, a search in
+/// doubles within its phase finds it, and a correction makes it exact.
 ///
 /// With a start speed, the motion is at most that fast, or goes towards the end of `length` and can
 /// stop there.

@@ -227,7 +227,7 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale) {
     const DoubleDouble velocity = scale * velocityOf(piece);
     const DoubleDouble acceleration = scale * accelerationOf(piece);
     pieces.push_back({piece.duration, origin + scale * piece.p0, velocity.hi, acceleration.hi,
-                      (scale * DoubleDouble(piece.j)).value(), velocity.lo, acceleration.lo});
+                      (scale * piece.j).value(), velocity.lo, acceleration.lo});
   }
   return {path.startNs(), std::move(pieces)};
 }

@@ -9,27 +9,6 @@ DoubleDouble fromInteger(std::int64_t value) {
   return exactSum(hi, lo);
 }
 
-DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
-  // a - b * part
-  const auto without = [&b](DoubleDouble from, double part) {
-    const DoubleDouble product = exactProduct(b.hi, part);
-    return from - normalized(product.hi, product.lo + b.lo * part);
-  };
-  const double first = a.hi / b.hi;
-  DoubleDouble rest = without(a, first);
-  const double second = rest.hi / b.hi;
-  rest = without(rest, second);
-  return normalized(first, second) + DoubleDouble(rest.hi / b.hi);
-}
-
-DoubleDouble sqrt(DoubleDouble a) {
-  if (!(a.hi > 0.0)) return 0.0;
-  // One of Newton's steps from the double nearest to the root.
-  const double root = std::sqrt(a.hi);
-  const DoubleDouble rest = a - exactProduct(root, root);
-  return normalized(root, rest.hi / (2.0 * root));
-}
-
 Split split(DoubleDouble value) {
   const auto high = static_cast<std::int64_t>(std::nearbyint(value.hi));
   const double rest = (value.hi - static_cast<double>(high)) + value.lo;
@@ -39,10 +18,8 @@ Split split(DoubleDouble value) {
           ((value.hi - static_cast<double>(high)) - carry) + value.lo};
 }
 
-DoubleDouble secondsOf(std::int64_t nanoseconds) {
-  return fromInteger(nanoseconds) / DoubleDouble(1e9);
-}
+DoubleDouble secondsOf(std::int64_t nanoseconds) { return fromInteger(nanoseconds) / 1e9; }
 
-Split splitNanoseconds(DoubleDouble seconds) { return split(seconds * DoubleDouble(1e9)); }
+Split splitNanoseconds(DoubleDouble seconds) { return split(seconds * 1e9); }
 
 }  // namespace stepdriver::motion

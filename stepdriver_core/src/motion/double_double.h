@@ -66,16 +66,42 @@ inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
   return normalized(sum.hi, sum.lo + low.lo);
 }
 
+inline DoubleDouble operator+(DoubleDouble a, double b) {
+  const DoubleDouble sum = exactSum(a.hi, b);
+  return normalized(sum.hi, sum.lo + a.lo);
+}
+
 inline DoubleDouble operator-(DoubleDouble a) { return {-a.hi, -a.lo}; }
 
 inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) { return a + (-b); }
+
+inline DoubleDouble operator-(DoubleDouble a, double b) { return a + (-b); }
 
 inline DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
   const DoubleDouble product = exactProduct(a.hi, b.hi);
   return normalized(product.hi, product.lo + (a.hi * b.lo + a.lo * b.hi));
 }
 
-DoubleDouble operator/(DoubleDouble a, DoubleDouble b);
+inline DoubleDouble operator*(DoubleDouble a, double b) {
+  const DoubleDouble product = exactProduct(a.hi, b);
+  return normalized(product.hi, product.lo + a.lo * b);
+}
+
+/// Relative error below 2^-102.
+inline DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
+  const double quotient = a.hi / b.hi;
+  const DoubleDouble product = b * quotient;
+  const double rest = (a.hi - product.hi) + (a.lo - product.lo);
+  return normalized(quotient, rest / b.hi);
+}
+
+/// Relative error below 2^-104.
+inline DoubleDouble operator/(DoubleDouble a, double b) {
+  const double quotient = a.hi / b;
+  const DoubleDouble product = exactProduct(quotient, b);
+  const double rest = ((a.hi - product.hi) - product.lo) + a.lo;
+  return normalized(quotient, rest / b);
+}
 
 inline bool operator<(DoubleDouble a, DoubleDouble b) {
   return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);
@@ -84,12 +110,21 @@ inline bool operator<(DoubleDouble a, DoubleDouble b) {
 inline DoubleDouble abs(DoubleDouble a) { return a.hi < 0.0 ? -a : a; }
 
 /// 0 of a negative number.
-DoubleDouble sqrt(DoubleDouble a);
+inline DoubleDouble sqrt(DoubleDouble a) {
+  if (!(a.hi > 0.0)) return 0.0;
+  // One of Newton's steps from the double nearest to the root.
+  const double root = std::sqrt(a.hi);
+  const DoubleDouble square = exactProduct(root, root);
+  return normalized(root, (((a.hi - square.hi) - square.lo) + a.lo) / (2.0 * root));
+}
+
+inline DoubleDouble half(DoubleDouble a) { return {0.5 * a.hi, 0.5 * a.lo}; }
 
 /// @name The same for doubles, for templates of either type
 /// @{
 inline double abs(double a) { return std::abs(a); }
 inline double sqrt(double a) { return a > 0.0 ? std::sqrt(a) : 0.0; }
+inline double half(double a) { return 0.5 * a; }
 inline double highOf(double a) { return a; }
 inline double highOf(DoubleDouble a) { return a.hi; }
 template <typename Real>

@@ -1,7 +1,6 @@
 #include "motion_builder.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -83,9 +82,7 @@ void MotionBuilder::moveOn(double sign, const MotionLimits& limits) {
   Path path(v_, a_);
   changeToMaximum(path, sign, limits);
   path.run(0.0, std::min(kForever, kFarthestJog / limits.max_speed));
-  DoubleDouble end = position_;
-  for (std::size_t i = 0; i < path.size(); ++i) end = end + wayOf(path[i], path[i].duration);
-  add({path, path.size()}, end);
+  add({path, path.size()}, position_ + path.length());
 }
 
 double MotionBuilder::heading(const MotionLimits& limits) const {
@@ -106,19 +103,15 @@ std::int64_t MotionBuilder::nextRest(const MotionLimits& limits) const {
 void MotionBuilder::add(const Approach& part, DoubleDouble end) {
   const Path& path = part.path;
   pieces_.reserve(pieces_.size() + path.size());
-  std::array<DoubleDouble, Path::kMost> ways;
   DoubleDouble left;  // of the second part
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    ways[i] = wayOf(path[i], path[i].duration);
-    if (i >= part.first_part) left = left + ways[i];
-  }
+  for (std::size_t i = part.first_part; i < path.size(); ++i) left = left + path[i].way;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const bool first = i < part.first_part;
     pieces_.push_back(pieceOf(path[i], first ? position_ : end - left));
     if (first) {
-      position_ = position_ + ways[i];
+      position_ = position_ + path[i].way;
     } else {
-      left = left - ways[i];
+      left = left - path[i].way;
     }
   }
   position_ = end;

@@ -14,6 +14,7 @@ struct Phase {
   DoubleDouble v;         // microsteps/s
   DoubleDouble a;         // microsteps/s^2
   double j = 0.0;         // microsteps/s^3
+  DoubleDouble way;       // microsteps, signed
 };
 
 /// A sequence of phases, built from a velocity and an acceleration: a motion whose position and
@@ -33,6 +34,12 @@ class Path {
   /// Leaves only the first `count` phases, of more than these.
   void cut(std::size_t count);
 
+  /// [microsteps] signed
+  DoubleDouble length() const {
+    DoubleDouble length;
+    for (std::size_t i = 0; i < size_; ++i) length = length + phases_[i].way;
+    return length;
+  }
   DoubleDouble v() const { return v_; }
   DoubleDouble a() const { return a_; }
   std::size_t size() const { return size_; }
@@ -56,9 +63,6 @@ template <typename Real>
 inline constexpr double kExact = 1e-13;
 template <>
 inline constexpr double kExact<DoubleDouble> = 1e-29;
-
-/// The distance of a phase in the time `t` from its beginning.
-DoubleDouble wayOf(const Phase& phase, DoubleDouble t);
 
 Piece pieceOf(const Phase& phase, DoubleDouble position);
 

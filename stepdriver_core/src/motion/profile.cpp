@@ -11,8 +11,10 @@ namespace stepdriver::motion {
 namespace {
 
 double peakSpeedOf(const Piece& piece) {
-  const auto speed = [&piece](DoubleDouble t) { return std::abs(piece.velocityAt(t).value()); };
-  const double ends = std::max(std::abs(piece.v0), speed(piece.duration));
+  const auto speed = [&piece](double t) {
+    return std::abs(piece.v0 + t * (piece.a + t * (0.5 * piece.j)));
+  };
+  const double ends = std::max(std::abs(piece.v0), speed(piece.duration.hi));
   const double level = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
   return level > 0.0 && level < piece.duration.hi ? std::max(ends, speed(level)) : ends;
 }
@@ -21,19 +23,18 @@ double peakSpeedOf(const Piece& piece) {
 
 DoubleDouble Piece::positionAt(DoubleDouble t) const {
   // Horner's method without zero terms: most pieces have no jerk, and many have no acceleration.
+  DoubleDouble bend(0.5 * a, 0.5 * a_rest);
+  if (j != 0.0) bend = bend + t * (0.5 * j) * third<DoubleDouble>();
   DoubleDouble slope(v0, v0_rest);
-  if (a != 0.0) slope = slope + t * DoubleDouble(a / 2.0, a_rest / 2.0);
-  if (j != 0.0) slope = slope + t * t * DoubleDouble(j * 0.5) * third<DoubleDouble>();
+  if (bend.hi != 0.0) slope = slope + t * bend;
   return p0 + t * slope;
 }
 
 DoubleDouble Piece::velocityAt(DoubleDouble t) const {
-  return DoubleDouble(v0, v0_rest) + t * (DoubleDouble(a, a_rest) + t * DoubleDouble(j / 2.0));
+  return DoubleDouble(v0, v0_rest) + t * (DoubleDouble(a, a_rest) + t * (0.5 * j));
 }
 
-DoubleDouble Piece::accelerationAt(DoubleDouble t) const {
-  return DoubleDouble(a, a_rest) + t * DoubleDouble(j);
-}
+DoubleDouble Piece::accelerationAt(DoubleDouble t) const { return DoubleDouble(a, a_rest) + t * j; }
 
 double Piece::firstTurn(double after) const {
   const double end = duration.value();

@@ -52,13 +52,15 @@ Profile planRate(std::int64_t start_ns, const MotionState& from, double rate,
   for (std::size_t i = 0; i < path.size(); ++i) {
     Phase phase = path[i];
     const DoubleDouble left = end - place;
-    const bool ends_here = left < wayOf(phase, phase.duration);
+    const bool ends_here = left < phase.way;
     if (ends_here) {
-      const auto short_of_it = [&](DoubleDouble t) { return left - wayOf(phase, t); };
+      const auto short_of_it = [&](DoubleDouble t) {
+        return left - advance(phase.v, phase.a, phase.j, t).way;
+      };
       phase.duration = rootOf(short_of_it, phase.duration.value());
     }
     pieces.push_back(pieceOf(phase, place));
-    place = ends_here ? end : place + wayOf(phase, phase.duration);
+    place = ends_here ? end : place + phase.way;
     if (ends_here) break;
   }
   if (const DoubleDouble left = end - place; path.v().hi > 0.0 && left.hi > kNoWay) {

@@ -5,6 +5,24 @@
 
 namespace stepdriver::motion {
 
+/// A motion from a velocity and an acceleration after a time of constant jerk.
+template <typename Real>
+struct Advance {
+  Real way;  ///< [microsteps] signed
+  Real v;    ///< [microsteps/s]
+  Real a;    ///< [microsteps/s^2]
+};
+
+/// @param t [s] @param j [microsteps/s^3]
+template <typename Real>
+Advance<Real> advance(Real v, Real a, double j, Real t) {
+  const Real by_a = t * a;
+  if (j == 0.0) return {t * (v + half(by_a)), v + by_a, a};
+  const Real a_change = t * j;
+  const Real by_j = half(t * a_change);
+  return {t * (v + half(by_a) + by_j * third<Real>()), v + (by_a + by_j), a + a_change};
+}
+
 /// The end of a sequence of phases of constant jerk: how far and how fast. A search needs no more,
 /// and takes doubles; exact ends take DoubleDouble.
 template <typename Number>
@@ -18,12 +36,9 @@ class Reach {
   /// nanosecond is only rounding and is ignored.
   void run(double j, Real duration) {
     if (!(highOf(duration) > kNoTime)) return;
-    const Real half_change = duration * Real(j * 0.5);
-    Real slope = v_ + duration * a_ * Real(0.5);
-    if (j != 0.0) slope = slope + duration * half_change * third<Real>();
-    length_ = length_ + duration * slope;
-    v_ = v_ + duration * (a_ + half_change);
-    a_ = a_ + half_change + half_change;
+    const Advance<Real> end = advance(v_, a_, j, duration);
+    length_ = length_ + end.way;
+    settle(end.v, end.a);
   }
   /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded
   /// one.

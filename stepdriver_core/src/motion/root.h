@@ -10,8 +10,9 @@ namespace stepdriver::motion {
 
 /// @file The roots of continuous functions that fall from above 0 at 0 to 0 or less at `high`.
 ///
-/// Ridders' method (C. J. F. Ridders, A new algorithm for computing a single root of a real
-/// continuous function, 1979), which never leaves its bracket; then secants in double-double.
+/// Newton's method if the slope is known, otherwise Ridders' (C. J. F. Ridders, A new algorithm for
+/// computing a single root of a real continuous function, 1979). Neither leaves its bracket. Then
+/// secants in double-double.
 
 /// Where such a root lies.
 struct Bracket {
@@ -79,7 +80,7 @@ template <typename Function>
 ExactRoot correctedRoot(const Function& f, DoubleDouble t, double slope, double last) {
   DoubleDouble f_t = f(t);
   for (int i = 0; i < 6 && slope < 0.0 && f_t.hi != 0.0; ++i) {
-    const DoubleDouble change = f_t / DoubleDouble(-slope);
+    const DoubleDouble change = f_t / -slope;
     const DoubleDouble better = t + change;
     if (std::abs(f_t.hi) <= last && std::abs(change.hi) <= kNextTo * t.hi) return {better, {}};
     const DoubleDouble f_better = f(better);
@@ -103,18 +104,64 @@ DoubleDouble rootOf(const Function& f, double high) {
   return correctedRoot(f, t, change.hi / aside, 0.0).t;
 }
 
+/// A function's value and slope at one place.
+struct Value {
+  double f = 0.0;
+  double slope = 0.0;
+};
+
+/// A root, roughly, by Newton's method within the bracket.
+struct RoughRoot {
+  double t = 0.0;
+  double slope = 0.0;  ///< of f, near there
+};
+
+/// @param f double to Value.
+/// @param noise f's rounding error: values this near to 0 are as good as 0.
+template <typename Function>
+RoughRoot newtonRootOf(const Function& f, Bracket bracket, double noise) {
+  constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
+  constexpr int kMost = 100;  // halvings
+  // As if f fell with the square of t.
+  double t = bracket.high * std::sqrt(bracket.f_low / (bracket.f_low - bracket.f_high));
+  double slope = 0.0;
+  for (int i = 0; i < kMost; ++i) {
+    const Value value = f(t);
+    slope = value.slope;
+    if (std::abs(value.f) <= noise) break;
+    (value.f > 0.0 ? bracket.low : bracket.high) = t;
+    double better = t - value.f / slope;
+    if (!(better > bracket.low && better < bracket.high)) {
+      better = bracket.low + (bracket.high - bracket.low) / 2.0;
+    }
+    const double change = std::abs(better - t);
+    t = better;
+    if (change <= kRounding * t) break;
+  }
+  return {t, slope};
+}
+
+/// The root of a function near a rough one.
+///
+/// @param f DoubleDouble to DoubleDouble.
+/// @param high end of the bracket.
+template <typename Function>
+DoubleDouble rootNear(const Function& f, const RoughRoot& rough, double high) {
+  constexpr double kLast = 1e-7;
+  constexpr double kWrong = 1e-9;  // the rough function has another root
+  const ExactRoot root = correctedRoot(f, rough.t, rough.slope, kLast);
+  return std::abs(root.left.hi) > kWrong ? rootOf(f, high) : root.t;
+}
+
 /// The root of a function that is also known in doubles, which is faster.
 ///
 /// @param rough double to double, with this rounding error.
 /// @param exact DoubleDouble to DoubleDouble.
 template <typename Rough, typename Exact>
 DoubleDouble rootOf(const Rough& rough, const Exact& exact, const Bracket& bracket, double noise) {
-  constexpr double kLast = 1e-7;
-  constexpr double kWrong = 1e-9;  // the rough function has another root
   const double t = roughRootOf(rough, bracket, noise);
   const double aside = 1e-6 * t;
-  const ExactRoot root = correctedRoot(exact, t, (rough(t) - rough(t - aside)) / aside, kLast);
-  return std::abs(root.left.hi) > kWrong ? rootOf(exact, bracket.high) : root.t;
+  return rootNear(exact, {t, (rough(t) - rough(t - aside)) / aside}, bracket.high);
 }
 
 }  // namespace stepdriver::motion

@@ -11,11 +11,6 @@ Real square(Real x) {
   return x * x;
 }
 
-template <typename Real>
-Real half(Real x) {
-  return x * Real(0.5);
-}
-
 // The state seen in the direction of the change, so that the velocity always rises.
 template <typename End>
 class Mirrored {
@@ -47,27 +42,26 @@ void rise(Mirrored<End> m, typename End::Real v_end, typename End::Real a_end, d
   const Real change = v_end - m.v();
   if (jerk == 0.0) {
     m.settle(m.v(), limit);
-    m.run(0.0, change / Real(limit));
+    m.run(0.0, change / limit);
     m.settle(v_end, 0.0);
     return;
   }
-  const Real per_jerk = Real(1.0) / Real(jerk);
   const Real a = m.a();
   const Real top = std::max(Real(limit), a_end);
   // The point at which the line that rises from (v, a^2/2) meets the one that falls to (v_end,
   // a_end^2/2).
-  const Real corner = half(square(a) + square(a_end)) + Real(jerk) * change;
+  const Real corner = half(square(a) + square(a_end)) + change * jerk;
   if (!(square(top) < corner)) {
     const Real peak = sqrt(corner);
-    m.run(jerk, (peak - a) * per_jerk);
-    m.run(-jerk, (peak - a_end) * per_jerk);
+    m.run(jerk, (peak - a) / jerk);
+    m.run(-jerk, (peak - a_end) / jerk);
   } else {
     const Real up = abs(square(top) - square(a));
     const Real down = square(top) - square(a_end);
-    m.run(a < top ? jerk : -jerk, abs(top - a) * per_jerk);
+    m.run(a < top ? jerk : -jerk, abs(top - a) / jerk);
     m.settle(m.v(), top);
-    m.run(0.0, (change - half(up + down) * per_jerk) / top);
-    m.run(-jerk, (top - a_end) * per_jerk);
+    m.run(0.0, (change - half(up + down) / jerk) / top);
+    m.run(-jerk, (top - a_end) / jerk);
   }
   m.settle(v_end, a_end);
 }
@@ -77,7 +71,7 @@ template <typename End>
 void level(Mirrored<End> m, double jerk) {
   using Real = typename End::Real;
   if (jerk == 0.0 || !(m.a() < Real(0.0))) return;
-  const Real duration = -m.a() / Real(jerk);
+  const Real duration = -m.a() / jerk;
   const Real v = m.v() + half(m.a() * duration);
   m.run(jerk, duration);
   m.settle(v, 0.0);
@@ -89,10 +83,10 @@ template <typename End>
 typename End::Real squareAtStandstill(Mirrored<End> m, typename End::Real v_end,
                                       const MotionLimits& limits) {
   using Real = typename End::Real;
-  const Real j2(2.0 * limits.jerk);
+  const double j2 = 2.0 * limits.jerk;
   const Real limit(std::min(limits.acceleration, limits.deceleration));
-  const Real highest = std::min(square(m.a()) - j2 * m.v(), j2 * v_end);
-  const Real lowest = square(m.a()) + j2 * m.v();
+  const Real highest = std::min(square(m.a()) - m.v() * j2, v_end * j2);
+  const Real lowest = square(m.a()) + m.v() * j2;
   return std::max(std::min(highest, square(limit)), lowest);
 }
 
@@ -101,11 +95,11 @@ typename End::Real squareAtStandstill(Mirrored<End> m, typename End::Real v_end,
 template <typename End>
 bool dropToStartSpeed(Mirrored<End> m, double start, const MotionLimits& limits) {
   using Real = typename End::Real;
-  const Real above = m.v() - Real(start);
+  const Real above = m.v() - start;
   if (limits.jerk == 0.0 || !(m.a() < Real(0.0))) return false;
-  const Real root = square(m.a()) - Real(2.0 * limits.jerk) * above;
+  const Real root = square(m.a()) - above * (2.0 * limits.jerk);
   if (!(highOf(root) > kExact<Real> * limits.jerk * highOf(m.v()))) return false;
-  m.run(limits.jerk, Real(2.0) * above / (sqrt(root) - m.a()));
+  m.run(limits.jerk, above * 2.0 / (sqrt(root) - m.a()));
   m.settle(start, 0.0);
   return true;
 }
@@ -114,9 +108,8 @@ bool dropToStartSpeed(Mirrored<End> m, double start, const MotionLimits& limits)
 
 template <typename End>
 typename End::Real levelVelocity(const End& path, const MotionLimits& limits) {
-  using Real = typename End::Real;
   if (limits.jerk == 0.0 || highOf(path.a()) == 0.0) return path.v();
-  return path.v() + half(path.a() * abs(path.a())) / Real(limits.jerk);
+  return path.v() + half(path.a() * abs(path.a())) / limits.jerk;
 }
 
 template <typename End>
@@ -132,7 +125,7 @@ void changeVelocity(End& path, typename End::Real velocity, const MotionLimits& 
     return;
   }
   Mirrored<End> m(path, at_level < velocity ? 1.0 : -1.0);
-  const Real goal = Real(m.sign()) * velocity;
+  const Real goal = velocity * m.sign();
   level(m, limits.jerk);
   if (m.v() < Real(0.0) && Real(0.0) < goal) {
     const Real a = limits.jerk > 0.0 ? sqrt(squareAtStandstill(m, goal, limits)) : Real(0.0);
@@ -146,7 +139,7 @@ TurnRange turnRange(DoubleDouble v, DoubleDouble a, double sign, const MotionLim
   Reach<DoubleDouble> end(v, a);
   const Mirrored<Reach<DoubleDouble>> m(end, sign);
   level(m, limits.jerk);
-  const DoubleDouble softest = square(m.a()) + DoubleDouble(2.0 * limits.jerk) * m.v();
+  const DoubleDouble softest = square(m.a()) + m.v() * (2.0 * limits.jerk);
   return {sqrt(softest), sqrt(squareAtStandstill(m, DoubleDouble(limits.max_speed), limits))};
 }
 
@@ -194,7 +187,6 @@ template void changeVelocity(Path&, DoubleDouble, const MotionLimits&);
 template void turn(Search&, double, double, const MotionLimits&);
 template void turn(Exact&, double, DoubleDouble, const MotionLimits&);
 template void turn(Path&, double, DoubleDouble, const MotionLimits&);
-template void comeToRest(Search&, const MotionLimits&);
 template void comeToRest(Exact&, const MotionLimits&);
 template void comeToRest(Path&, const MotionLimits&);
 template void changeToMaximum(Path&, double, const MotionLimits&);

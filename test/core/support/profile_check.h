@@ -47,8 +47,7 @@ class ProfileCheck {
   /// After expectWithinLimits().
   void expectRestOn(std::int64_t target) const {
     const double off = (profile_.endPosition() - fromInteger(target)).hi;
-    // 1e-15 s is the shortest piece that exists.
-    EXPECT_LE(std::abs(off), 1e-12 + 1e-28 * way_ + 2e-15 * fastest_) << "ends beside the target";
+    EXPECT_LE(std::abs(off), exactPositionDoubt()) << "ends beside the target";
     EXPECT_LE(std::abs(end_.velocity), start_ + speedDoubt());
     if (limits_.jerk > 0.0) {
       EXPECT_LE(std::abs(end_.acceleration), accelerationDoubt());
@@ -102,9 +101,10 @@ class ProfileCheck {
         {std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)), start_});
   }
 
-  /// The error of the position from rounding a state to doubles. It is largest just above the start
-  /// speed: an additional speed of dv takes the time sqrt(dv/j).
+  /// The error of the position from rounding a state to doubles, if it moves. It is largest just
+  /// above the start speed: an additional speed of dv takes the time sqrt(dv/j).
   double positionDoubt() const {
+    if (from_.velocity == 0.0 && from_.acceleration == 0.0) return exactPositionDoubt();
     const double way = 1e-9 + 1e-14 * (way_ + stopping());
     if (start_ == 0.0 || limits_.jerk == 0.0) return way;
     return way + std::min(1e-3, start_ * std::sqrt(1e-14 * start_ / limits_.jerk));
@@ -116,6 +116,8 @@ class ProfileCheck {
     const double braking = v * v / limits_.deceleration;
     return limits_.jerk > 0.0 ? braking + v * limits_.deceleration / limits_.jerk : braking;
   }
+  // 1e-15 s is the shortest piece that exists.
+  double exactPositionDoubt() const { return 1e-12 + 1e-28 * way_ + 2e-15 * fastest_; }
   double speedDoubt() const { return 1e-14 * fastest_ + 1e-15 * std::max(top(), first_a_); }
   double accelerationDoubt() const {
     return 1e-13 * std::max(top(), first_a_) + 4e-15 * limits_.jerk;
