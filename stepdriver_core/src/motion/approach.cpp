@@ -11,9 +11,9 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoise = 4e-15;     // of a search in doubles, relative
-constexpr double kSure = 1e-8;       // relative; below this the sign of a rough value means nothing
-constexpr double kRounding = 1e-12;  // of an acceleration that is a limit, relative
+constexpr double kNoise = 4e-15;  // of a search in doubles, relative
+constexpr double kSure = 1e-8;    // relative; below this the sign of a rough value means nothing
+constexpr double kLimitRounding = 1e-12;  // of an acceleration that is a limit, relative
 
 DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
   Reach<DoubleDouble> stop(v, a);
@@ -51,7 +51,7 @@ RoughStop roughStop(double v, double a, double j, const MotionLimits& limits) {
   RoughStop stop;
   stop.length = sign * (mean * ramp + t * (w - a * t / 6.0));
   stop.farther = sign * (1.0 + sign * j / limits.jerk) * (v + a * (0.5 * ramp + mean * slope + t));
-  stop.applies = a >= -d * (1.0 + kRounding) && sign * level >= start;
+  stop.applies = a >= -d * (1.0 + kLimitRounding) && sign * level >= start;
   return stop;
 }
 
