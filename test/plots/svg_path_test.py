@@ -81,6 +81,9 @@ class SvgPathTest(unittest.TestCase):
                               ('<path d="M0 0C1e308 1e308 -1e308 -1e308 3 0"/>',
                                "a drawing reaches to 1e+100"),
                               ('<path d="M0 0Q1e300 1e-5 3 0"/>', "a drawing reaches to 1e+100"),
+                              ('<path d="L10 20 30 40"/>', "begin it with a move"),
+                              ('<path d="Q20 108 30 120"/>', "a curve to (30, 120)"),
+                              ('<path d="M0 0H1"/><path d="L10 20"/>', "begin it with a move"),
                               ("<g>", "can't be read as SVG")):
             with self.assertRaises(BadDrawing) as caught:
                 self.read(inside)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -54,10 +55,21 @@ void emitText(YAML::Emitter& emitter, const std::string& text) {
   emitter << text;
 }
 
+/// yaml-cpp can't write a long key in a list between brackets.
+bool holdsOnlyScalars(const ConfigValue::List& list) {
+  return std::none_of(list.begin(), list.end(), [](const ConfigValue& item) {
+    return item.as<ConfigValue::Map>() != nullptr || item.as<ConfigValue::List>() != nullptr;
+  });
+}
+
+/// YAML allows a key 1024 characters if nothing marks it as a key. A byte becomes at most four.
+constexpr std::size_t kLongestPlainKey = 250;  // bytes
+
 void emit(YAML::Emitter& emitter, const ConfigValue& value) {
   if (const auto* map = value.as<ConfigValue::Map>()) {
     emitter << YAML::BeginMap;
     for (const auto& [key, below] : *map) {
+      if (key.size() > kLongestPlainKey) emitter << YAML::LongKey;
       emitter << YAML::Key;
       emitText(emitter, key);
       emitter << YAML::Value;
@@ -65,7 +77,7 @@ void emit(YAML::Emitter& emitter, const ConfigValue& value) {
     }
     emitter << YAML::EndMap;
   } else if (const auto* list = value.as<ConfigValue::List>()) {
-    emitter << YAML::Flow << YAML::BeginSeq;
+    emitter << (holdsOnlyScalars(*list) ? YAML::Flow : YAML::Block) << YAML::BeginSeq;
     for (const ConfigValue& item : *list) emit(emitter, item);
     emitter << YAML::EndSeq;
   } else if (const auto* text = value.as<std::string>()) {

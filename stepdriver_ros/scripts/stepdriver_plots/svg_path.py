@@ -100,6 +100,9 @@ def strokes_of(path, segments, svgelements):
             continue
         if isinstance(segment, svgelements.Move):
             strokes.append([place(segment.end)])
+        elif segment.start is None:
+            raise BadDrawing(f"{path}: a path begins with a line or a curve to "
+                             f"({segment.end.x:g}, {segment.end.y:g}); begin it with a move (M or m)")
         elif isinstance(segment, svgelements.Linear):
             strokes[-1].append(place(segment.end))
         else:

@@ -90,6 +90,22 @@ TEST(Yaml, WritesEveryTextSoThatItIsReadAsTheSame) {
   }
 }
 
+TEST(Yaml, WritesKeysOfAnyLengthSoThatTheyAreReadAsTheSame) {
+  for (const std::string part : {"a", "\x7f", "\xc2\x85", "\xc3\xbc", "\xf0\x9f\x98\x80", "\n"}) {
+    std::string key = " ";
+    while (key.size() < 1100) {
+      key += part;
+      const ConfigValue below(ConfigValue::Map{{key, ConfigValue(std::string("b"))}});
+      const ConfigValue::List list{ConfigValue(ConfigValue::List{below}), below};
+      const ConfigValue value(ConfigValue::Map{{key, below}, {"list", ConfigValue(list)}});
+      const std::string text = textOf(value);
+      const ConfigValue again = parse(text, "axis.yaml");
+      ASSERT_EQ(again.as<ConfigValue::Map>()->count(key), 1U) << key.size();
+      ASSERT_EQ(textOf(again), text);
+    }
+  }
+}
+
 TEST(Yaml, TellsBooleansAndNothing) {
   for (const char* text : {"true", "True", "yes", "on", "ON", "!!bool yes"}) {
     ASSERT_NE(valueOf(text).as<bool>(), nullptr) << text;
