@@ -17,10 +17,12 @@ namespace {
 
 using config::ConfigValue;
 
-/// Whether a plain scalar with this text is a string with this text: `on` and 017 aren't, and a
-/// carriage return at its end would belong to the line.
+/// Whether a plain scalar with this text is a string with this text: `on` and 017 aren't, a
+/// carriage return at its end would belong to the line, --- may begin a document, and the key <<
+/// merges maps.
 bool isPlain(const std::string& text) {
-  if (!isPrintable(text)) return false;
+  if (!isPrintable(text) || text == "<<") return false;
+  if (text.rfind("---", 0) == 0 || text.rfind("...", 0) == 0) return false;
   try {
     const ConfigValue value = resolveScalar(text);
     const std::string* const read = value.as<std::string>();

@@ -90,6 +90,29 @@ TEST(Yaml, WritesEveryTextSoThatItIsReadAsTheSame) {
   }
 }
 
+TEST(Yaml, WritesEveryTextOfThreeCharactersSoThatItIsReadAsTheSame) {
+  const std::string characters = "-.?:,#&*!|>'\"%@`{}[]~=<a0 \n\t\\";
+  std::vector<std::string> texts = {""};
+  for (std::size_t i = 0; texts[i].size() < 3; ++i) {
+    for (const char character : characters) texts.push_back(texts[i] + character);
+  }
+  for (const std::string& text : texts) {
+    const ConfigValue root = parse(textOf(text), "axis.yaml");
+    ASSERT_NE(root.as<std::string>(), nullptr) << text;
+    ASSERT_EQ(*root.as<std::string>(), text);
+    const ConfigValue map(ConfigValue::Map{{text, ConfigValue(ConfigValue::List{text, text})}});
+    const ConfigValue again = parse(textOf(map), "axis.yaml");
+    const auto& [key, value] = *again.as<ConfigValue::Map>()->begin();
+    ASSERT_EQ(key, text);
+    const auto* list = value.as<ConfigValue::List>();
+    ASSERT_TRUE(list != nullptr && list->size() == 2) << text;
+    for (const ConfigValue& item : *list) {
+      ASSERT_NE(item.as<std::string>(), nullptr) << text;
+      ASSERT_EQ(*item.as<std::string>(), text);
+    }
+  }
+}
+
 TEST(Yaml, WritesKeysOfAnyLengthSoThatTheyAreReadAsTheSame) {
   for (const std::string part : {"a", "\x7f", "\xc2\x85", "\xc3\xbc", "\xf0\x9f\x98\x80", "\n"}) {
     std::string key = " ";
