@@ -346,11 +346,9 @@ check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
 # ---- sanitizers: builds by the presets asan and tsan
 
-# build_sanitized SOURCE NAME PRESET TARGET...: builds only these targets of SOURCE in $build/NAME-PRESET.
-build_sanitized() {
-  cmake -S "$1" --preset "$3" -B "$build/$2-$3" &&
-    cmake --build "$build/$2-$3" -j "$jobs" --target "${@:4}"
-}
+# configure_sanitized PRESET: with the tests of the core in the same build, which compiles it once.
+configure_sanitized() { cmake -S "$src" --preset "$1" -B "$build/catkin-$1" -DSTEPDRIVER_TESTS=ON; }
+build_sanitized() { cmake --build "$build/catkin-$1" -j "$jobs" --target "${@:2}"; }
 
 # Exports the environment of the test preset of that name.
 use_test_preset() {
@@ -367,13 +365,14 @@ for key, value in next(p for p in presets if p["name"] == name)["environment"].i
 }
 
 build_core_asan() {
-  build_sanitized "$src/stepdriver_core" core asan machine_tests pulse_tests recorder_tests search_tests
+  configure_sanitized asan && build_sanitized asan machine_tests pulse_tests recorder_tests search_tests
 }
 build_core_tsan() {
-  build_sanitized "$src/stepdriver_core" core tsan gpio_tests machine_tests pulse_tests recorder_tests
+  configure_sanitized tsan && build_sanitized tsan gpio_tests machine_tests pulse_tests recorder_tests
 }
-build_node_asan() { build_sanitized "$src" catkin asan stepdriver_node; }
-build_node_tsan() { build_sanitized "$src" catkin tsan stepdriver_node; }
+# After those of the core.
+build_node_asan() { build_sanitized asan stepdriver_node; }
+build_node_tsan() { build_sanitized tsan stepdriver_node; }
 
 # sanitize_core PRESET: runs the tests of the programs that are built.
 sanitize_core() {
@@ -381,7 +380,7 @@ sanitize_core() {
   await "build_core_$preset"
   use_test_preset "$preset"
   # The number of schedules of each kind that the search samples.
-  STEPDRIVER_SCHEDULES=2000 ctest --test-dir "$build/core-$preset" -j "$jobs" --timeout 300 \
+  STEPDRIVER_SCHEDULES=2000 ctest --test-dir "$build/catkin-$preset/stepdriver_core" -j "$jobs" --timeout 300 \
     --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$slow_tests"
 }
 # Tests that take minutes with a sanitizer are excluded. The search has one thread, so ThreadSanitizer has
