@@ -45,8 +45,9 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   const motion::MotionState from = before.profile->stateAt(at);
   const motion::MotionLimits stopping = axis.stopLimits();
   const motion::DoubleDouble end = before.profile->endPosition();
-  // A motion that hasn't begun has nothing ahead of it.
-  const bool ends_ahead = (end - from.position).value() * from.velocity > 0.0;
+  // A motion that hasn't begun has nothing ahead of it, but one may be passing its end.
+  const double way = (end - from.position).value();
+  const bool ends_ahead = way * from.velocity > 0.0 || std::abs(way) < 0.5;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
   return motion::planStop(at, from, stopping, std::llround(end.value()));
 }

@@ -10,6 +10,10 @@
 namespace stepdriver::motion {
 namespace {
 
+// Passing a target by less than this makes no step beyond it: the next one comes at a half. The
+// rest is for rounding, see Stop.
+constexpr double kHarmless = 0.49;  // microsteps
+
 // How far a profile goes beyond its target, as seen from its beginning.
 double farthestBeyond(const Profile& profile, const MotionState& from, DoubleDouble target) {
   const double way = (target - from.position).hi;
@@ -66,7 +70,7 @@ Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t ta
   }
   Plan plan{motion.profile(start_ns)};
   const double farthest = farthestBeyond(plan.profile, from, end);
-  if (!stop.meets(0.5 * farthest)) plan.overshoot = farthest;
+  if (farthest > kHarmless) plan.overshoot = farthest;
   return plan;
 }
 
@@ -106,11 +110,14 @@ Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimit
   const MotionLimits slower = stopping(motion, limits);
   const std::int64_t rest = motion.nextRest(limits);
   const double heading = motion.heading(limits);
-  // A motion that still decelerates hard may turn before it rests, and then leaves what is ahead.
-  const bool ahead =
-      not_beyond && heading * (fromInteger(*not_beyond) - motion.position()).hi >= 0.0;
-  if (ahead && heading * static_cast<double>(rest - *not_beyond) > 0.0) {
-    return planMove(at_ns, state, *not_beyond, slower).profile;
+  if (not_beyond && heading * static_cast<double>(rest - *not_beyond) > 0.0) {
+    // A motion that still decelerates hard may turn before it rests, and then leaves what is ahead.
+    const DoubleDouble past = motion.position() - fromInteger(*not_beyond);
+    const bool ahead = heading * past.hi <= 0.0;
+    const DoubleDouble end = past + Stop(motion.v(), motion.a(), limits).length();
+    if (ahead || heading * end.hi < kHarmless) {
+      return planMove(at_ns, state, *not_beyond, slower).profile;
+    }
   }
   return fastestMove(at_ns, state, rest, slower).profile;
 }

@@ -32,14 +32,16 @@ namespace stepdriver::motion {
 struct Plan {
   Profile profile;
   /// How far the motion overshoots its target before it turns and comes back [microsteps]; 0 if it
-  /// doesn't. Above 0 only if no motion within the limits could turn or stop before the target.
+  /// makes no step beyond it. Above 0 only if no motion within the limits could turn or stop before
+  /// the target.
   double overshoot = 0.0;
 
   bool overshoots() const { return overshoot > 0.0; }
 };
 
-/// The fastest motion to rest on `target` that doesn't overshoot it; if there is none, the fastest
-/// motion of all.
+/// The fastest motion to rest on `target`, if it passes it by less than half a microstep: it makes
+/// no step beyond it. Otherwise the fastest one that doesn't pass the target at all; if there is
+/// none, the fastest of all.
 Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
               const MotionLimits& limits);
 
@@ -57,7 +59,7 @@ Plan planVelocity(std::int64_t start_ns, const MotionState& from, double velocit
 /// up only from a crawl, slower than the speed that the axis reaches within a microstep.
 ///
 /// @param not_beyond a position at which the motion would have come to rest anyway. It is ignored
-///   if the stop doesn't head for it.
+///   if the stop doesn't head for it, unless the motion is passing it without a step.
 Profile planStop(std::int64_t at_ns, const MotionState& state, const MotionLimits& limits,
                  std::optional<std::int64_t> not_beyond = std::nullopt);
 

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
 #include <functional>
 #include <future>
 #include <memory>
@@ -109,6 +111,33 @@ TEST_F(Hold, AndStopEndAMoveThatIsAboutToTurn) {
       EXPECT_EQ(violationsOf(one.report("x")), "");
     }
   }
+}
+
+// The shortest stop from 60 mm/s, at 300 mm/s^2, ends less than half a microstep beyond the target.
+TEST_F(Hold, AndStopOfAnAxisThatPassesItsTargetMakeNoStepBeyondIt) {
+  int passes = 0;
+  for (const bool hold : {true, false}) {
+    for (int after = 0; after < 20; ++after) {
+      SCOPED_TRACE(after);
+      Bench one({linearAxis("x", 20'000.0, 0.06, 0.3)});
+      axis::Axis& x = one.axis("x");
+      x.setPosition(0.0);
+      x.jog(0.06);
+      one.machine->advance(0.50015 + 0.00001 * after);
+      const std::int64_t target =
+          std::llround(20'000.0 * (x.state().planned + 0.06 * 0.001 + 0.006) - 0.3);
+      const axis::Move move = x.moveTo(static_cast<double>(target) / 20'000.0);
+      EXPECT_EQ(move.overshoot, 0.0);
+      one.machine->advance(0.19 + 0.001 * after);
+      passes += x.state().planned > move.target ? 1 : 0;
+      hold ? one.machine->hold() : x.stop();
+      one.machine->advance(0.3);
+      EXPECT_FALSE(x.state().moving);
+      EXPECT_LE(one.pulses("x"), target);
+      EXPECT_EQ(violationsOf(one.report("x")), "");
+    }
+  }
+  EXPECT_GT(passes, 10);
 }
 
 TEST_F(Hold, OutlastsWhatDropsTheGoalThatItKeeps) {

@@ -23,7 +23,10 @@ TEST(PlannerProperties, EveryMoveFromAnyStateKeepsTheLimitsAndEndsOnItsTarget) {
     check.expectWithinLimits();
     check.expectRestOn(target);
     check.expectOvershoot(target, plan.overshoot);
-    if (check.way() < 1000.0) check.expectSteps(target);
+    if (check.way() < 1000.0) {
+      check.expectSteps(target);
+      if (!plan.overshoots()) check.expectNoStepBeyond(target);
+    }
     if (HasFailure()) return;
   }
 }
@@ -33,6 +36,7 @@ TEST(PlannerProperties, HoldForTargetsAboutTheStoppingDistance) {
   Random random(7);
   int overshoots = 0;
   int turns = 0;
+  int passes = 0;
   for (int i = 0; i < 20000; ++i) {
     MotionLimits limits = anyLimits(random);
     limits.start_speed = 0.0;
@@ -54,9 +58,31 @@ TEST(PlannerProperties, HoldForTargetsAboutTheStoppingDistance) {
     const auto& pieces = plan.profile.pieces();
     const auto turned = [](const Piece& p) { return std::abs(p.p0.hi) < 1e-9; };
     turns += std::any_of(pieces.begin(), pieces.end(), turned) ? 1 : 0;
+    if (plan.overshoots() || check.way() > 10'000.0) continue;
+    check.expectNoStepBeyond(0);
+    // A stop or another plan at any time while it passes the target makes no step beyond it either.
+    for (const Piece& piece : pieces) {
+      const double turn = piece.firstTurn(0.0);
+      if (!(turn < piece.duration.hi && piece.positionAt(turn).hi > 1e-3)) continue;
+      ++passes;
+      for (const double part : {0.5, 0.9, 0.99, 1.0}) {
+        const MotionState passing{piece.positionAt(part * turn),
+                                  piece.velocityAt(part * turn).value(),
+                                  piece.accelerationAt(part * turn).value()};
+        if (!(passing.position.hi > 0.0)) continue;
+        for (const Profile& next :
+             {planStop(0, passing, limits, 0), planMove(0, passing, 0, limits).profile}) {
+          StepFinder finder(next, 0);
+          Step step;
+          while (finder.next(step)) ASSERT_LE(finder.count(), 0) << part;
+          EXPECT_EQ(finder.count(), 0);
+        }
+      }
+    }
   }
   EXPECT_GT(overshoots, 1000);
   EXPECT_GT(turns, 300);
+  EXPECT_GT(passes, 100);
 }
 
 // Limits and states of all orders of magnitude, independently of each other.

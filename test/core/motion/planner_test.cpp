@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 
 #include "motion/step_finder.h"
@@ -23,6 +25,23 @@ void expectSound(const Profile& profile, const MotionState& from, const MotionLi
   check.expectWithinLimits();
   check.expectRestOn(target);
   check.expectSteps(target);
+}
+
+double highest(const Profile& profile) {
+  double highest = profile.endPosition().value();
+  for (const Piece& piece : profile.pieces()) {
+    for (const double t : {0.0, piece.firstTurn(0.0)}) {
+      highest = std::max(highest, piece.positionAt(t).value());
+    }
+  }
+  return highest;
+}
+
+std::int64_t highestStep(const Profile& profile, std::int64_t count) {
+  std::int64_t highest = count;
+  StepFinder finder(profile, count);
+  for (Step step; finder.next(step);) highest = std::max(highest, finder.count());
+  return highest;
 }
 
 // ---- new targets during a motion ----
@@ -76,10 +95,23 @@ TEST(PlanMove, TurnsShortOfATargetThatItCouldOnlyRestBeyond) {
   EXPECT_DOUBLE_EQ(stop.endPosition().value(), 251.0);
   const Plan turned = planMove(0, braking, 250, limits);
   EXPECT_FALSE(turned.overshoots());
+  EXPECT_NEAR(highest(turned.profile), 250.0, 1e-9);
   expectSound(turned.profile, braking, limits, 250);
   const Plan passed = planMove(0, braking, 249, limits);
   EXPECT_TRUE(passed.overshoots());
   expectSound(passed.profile, braking, limits, 249);
+}
+
+TEST(PlanMove, PassesATargetByLessThanHalfAMicrostepIfThatIsFaster) {
+  // It could also turn on the target; that takes 0.752 s.
+  const MotionLimits limits{0, 1000, 2000, 2000, 20000};
+  const MotionState braking = at(0.8, 1000, -2000);
+  const Plan plan = planMove(0, braking, 251, limits);
+  expectSound(plan.profile, braking, limits, 251);
+  EXPECT_LT(seconds(plan.profile), 0.6);
+  EXPECT_NEAR(highest(plan.profile), 251.351, 0.001);
+  EXPECT_FALSE(plan.overshoots());
+  EXPECT_EQ(highestStep(plan.profile, 1), 251);
 }
 
 TEST(PlanMove, ALowerSpeedLimitIsComeDownToAtTheDeceleration) {
@@ -190,6 +222,25 @@ TEST(PlanStop, DoesNotPassWhereTheMotionWouldHaveEnded) {
       EXPECT_LE(stop.endNs(), move.endNs() + 1);
       expectSound(stop, state, limits, split(stop.endPosition()).whole);
     }
+  }
+}
+
+TEST(PlanStop, OfAMotionThatPassesItsTargetWithoutAStepEndsOnTheTarget) {
+  for (const double jerk : {0.0, 20000.0}) {
+    const MotionLimits limits{0, 1000, 2000, 2000, jerk};
+    const std::int64_t target = jerk > 0.0 ? 300 : 250;
+    const Profile move = planMove(0, at(0.3, 1000), target, limits).profile;
+    int passing = 0;
+    for (std::int64_t time = 1; time < move.endNs(); time += 100'003) {
+      SCOPED_TRACE(time);
+      const MotionState state = move.stateAt(time);
+      if (state.position.hi < static_cast<double>(target)) continue;
+      ++passing;
+      const Profile stop = planStop(time, state, limits, target);
+      EXPECT_EQ(highestStep(stop, target), target);
+      expectSound(stop, state, limits, target);
+    }
+    EXPECT_GT(passing, 100);
   }
 }
 

@@ -54,7 +54,8 @@ class ProfileCheck {
     }
   }
 
-  /// It overshoots the target by the stated distance. Call after expectWithinLimits().
+  /// It makes no step beyond the target, or overshoots it by the stated distance. Call after
+  /// expectWithinLimits().
   void expectOvershoot(std::int64_t target, double overshoot) const {
     const double way = (fromInteger(target) - from_.position).hi;
     double farthest = 0.0;
@@ -68,7 +69,19 @@ class ProfileCheck {
         }
       }
     }
-    EXPECT_NEAR(farthest, overshoot, 2.0 * positionDoubt());
+    // Less than half a microstep makes no step.
+    EXPECT_NEAR(farthest, overshoot, overshoot > 0.0 ? 2.0 * positionDoubt() : 0.495);
+  }
+
+  /// It makes no step beyond the target, as seen from its beginning.
+  void expectNoStepBeyond(std::int64_t target) const {
+    const bool upwards = from_.position < fromInteger(target);
+    StepFinder finder(profile_, split(from_.position).whole);
+    Step step;
+    while (finder.next(step)) {
+      const std::int64_t beyond = upwards ? finder.count() - target : target - finder.count();
+      ASSERT_LE(beyond, 0) << "at " << step.time_ns << " ns";
+    }
   }
 
   /// The steps lead from one count to the other, and none is closer than the peak speed allows.
