@@ -4,20 +4,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <ctime>
 #include <system_error>
 #include <utility>
 
+#include "steady_now.h"
+
 namespace stepdriver::gpio {
-namespace {
-
-std::int64_t steadyNow() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
-}  // namespace
 
 // Shared by the threads; it outlives a thread that hangs in a write.
 struct LineWriters::Shared {

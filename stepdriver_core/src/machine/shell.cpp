@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "pulse/realtime.h"
+#include "steady_now.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -34,10 +35,6 @@ bool asksForLevels(const Request& request) {
          std::holds_alternative<MoveLine>(request) || std::holds_alternative<Resume>(request) ||
          std::holds_alternative<Home>(request) || std::holds_alternative<SetMicrosteps>(request) ||
          std::holds_alternative<Recover>(request);
-}
-
-std::int64_t steadyNow() {
-  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 std::chrono::steady_clock::time_point steadyTime(std::int64_t time_ns) {

@@ -10,18 +10,20 @@
 #include <ctime>
 
 #include "pulse/hybrid_wait.h"
+#include "steady_now.h"
 
 namespace stepdriver::pulse {
 namespace {
 
-Nanoseconds steadyNow() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return static_cast<Nanoseconds>(time.tv_sec) * 1'000'000'000 + time.tv_nsec;
-}
-
 // How often a thread that waits for a paced clock looks at the time.
 constexpr Nanoseconds kLook = VirtualClock::kStall / 10;
+
+// The call that takes the C library's timespec. A computer of 32 bits has two.
+#ifdef SYS_futex_time64
+constexpr long kFutex = sizeof(timespec) == 2 * sizeof(long) ? SYS_futex : SYS_futex_time64;
+#else
+constexpr long kFutex = SYS_futex;
+#endif
 
 // Sleeps until the time of CLOCK_MONOTONIC or until the word changes from this value, or for a
 // shorter time.
@@ -29,7 +31,7 @@ void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32
   timespec deadline{};
   deadline.tv_sec = static_cast<time_t>(time / 1'000'000'000);
   deadline.tv_nsec = static_cast<decltype(deadline.tv_nsec)>(time % 1'000'000'000);
-  syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&word), FUTEX_WAIT_BITSET_PRIVATE, value,
+  syscall(kFutex, reinterpret_cast<std::uint32_t*>(&word), FUTEX_WAIT_BITSET_PRIVATE, value,
           time == kNever ? nullptr : &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
 }
 
@@ -67,7 +69,7 @@ void SteadyClock::wait(Nanoseconds time, bool may_spin) {
 
 void SteadyClock::wake() {
   wakes_.fetch_add(1, std::memory_order_release);
-  syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&wakes_), FUTEX_WAKE_PRIVATE, 1, nullptr,
+  syscall(kFutex, reinterpret_cast<std::uint32_t*>(&wakes_), FUTEX_WAKE_PRIVATE, 1, nullptr,
           nullptr, 0);
 }
 

@@ -27,8 +27,8 @@ std::size_t LatenessHistogram::bucketOf(Nanoseconds time) {
 Nanoseconds LatenessHistogram::longestIn(std::size_t bucket) {
   if (bucket < 2U << kBitsOfBucket) return static_cast<Nanoseconds>(bucket);
   const std::size_t shift = (bucket >> kBitsOfBucket) - 1;
-  const std::size_t mantissa = bucket - (shift << kBitsOfBucket);
-  return static_cast<Nanoseconds>(((mantissa + 1) << shift) - 1);
+  const auto mantissa = static_cast<Nanoseconds>(bucket - (shift << kBitsOfBucket));
+  return ((mantissa + 1) << shift) - 1;
 }
 
 void LatenessHistogram::add(Nanoseconds time) {

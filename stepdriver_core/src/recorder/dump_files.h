@@ -10,7 +10,7 @@ namespace stepdriver::recorder {
 /// Writes a recording to two new files, and removes the oldest ones before.
 ///
 /// @return without an error.
-/// @throw Error if a file can't be written; then none of the two exists.
+/// @throw Error if a file can't be written; then neither of them exists.
 Dump writeFiles(const machine::Recording& recording, const std::string& reason,
                 const DumperOptions& options);
 

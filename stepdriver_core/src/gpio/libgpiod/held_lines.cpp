@@ -11,16 +11,12 @@
 #include <system_error>
 #include <utility>
 
+#include "steady_now.h"
+
 namespace stepdriver::gpio::gpiod {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-
-std::int64_t monotonicNow() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * kSecond + now.tv_nsec;
-}
 
 template <typename Items>
 bool has(const Items& items, int index) {
@@ -138,7 +134,7 @@ int HeldLines::takeEdges(const EdgeSource& source, EdgeEvent* events,
   const int count = group.request->takeEdges(source.fd, events, capacity);
   if (count <= 0) return count;
   // Kernels before 5.7 stamp with CLOCK_REALTIME, which is far in the future here.
-  const std::int64_t now = monotonicNow();
+  const std::int64_t now = steadyNow();
   for (int i = 0; i < count; ++i) {
     events[i].input = group.inputs[static_cast<std::size_t>(events[i].input)];
     events[i].time_ns = std::min(events[i].time_ns, now);
