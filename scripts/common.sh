@@ -204,16 +204,19 @@ install_catkin() { cmake --install "$build/catkin"; }
 
 # ---- ROS ----
 
-# Sets the environment of a devel or install space, and a free port for a master of our own. Other
-# roscores on this machine aren't affected.
+# Sets the environment of a devel or install space, and a free port for a master of our own.
 use_ros() {
   local setup=$1/setup.bash
-  getent hosts localhost >/dev/null || die "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
   [[ -f $setup ]] || die "$setup isn't there: the build of the ROS package failed"
   set +u
   # shellcheck disable=SC1090
   source "$setup"
   set -u
+  choose_master
+}
+# Other roscores on this machine aren't affected.
+choose_master() {
+  getent hosts localhost >/dev/null || die "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
   ros_port=$(/usr/bin/python3 -c '
 import socket
 s = socket.socket()

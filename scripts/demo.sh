@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/demo.sh [--installed]
+usage: scripts/demo.sh [--installed | --packaged]
 
 Installs missing packages, builds the package into build/install, launches one axis on the simulated
 rig, enables it, moves it 1000 steps forward and back with rosservice call, and shows the commands, the
@@ -14,13 +14,14 @@ activity of the pins and the position of the axis. Writes the pin trace to a fil
 these agree.
 
   --installed  builds nothing: uses build/install as it is
+  --packaged   builds and installs nothing: uses the Debian package ros-stepdriver
 END
 }
 
 installed=
 case ${1:-} in
   '') ;;
-  --installed) installed=1 ;;
+  --installed | --packaged) installed=${1#--} ;;
   -h | --help) usage && exit ;;
   *) usage >&2 && exit 2 ;;
 esac
@@ -77,7 +78,7 @@ move() {
 }
 
 choose_build_folder
-install_packages core ros trace
+[[ $installed == packaged ]] || install_packages core ros trace
 if [[ -z $installed ]]; then
   rm -rf "$ROS_HOME/log"
   say "Building: the first time this takes about ten minutes of processor time" \
@@ -85,7 +86,7 @@ if [[ -z $installed ]]; then
   quietly build build_catkin
   quietly install install_catkin
 fi
-use_ros "$build/install"
+if [[ $installed == packaged ]]; then choose_master; else use_ros "$build/install"; fi
 
 trace=$build/demo/axis.vcd
 log=$build/demo/roslaunch.log
@@ -143,4 +144,7 @@ else
 fi
 
 ((problems == 0)) || die "$problems thing(s) above went wrong"
-say "" "All of these agree. To continue by hand, first run in each terminal:" "    source $build/install/setup.bash"
+say "" "All of these agree."
+if [[ $installed != packaged ]]; then
+  say "To continue by hand, first run in each terminal:" "    source $build/install/setup.bash"
+fi

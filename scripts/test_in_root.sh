@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--demo] [--keep]
+usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--demo | --packages] [--keep]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
 copies the checkout into it, and runs scripts/demo.sh, scripts/test.sh and the demo again there as root,
@@ -20,23 +20,25 @@ the next time; the working copy is removed at the end.
   --blank  uses a folder whose path contains a blank: catkin can't build there, so the build goes
            elsewhere
   --demo   only runs scripts/demo.sh, once: a newcomer's first command
+  --packages  only runs scripts/package.sh --twice --try: makes the Debian packages and tries them
   --keep   keeps the working copy, and prints its path
 END
 }
 
-suite='' keep='' demo='' checkout=/home/user/stepdriver
+suite='' keep='' only='' checkout=/home/user/stepdriver
 for argument; do
   case $argument in
     bookworm | trixie | focal) suite=$argument ;;
     --blank) checkout="/home/new user/step driver" ;;
-    --demo) demo=1 ;;
+    --demo) only=demo.sh ;;
+    --packages) only='package.sh --twice --try' ;;
     --keep) keep=1 ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
 done
 [[ -n $suite ]] || { usage >&2 && exit 2; }
-[[ -z $demo || $suite != focal ]] || die "--demo: on Ubuntu only scripts/test.sh --core can be tried"
+[[ -z $only || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core can be tried"
 (($(id -u) == 0)) || die "needs root, for debootstrap and chroot: sudo $0 $suite"
 command -v debootstrap >/dev/null || die "needs debootstrap: apt-get install debootstrap"
 
@@ -61,7 +63,7 @@ mkdir -p "$roots"
 roots=$(cd "$roots" && pwd -P)
 base=$roots/$suite
 commands=(demo.sh test.sh demo.sh)
-[[ -z $demo ]] || commands=(demo.sh)
+[[ -z $only ]] || commands=("$only")
 if [[ $suite == focal ]]; then
   components=main,universe
   mirror=$(mirror_of Ubuntu http://archive.ubuntu.com/ubuntu)

@@ -1,0 +1,127 @@
+#!/usr/bin/env bash
+# Makes the Debian packages of this checkout, and tries them.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+
+usage() {
+  cat <<'END'
+usage: scripts/package.sh [--twice] [--try]
+
+Installs what the build needs, makes the Debian packages of this checkout, shows lintian's findings, and
+leaves the packages in the folder packages of the build folder:
+
+  ros-stepdriver         the node, its launch files and configurations, and the other programs
+  stepdriver-service     the services for systemd, with their user, device rule and limits
+  python3-stepdriver     the messages for Python
+  libstepdriver-dev      the messages for C++, and what catkin needs
+  libstepdriver-core-dev the library without ROS
+
+  --twice  builds them twice, in different folders: they must be equal
+  --try    also installs them, runs the tests of debian/tests, and installs a newer version; then removes
+           and purges them: nothing may be left. It changes this system, so use it in one that you can
+           throw away: scripts/test_in_root.sh bookworm --packages
+
+Exit code 0: all went well, and lintian had no error and no warning.
+END
+}
+
+twice='' try=''
+for argument; do
+  case $argument in
+    --twice) twice=1 ;;
+    --try) try=1 ;;
+    -h | --help) usage && exit ;;
+    *) usage >&2 && exit 2 ;;
+  esac
+done
+[[ -z $try ]] || (($(id -u) == 0)) || die "--try needs root"
+
+choose_build_folder
+install_packages core ros package
+packages=$build/packages
+
+# make_packages FOLDER: from a copy, because dpkg-buildpackage writes next to the sources.
+make_packages() {
+  local copy=$1/stepdriver
+  rm -rf "$1"
+  mkdir -p "$copy"
+  tar -C "$root" --exclude=./build --exclude=./.git -c . | tar -C "$copy" --no-same-owner -x
+  (cd "$copy" && dpkg-buildpackage --no-sign --build=binary --jobs="$jobs")
+}
+# A .deb has no path of the machine that made it, and no time but that of debian/changelog.
+sums() { (cd "$1" && sha256sum -- *.deb); }
+
+say "Building the packages (tail -f $build/log/package.log)"
+quietly package make_packages "$packages"
+if [[ -n $twice ]]; then
+  say "Building them again, in another folder"
+  quietly package-again make_packages "$build/packages-again/longer"
+  diff <(sums "$packages") <(sums "$build/packages-again/longer") ||
+    die "two builds aren't equal: $packages, $build/packages-again/longer"
+  say "Both builds are equal:"
+  rm -rf "$build/packages-again"
+fi
+rm -rf "$packages/stepdriver"
+sums "$packages" | indent
+say "lintian:"
+lintian --allow-root --display-info --fail-on error,warning "$packages"/*.changes | indent
+[[ -n $try ]] || exit 0
+
+# ---- trying them ----
+
+apt() { DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=600 "$@"; }
+mapfile -t own < <(cd "$packages" && printf '%s\n' *.deb | sed 's/_.*//')
+
+# What a package can leave behind: files, users and groups. Others may use the groups gpio and realtime.
+contents() {
+  find / -xdev \( -path /proc -o -path /sys -o -path /dev -o -path /tmp -o -path /run -o -path /root \
+    -o -path /var/cache -o -path /var/log/apt -o -path /var/lib/apt -o -path /var/lib/dpkg \
+    -o -path "$root" -o -path "$build" \) -prune -o ! -name __pycache__ ! -name '*.pyc' -print |
+    grep -vxF -e /var/log/dpkg.log -e /var/log/alternatives.log | sort
+  cut -d: -f1 /etc/passwd /etc/group | grep -vxE 'gpio|realtime'
+}
+
+try_packages() {
+  local file name copy needs
+  say "Installing what they depend on"
+  mapfile -t needs < <(apt --simulate --no-install-recommends install "$packages"/*.deb |
+    sed -n 's/^Inst \([^ ]*\) .*/\1/p' | grep -vxF -f <(printf '%s\n' "${own[@]}"))
+  apt --no-install-recommends install "${needs[@]}" python3-rosservice python3-rostopic \
+    ros-robot-state-publisher sigrok-cli >"$build/log/package-needs.log" 2>&1
+  contents >"$build/packages/before"
+
+  say "Installing them"
+  apt --no-install-recommends install "$packages"/*.deb >"$build/log/package-install.log" 2>&1
+  (cd "$root" && bash scripts/demo.sh --packaged | tail -n 4 && bash debian/tests/library | tail -n 1)
+  for name in gpio realtime; do
+    getent group "$name" | grep -qw stepdriver || die "stepdriver isn't in the group $name"
+  done
+  if command -v systemd-analyze >/dev/null; then
+    systemd-analyze verify /lib/systemd/system/stepdriver.service
+  fi
+  ! find /etc/systemd/system -name 'stepdriver*' | grep . || die "a service was enabled"
+
+  say "Installing a newer version"
+  for file in "$packages"/*.deb; do
+    copy=$build/packages/newer/$(basename "$file" .deb)
+    mkdir -p "$copy"
+    dpkg-deb --raw-extract "$file" "$copy"
+    sed -i -e 's/^Version: .*/&+newer/' -e 's/\(stepdriver[a-z-]* (= [0-9.]*\))/\1+newer)/g' "$copy/DEBIAN/control"
+    dpkg-deb --root-owner-group --build "$copy" "$copy.deb"
+  done >"$build/log/package-newer.log"
+  mkdir -p /etc/stepdriver /var/lib/stepdriver
+  printf '# mine\n' >/etc/stepdriver/axes.yaml
+  dpkg --install "$build"/packages/newer/*.deb >>"$build/log/package-newer.log" 2>&1
+  [[ -f /etc/stepdriver/axes.yaml ]] || die "the upgrade lost /etc/stepdriver/axes.yaml"
+  rm /etc/stepdriver/axes.yaml
+
+  say "Removing and purging them"
+  dpkg --remove "${own[@]}" >"$build/log/package-remove.log" 2>&1
+  dpkg --purge "${own[@]}" >>"$build/log/package-remove.log" 2>&1
+  contents >"$build/packages/after"
+  diff "$build/packages/before" "$build/packages/after" || die "the packages left something behind"
+  say "Nothing is left of them but the groups gpio and realtime."
+}
+run try_packages
+((run_status == 0)) || die "trying the packages failed: see the files package-*.log in $build/log"
