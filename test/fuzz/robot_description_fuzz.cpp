@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "common/robot_description.h"
 #include "fuzz/fuzz_input.h"
-#include "node/parameters/robot_description.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
 

@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "common/description_parameter.h"
 #include "common/node_start.h"
+#include "common/robot_description.h"
 #include "common/xmlrpc_value.h"
-#include "robot_description.h"
 #include "stepdriver_core/config/config_reader.h"
 #include "stepdriver_core/error.h"
 
@@ -19,25 +20,6 @@ namespace {
 constexpr const char* kActionStatusFrequency = "actionlib_status_frequency";
 constexpr config::Range kActionStatusFrequencies{0.0, 1000.0};
 constexpr double kLowestActionStatusFrequency = 0.01;
-
-void applyDescriptionParameter(Parameters& parameters, std::vector<ConfigIssue>& issues) {
-  std::string name;
-  XmlRpc::XmlRpcValue value;
-  if (!ros::param::search(ros::this_node::getNamespace(), "robot_description", name) ||
-      !ros::param::get(name, value)) {
-    parameters.notes.emplace_back(
-        "There is no robot_description: the limits are those of the axes' configuration");
-    return;
-  }
-  const config::ConfigValue description = configValue(value);
-  const auto* urdf = description.as<std::string>();
-  if (urdf == nullptr) {
-    issues.push_back(
-        {name, fmt::format("is {}, but must be the XML of a URDF", description.shown())});
-    return;
-  }
-  parameters.warnings = applyRobotDescription(*urdf, name, parameters.config.axes, issues);
-}
 
 void readActionStatusFrequency(Parameters& parameters, std::vector<ConfigIssue>& issues) {
   std::string name;
@@ -73,7 +55,16 @@ Parameters readParameters() {
   readActionStatusFrequency(parameters, issues);
   // Values that depend on the axes can be checked only if the axes are right.
   if (!issues.empty()) throw ConfigError(issues);
-  if (config.urdf_limits) applyDescriptionParameter(parameters, issues);
+  if (config.urdf_limits) {
+    const auto warnings =
+        applyDescriptionParameter(ros::this_node::getNamespace(), config.axes, issues);
+    if (warnings) {
+      parameters.warnings = *warnings;
+    } else {
+      parameters.notes.emplace_back(
+          "There is no robot_description: the limits are those of the axes' configuration");
+    }
+  }
   if (issues.empty() && config.backend == setup::GpioBackend::kSimulated) {
     setup::checkSimulation(config.axes, config.simulation, name + "/simulation", issues);
   }
