@@ -160,7 +160,7 @@ tidy_all() {
   local together=("--config-file=$src/.clang-tidy" --checks=-bugprone-suspicious-include)
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel|test/bad_days/soak)/' |
     compiled_alone_by core | tidy core || status=1
-  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/docs)/|^test/bad_days/[^/]*$' |
+  own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/base|test/docs)/|^test/bad_days/[^/]*$' |
     compiled_alone_by catkin | tidy catkin || status=1
   compiled_together_by core | tidy core "${together[@]}" || status=1
   compiled_together_by catkin | grep -vF /catkin/stepdriver_core/ | tidy catkin "${together[@]}" || status=1
@@ -307,6 +307,8 @@ check_install() {
     die "stepdriver_node --help doesn't work"
   rosrun stepdriver stepdriver_joystick --help >"$build/log/joystick-help.log" ||
     die "stepdriver_joystick --help doesn't work"
+  rosrun stepdriver stepdriver_base --help >"$build/log/base-help.log" ||
+    die "stepdriver_base --help doesn't work"
   for program in console draw plot_motion; do
     rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
       die "$program --help doesn't work"

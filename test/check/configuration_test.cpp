@@ -42,7 +42,8 @@ TEST_F(Configuration, ReadsEveryFileThatIsShipped) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(STEPDRIVER_CONFIGS)) {
     if (entry.path().extension() != ".yaml") continue;
-    if (entry.path().filename() == "joystick.yaml") continue;  // for another node
+    const std::string name = entry.path().filename();
+    if (name == "joystick.yaml" || name == "base.yaml") continue;  // for other nodes
     SCOPED_TRACE(entry.path());
     const auto config = readConfiguration(entry.path().string(), BackendChoice::kAsInTheFile);
     EXPECT_FALSE(config.axes.empty());

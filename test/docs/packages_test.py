@@ -31,8 +31,8 @@ SYSTEM_KEYS = {
 # Packages of noetic/distribution.yaml: their names are keys.
 ROS_KEYS = set(
     "actionlib actionlib_msgs catkin diagnostic_msgs diagnostic_updater geometry_msgs message_generation "
-    "message_runtime robot_state_publisher rosbag roscpp rosgraph rosgraph_msgs roslaunch rosparam rospy "
-    "rostest rviz sensor_msgs std_msgs std_srvs trajectory_msgs visualization_msgs".split()
+    "message_runtime nav_msgs robot_state_publisher rosbag roscpp rosgraph rosgraph_msgs roslaunch rosparam rospy "
+    "rostest rviz sensor_msgs std_msgs std_srvs tf2_msgs tf2_ros trajectory_msgs visualization_msgs".split()
 )
 # Needed by an installed program, but rosdep has no key for them: docs/first_programs.md names them.
 WITHOUT_KEY = {"python3-svgelements"}

@@ -175,13 +175,15 @@ TEST(ListeningOfLaunchFiles, IsOnTheLoopbackUnlessTheArgumentSaysOtherwise) {
     for (const auto& entry :
          std::filesystem::directory_iterator(std::string(STEPDRIVER_SOURCES) + folder)) {
       if (entry.path().extension() != ".launch") continue;
-      const bool joystick = entry.path().stem() == "joystick";
-      expectListenArgument(entry.path(), joystick ? "/joystick" : "/stepdriver");
+      const std::string name = entry.path().stem();
+      const bool other = name == "joystick" || name == "base";
+      expectListenArgument(entry.path(), other ? "/" + name : "/stepdriver");
       ++files;
     }
   }
-  EXPECT_EQ(files, 9);
+  EXPECT_EQ(files, 11);
   expectListenArgument(STEPDRIVER_SOURCES "/launch/examples/esp32_two_sticks.launch", "/joystick");
+  expectListenArgument(STEPDRIVER_SOURCES "/launch/examples/stm32_car.launch", "/base");
 }
 
 TEST(ListeningOfLaunchFiles, IsWhatTheEnvironmentSays) {

@@ -28,6 +28,7 @@ const char* fromEnvironment(const char* name, const char* otherwise) {
 
 const char* const kStepdriverNode = fromEnvironment("STEPDRIVER_NODE", STEPDRIVER_NODE);
 const char* const kStepdriverJoystick = STEPDRIVER_JOYSTICK;
+const char* const kStepdriverBase = STEPDRIVER_BASE;
 
 NodeProcess::NodeProcess(const std::vector<std::string>& arguments, const std::string& program) {
   std::vector<std::string> words{program};

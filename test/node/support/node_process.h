@@ -16,6 +16,7 @@ namespace stepdriver::node_test {
 // names another build of the node, for example one with a sanitizer.
 extern const char* const kStepdriverNode;
 extern const char* const kStepdriverJoystick;
+extern const char* const kStepdriverBase;
 
 /// A running node, and everything that it prints. If it is still running at the end, it is killed.
 class NodeProcess {
