@@ -33,7 +33,7 @@ double ramped(double part) {
   return 0.25 + (t - 1.0 / 3.0) * 1.5;
 }
 
-/// A base that drives legs: what its counts say and where it truly is.
+/// A base that drives legs: the pose from its counts, and the exact one.
 class DrivenLegs {
  public:
   void drive(const Leg& leg) {

@@ -83,6 +83,15 @@ class Dump {
         axis.stick.max_speed, axis.stick.dead_band, axis.stick.exponent, axis.stick.inverted,
         axis.disable_in_dead_band, axis.disable_after);
   }
+  void add(const base::Variances& variances) {
+    for (const double variance : variances) add(variance);
+  }
+  void add(const base::WheelConfig& wheel) {
+    all(wheel.axis, static_cast<int>(wheel.side), wheel.diameter);
+  }
+  void add(const base::SteeringConfig& steering) {
+    all(steering.axis, steering.wheelbase, steering.max_angle);
+  }
   template <typename... Values>
   void all(const Values&... values) {
     (add(values), ...);
@@ -115,6 +124,15 @@ std::string dump(const joystick::JoystickConfig& config) {
   Dump dump;
   dump.all(config.driver, config.rate, config.joy_timeout, config.deadman_button);
   for (const auto& axis : config.axes) dump.add(axis);
+  return dump.text();
+}
+
+std::string dump(const base::BaseConfig& config) {
+  Dump dump;
+  dump.all(config.driver, config.rate, config.cmd_vel_timeout, config.driver_timeout,
+           config.odom_frame, config.base_frame, config.publish_tf, config.pose_variances,
+           config.twist_variances, config.separation, config.steering);
+  for (const auto& wheel : config.wheels) dump.add(wheel);
   return dump.text();
 }
 

@@ -39,6 +39,13 @@ Reading readNode(const ConfigValue& tree) {
   reading.config = dump(ros_node::readNodeConfig(tree, "", reading.issues));
   return reading;
 }
+
+Reading readBase(const ConfigValue& tree) {
+  Reading reading;
+  reading.config = dump(base::readBaseConfig(tree, "", reading.issues));
+  return reading;
+}
+
 Reading readJoystick(const ConfigValue& tree) {
   Reading reading;
   reading.config = dump(joystick::readJoystickConfig(tree, "", reading.issues));
@@ -89,6 +96,15 @@ axes:
   x:)" + kAxisMap;
   if (rotary) text = replaced(replaced(text, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
   return {rotary ? "rotary" : "linear", rotary, readNode, yaml::parse(text, "base")};
+}
+
+Node baseNode() {
+  return {"base", false, readBase,
+          yaml::parse(R"(
+separation_mm: 300.0
+wheels: {x: {side: left}, y: {side: right}}
+steering: {axis: z, wheelbase_mm: 400.0})",
+                      "base")};
 }
 
 Node joystickNode() {
@@ -170,6 +186,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   if (std::string(node.name) == "joystick") {
     return parametersUnder("The joystick's node", "");
   }
+  if (std::string(node.name) == "base") return parametersUnder("The base's node", "");
   if (std::string(node.name) == "gantry") return parametersUnder("Several motors", "axes/x/");
   std::vector<Parameter> all = parametersUnder("The node", "");
   for (const auto& [heading, prefix] :
@@ -217,7 +234,7 @@ std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>
       map += (map.empty() ? "" : "/") + key;
     }
   }
-  for (const char* names_of_axes : {"axes", "simulation/axes"}) maps.erase(names_of_axes);
+  for (const char* names_of_axes : {"axes", "simulation/axes", "wheels"}) maps.erase(names_of_axes);
   return maps;
 }
 
@@ -225,6 +242,7 @@ std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>
 std::string wantedWords(const Parameter& parameter) {
   if (parameter.type == "line") return "a line";
   if (parameter.type == "boolean") return "true or false";
+  if (parameter.type == "list") return "a list of " + parameter.range;
   std::string range = replaced(parameter.range, "`", "");
   const bool is_choice = range != parameter.range || parameter.range.find(',') != std::string::npos;
   if (is_choice) range.replace(range.rfind(", "), 2, " or ");
@@ -239,9 +257,9 @@ std::string wantedWords(const Parameter& parameter) {
 /// Whether the bases have the key: they have a map of each kind, and their axes are scaled in the
 /// first of the ways.
 bool isRequired(const Parameter& parameter) {
-  static const std::set<std::string> words = {"required",     "required with it", "no homing",
-                                              "no switch",    "no button",        "no brake",
-                                              "no heartbeat", "by the mechanics"};
+  static const std::set<std::string> words = {
+      "required", "required with it", "no homing",   "no switch",       "no button",
+      "no brake", "no heartbeat",     "no steering", "by the mechanics"};
   return words.count(parameter.fallback) > 0;
 }
 
@@ -254,7 +272,7 @@ std::optional<ConfigValue> literal(const Parameter& parameter) {
     if (words.count(text) > 0 || text.rfind("[the chip's]", 0) == 0) return {};
     return ConfigValue(text);
   }
-  const bool is_value = text == "true" || text == "false" ||
+  const bool is_value = parameter.type == "list" || text == "true" || text == "false" ||
                         text.find_first_not_of("-.0123456789") == std::string::npos;
   if (!is_value) return {};
   return yaml::parse("v: " + text, "default").as<ConfigValue::Map>()->at("v");
@@ -331,7 +349,8 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
 std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param.name; }
 
 INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
-                         testing::Values(driver(false), driver(true), gantry(), joystickNode()),
+                         testing::Values(driver(false), driver(true), gantry(), joystickNode(),
+                                         baseNode()),
                          nameOf);
 
 }  // namespace

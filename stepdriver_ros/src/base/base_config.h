@@ -10,7 +10,7 @@
 
 namespace stepdriver::base {
 
-/// Where a wheel is.
+/// The place of a wheel.
 enum class Side {
   kLeft,
   kRight,

@@ -9,7 +9,7 @@
 
 namespace stepdriver::base {
 
-/// What the driver says of an axis of the base.
+/// The state of an axis of the base, from the driver.
 struct AxisReport {
   std::string trouble;  ///< why it can't drive; empty: it can
   bool moving = false;
@@ -22,7 +22,7 @@ struct DriveOrders {
   std::optional<double> steering;  ///< [rad] a new target of the steering
 };
 
-/// Decides what the wheels do: from commands, from what the driver says of its axes, and from time.
+/// Decides what the wheels do: from commands, from the states of its axes, and from time.
 ///
 /// It ramps all wheels together, so that the ratio of their velocities is that of the command. If
 /// an axis can't drive, if the driver is silent, or if a wheel stands that should turn, all wheels
@@ -52,7 +52,7 @@ class Drive {
   void command(const Twist& wanted, double now);
   /// @param wheels, steering in the order of the kinematics; the last one only if there is one.
   void report(const std::vector<AxisReport>& wheels, const AxisReport& steering, double now);
-  /// Where the steering is [rad].
+  /// The current angle of the steering [rad].
   void steeringIsAt(double angle) { angle_ = angle; }
   /// The driver has refused or failed to take the target of the steering.
   void steeringRefused(const std::string& why) { steering_refused_ = why; }

@@ -29,8 +29,8 @@ struct Steering {
   double max_angle = 0.0;  ///< [rad] to either side, at most a quarter of a revolution
 };
 
-/// Where the wheels are: the one description of differential drives, which have wheels on both
-/// sides, and of tricycles, which have a steering.
+/// The wheels and their places: the one description of differential drives, which have wheels on
+/// both sides, and of tricycles, which have a steering.
 struct Kinematics {
   std::vector<Wheel> wheels;
   std::optional<Steering> steering;

@@ -6,7 +6,7 @@
 
 namespace stepdriver::base {
 
-/// Where the base is, in the frame in which it began.
+/// Place and heading of the base, in the frame in which it began.
 struct Pose {
   double x = 0.0;    ///< [m]
   double y = 0.0;    ///< [m]
@@ -20,7 +20,7 @@ struct Pose {
 Pose movedBy(const Pose& pose, const Twist& displacement);
 
 /// The pose of a base from the positions of its wheels. It doesn't drift while the wheels stand
-/// still, and the yaw of a base with wheels on both sides only depends on where they stand now.
+/// still, and the yaw of a base with wheels on both sides depends only on their current positions.
 class Odometry {
  public:
   explicit Odometry(Kinematics kinematics);
