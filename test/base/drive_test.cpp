@@ -122,6 +122,17 @@ TEST_F(DriveTest, KeepsTheCurvatureWhileItRampsAndSaturates) {
   }
 }
 
+TEST_F(DriveTest, KeepsTheCurvatureWithASpeedOverride) {
+  drive->speedOverrideIs(2.0);
+  wanted = Twist{0.4, 1.0};  // the wheels turn at 0.25 and 0.55 m/s, which would become 1.1 m/s
+  turnFor(3.0);
+  EXPECT_NEAR(told.at(1), 0.5, 1e-12) << "half of the maximum";
+  EXPECT_NEAR(told.at(0), 0.5 * 0.25 / 0.55, 1e-12);
+  drive->speedOverrideIs(0.5);
+  turnFor(3.0);
+  EXPECT_NEAR(told.at(1), 0.55, 1e-12) << "the driver makes it slower";
+}
+
 TEST_F(DriveTest, ComesToRestIfTheCommandsEnd) {
   wanted = Twist{0.4, 1.0};
   turnFor(2.0);

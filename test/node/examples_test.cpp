@@ -1,4 +1,6 @@
+#include <geometry_msgs/Twist.h>
 #include <gtest/gtest.h>
+#include <nav_msgs/Odometry.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
@@ -198,6 +200,31 @@ TEST(Examples, Stm32WheelRollsTwentyTurns) {
   EXPECT_NEAR(back.position, 0.0, 1e-4);
   const auto report = rigOf(node);
   EXPECT_EQ(report.pulses_forward.at(0), report.pulses_backward.at(0));
+}
+
+// Two such wheels, and the message of teleop_twist_keyboard's key "u": forwards and to the left.
+TEST(Examples, Stm32CarDrivesByTheMessagesOfAKeyboard) {
+  const std::string node = "/car/stepdriver";
+  const Recorder<nav_msgs::Odometry> odom(std::string("/car/odom"));
+  auto keyboard = ros::NodeHandle().advertise<geometry_msgs::Twist>("/car/cmd_vel", 1);
+  geometry_msgs::Twist key;
+  key.linear.x = 0.5;
+  key.angular.z = 1.0;
+  EXPECT_TRUE(waitUntil([&] {
+    keyboard.publish(key);
+    if (odom.count() == 0) return false;
+    const auto twist = odom.messages().back().twist.twist;
+    return std::abs(twist.linear.x - 0.5) < 1e-6 && std::abs(twist.angular.z - 1.0) < 1e-6;
+  }));
+  keyboard.publish(geometry_msgs::Twist());  // its key "k"
+  EXPECT_TRUE(odom.waitForLatest([](const nav_msgs::Odometry& message) {
+    return message.twist.twist.linear.x == 0.0 && message.twist.twist.angular.z == 0.0;
+  }));
+  const auto report = rigOf(node);
+  ASSERT_EQ(report.name, (std::vector<std::string>{"left", "right"}));
+  EXPECT_GT(report.pulses_forward.at(0), 0) << "plus is forwards on both sides";
+  EXPECT_GT(report.pulses_forward.at(1), report.pulses_forward.at(0));
+  EXPECT_EQ(report.violations, (Counts{0, 0}));
 }
 
 }  // namespace

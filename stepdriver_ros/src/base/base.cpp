@@ -115,6 +115,7 @@ void Base::takeStates(const AxisStates& message) {
   for (const DrivenAxis& wheel : wheels_.wheels) reports.push_back(reportOf(message, wheel));
   AxisReport steering;
   if (wheels_.kinematics.steering) steering = reportOf(message, wheels_.steering);
+  drive_.speedOverrideIs(message.speed_override);
   drive_.report(reports, steering, steadyNow());
 }
 

@@ -17,8 +17,8 @@ constexpr double kSlowest = 1e-9;
 constexpr double kFollowTime = 0.5;  // [s]
 // How long the order to stop is repeated while a wheel still turns.
 constexpr double kStopTime = 1.0;  // [s]
-// A late turn must not make the wheels jump.
-constexpr double kLongestTurn = 0.2;          // [s]
+// A later turn must not make the wheels jump; the period of the lowest rate.
+constexpr double kLongestTurn = 1.0;          // [s]
 constexpr double kSameAngle = 1e-6;           // [rad]
 constexpr double kSteeringTolerance = 0.035;  // [rad] 2 degrees
 constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
@@ -155,7 +155,9 @@ DriveOrders Drive::driveOrders(double seconds) {
   const bool steers = kinematics_.steering.has_value();
   double speed = steers ? steer(orders) : 0.0;
   Twist goal = steers ? twistOf(*kinematics_.steering, speed, angle_) : wanted_;
-  const double factor = speedFactor(kinematics_, wheelVelocities(kinematics_, goal, angle_));
+  std::vector<double> velocities = wheelVelocities(kinematics_, goal, angle_);
+  for (double& velocity : velocities) velocity *= std::max(1.0, speed_override_);
+  const double factor = speedFactor(kinematics_, velocities);
   speed *= factor;
   goal.linear *= factor;
   goal.angular *= factor;
@@ -170,7 +172,8 @@ DriveOrders Drive::driveOrders(double seconds) {
   }
   twist_ = goal;
   speed_ = speed;
-  return tell(orders, wheelVelocities(kinematics_, twist_, angle_));
+  tell(orders, wheelVelocities(kinematics_, twist_, angle_));
+  return orders;
 }
 
 double Drive::steer(DriveOrders& orders) {
@@ -187,7 +190,7 @@ double Drive::steer(DriveOrders& orders) {
   return motion.speed * std::max(0.0, std::cos(motion.angle - angle_));
 }
 
-DriveOrders& Drive::tell(DriveOrders& orders, std::vector<double> velocities) {
+void Drive::tell(DriveOrders& orders, std::vector<double> velocities) {
   bool rests = true;
   for (std::size_t i = 0; i < velocities.size(); ++i) {
     const double most = kinematics_.wheels[i].max_speed;
@@ -198,7 +201,6 @@ DriveOrders& Drive::tell(DriveOrders& orders, std::vector<double> velocities) {
   if (!rests || !told_.empty()) orders.wheels = velocities;
   if (rests) velocities.clear();
   told_ = std::move(velocities);
-  return orders;
 }
 
 }  // namespace stepdriver::base

@@ -52,6 +52,9 @@ class Drive {
   void command(const Twist& wanted, double now);
   /// @param wheels, steering in the order of the kinematics; the last one only if there is one.
   void report(const std::vector<AxisReport>& wheels, const AxisReport& steering, double now);
+  /// The driver's factor of all velocities. It is multiplied after the commands, and above 1 the
+  /// driver limits each wheel by itself.
+  void speedOverrideIs(double factor) { speed_override_ = factor; }
   /// The current angle of the steering [rad].
   void steeringIsAt(double angle) { angle_ = angle; }
   /// The driver has refused or failed to take the target of the steering.
@@ -79,7 +82,7 @@ class Drive {
   DriveOrders driveOrders(double seconds);
   /// Turns the steering, and returns the speed that its wheel should have meanwhile.
   double steer(DriveOrders& orders);
-  DriveOrders& tell(DriveOrders& orders, std::vector<double> velocities);
+  void tell(DriveOrders& orders, std::vector<double> velocities);
 
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
@@ -97,6 +100,7 @@ class Drive {
   std::vector<AxisReport> reports_;
   AxisReport steering_report_;
   double reported_at_ = kNever;
+  double speed_override_ = 1.0;
   double angle_ = 0.0;
   std::optional<double> target_;  // that the steering has been given
   std::string steering_refused_;
