@@ -25,13 +25,13 @@ class DriveTest : public testing::Test {
     kinematics = used;
     drive.emplace(used, wheels, "steer", "/driver", Drive::Timeouts());
     reports.assign(wheels.size(), AxisReport());
-    turn();
+    cycle();
   }
 
   void SetUp() override { use(twoWheels(0.3), {"left", "right"}); }
 
-  /// A turn, after which the wheels do what they were told.
-  DriveOrders turn() {
+  /// One period, after which the wheels do what they were told.
+  DriveOrders cycle() {
     now += kPeriod;
     if (driver_reports) drive->report(reports, steering, now);
     drive->steeringIsAt(angle);
@@ -45,8 +45,8 @@ class DriveTest : public testing::Test {
     return orders;
   }
 
-  void turnFor(double seconds) {
-    for (double left = seconds; left > 0.0; left -= kPeriod) turn();
+  void runFor(double seconds) {
+    for (double left = seconds; left > 0.0; left -= kPeriod) cycle();
   }
 
   bool rests() const {
@@ -60,7 +60,7 @@ class DriveTest : public testing::Test {
   bool driver_reports = true;
   bool stuck = false;
   bool steering_stuck = false;
-  std::optional<Twist> wanted;  // sent before each turn
+  std::optional<Twist> wanted;  // sent in each cycle
   std::vector<AxisReport> reports;
   AxisReport steering;
   std::vector<double> told;
@@ -70,28 +70,28 @@ TEST_F(DriveTest, WaitsForTheDriver) {
   driver_reports = false;
   use(twoWheels(0.3), {"left", "right"});
   wanted = Twist{0.2, 0.0};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_EQ(drive->state(), Drive::State::kStopped);
   EXPECT_EQ(drive->cause(), "there is no state of /driver yet");
   EXPECT_TRUE(told.empty()) << "nothing was sent";
   wanted.reset();
-  turnFor(0.6);
+  runFor(0.6);
   driver_reports = true;
-  turn();
+  cycle();
   EXPECT_EQ(drive->state(), Drive::State::kReady);
 }
 
 TEST_F(DriveTest, SendsNothingUntilItIsCommandedAndAfterItHasStopped) {
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_TRUE(told.empty());
   wanted = Twist{0.2, 0.0};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_EQ(told, (std::vector<double>{0.2, 0.2}));
-  EXPECT_FALSE(turn().wheels.empty()) << "it repeats the velocities";
+  EXPECT_FALSE(cycle().wheels.empty()) << "it repeats the velocities";
   wanted = Twist{};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_TRUE(rests());
-  EXPECT_TRUE(turn().wheels.empty()) << "others can move the wheels";
+  EXPECT_TRUE(cycle().wheels.empty()) << "others can move the wheels";
 }
 
 TEST_F(DriveTest, KeepsTheCurvatureWhileItRampsAndSaturates) {
@@ -103,7 +103,7 @@ TEST_F(DriveTest, KeepsTheCurvatureWhileItRampsAndSaturates) {
     wanted = command;
     std::vector<double> before(2, 0.0);
     for (int n = 0; n < 100; ++n) {
-      const auto wheels = turn().wheels;
+      const auto wheels = cycle().wheels;
       ASSERT_EQ(wheels.size(), 2U);
       const Twist twist = twistFrom(kinematics, wheels, 0.0);
       ASSERT_NEAR(twist.linear * command.angular, twist.angular * command.linear, 1e-8) << n;
@@ -117,7 +117,7 @@ TEST_F(DriveTest, KeepsTheCurvatureWhileItRampsAndSaturates) {
     const double factor = speedFactor(kinematics, wheelVelocities(kinematics, full, 0.0));
     ASSERT_NEAR(twistFrom(kinematics, told, 0.0).linear, command.linear * factor, 1e-8);
     wanted = Twist{};
-    turnFor(2.0);
+    runFor(2.0);
     ASSERT_TRUE(rests()) << i;
   }
 }
@@ -125,80 +125,80 @@ TEST_F(DriveTest, KeepsTheCurvatureWhileItRampsAndSaturates) {
 TEST_F(DriveTest, KeepsTheCurvatureWithASpeedOverride) {
   drive->speedOverrideIs(2.0);
   wanted = Twist{0.4, 1.0};  // the wheels turn at 0.25 and 0.55 m/s, which would become 1.1 m/s
-  turnFor(3.0);
+  runFor(3.0);
   EXPECT_NEAR(told.at(1), 0.5, 1e-12) << "half of the maximum";
   EXPECT_NEAR(told.at(0), 0.5 * 0.25 / 0.55, 1e-12);
   drive->speedOverrideIs(0.5);
-  turnFor(3.0);
+  runFor(3.0);
   EXPECT_NEAR(told.at(1), 0.55, 1e-12) << "the driver makes it slower";
 }
 
 TEST_F(DriveTest, ComesToRestIfTheCommandsEnd) {
   wanted = Twist{0.4, 1.0};
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_FALSE(rests());
   EXPECT_FALSE(drive->takeTimedOut());
   wanted.reset();
-  turnFor(0.4);
+  runFor(0.4);
   EXPECT_NEAR(told.at(1), 0.55, 1e-9) << "the timeout of 0.5 s isn't over";
-  turnFor(0.2 + 0.55 / 1.5);
+  runFor(0.2 + 0.55 / 1.5);
   EXPECT_TRUE(rests());
   EXPECT_TRUE(drive->takeTimedOut());
   EXPECT_FALSE(drive->takeTimedOut()) << "it is told once";
   wanted = Twist{0.4, 0.0};
-  turnFor(0.2);
+  runFor(0.2);
   EXPECT_FALSE(rests()) << "a timeout needs no pause";
 }
 
 TEST_F(DriveTest, StopsAllWheelsAtOnceIfOneCannotDrive) {
   wanted = Twist{0.4, 0.0};
-  turnFor(2.0);
+  runFor(2.0);
   reports[1].trouble = "the driver reports a fault";
-  turn();
+  cycle();
   EXPECT_EQ(told, (std::vector<double>{0.0, 0.0}));
   EXPECT_EQ(drive->state(), Drive::State::kStopped);
   EXPECT_EQ(drive->cause(), "right: the driver reports a fault");
   told.clear();
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_TRUE(told.empty()) << "nothing more is sent: " << told.size();
 }
 
 TEST_F(DriveTest, RepeatsTheStopWhileAWheelStillTurns) {
   wanted = Twist{0.4, 0.0};
-  turnFor(2.0);
+  runFor(2.0);
   reports[1].trouble = "on hold";
-  turn();
+  cycle();
   reports[0].moving = true;
-  EXPECT_EQ(turn().wheels, (std::vector<double>{0.0, 0.0}));
+  EXPECT_EQ(cycle().wheels, (std::vector<double>{0.0, 0.0}));
   reports[0].moving = false;
-  EXPECT_TRUE(turn().wheels.empty());
+  EXPECT_TRUE(cycle().wheels.empty());
 }
 
 TEST_F(DriveTest, NeedsAPauseOrZeroAfterAStop) {
   for (const bool by_zero : {true, false}) {
     wanted = Twist{0.4, 0.0};
-    turnFor(2.0);
+    runFor(2.0);
     ASSERT_FALSE(rests());
     reports[0].trouble = "disabled";
-    turnFor(0.5);
+    runFor(0.5);
     reports[0].trouble.clear();
-    turnFor(2.0);
+    runFor(2.0);
     EXPECT_EQ(drive->state(), Drive::State::kWaiting) << "the commands didn't pause";
     EXPECT_EQ(drive->cause(), "left: disabled");
     EXPECT_TRUE(rests());
     if (by_zero) {
       wanted = Twist{};
-      turn();
+      cycle();
     } else {
       wanted.reset();
-      turnFor(0.4);
+      runFor(0.4);
       EXPECT_EQ(drive->state(), Drive::State::kWaiting) << "the pause is too short";
-      turnFor(0.2);
+      runFor(0.2);
     }
     EXPECT_EQ(drive->state(), Drive::State::kReady);
     EXPECT_TRUE(rests()) << "the old command is forgotten";
     wanted = Twist{0.4, 0.0};
-    turnFor(0.2);
+    runFor(0.2);
     EXPECT_FALSE(rests());
   }
 }
@@ -206,32 +206,32 @@ TEST_F(DriveTest, NeedsAPauseOrZeroAfterAStop) {
 TEST_F(DriveTest, ZeroWhileTheCauseLastsIsNotEnough) {
   reports[0].trouble = "disabled";
   wanted = Twist{};
-  turnFor(1.0);
+  runFor(1.0);
   wanted = Twist{0.4, 0.0};
   reports[0].trouble.clear();
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_EQ(drive->state(), Drive::State::kWaiting);
   EXPECT_TRUE(rests());
 }
 
 TEST_F(DriveTest, StopsIfTheDriverIsSilent) {
   wanted = Twist{0.4, 0.0};
-  turnFor(2.0);
+  runFor(2.0);
   driver_reports = false;
-  turnFor(0.4);
+  runFor(0.4);
   EXPECT_FALSE(rests());
-  turnFor(0.2);
+  runFor(0.2);
   EXPECT_TRUE(rests());
   EXPECT_EQ(drive->cause(), "there was no state of /driver for 0.5 s");
 }
 
 TEST_F(DriveTest, StopsIfAWheelStandsThatShouldTurn) {
   wanted = Twist{0.4, 0.0};
-  turnFor(2.0);
+  runFor(2.0);
   stuck = true;
-  turnFor(0.4);
+  runFor(0.4);
   EXPECT_FALSE(rests()) << "it has some time to follow";
-  turnFor(0.2);
+  runFor(0.2);
   EXPECT_TRUE(rests());
   EXPECT_EQ(drive->cause(),
             "right: it stands although it should turn; the log of /driver says why");
@@ -239,17 +239,17 @@ TEST_F(DriveTest, StopsIfAWheelStandsThatShouldTurn) {
 
 TEST_F(DriveTest, LetsAWheelStandAroundWhichTheBaseTurns) {
   wanted = Twist{0.15, 1.0};  // around the left wheel
-  turnFor(3.0);
+  runFor(3.0);
   EXPECT_EQ(drive->state(), Drive::State::kReady) << drive->cause();
   EXPECT_EQ(told.at(0), 0.0);
   EXPECT_NEAR(told.at(1), 0.3, 1e-12);
 }
 
 TEST_F(DriveTest, RestsAtTheEndOfTheProgramOnlyIfItDrives) {
-  turn();
+  cycle();
   EXPECT_TRUE(drive->rest().wheels.empty());
   wanted = Twist{0.4, 0.0};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_EQ(drive->rest().wheels, (std::vector<double>{0.0, 0.0}));
 }
 
@@ -257,16 +257,16 @@ TEST_F(DriveTest, SteersBeforeItTurnsOnTheSpot) {
   use(tricycle({steeredWheel()}), {"front"});
   steering_stuck = true;  // it is on its way
   steering.moving = true;
-  turn();
+  cycle();
   wanted = Twist{0.0, 1.0};
-  EXPECT_NEAR(turn().steering.value_or(0.0), kRightAngle, 1e-12);
-  turnFor(1.0);
+  EXPECT_NEAR(cycle().steering.value_or(0.0), kRightAngle, 1e-12);
+  runFor(1.0);
   EXPECT_TRUE(told.empty() || rests()) << "the wheel stands square to its way";
   angle = kRightAngle / 2.0;
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_NEAR(told.at(0), 0.4 * std::sqrt(0.5), 1e-9) << "slower until it is there";
   angle = kRightAngle;
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_NEAR(told.at(0), 0.4, 1e-12);
   EXPECT_EQ(drive->state(), Drive::State::kReady) << drive->cause();
 }
@@ -274,35 +274,35 @@ TEST_F(DriveTest, SteersBeforeItTurnsOnTheSpot) {
 TEST_F(DriveTest, KeepsTheSteeringAtStandstill) {
   use(tricycle({steeredWheel()}), {"front"});
   wanted = Twist{0.4, 1.0};
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_NEAR(angle, kRightAngle / 2.0, 1e-12);
-  EXPECT_FALSE(turn().steering) << "the target is sent once";
+  EXPECT_FALSE(cycle().steering) << "the target is sent once";
   wanted = Twist{};
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_TRUE(rests());
   EXPECT_NEAR(angle, kRightAngle / 2.0, 1e-12);
   angle = 0.0;  // someone else moves it
-  turnFor(2.0);
+  runFor(2.0);
   EXPECT_EQ(drive->state(), Drive::State::kReady) << drive->cause();
   wanted = Twist{0.4, 1.0};
-  EXPECT_TRUE(turn().steering) << "it is sent again";
+  EXPECT_TRUE(cycle().steering) << "it is sent again";
 }
 
 TEST_F(DriveTest, StopsIfTheSteeringStandsElsewhereOrIsRefused) {
   use(tricycle({steeredWheel()}), {"front"});
   steering_stuck = true;
   wanted = Twist{0.4, 1.0};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_EQ(drive->cause(), "steer: it stands at 0.0 degrees instead of 45.0");
   EXPECT_TRUE(rests());
   steering_stuck = false;
   wanted = Twist{};
-  turn();
+  cycle();
   wanted = Twist{0.4, 1.0};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_FALSE(rests()) << drive->cause();
   drive->steeringRefused("steer isn't homed");
-  turn();
+  cycle();
   EXPECT_TRUE(rests());
   EXPECT_EQ(drive->cause(), "steer: steer isn't homed");
 }
@@ -312,10 +312,10 @@ TEST_F(DriveTest, SaysThatATurnIsTooTight) {
   limited.steering->max_angle = 0.5;
   use(limited, {"rear"});
   wanted = Twist{0.2, 0.1};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_FALSE(drive->takeTooTight());
   wanted = Twist{0.2, 1.0};
-  turnFor(1.0);
+  runFor(1.0);
   EXPECT_TRUE(drive->takeTooTight());
   EXPECT_NEAR(angle, 0.5, 1e-12);
   EXPECT_NEAR(told.at(0), 0.2, 1e-12) << "m/s, as commanded";

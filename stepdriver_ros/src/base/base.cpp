@@ -47,8 +47,16 @@ std::size_t indexOf(const std::vector<std::string>& names, const std::string& na
   return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
-bool isFinite(const geometry_msgs::Twist& twist) {
-  return std::isfinite(twist.linear.x) && std::isfinite(twist.angular.z);
+/// The first number of a command that isn't finite, in words; empty if all of them are.
+std::string badNumberIn(const geometry_msgs::Twist& twist) {
+  const std::pair<const char*, double> numbers[] = {
+      {"linear.x", twist.linear.x},   {"linear.y", twist.linear.y},
+      {"linear.z", twist.linear.z},   {"angular.x", twist.angular.x},
+      {"angular.y", twist.angular.y}, {"angular.z", twist.angular.z}};
+  for (const auto& [name, number] : numbers) {
+    if (!std::isfinite(number)) return fmt::format("{} is {}", name, number);
+  }
+  return {};
 }
 
 }  // namespace
@@ -77,8 +85,9 @@ Base::Base(ros::NodeHandle node, const std::string& driver, BaseConfig config, D
       ros::names::append(ros::names::parentNamespace(driver), "joint_states"), kSeveral,
       [this](const sensor_msgs::JointState::ConstPtr& message) { takeJoints(*message); }, {},
       no_delay);
-  turn_timer_ = node.createSteadyTimer(ros::WallDuration(1.0 / config_.rate),
-                                       [this](const ros::SteadyTimerEvent& /*event*/) { turn(); });
+  update_timer_ =
+      node.createSteadyTimer(ros::WallDuration(1.0 / config_.rate),
+                             [this](const ros::SteadyTimerEvent& /*event*/) { update(); });
   diagnostics_timer_ = node.createSteadyTimer(
       ros::WallDuration(kDiagnosticsPeriod),
       [this](const ros::SteadyTimerEvent& /*event*/) { updater_.force_update(); });
@@ -90,15 +99,13 @@ void Base::rest() {
 }
 
 void Base::takeCommand(const geometry_msgs::Twist& message) {
-  const bool bad = !isFinite(message);
-  if (bad && !bad_command_) {
-    ROS_ERROR_NAMED("base",
-                    "cmd_vel: linear.x is %g and angular.z is %g, but both must be finite numbers: "
-                    "the message is ignored",
-                    message.linear.x, message.angular.z);
+  const std::string bad = badNumberIn(message);
+  if (!bad.empty() && !bad_command_) {
+    ROS_ERROR_NAMED("base", "cmd_vel: %s, but must be a finite number: the message is ignored",
+                    bad.c_str());
   }
-  bad_command_ = bad;
-  if (bad) return;
+  bad_command_ = !bad.empty();
+  if (bad_command_) return;
   const bool sideways = message.linear.y != 0.0;
   if (sideways && !sideways_) {
     ROS_WARN_NAMED("base",
@@ -115,6 +122,7 @@ void Base::takeStates(const AxisStates& message) {
   for (const DrivenAxis& wheel : wheels_.wheels) reports.push_back(reportOf(message, wheel));
   AxisReport steering;
   if (wheels_.kinematics.steering) steering = reportOf(message, wheels_.steering);
+  driver_heard_ = true;
   drive_.speedOverrideIs(message.speed_override);
   drive_.report(reports, steering, steadyNow());
 }
@@ -197,11 +205,11 @@ void Base::publishOdometry(const ros::Time& stamp, const Twist& twist) {
   broadcaster_->sendTransform(transform);
 }
 
-void Base::turn() {
+void Base::update() {
   const DriveOrders orders = drive_.orders(steadyNow());
   logState();
   if (drive_.takeTimedOut()) {
-    ROS_WARN_NAMED("base", "No cmd_vel for %g s, so the base comes to rest",
+    ROS_INFO_NAMED("base", "No cmd_vel for %g s, so the base comes to rest",
                    config_.cmd_vel_timeout);
   }
   if (drive_.takeTooTight()) {
@@ -252,8 +260,10 @@ void Base::logState() {
                    config_.cmd_vel_timeout);
   } else if (was_ready_) {
     ROS_ERROR_NAMED("base", "All wheels stop: %s", logged_cause_.c_str());
-  } else {
+  } else if (driver_heard_) {
     ROS_WARN_NAMED("base", "Not ready: %s", logged_cause_.c_str());
+  } else {
+    ROS_INFO_NAMED("base", "Not ready: %s", logged_cause_.c_str());
   }
 }
 

@@ -47,7 +47,7 @@ class Base {
   std::string troubleOf(const AxisStates& message, std::size_t index) const;
   AxisReport reportOf(const AxisStates& message, const DrivenAxis& axis) const;
   void publishOdometry(const ros::Time& stamp, const Twist& twist);
-  void turn();
+  void update();
   void send(const std::vector<double>& velocities);
   void moveSteering();
   void logState();
@@ -62,6 +62,7 @@ class Base {
 
   std::optional<Drive::State> logged_state_;
   std::string logged_cause_;
+  bool driver_heard_ = false;
   bool was_ready_ = false;
   bool bad_command_ = false;  // the last one, which was said
   bool sideways_ = false;     // likewise
@@ -76,7 +77,7 @@ class Base {
   ros::Subscriber command_subscriber_;
   ros::Subscriber states_subscriber_;
   ros::Subscriber joints_subscriber_;
-  ros::SteadyTimer turn_timer_;
+  ros::SteadyTimer update_timer_;
   ros::SteadyTimer diagnostics_timer_;
 };
 

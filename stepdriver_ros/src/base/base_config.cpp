@@ -54,6 +54,17 @@ Variances readVariances(ConfigReader& reader, const std::string& key) {
   return variances;
 }
 
+/// The name of a frame as tf2 takes it.
+std::string readFrame(ConfigReader& reader, const std::string& key, const std::string& fallback) {
+  std::string frame = reader.text(key, fallback);
+  if (frame.empty() || frame.front() == '/') {
+    reader.issue(
+        key,
+        fmt::format("is \"{}\", but must be the name of a frame, without a / in front", frame));
+  }
+  return frame;
+}
+
 WheelConfig readWheel(const std::string& name, ConfigReader reader) {
   config::checkAxisName(name, reader);
   WheelConfig wheel;
@@ -144,8 +155,12 @@ BaseConfig readBaseConfig(const ConfigValue& tree, const std::string& name,
   config.cmd_vel_timeout =
       reader.number("cmd_vel_timeout", kCommandTimeouts, config.cmd_vel_timeout);
   config.driver_timeout = reader.number("driver_timeout", kDriverTimeouts, config.driver_timeout);
-  config.odom_frame = reader.text("odom_frame", config.odom_frame);
-  config.base_frame = reader.text("base_frame", config.base_frame);
+  config.odom_frame = readFrame(reader, "odom_frame", config.odom_frame);
+  config.base_frame = readFrame(reader, "base_frame", config.base_frame);
+  if (config.odom_frame == config.base_frame) {
+    reader.issue("base_frame",
+                 fmt::format("is \"{}\", but must differ from odom_frame", config.base_frame));
+  }
   config.publish_tf = reader.boolean("publish_tf", config.publish_tf);
   config.pose_variances = readVariances(reader, "pose_covariance_diagonal");
   config.twist_variances = readVariances(reader, "twist_covariance_diagonal");

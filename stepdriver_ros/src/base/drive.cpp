@@ -17,8 +17,8 @@ constexpr double kSlowest = 1e-9;
 constexpr double kFollowTime = 0.5;  // [s]
 // How long the order to stop is repeated while a wheel still turns.
 constexpr double kStopTime = 1.0;  // [s]
-// A later turn must not make the wheels jump; the period of the lowest rate.
-constexpr double kLongestTurn = 1.0;          // [s]
+// A late call must not make the wheels jump; this is the period of the lowest rate.
+constexpr double kLongestPeriod = 1.0;        // [s]
 constexpr double kSameAngle = 1e-6;           // [rad]
 constexpr double kSteeringTolerance = 0.035;  // [rad] 2 degrees
 constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
@@ -50,7 +50,7 @@ void Drive::report(const std::vector<AxisReport>& wheels, const AxisReport& stee
 }
 
 DriveOrders Drive::orders(double now) {
-  const double seconds = std::clamp(now - asked_at_, 0.0, kLongestTurn);
+  const double seconds = std::clamp(now - asked_at_, 0.0, kLongestPeriod);
   asked_at_ = now;
   updateState(now);
   if (state_ != State::kReady) return stopOrders(now);
@@ -88,7 +88,7 @@ std::string Drive::findCause(double now) {
 }
 
 std::string Drive::standingAxis(double now) {
-  const auto standsTooLong = [this, now](std::size_t axis, bool stands) {
+  const auto stands_too_long = [this, now](std::size_t axis, bool stands) {
     std::optional<double>& since = stands_since_[axis];
     if (!stands) {
       since.reset();
@@ -100,14 +100,14 @@ std::string Drive::standingAxis(double now) {
   std::string cause;
   for (std::size_t i = 0; i < names_.size(); ++i) {
     const bool stands = !told_.empty() && told_[i] != 0.0 && !reports_[i].moving;
-    if (standsTooLong(i, stands)) {
+    if (stands_too_long(i, stands)) {
       cause = fmt::format("{}: it stands although it should turn; the log of {} says why",
                           names_[i], driver_);
     }
   }
   const bool stands =
       target_ && !steering_report_.moving && std::abs(*target_ - angle_) > kSteeringTolerance;
-  if (standsTooLong(names_.size(), stands)) {
+  if (stands_too_long(names_.size(), stands)) {
     cause = fmt::format("{}: it stands at {:.1f} degrees instead of {:.1f}", steering_name_,
                         angle_ * kDegreesPerRadian, *target_ * kDegreesPerRadian);
   }

@@ -9,11 +9,11 @@ namespace {
 
 /// Whether the wheels that don't steer tell the rotation by themselves.
 bool hasBothSides(const Kinematics& kinematics) {
-  const auto fixedAt = [&kinematics](double side) {
+  const auto fixed_at = [&kinematics](double side) {
     return std::any_of(kinematics.wheels.begin(), kinematics.wheels.end(),
                        [side](const Wheel& wheel) { return wheel.y * side > 0.0; });
   };
-  return fixedAt(1.0) && fixedAt(-1.0);
+  return fixed_at(1.0) && fixed_at(-1.0);
 }
 
 /// The regression line of the travels over the places of the wheels: travel = linear - angular y.
