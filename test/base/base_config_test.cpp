@@ -233,8 +233,8 @@ TEST(DriverWheels, MustFitTheAxesOfTheDriver) {
                   "mm, so its position is the distance"});
   tree = twoWheeled();
   drop(tree, "wheels/right");
-  put(tree, "wheels/rigth/side", "right");
-  EXPECT_EQ(misfits(tree), Lines{"/base/wheels/rigth: isn't an axis of /stepdriver, which has "
+  put(tree, "wheels/rear/side", "right");
+  EXPECT_EQ(misfits(tree), Lines{"/base/wheels/rear: isn't an axis of /stepdriver, which has "
                                  "front, left, right, steer"});
   tree = threeWheeled();
   drop(tree, "wheels/front/diameter_mm");
