@@ -26,6 +26,7 @@ using activity::Order;
 using activity::Why;
 
 const Why kStopped{axis::MoveEnd::kStopped, "it was stopped"};
+constexpr const char* kMovedMeanwhile = "it moved while its path was planned";
 const Why kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
 
 constexpr const char* kChipRemedy =
@@ -52,6 +53,9 @@ void refuseTooFast(const std::vector<const axis::AxisModel*>& axes, double veloc
       "the velocity {0} {2} of the line is above {1} {2}, the highest that its axes reach together",
       numberText(velocity), upperBoundText(most), linear >= rotary ? "m/s" : "rad/s"));
 }
+
+// [microsteps] Where the joint of an axis at rest is.
+double restOf(const axis::PathStart& start) { return start.motor.position.value() - start.slack; }
 
 void refuseBadNumber(const axis::AxisModel& axis, const char* what, double value) {
   if (std::isfinite(value) && value >= 0.0) return;
@@ -436,18 +440,28 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
     axes.push_back(&moved);
     Goal goal;
     goal.kind = Goal::Kind::kTogether;
-    const double target = wanted.prepared->target(i);
+    const double target = wanted.path ? wanted.path->targets[i] : wanted.prepared->target(i);
     goal.target = motion::restingCount(target);
     goal.remainder = target - static_cast<double>(*goal.target);
     orders.push_back({&moved, goalWithOutcome(goal)});
   }
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (axes[i]->pathAxis() == wanted.prepared->axes()[i]) continue;
-    return call->fail({activity::Failure::Kind::kOutdated,
-                       axes[i]->name() + ": its limits or its scale changed meanwhile"});
+    if (axes[i]->pathAxis() != wanted.prepared->axes()[i]) {
+      return call->fail({activity::Failure::Kind::kOutdated,
+                         axes[i]->name() + ": its limits or its scale changed meanwhile"});
+    }
+    if (wanted.path &&
+        (axes[i]->moving() || restOf(axes[i]->pathStart(0)) != wanted.path->from[i])) {
+      return call->fail(
+          {activity::Failure::Kind::kOutdated, axes[i]->name() + ": " + kMovedMeanwhile});
+    }
   }
-  const auto join = [prepared = wanted.prepared, axes](std::int64_t at) {
-    return axis::PreparedTrajectory::join(prepared, activity::startsOf(axes, at));
+  const auto join = [prepared = wanted.prepared, axes, path = wanted.path](std::int64_t at) {
+    const std::vector<axis::PathStart> starts = activity::startsOf(axes, at);
+    for (std::size_t i = 0; path && i < starts.size(); ++i) {
+      if (starts[i].moves || restOf(starts[i]) != path->from[i]) axes[i]->refuse(kMovedMeanwhile);
+    }
+    return axis::PreparedTrajectory::join(prepared, starts);
   };
   activities_.begin(std::make_unique<activity::FollowGoal>(context_, std::move(orders), join, call),
                     kTakenOver);
@@ -744,6 +758,8 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
     }
   }
   shown.path_axis = axis.pathAxis();
+  shown.commanded = axis.positionNow() + axis.position.remainder();
+  if (!axis.moving()) shown.rest = restOf(axis.pathStart(0));
   shown.channel = axis.motor.state();
   shown.memory = axis.memory();
   return shown;

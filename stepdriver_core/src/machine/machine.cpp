@@ -15,6 +15,7 @@
 #include "machine_axis.h"
 #include "message_text.h"
 #include "nanoseconds.h"
+#include "path_plan.h"
 #include "pulse/measure.h"
 #include "pulse/pulse_engine.h"
 #include "shell.h"
@@ -118,28 +119,61 @@ class Machine::Impl {
   }
 
   CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
-    const std::vector<AxisId> axes = idsOf(axesOf(request.names));
+    return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
+      wanted.prepared = disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(
+          factsOf(now, wanted.axes), request.points));
+    });
+  }
+
+  CoordinatedMove followPath(const PathRequest& request) {
+    return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
+      const std::vector<axis::PathAxis> facts = factsOf(now, wanted.axes);
+      const std::vector<PathOrigin> origins = originsOf(now, wanted.axes);
+      PathPlan plan = planPath(request, facts, origins);
+      wanted.path.emplace();
+      for (const PathOrigin& origin : origins) wanted.path->from.push_back(origin.rest);
+      wanted.path->targets = std::move(plan.targets);
+      wanted.prepared =
+          disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(facts, plan.points));
+    });
+  }
+
+  // Prepares a trajectory from the facts about its axes, and again if these have changed meanwhile.
+  template <typename Prepare>
+  CoordinatedMove follow(const std::vector<std::string>& names, const Prepare& prepare) {
+    const std::vector<AxisId> axes = idsOf(axesOf(names));
     const auto begun = shell_->snapshot();
-    FollowTrajectory wanted{axes, nullptr, {}};
+    FollowTrajectory wanted{axes, nullptr, {}, std::nullopt};
     wanted.stops.reserve(axes.size());
     for (const AxisId axis : axes) wanted.stops.push_back(begun->axes.at(axis).state.stops);
     for (int i = 0;; ++i) {
-      wanted.prepared = disposer_.keep(
-          std::make_shared<const axis::PreparedTrajectory>(factsOf(axes), request.points));
+      prepare(*shell_->snapshot(), wanted);
       const activity::Reply reply = shell_->call(wanted);
       const bool outdated =
           reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
       if (outdated && i < kMostPreparations) continue;
-      return moveOf(request.names, valueOf(reply));
+      return moveOf(names, valueOf(reply));
     }
   }
 
-  std::vector<axis::PathAxis> factsOf(const std::vector<AxisId>& axes) const {
-    const auto snapshot = shell_->snapshot();
+  static std::vector<axis::PathAxis> factsOf(const MachineSnapshot& snapshot,
+                                             const std::vector<AxisId>& axes) {
     std::vector<axis::PathAxis> facts;
     facts.reserve(axes.size());
-    for (const AxisId axis : axes) facts.push_back(snapshot->axes.at(axis).path_axis);
+    for (const AxisId axis : axes) facts.push_back(snapshot.axes.at(axis).path_axis);
     return facts;
+  }
+
+  static std::vector<PathOrigin> originsOf(const MachineSnapshot& snapshot,
+                                           const std::vector<AxisId>& axes) {
+    std::vector<PathOrigin> origins;
+    origins.reserve(axes.size());
+    for (const AxisId axis : axes) {
+      const AxisSnapshot& own = snapshot.axes.at(axis);
+      if (own.state.moving) own.path_axis.refuse("it moves; a path begins at rest");
+      origins.push_back({own.rest, own.commanded});
+    }
+    return origins;
   }
 
   std::vector<MachineAxis*> axesOf(const std::vector<std::string>& names) const {
@@ -305,6 +339,10 @@ CoordinatedMove Machine::moveLine(const LineRequest& request) { return impl_->mo
 
 CoordinatedMove Machine::followTrajectory(const TrajectoryRequest& request) {
   return impl_->followTrajectory(request);
+}
+
+CoordinatedMove Machine::followPath(const PathRequest& request) {
+  return impl_->followPath(request);
 }
 
 std::optional<CoordinatedResult> Machine::result(const CoordinatedMove& move) const {

@@ -55,6 +55,12 @@ struct FollowTrajectory {
   /// AxisState::stops of each axis at the time of the request: if one was stopped since, it isn't
   /// begun.
   std::vector<std::uint64_t> stops;
+  /// What is known about a path, of which this is the trajectory.
+  struct Path {
+    std::vector<double> from;     ///< [microsteps] AxisSnapshot::rest of each axis
+    std::vector<double> targets;  ///< [microsteps] the commanded positions at its end
+  };
+  std::optional<Path> path;
 };
 struct StopAxis {
   AxisId axis = 0;

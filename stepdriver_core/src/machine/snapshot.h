@@ -29,7 +29,10 @@ struct AxisSnapshot {
   axis::AxisState state;        ///< without the parts that change with every step
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] position at count 0
-  std::int64_t backlash = 0;    ///< [microsteps]
+  double commanded = 0.0;       ///< [unit] the commanded position, if the axis is at rest
+  /// [microsteps] The joint, if it is at rest: after a stop on a path it is between two counts.
+  double rest = 0.0;
+  std::int64_t backlash = 0;  ///< [microsteps]
   std::size_t motors = 1;
   pulse::MotorCounts square_lags{};  ///< ChannelState::lags when the motors were square
   axis::AxisLimits limits;

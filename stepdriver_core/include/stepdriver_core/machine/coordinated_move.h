@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +30,58 @@ struct TrajectoryRequest {
   std::vector<std::string> names;  ///< of the axes, each once; need not be all
   std::vector<axis::TrajectoryPoint> points;
 };
+
+/// A segment of a path, from the end of the one before it; the first begins where the axes stand.
+/// Positions have one number for each name of the path [unit].
+struct PathSegment {
+  enum class Shape {
+    kLine,  ///< straight
+    /// A circular arc around a centre, or a full turn if both ends are the same in its plane; axes
+    /// outside of the plane move in proportion to its angle. The distances from the centre to its
+    /// begin and to its end may differ by kArcMismatch: the centre is then moved.
+    kArcAround,
+    kArcThrough,  ///< the same through a point between its begin and its end
+    kBezier,      ///< cubic
+  };
+  Shape shape = Shape::kLine;
+  std::vector<double> end;  ///< the position at its end
+
+  /// @name Arcs only
+  /// @{
+  std::array<std::string, 2> plane;  ///< the names of two axes of the same kind
+  std::array<double, 2> point{};     ///< the centre, or the point on the way, of these two [unit]
+  /// Around a centre: from the second axis of the plane to the first, instead of the other way.
+  bool clockwise = false;
+  /// @}
+
+  std::vector<double> control1;  ///< of a Bezier, the control point next to its begin
+  std::vector<double> control2;  ///< the one next to its end
+
+  double velocity = 0.0;  ///< as PathRequest::velocity; 0: that one
+  /// [unit] PathRequest::tolerance for the corner at its end; empty: that one.
+  std::optional<double> tolerance;
+};
+
+/// [unit] See PathSegment::Shape::kArcAround.
+constexpr double kArcMismatch = 5e-6;
+
+/// Segments that several axes follow without stopping, as Machine::followPath() takes them. A unit
+/// is m on a linear axis, rad on a rotary one.
+struct PathRequest {
+  std::vector<std::string> names;     ///< of the axes, each once; need not be all
+  std::vector<PathSegment> segments;  ///< 1 to kMostPathSegments, each longer than 0
+  bool relative = false;  ///< all positions count from the commanded positions at the begin
+  /// Highest speed along the path; 0: as fast as the limits of all axes allow. In segments in which
+  /// a linear axis moves, it is the root of the sum of the squared speeds of the linear axes [m/s],
+  /// in others it is the same of the rotary axes [rad/s].
+  double velocity = 0.0;
+  /// [unit] How far corners may be rounded: the root of the sum of the squared distances of all
+  /// axes. 0: the axes stop at each corner.
+  double tolerance = 0.0;
+};
+
+/// A path of more segments is refused: give it in parts.
+constexpr std::size_t kMostPathSegments = 50'000;
 
 /// An accepted motion of several axes.
 struct CoordinatedMove {

@@ -130,6 +130,20 @@ class Machine {
   ///   backlash, or if one of the axes was stopped while this was planned.
   CoordinatedMove followTrajectory(const TrajectoryRequest& request);
 
+  /// Moves several axes along a path of lines, arcs and Beziers, from where they stand to rest at
+  /// its end, as fast as their limits allow. Corners are rounded within the tolerance and passed
+  /// without a stop; at a corner with a tolerance of 0, and at a turn by more than 170 degrees, the
+  /// axes stop. From then on it is a trajectory: for holds, stops, the speed override and backlash
+  /// see followTrajectory(). Axes with a backlash use four fifths of their speeds and
+  /// accelerations, so that it can be taken up meanwhile. It is planned in the calling thread and
+  /// delays no other call.
+  ///
+  /// @throw Refused as moveTo(), and if one of the axes moves or has a jerk limit, if the request
+  ///   is malformed, if a segment has a length of 0 or leads beyond a soft limit, if an arc has no
+  ///   circle, if a Bezier has a cusp, or if one of the axes was stopped while this was planned;
+  ///   the message names the segment (the first is 0). Then nothing moves.
+  CoordinatedMove followPath(const PathRequest& request);
+
   /// How a motion of several axes ended; empty if it hasn't ended.
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
   /// Returns when it has ended.

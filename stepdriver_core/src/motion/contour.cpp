@@ -1,0 +1,304 @@
+#include "contour.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kSmooth = 1e-6;                   // rad: no corner
+constexpr double kSharpest = 170.0 / 180.0 * kPi;  // rad: beyond that, it is a stop
+constexpr double kMidRounding = 3.0 / 8.0;         // m(0)/d
+constexpr double kLeastBlend = 0.01;               // of the resolution
+constexpr double kLeastRate = 1e-4;                // of a Bezier, of the sum of its handles
+constexpr double kInLine = 1e-9;                   // sine of the angle of three points
+
+double norm(const std::vector<double>& vector) {
+  double sum = 0.0;
+  for (const double x : vector) sum += x * x;
+  return std::sqrt(sum);
+}
+
+// The point of a Bezier's derivative, a parabola, that is nearest to 0: tried where its distance
+// from 0 is least among many places, and then more closely around the best.
+double leastRate(const std::vector<double>& powers, std::size_t axes) {
+  const auto rate_at = [&](double u) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < axes; ++i) {
+      const double* c = &powers[4 * i];
+      const double d = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
+      sum += d * d;
+    }
+    return std::sqrt(sum);
+  };
+  constexpr int kPlaces = 32;
+  double best = 0.0;
+  double width = 1.0 / kPlaces;
+  for (int i = 1; i <= kPlaces; ++i) {
+    if (rate_at(i * width) < rate_at(best)) best = i * width;
+  }
+  for (; width > 1e-6; width /= 2.0) {
+    for (const double u : {best - width, best + width}) {
+      if (u >= 0.0 && u <= 1.0 && rate_at(u) < rate_at(best)) best = u;
+    }
+  }
+  return rate_at(best);
+}
+
+}  // namespace
+
+Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& segments,
+                 double resolution)
+    : start_(std::move(start)), resolution_(resolution) {
+  segments_.reserve(segments.size());
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    segments_.push_back(placed(i == 0 ? start_ : segments[i - 1].end, segments[i], i));
+  }
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) round(i, segments[i].tolerance);
+}
+
+Contour::Segment Contour::placed(const std::vector<double>& from, const ContourSegment& given,
+                                 std::size_t index) const {
+  Segment segment;
+  segment.shape = given.shape;
+  segment.speed = given.speed;
+  segment.measured = given.measured;
+  if (given.shape == ContourSegment::Shape::kBezier) {
+    segment.powers.resize(4 * axes());
+    double handles = 0.0;
+    for (std::size_t i = 0; i < axes(); ++i) {
+      const double p0 = from[i];
+      const double p1 = given.control1[i];
+      const double p2 = given.control2[i];
+      const double p3 = given.end[i];
+      double* c = &segment.powers[4 * i];
+      c[0] = p0;
+      c[1] = 3.0 * (p1 - p0);
+      c[2] = 3.0 * (p2 - 2.0 * p1 + p0);
+      c[3] = p3 - p0 + 3.0 * (p1 - p2);
+      handles += std::abs(p1 - p0) + std::abs(p2 - p1) + std::abs(p3 - p2);
+    }
+    if (leastRate(segment.powers, axes()) < kLeastRate * handles) {
+      throw std::invalid_argument(
+          fmt::format("segment {} is a Bezier with a cusp, or with a control point at its end: "
+                      "its derivative is 0 there, and must not be",
+                      index));
+    }
+  } else {
+    segment.powers.resize(2 * axes());
+    for (std::size_t i = 0; i < axes(); ++i) {
+      segment.powers[2 * i] = from[i];
+      segment.powers[2 * i + 1] = given.end[i] - from[i];
+    }
+  }
+  if (given.shape == ContourSegment::Shape::kArc) {
+    segment.plane = given.plane;
+    segment.centre = given.centre;
+    segment.angle = given.angle;
+    const double x = from[given.plane[0]] - given.centre[0];
+    const double y = from[given.plane[1]] - given.centre[1];
+    segment.radius = std::hypot(x, y);
+    segment.from = std::atan2(y, x);
+  }
+  return segment;
+}
+
+// [1/unit] The largest |p''| of the half of a segment next to a corner, for a parameter with which
+// |p'| = 1 at the corner.
+double Contour::sharpest(const Segment& segment, double rate) const {
+  switch (segment.shape) {
+    case ContourSegment::Shape::kLine:
+      return 0.0;
+    case ContourSegment::Shape::kArc:
+      return segment.radius * segment.angle * segment.angle / (rate * rate);
+    case ContourSegment::Shape::kBezier: {
+      // The second derivative is linear: largest at an end.
+      double begin = 0.0;
+      double end = 0.0;
+      for (std::size_t i = 0; i < axes(); ++i) {
+        const double* c = &segment.powers[4 * i];
+        begin += 4.0 * c[2] * c[2];
+        end += (2.0 * c[2] + 6.0 * c[3]) * (2.0 * c[2] + 6.0 * c[3]);
+      }
+      return std::sqrt(std::max(begin, end)) / (rate * rate);
+    }
+  }
+  return 0.0;
+}
+
+void Contour::round(std::size_t corner, double tolerance) {
+  Segment& before = segments_[corner];
+  Segment& after = segments_[corner + 1];
+  ContourPoint in;
+  ContourPoint out;
+  evaluateGiven(corner, 1.0, in);
+  evaluateGiven(corner + 1, 0.0, out);
+  before.end.rate = norm(in.first);
+  after.begin.rate = norm(out.first);
+  std::vector<double> shift(axes());
+  for (std::size_t i = 0; i < axes(); ++i) {
+    shift[i] = (out.first[i] / after.begin.rate - in.first[i] / before.end.rate) / 2.0;
+  }
+  const double half_chord = norm(shift);  // sin(turn/2)
+  before.stops = false;
+  if (2.0 * half_chord < kSmooth) return;
+  double blend = 0.0;
+  if (half_chord <= std::sin(kSharpest / 2.0)) {
+    blend = std::min(
+        {tolerance / (kMidRounding * half_chord), before.end.rate / 2.0, after.begin.rate / 2.0});
+    const double bend =
+        std::max(sharpest(before, before.end.rate), sharpest(after, after.begin.rate));
+    if (bend > 0.0) blend = std::min(blend, 1.0 / (2.0 * bend));
+  }
+  if (blend < kLeastBlend * resolution_) {
+    before.stops = true;
+    return;
+  }
+  before.end.blend = after.begin.blend = blend;
+  before.end.shift = after.begin.shift = std::move(shift);
+}
+
+double Contour::roundedUntil(std::size_t segment) const {
+  const End& begin = segments_[segment].begin;
+  return begin.blend > 0.0 ? begin.blend / begin.rate : 0.0;
+}
+
+double Contour::roundedFrom(std::size_t segment) const {
+  const End& end = segments_[segment].end;
+  return end.blend > 0.0 ? 1.0 - end.blend / end.rate : 1.0;
+}
+
+bool Contour::isLine(std::size_t segment) const {
+  return segments_[segment].shape == ContourSegment::Shape::kLine;
+}
+
+void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) const {
+  const Segment& segment = segments_[index];
+  point.position.resize(axes());
+  point.first.resize(axes());
+  point.second.resize(axes());
+  if (segment.shape == ContourSegment::Shape::kBezier) {
+    for (std::size_t i = 0; i < axes(); ++i) {
+      const double* c = &segment.powers[4 * i];
+      point.position[i] = c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+      point.first[i] = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
+      point.second[i] = 2.0 * c[2] + u * 6.0 * c[3];
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < axes(); ++i) {
+    const double* c = &segment.powers[2 * i];
+    point.position[i] = c[0] + u * c[1];
+    point.first[i] = c[1];
+    point.second[i] = 0.0;
+  }
+  if (segment.shape == ContourSegment::Shape::kLine) return;
+  const double angle = segment.from + u * segment.angle;
+  const double x = segment.radius * std::cos(angle);
+  const double y = segment.radius * std::sin(angle);
+  const auto [a, b] = segment.plane;
+  point.position[a] = segment.centre[0] + x;
+  point.position[b] = segment.centre[1] + y;
+  point.first[a] = -y * segment.angle;
+  point.first[b] = x * segment.angle;
+  point.second[a] = -x * segment.angle * segment.angle;
+  point.second[b] = -y * segment.angle * segment.angle;
+}
+
+void Contour::evaluate(std::size_t index, double u, ContourPoint& point) const {
+  evaluateGiven(index, u, point);
+  const Segment& segment = segments_[index];
+  bend(segment.begin, u * segment.begin.rate, 1.0, point);
+  bend(segment.end, (1.0 - u) * segment.end.rate, -1.0, point);
+}
+
+// Adds shift (m(w) - |w|), at a distance |w| from the corner, which is on the side of w's sign.
+void Contour::bend(const End& end, double distance, double sign, ContourPoint& point) const {
+  if (!(distance < end.blend)) return;
+  const double y = distance / end.blend;
+  const double position = end.blend * (kMidRounding + y * y * (0.75 - 0.125 * y * y)) - distance;
+  const double first = sign * end.rate * (y * (1.5 - 0.5 * y * y) - 1.0);
+  const double second = end.rate * end.rate * 1.5 * (1.0 - y * y) / end.blend;
+  for (std::size_t i = 0; i < axes(); ++i) {
+    point.position[i] += end.shift[i] * position;
+    point.first[i] += end.shift[i] * first;
+    point.second[i] += end.shift[i] * second;
+  }
+}
+
+std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) const {
+  const Segment& segment = segments_[index];
+  ContourPoint point;
+  evaluateGiven(index, 0.0, point);
+  double low = point.position[axis];
+  double high = low;
+  const auto take = [&](double u) {
+    if (!(u > 0.0 && u <= 1.0)) return;
+    evaluateGiven(index, u, point);
+    low = std::min(low, point.position[axis]);
+    high = std::max(high, point.position[axis]);
+  };
+  take(1.0);
+  if (segment.shape == ContourSegment::Shape::kBezier) {
+    // c1 + 2 c2 u + 3 c3 u^2 = 0
+    const double* c = &segment.powers[4 * axis];
+    const double root = std::sqrt(std::max(0.0, c[2] * c[2] - 3.0 * c[1] * c[3]));
+    const double sum = -(c[2] + std::copysign(root, c[2]));
+    if (sum != 0.0) take(c[1] / sum);
+    if (c[3] != 0.0) take(sum / (3.0 * c[3]));
+  }
+  if (segment.shape == ContourSegment::Shape::kArc) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (segment.plane[k] != axis) continue;
+      const double quarter = k == 0 ? 0.0 : kPi / 2.0;  // the angle of an extreme
+      const auto [least, most] = std::minmax({segment.from, segment.from + segment.angle});
+      for (double turn = std::ceil((least - quarter) / kPi); turn * kPi + quarter < most; ++turn) {
+        take((turn * kPi + quarter - segment.from) / segment.angle);
+      }
+    }
+  }
+  return {low, high};
+}
+
+Arc arcAround(const std::array<double, 2>& from, const std::array<double, 2>& centre,
+              const std::array<double, 2>& to, bool clockwise) {
+  Arc arc{centre, clockwise ? -2.0 * kPi : 2.0 * kPi};
+  const double x = to[0] - from[0];
+  const double y = to[1] - from[1];
+  const double chord = std::hypot(x, y);
+  if (chord == 0.0) return arc;
+  // The part of the centre's offset from the middle of the chord that is along the chord.
+  const double along =
+      ((centre[0] - (from[0] + to[0]) / 2.0) * x + (centre[1] - (from[1] + to[1]) / 2.0) * y) /
+      (chord * chord);
+  arc.centre = {centre[0] - along * x, centre[1] - along * y};
+  const double begin = std::atan2(from[1] - arc.centre[1], from[0] - arc.centre[0]);
+  const double end = std::atan2(to[1] - arc.centre[1], to[0] - arc.centre[0]);
+  arc.angle = end - begin;
+  if (clockwise && arc.angle >= 0.0) arc.angle -= 2.0 * kPi;
+  if (!clockwise && arc.angle <= 0.0) arc.angle += 2.0 * kPi;
+  return arc;
+}
+
+Arc arcThrough(const std::array<double, 2>& from, const std::array<double, 2>& through,
+               const std::array<double, 2>& to) {
+  const double ax = through[0] - from[0];
+  const double ay = through[1] - from[1];
+  const double bx = to[0] - from[0];
+  const double by = to[1] - from[1];
+  const double cross = ax * by - ay * bx;
+  const double aa = ax * ax + ay * ay;
+  const double bb = bx * bx + by * by;
+  const double gap = std::hypot(bx - ax, by - ay);
+  if (!(std::abs(cross) > kInLine * std::sqrt(aa) * std::sqrt(bb)) || gap == 0.0) return {};
+  const std::array<double, 2> centre{from[0] + (by * aa - ay * bb) / (2.0 * cross),
+                                     from[1] + (ax * bb - bx * aa) / (2.0 * cross)};
+  return arcAround(from, centre, to, cross < 0.0);
+}
+
+}  // namespace stepdriver::motion

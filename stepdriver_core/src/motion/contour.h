@@ -1,0 +1,156 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace stepdriver::motion {
+
+/// A segment of a contour, from the end of the one before it. Numbers are in the units of the axes,
+/// one for each axis.
+struct ContourSegment {
+  enum class Shape {
+    kLine,
+    /// A circular arc in the plane of two axes; the others move in proportion to its angle.
+    kArc,
+    kBezier,  ///< cubic
+  };
+  Shape shape = Shape::kLine;
+  std::vector<double> end;
+
+  std::array<std::size_t, 2> plane{};  ///< of an arc: its axes
+  std::array<double, 2> centre{};      ///< of an arc, as far from its begin as from its end
+  double angle = 0.0;                  ///< [rad] of an arc, from plane[0] towards plane[1]
+
+  std::vector<double> control1;  ///< of a Bezier
+  std::vector<double> control2;
+
+  /// [unit/s] Highest speed along it: the root of the sum of the squared speeds of its measured
+  /// axes.
+  double speed = std::numeric_limits<double>::infinity();
+  std::vector<bool> measured;  ///< the axes of which this is the speed; empty: all
+  /// [unit] How far the corner at its end may be rounded; 0: an exact stop at the corner. It is
+  /// ignored at the end of the contour and if there is no corner.
+  double tolerance = 0.0;
+};
+
+/// A point of a contour and its derivatives with respect to the parameter of its segment.
+struct ContourPoint {
+  std::vector<double> position;
+  std::vector<double> first;
+  std::vector<double> second;
+};
+
+/// A curve of segments whose corners are rounded. Distances are the root of the sum of the squares
+/// over all axes, each in its own unit. Immutable.
+///
+/// A corner is where the direction changes by more than a millionth. Let p(w) be the path as given
+/// near a corner at w = 0, t1 and t2 its directions before and after it, and w a multiple of the
+/// parameter of each segment with |p'(0)| = 1: on lines and arcs, the distance to the corner. The
+/// path is the sum of a curve without a corner and of (t2 - t1) |w|/2. Instead of |w| the contour
+/// has, for |w| < d,
+///
+///     m(w) = d (3/8 + 3/4 (w/d)^2 - 1/8 (w/d)^4)
+///
+/// which continues |w| with the first and second derivative. So the rounded corner has the
+/// direction and the curvature of the path at both ends, its curvature jumps in its middle only by
+/// as much as the curvatures of the two segments differ, and no point of it is farther from the
+/// path point of the same parameter than (m(0) - 0) |t2 - t1|/2 = 3/8 d sin(turn/2), nor is any
+/// point of the path farther from it. d is the largest that makes this the tolerance or less, and
+/// that is at most
+/// - half of either segment (half of its parameter), so that corners never overlap, and
+/// - 1/(2 max|p''|) over that half, so that its derivative is never 0: with y = |w|/d, it is at
+///   least sqrt(cos^2(turn/2) + y^2 sin^2(turn/2)) - y/2.
+///
+/// There is a stop at a corner instead if its tolerance is 0, if it turns by more than 170 degrees,
+/// or if d is less than a hundredth of the resolution.
+class Contour {
+ public:
+  /// @param start one number for each axis. @param segments each one of a length above 0; at least
+  ///   one. @param resolution [unit] what makes no difference: a microstep of the finest axis.
+  /// @throw std::invalid_argument if a Bezier's derivative is (almost) 0 at a point, which no axis
+  ///   can pass without a stop; it names the segment (the first is 0).
+  Contour(std::vector<double> start, const std::vector<ContourSegment>& segments,
+          double resolution);
+
+  std::size_t axes() const { return start_.size(); }
+  std::size_t size() const { return segments_.size(); }
+  const std::vector<double>& start() const { return start_; }
+  double resolution() const { return resolution_; }
+
+  /// @param parameter from 0 to 1.
+  void evaluate(std::size_t segment, double parameter, ContourPoint& point) const;
+  /// The same of the path as given, with all its corners.
+  void evaluateGiven(std::size_t segment, double parameter, ContourPoint& point) const;
+
+  /// The lowest and the highest position of an axis on a segment as given.
+  std::pair<double, double> range(std::size_t segment, std::size_t axis) const;
+
+  /// Up to which parameter of a segment the corner at its begin is rounded, and from which on the
+  /// one at its end: 0 and 1 if they aren't.
+  double roundedUntil(std::size_t segment) const;
+  double roundedFrom(std::size_t segment) const;
+  bool isLine(std::size_t segment) const;
+  /// Whether the motion has to stop at the end of a segment.
+  bool stopsAfter(std::size_t segment) const { return segments_[segment].stops; }
+  /// [unit/s] See ContourSegment.
+  double speed(std::size_t segment) const { return segments_[segment].speed; }
+  const std::vector<bool>& measured(std::size_t segment) const {
+    return segments_[segment].measured;
+  }
+
+ private:
+  // One end of a segment, and how its corner is rounded.
+  struct End {
+    double rate = 0.0;          // |p'|
+    double blend = 0.0;         // d; 0: not at all
+    std::vector<double> shift;  // (t2 - t1)/2
+  };
+  struct Segment {
+    ContourSegment::Shape shape;
+    // Coefficients of the powers of the parameter, one after the other: 2 for each axis, or 4 of a
+    // Bezier. Of an arc, those of its two axes are unused.
+    std::vector<double> powers;
+    std::array<std::size_t, 2> plane{};
+    std::array<double, 2> centre{};
+    double radius = 0.0;
+    double from = 0.0;  // rad
+    double angle = 0.0;
+    End begin;
+    End end;
+    bool stops = true;
+    double speed;
+    std::vector<bool> measured;
+  };
+
+  Segment placed(const std::vector<double>& from, const ContourSegment& given,
+                 std::size_t index) const;
+  void round(std::size_t corner, double tolerance);
+  double sharpest(const Segment& segment, double rate) const;
+  void bend(const End& end, double distance, double sign, ContourPoint& point) const;
+
+  std::vector<double> start_;
+  double resolution_;
+  std::vector<Segment> segments_;
+};
+
+/// The centre and the angle of a ContourSegment.
+struct Arc {
+  std::array<double, 2> centre{};
+  double angle = 0.0;  ///< [rad]
+};
+
+/// From one point around a centre to another; a full turn if they are the same. If their distances
+/// from the centre differ, the centre is moved to the nearest place that is equally far from both.
+Arc arcAround(const std::array<double, 2>& from, const std::array<double, 2>& centre,
+              const std::array<double, 2>& to, bool clockwise);
+
+/// From one point through a second one to a third.
+///
+/// @return an angle of 0 if they are in line or if two of them are the same.
+Arc arcThrough(const std::array<double, 2>& from, const std::array<double, 2>& through,
+               const std::array<double, 2>& to);
+
+}  // namespace stepdriver::motion

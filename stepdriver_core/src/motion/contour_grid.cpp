@@ -1,0 +1,165 @@
+#include "contour_grid.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "give_way.h"
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr double kMostTurn = 0.12;           // [rad] of an interval
+constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an interval
+constexpr double kMostArcDeviation = 0.005;  // of the resolution
+constexpr double kLeastPart = 1e-9;          // of a segment
+constexpr double kShortest = 1e-7;           // of a segment: not divided further
+constexpr int kPartsOfCorner = 10;           // at least, of each half
+constexpr int kPartsOfCurve = 4;             // at least
+constexpr std::size_t kPlacesOfItem = 16;    // for giveWay()
+
+}  // namespace
+
+ContourGrid::ContourGrid(const Contour& contour) : contour_(contour), axes_(contour.axes()) {
+  positions_ = contour.start();
+  stops_.push_back(true);
+  for (std::size_t i = 0; i < contour.size(); ++i) {
+    giveWay(i);
+    const double first = contour.roundedUntil(i);
+    const double last = contour.roundedFrom(i);
+    if (first > 0.0) divide(i, 0.0, first, kPartsOfCorner);
+    if (last - first > kLeastPart) divide(i, first, last, contour.isLine(i) ? 1 : kPartsOfCurve);
+    if (last < 1.0) divide(i, last, 1.0, kPartsOfCorner);
+    stops_.back() = contour.stopsAfter(i);
+  }
+}
+
+void ContourGrid::evaluate(std::size_t segment, double parameter, Place& place) const {
+  contour_.evaluate(segment, parameter, place.point);
+  place.parameter = parameter;
+  double sum = 0.0;
+  for (const double x : place.point.first) sum += x * x;
+  place.rate = std::sqrt(sum);
+}
+
+// Into `parts` intervals, or more if they would be too long; one part is straight.
+void ContourGrid::divide(std::size_t segment, double from, double to, int parts) {
+  Place begin;
+  Place end;
+  evaluate(segment, from, begin);
+  if (parts == 1) {
+    evaluate(segment, to, end);
+    append(segment, begin, end, begin.rate * (to - from), true);
+    return;
+  }
+  std::vector<double> ahead;  // parameters of places, the next one last
+  for (int i = 0; i < parts; ++i) ahead.push_back(to + (from - to) * i / parts);
+  Place middle;
+  while (!ahead.empty()) {
+    const double half = (begin.parameter + ahead.back()) / 2.0;
+    evaluate(segment, half, middle);
+    evaluate(segment, ahead.back(), end);
+    if (ahead.back() - begin.parameter > kShortest && tooLong(begin, middle, end)) {
+      ahead.push_back(half);
+      continue;
+    }
+    append(segment, begin, end, lengthOf(begin, middle, end), false);
+    std::swap(begin, end);
+    ahead.pop_back();
+  }
+}
+
+std::vector<std::size_t> ContourGrid::quarter(const std::vector<bool>& which) {
+  const ContourGrid before = std::move(*this);
+  axes_ = before.axes_;
+  const auto more = 3 * static_cast<std::size_t>(std::count(which.begin(), which.end(), true));
+  intervals_.clear();
+  derivatives_.clear();
+  intervals_.reserve(before.size() + more);
+  derivatives_.reserve(before.derivatives_.size() + 4 * axes_ * more);
+  positions_.reserve(before.positions_.size() + axes_ * more);
+  positions_.assign(before.position(0), before.position(0) + axes_);
+  stops_.assign(1, true);
+  std::vector<std::size_t> origins;
+  origins.reserve(before.size() + more);
+  std::array<Place, 9> places;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    giveWay(i / kPlacesOfItem);
+    const Interval& interval = before[i];
+    if (which[i] && !interval.straight) {
+      for (std::size_t k = 0; k < places.size(); ++k) {
+        const double part = static_cast<double>(k) / static_cast<double>(places.size() - 1);
+        evaluate(interval.segment, interval.from + part * (interval.to - interval.from), places[k]);
+      }
+      for (std::size_t k = 0; k + 2 < places.size(); k += 2) {
+        append(interval.segment, places[k], places[k + 2],
+               lengthOf(places[k], places[k + 1], places[k + 2]), false);
+        origins.push_back(i);
+      }
+    } else {
+      intervals_.push_back(interval);
+      derivatives_.insert(derivatives_.end(), before.firstAtBegin(i),
+                          before.firstAtBegin(i) + 4 * axes_);
+      positions_.insert(positions_.end(), before.position(i + 1), before.position(i + 1) + axes_);
+      stops_.push_back(false);
+      origins.push_back(i);
+    }
+    stops_.back() = before.stopsAt(i + 1);
+  }
+  return origins;
+}
+
+bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {
+  const auto [least, most] = std::minmax({begin.rate, middle.rate, end.rate});
+  if (most > kMostRateRatio * least) return true;
+  double first = 0.0;
+  double second = 0.0;
+  for (std::size_t i = 0; i < axes_; ++i) {
+    const double a = begin.point.first[i] / begin.rate;
+    const double b = middle.point.first[i] / middle.rate;
+    const double c = end.point.first[i] / end.rate;
+    first += (b - a) * (b - a);
+    second += (c - b) * (c - b);
+  }
+  const double turn = std::sqrt(first) + std::sqrt(second);
+  if (turn > kMostTurn) return true;
+  // Of a cubic from an arc of this length and turn, at a constant speed.
+  const double length = middle.rate * (end.parameter - begin.parameter);
+  return length * turn * turn * turn / 384.0 > kMostArcDeviation * contour_.resolution();
+}
+
+// Simpson's rule with the derivatives of |p'| at the ends, exact up to the fifth power.
+double ContourGrid::lengthOf(const Place& begin, const Place& middle, const Place& end) const {
+  double slopes = 0.0;
+  for (std::size_t i = 0; i < axes_; ++i) {
+    slopes += begin.point.first[i] * begin.point.second[i] / begin.rate -
+              end.point.first[i] * end.point.second[i] / end.rate;
+  }
+  const double h = end.parameter - begin.parameter;
+  return h / 30.0 * (7.0 * begin.rate + 16.0 * middle.rate + 7.0 * end.rate) +
+         h * h / 60.0 * slopes;
+}
+
+void ContourGrid::append(std::size_t segment, const Place& begin, const Place& end, double length,
+                         bool straight) {
+  intervals_.push_back({length, segment, straight, begin.parameter, end.parameter});
+  appendDerivatives(begin);
+  appendDerivatives(end);
+  positions_.insert(positions_.end(), end.point.position.begin(), end.point.position.end());
+  stops_.push_back(false);
+}
+
+void ContourGrid::appendDerivatives(const Place& place) {
+  const std::vector<double>& first = place.point.first;
+  const std::vector<double>& second = place.point.second;
+  double along = 0.0;
+  for (std::size_t i = 0; i < axes_; ++i) along += first[i] * second[i];
+  const double square = place.rate * place.rate;
+  for (const double x : first) derivatives_.push_back(x / place.rate);
+  for (std::size_t i = 0; i < axes_; ++i) {
+    derivatives_.push_back((second[i] - first[i] * (along / square)) / square);
+  }
+}
+
+}  // namespace stepdriver::motion

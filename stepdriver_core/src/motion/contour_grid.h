@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "motion/contour.h"
+
+namespace stepdriver::motion {
+
+/// A contour divided into short intervals of its length s, each from one place to the next. A
+/// straight part is one interval.
+class ContourGrid {
+ public:
+  explicit ContourGrid(const Contour& contour);
+
+  struct Interval {
+    double length = 0.0;  ///< [unit]
+    std::size_t segment = 0;
+    bool straight = false;
+    double from = 0.0;  ///< the parameters of the segment at its ends
+    double to = 0.0;
+  };
+
+  /// Divides some of the intervals that aren't straight, each into four.
+  ///
+  /// @return the former index of each interval.
+  std::vector<std::size_t> quarter(const std::vector<bool>& which);
+
+  std::size_t axes() const { return axes_; }
+  std::size_t size() const { return intervals_.size(); }
+  const Interval& operator[](std::size_t index) const { return intervals_[index]; }
+  /// Of the place before an interval; with the index size(), of the end.
+  const double* position(std::size_t place) const { return &positions_[place * axes_]; }
+  bool stopsAt(std::size_t place) const { return stops_[place]; }
+
+  /// @name The first two derivatives of the position with respect to s, at the ends of an interval.
+  /// The second one jumps at a place if the curvature does; the first one only at a stop.
+  /// @{
+  const double* firstAtBegin(std::size_t interval) const { return derivative(interval, 0); }
+  const double* secondAtBegin(std::size_t interval) const { return derivative(interval, 1); }
+  const double* firstAtEnd(std::size_t interval) const { return derivative(interval, 2); }
+  const double* secondAtEnd(std::size_t interval) const { return derivative(interval, 3); }
+  /// @}
+
+ private:
+  // A point of the contour with its parameter, and what follows from its derivatives.
+  struct Place {
+    double parameter = 0.0;
+    ContourPoint point;
+    double rate = 0.0;  // |p'|
+  };
+
+  const double* derivative(std::size_t interval, std::size_t which) const {
+    return &derivatives_[(4 * interval + which) * axes_];
+  }
+  void evaluate(std::size_t segment, double parameter, Place& place) const;
+  void divide(std::size_t segment, double from, double to, int parts);
+  bool tooLong(const Place& begin, const Place& middle, const Place& end) const;
+  double lengthOf(const Place& begin, const Place& middle, const Place& end) const;
+  void append(std::size_t segment, const Place& begin, const Place& end, double length,
+              bool straight);
+  void appendDerivatives(const Place& place);
+
+  const Contour& contour_;
+  std::size_t axes_;
+  std::vector<Interval> intervals_;
+  std::vector<double> positions_;
+  std::vector<double> derivatives_;  // four of each interval
+  std::vector<bool> stops_;
+};
+
+}  // namespace stepdriver::motion

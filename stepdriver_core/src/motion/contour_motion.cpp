@@ -1,0 +1,336 @@
+#include "contour_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "contour_grid.h"
+#include "contour_speed.h"
+#include "give_way.h"
+#include "motion/profile.h"
+
+namespace stepdriver::motion {
+namespace {
+
+// [s] Knots aren't closer than this, so that rounded times and positions don't change
+// accelerations. In such a time an acceleration makes no difference to the position.
+constexpr double kShortestPiece = 20e-6;
+constexpr std::size_t kPlacesOfItem = 16;  // for giveWay()
+constexpr int kMostPlans = 12;
+// Of a limit: less is left for the whole motion to be slowed down by.
+constexpr double kSmallExcess = 1e-3;
+// Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
+// right, makes fewer plans.
+constexpr double kLowerFirstBy = 1.0005;
+constexpr double kLowerBy = 1.005;
+
+// An interval is divided if it isn't at a limit to this part, unless it takes less than a small
+// part of its segment's time.
+constexpr double kFullUse = 0.9;
+constexpr double kMostSquareRatio = 1.5;
+constexpr double kSmallPart = 0.005;
+// Of a limit: if a cubic exceeds it by so much, its interval is divided.
+constexpr double kPoorCubic = 1.03;
+constexpr double kMostDeviation = 0.02;  // of the resolution
+constexpr int kMostDivisions = 3;
+
+// A straight part, from a speed to another one, and what lies between.
+struct Trapezoid {
+  double ramp_up = 0.0;  // s
+  double way_up = 0.0;   // unit
+  double cruise = 0.0;   // s
+  double way_cruise = 0.0;
+  double ramp_down = 0.0;  // s
+  double peak = 0.0;       // unit/s
+};
+
+Trapezoid trapezoidOf(double length, double begin_square, double end_square,
+                      const ContourSpeed::Ramp& ramp, double highest_square) {
+  const double meeting =
+      (2.0 * length * ramp.up * ramp.down + begin_square * ramp.down + end_square * ramp.up) /
+      (ramp.up + ramp.down);
+  const double peak_square =
+      std::max({std::min(meeting, highest_square), begin_square, end_square});
+  Trapezoid made;
+  made.peak = std::sqrt(peak_square);
+  made.ramp_up = (made.peak - std::sqrt(begin_square)) / ramp.up;
+  made.ramp_down = (made.peak - std::sqrt(end_square)) / ramp.down;
+  made.way_up = (peak_square - begin_square) / (2.0 * ramp.up);
+  made.way_cruise =
+      std::max(0.0, length - made.way_up - (peak_square - end_square) / (2.0 * ramp.down));
+  made.cruise = made.way_cruise / made.peak;
+  return made;
+}
+
+// The knots of a planned speed.
+class Knots {
+ public:
+  explicit Knots(const ContourGrid& grid) : grid_(grid), axes_(grid.axes()) {}
+
+  void make(const ContourSpeed& speed) {
+    time_ = 0.0;
+    times_.clear();
+    intervals_.clear();
+    rests_.clear();
+    positions_.clear();
+    velocities_.clear();
+    appendPlace(0, 0.0, 0.0, 0);
+    double begin = 0.0;
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      giveWay(i / kPlacesOfItem);
+      const double end = std::sqrt(speed.square(i + 1));
+      if (grid_[i].straight) {
+        appendStraight(i, speed);
+      } else {
+        time_ += 2.0 * grid_[i].length / (begin + end);
+      }
+      appendPlace(i + 1, time_, end, i);
+      begin = end;
+    }
+  }
+
+  std::size_t size() const { return times_.size(); }
+  double time(std::size_t knot) const { return times_[knot]; }
+  std::size_t interval(std::size_t knot) const { return intervals_[knot]; }
+  double position(std::size_t knot, std::size_t axis) const {
+    return positions_[knot * axes_ + axis];
+  }
+  double velocity(std::size_t knot, std::size_t axis) const {
+    return velocities_[knot * axes_ + axis];
+  }
+
+ private:
+  void appendStraight(std::size_t interval, const ContourSpeed& speed) {
+    const Trapezoid made =
+        trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
+                    speed.ramp(interval), speed.capAtBegin(interval));
+    appendOnLine(interval, time_ + made.ramp_up, made.way_up, made.peak);
+    appendOnLine(interval, time_ + made.ramp_up + made.cruise, made.way_up + made.way_cruise,
+                 made.peak);
+    time_ += made.ramp_up + made.cruise + made.ramp_down;
+  }
+
+  void appendOnLine(std::size_t interval, double time, double way, double speed) {
+    if (!makeRoom(time, false)) return;
+    const double* from = grid_.position(interval);
+    const double* direction = grid_.firstAtBegin(interval);
+    for (std::size_t j = 0; j < axes_; ++j) {
+      positions_.push_back(from[j] + direction[j] * way);
+      velocities_.push_back(direction[j] * speed);
+    }
+    append(time, interval, false);
+  }
+
+  void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
+    const bool rests = speed == 0.0;
+    if (!makeRoom(time, rests)) return;
+    const double* position = grid_.position(place);
+    const double* direction = place == 0 ? grid_.firstAtBegin(0) : grid_.firstAtEnd(place - 1);
+    for (std::size_t j = 0; j < axes_; ++j) {
+      positions_.push_back(position[j]);
+      velocities_.push_back(direction[j] * speed);
+    }
+    append(time, interval, rests);
+  }
+
+  // Of two knots that are too close to each other, one at rest stays, or else the earlier one.
+  bool makeRoom(double time, bool rests) {
+    if (times_.empty() || time - times_.back() >= kShortestPiece) return true;
+    if (!rests || rests_.back()) return rests;
+    times_.pop_back();
+    intervals_.pop_back();
+    rests_.pop_back();
+    positions_.resize(positions_.size() - axes_);
+    velocities_.resize(velocities_.size() - axes_);
+    return true;
+  }
+
+  void append(double time, std::size_t interval, bool rests) {
+    times_.push_back(time);
+    intervals_.push_back(interval);
+    rests_.push_back(rests);
+  }
+
+  const ContourGrid& grid_;
+  std::size_t axes_;
+  double time_ = 0.0;
+  std::vector<double> times_;
+  std::vector<std::size_t> intervals_;  // of the grid, which end at the knot or contain it
+  std::vector<bool> rests_;
+  std::vector<double> positions_;
+  std::vector<double> velocities_;
+};
+
+// The demands of a cubic on the axes, in parts of their limits: the largest of all axes.
+struct Demand {
+  double acceleration_at_begin = 0.0;
+  double acceleration_at_end = 0.0;
+  double speed = 0.0;
+
+  double acceleration() const { return std::max(acceleration_at_begin, acceleration_at_end); }
+};
+
+// Of the cubic that ends at a knot.
+Demand demandOf(const Knots& knots, std::size_t knot, const std::vector<ContourLimits>& limits) {
+  const double duration = knots.time(knot) - knots.time(knot - 1);
+  Demand demand;
+  for (std::size_t j = 0; j < limits.size(); ++j) {
+    const double way = knots.position(knot, j) - knots.position(knot - 1, j);
+    const double v0 = knots.velocity(knot - 1, j);
+    const double v1 = knots.velocity(knot, j);
+    const double mean = way / duration;
+    const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / duration;
+    const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / duration;
+    const int direction = directionOf(v0, v1);
+    const auto part = [&](double a) {
+      return std::abs(a) / accelerationTowards(limits[j], direction, a > 0.0 ? 1 : -1);
+    };
+    demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
+    demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
+    double speed = std::max(std::abs(v0), std::abs(v1));
+    const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
+    if (turn > 0.0 && turn < 1.0) {
+      speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
+    }
+    demand.speed = std::max(demand.speed, speed / limits[j].speed);
+  }
+  return demand;
+}
+
+// By what factor limits are exceeded; 1 if they aren't.
+struct Excess {
+  double acceleration = 1.0;
+  double speed = 1.0;
+};
+
+// Whether an interval is so long that the motion isn't close to any limit at one of its ends, or
+// that the highest speed differs much between them: a motion that is as fast as possible is at one
+// of its limits everywhere.
+bool wastesTime(const ContourGrid& grid, const ContourSpeed& speed, std::size_t interval,
+                const Demand& demand) {
+  if (grid[interval].straight) return false;
+  if (demand.acceleration() > kPoorCubic) return true;
+  const double begin = speed.square(interval);
+  const double end = speed.square(interval + 1);
+  const double begin_use = begin / speed.capAtBegin(interval);
+  const double end_use = end / speed.capAtEnd(interval);
+  if (std::min(begin_use, end_use) > kFullUse)
+    return std::max(begin, end) > kMostSquareRatio * std::min(begin, end);
+  return std::min(std::max(demand.acceleration_at_begin, begin_use),
+                  std::max(demand.acceleration_at_end, end_use)) < kFullUse;
+}
+
+// How far the cubic of an interval may be from the contour [unit]. Let L be its length, b the angle
+// by which it turns, and r = (v1 - v0)/(v1 + v0) for the speeds at its ends. The fourth derivative
+// of q(s(t)) with constant s'' and curvature is 3 q'' s''^2 + 6 q''' s'' s'^2 + q'''' s'^4, and the
+// cubic deviates by T^4/384 of that.
+double deviationOf(const ContourGrid& grid, const ContourSpeed& speed, std::size_t interval) {
+  double square = 0.0;
+  for (std::size_t j = 0; j < grid.axes(); ++j) {
+    const double change = grid.firstAtEnd(interval)[j] - grid.firstAtBegin(interval)[j];
+    square += change * change;
+  }
+  const double begin = std::sqrt(speed.square(interval));
+  const double end = std::sqrt(speed.square(interval + 1));
+  const double r = std::abs(end - begin) / (end + begin);
+  const double b = std::sqrt(square);
+  return grid[interval].length * b * (r * r + b * r + b * b / 12.0) / 32.0;
+}
+
+// Divides the intervals that deviate, and those that waste time, unless they take only a small part
+// of their segment's.
+bool divideLong(const Knots& knots, const std::vector<ContourLimits>& limits, double deviation,
+                ContourGrid& grid, ContourSpeed& speed) {
+  std::vector<bool> divided(grid.size(), false);
+  std::vector<double> times;  // of the segments
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    times.resize(grid[knots.interval(i)].segment + 1, 0.0);
+    times.back() += knots.time(i) - knots.time(i - 1);
+  }
+  bool any = false;
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    const std::size_t interval = knots.interval(i);
+    const double time = knots.time(i) - knots.time(i - 1);
+    const Demand demand = demandOf(knots, i, limits);
+    const bool small = time < kSmallPart * times[grid[interval].segment];
+    if (small && demand.acceleration() < kPoorCubic) continue;
+    if (wastesTime(grid, speed, interval, demand)) divided[interval] = any = true;
+  }
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    if (grid[i].straight || deviationOf(grid, speed, i) <= deviation) continue;
+    divided[i] = any = true;
+  }
+  if (any) speed.regrid(grid.quarter(divided), divided);
+  return any;
+}
+
+// Lowers the limits of the intervals of the cubics that exceed them; returns the largest excess.
+Excess lowerLimits(const Knots& knots, const std::vector<ContourLimits>& limits, double by_more,
+                   ContourSpeed& speed) {
+  Excess worst;
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    const Demand demand = demandOf(knots, i, limits);
+    const Excess excess{std::max(1.0, demand.acceleration()), std::max(1.0, demand.speed)};
+    worst.acceleration = std::max(worst.acceleration, excess.acceleration);
+    worst.speed = std::max(worst.speed, excess.speed);
+    if (excess.acceleration == 1.0 && excess.speed == 1.0) continue;
+    const std::size_t last = knots.interval(i);
+    const std::size_t first = std::min(knots.interval(i - 1) + (i > 1 ? 1 : 0), last);
+    const auto by = [&](double factor) { return factor > 1.0 ? factor * by_more : 1.0; };
+    for (std::size_t k = first; k <= last; ++k) {
+      speed.lower(k, by(excess.acceleration), by(excess.speed));
+    }
+  }
+  return worst;
+}
+
+// The same motion, slower by a factor, at times of whole nanoseconds.
+std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid, double factor) {
+  const double last = knots.time(knots.size() - 1) * factor;
+  if (!(last < Profile::kLongest)) {
+    throw std::range_error("the motion along the path would take longer than 4e9 s");
+  }
+  std::vector<ContourKnot> made;
+  made.reserve(knots.size());
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    const double time = knots.time(i) * factor;
+    ContourKnot knot;
+    knot.time_ns = std::llround(time * 1e9);
+    const double later = static_cast<double>(knot.time_ns) * 1e-9 - time;
+    knot.segment = grid[knots.interval(i)].segment;
+    knot.positions.reserve(grid.axes());
+    knot.velocities.reserve(grid.axes());
+    for (std::size_t j = 0; j < grid.axes(); ++j) {
+      const double velocity = knots.velocity(i, j) / factor;
+      knot.positions.push_back(knots.position(i, j) + velocity * later);
+      knot.velocities.push_back(velocity);
+    }
+    made.push_back(std::move(knot));
+  }
+  return made;
+}
+
+}  // namespace
+
+std::vector<ContourKnot> planContour(const Contour& contour,
+                                     const std::vector<ContourLimits>& limits) {
+  ContourGrid grid(contour);
+  ContourSpeed speed(contour, grid, limits);
+  Knots knots(grid);
+  for (int i = 0; i < kMostDivisions; ++i) {
+    speed.plan();
+    knots.make(speed);
+    if (!divideLong(knots, limits, kMostDeviation * contour.resolution(), grid, speed)) break;
+  }
+  for (int plans = 1;; ++plans) {
+    speed.plan();
+    knots.make(speed);
+    const Excess excess = lowerLimits(knots, limits, plans == 1 ? kLowerFirstBy : kLowerBy, speed);
+    const double most = std::max(excess.acceleration, excess.speed);
+    if (most > 1.0 + kSmallExcess && plans < kMostPlans) continue;
+    return slowedDown(knots, grid, std::max(std::sqrt(excess.acceleration), excess.speed));
+  }
+}
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "motion/contour.h"
+
+namespace stepdriver::motion {
+
+/// The limits of one axis on a contour, all above 0 and finite [unit/s, unit/s^2].
+struct ContourLimits {
+  double speed = 0.0;
+  double acceleration = 0.0;  ///< while its speed rises
+  double deceleration = 0.0;  ///< while its speed falls
+};
+
+/// A place of a contour, the time at which the motion is there, and its velocity.
+struct ContourKnot {
+  std::int64_t time_ns = 0;
+  std::size_t segment = 0;
+  std::vector<double> positions;   ///< [unit]
+  std::vector<double> velocities;  ///< [unit/s]
+};
+
+/// The fastest motion along a contour, from rest to rest, within the limits of the axes and the
+/// speeds of the segments. There is no jerk limit: accelerations jump.
+///
+/// The axes move on the cubics that have the positions and velocities of the knots at both ends.
+/// Between knots they are within a tenth of the resolution of the contour. In the whole of each
+/// cubic, velocities and accelerations are within the limits, apart from rounding.
+///
+/// The contour is divided at places between which its direction turns by little, and straight parts
+/// aren't divided. With x = s'^2 as a function of the length s, the limits are linear in x and s'':
+///
+///     -a <= q'(s) s'' + q''(s) x <= a,   q'(s)^2 x <= v^2
+///
+/// s'' is constant between two places, and these hold at both. A pass from the end computes the
+/// largest x at each place from which the motion can still be slowed down, a pass from the start
+/// the largest of these that the motion can reach (H. Pham and Q.-C. Pham, A new approach to
+/// time-optimal path parameterization based on reachability analysis, 2018). On straight parts the
+/// motion is an exact trapezoid. A motion that is as fast as possible is at one of its limits at
+/// every time: intervals in which it isn't are divided, and so are those whose cubic would deviate.
+/// Limits that a cubic exceeds are then lowered there, and the passes are repeated. If an excess is
+/// left, the whole motion is slowed down by that factor.
+///
+/// @param limits one for each axis.
+/// @return the knots, the first one at rest at time 0 and at the start of the contour.
+/// @throw std::range_error if it takes Profile::kLongest or longer.
+std::vector<ContourKnot> planContour(const Contour& contour,
+                                     const std::vector<ContourLimits>& limits);
+
+}  // namespace stepdriver::motion

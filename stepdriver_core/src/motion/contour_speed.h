@@ -1,0 +1,90 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "motion/contour.h"
+#include "motion/contour_grid.h"
+#include "motion/contour_motion.h"
+
+namespace stepdriver::motion {
+
+/// The square of the highest speed along a contour at each place of its grid, see planContour().
+class ContourSpeed {
+ public:
+  /// @param contour, grid, limits outlive this.
+  ContourSpeed(const Contour& contour, const ContourGrid& grid,
+               const std::vector<ContourLimits>& limits);
+
+  /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
+  /// these.
+  void lower(std::size_t interval, double acceleration, double speed);
+  /// After ContourGrid::quarter(): its result, and what was divided.
+  void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided);
+  /// Plans everything the first time, then only what has changed since.
+  void plan();
+
+  /// [unit^2/s^2] The highest that the speeds alone allow before an interval and at its end.
+  double capAtBegin(std::size_t interval) const {
+    return capAt(interval, grid_.firstAtBegin(interval));
+  }
+  double capAtEnd(std::size_t interval) const {
+    return capAt(interval, grid_.firstAtEnd(interval));
+  }
+
+  /// [unit^2/s^2] @param place from 0 to the size of the grid.
+  double square(std::size_t place) const { return squares_[place]; }
+  /// The accelerations along a straight interval that the axes allow [unit/s^2].
+  struct Ramp {
+    double up = 0.0;
+    double down = 0.0;
+  };
+  Ramp ramp(std::size_t interval) const;
+
+ private:
+  // u = s'' is at least, or at most, offset + slope x.
+  struct Bound {
+    double offset = 0.0;
+    double slope = 0.0;
+    double at(double x) const { return offset + slope * x; }
+  };
+
+  double capAt(std::size_t interval, const double* first) const;
+  double capBefore(std::size_t place) const;
+  void collectBounds(std::size_t interval);
+  void addBounds(double u_factor, double x_factor, double least, double most);
+  void capEnd(std::size_t interval, double end);
+  double largestBefore(std::size_t interval, double end);
+  double largestAfter(std::size_t interval, double begin, double end);
+
+  const Contour& contour_;
+  const ContourGrid& grid_;
+  const std::vector<ContourLimits>& limits_;
+  std::vector<double> acceleration_shares_;  // of each interval
+  std::vector<double> speed_shares_;
+  std::vector<bool> stale_;           // each interval that has changed since the last plan
+  std::vector<double> controllable_;  // the largest x at each place from which it can slow down
+  std::vector<double> squares_;       // x at each place
+  // Of the interval that is being planned.
+  std::vector<Bound> above_;
+  std::vector<Bound> below_;
+  double most_x_ = 0.0;
+};
+
+/// The sign of the motion of an axis in an interval that begins and ends with these velocities; 0:
+/// it turns, or doesn't move.
+inline int directionOf(double begin, double end) {
+  const double rounding = 1e-9 * std::max(std::abs(begin), std::abs(end));
+  if (begin > rounding || end > rounding) return begin < -rounding || end < -rounding ? 0 : 1;
+  return begin < -rounding || end < -rounding ? -1 : 0;
+}
+
+/// The highest acceleration towards plus or minus of an axis that moves in this direction.
+inline double accelerationTowards(const ContourLimits& limits, int direction, int sign) {
+  if (direction == 0) return std::min(limits.acceleration, limits.deceleration);
+  return direction == sign ? limits.acceleration : limits.deceleration;
+}
+
+}  // namespace stepdriver::motion

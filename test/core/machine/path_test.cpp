@@ -1,0 +1,407 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/refusal.h"
+#include "support/trajectory_bench.h"
+
+// Paths of several axes, as the pins show them. The axes are the plotter's: 80 microsteps/mm,
+// 100 mm/s, 1000 mm/s^2.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using machine::CoordinatedMove;
+using machine::CoordinatedResult;
+using machine::PathRequest;
+using machine::PathSegment;
+using Shape = PathSegment::Shape;
+
+constexpr double kRadius = 0.020;       // m
+constexpr double kTolerance = 20e-6;    // m
+constexpr double kMicrostep = 12.5e-6;  // m
+const double kPi = std::acos(-1.0);
+
+using Place = std::array<double, 2>;
+
+PathSegment lineTo(std::vector<double> end) {
+  PathSegment segment;
+  segment.end = std::move(end);
+  return segment;
+}
+
+PathSegment arcTo(std::vector<double> end, Place centre) {
+  PathSegment segment = lineTo(std::move(end));
+  segment.shape = Shape::kArcAround;
+  segment.plane = {"x", "y"};
+  segment.point = centre;
+  return segment;
+}
+
+Place onCircle(double turn) {
+  return {kRadius * (std::cos(2.0 * kPi * turn) - 1.0), kRadius * std::sin(2.0 * kPi * turn)};
+}
+
+// The circle of 100 lines, around (-20 mm, 0), at the speed of the axes.
+PathRequest circle() {
+  PathRequest request{{"x", "y"}, {}, false, 0.1, kTolerance};
+  for (int i = 1; i <= 100; ++i) {
+    const Place place = i == 100 ? Place{0.0, 0.0} : onCircle(i / 100.0);
+    request.segments.push_back(lineTo({place[0], place[1]}));
+  }
+  return request;
+}
+
+// Two corners, an arc and a Bezier.
+PathRequest mixed() {
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0005};
+  request.segments = {lineTo({0.010, 0.0}), lineTo({0.010, 0.010}),
+                      arcTo({0.0, 0.020}, {0.0, 0.010}), lineTo({-0.010, 0.010})};
+  request.segments.back().shape = Shape::kBezier;
+  request.segments.back().control1 = {-0.005, 0.030};
+  request.segments.back().control2 = {-0.015, 0.020};
+  return request;
+}
+
+double distanceTo(const Place& point, const Place& a, const Place& b) {
+  const double x = b[0] - a[0];
+  const double y = b[1] - a[1];
+  const double along = ((point[0] - a[0]) * x + (point[1] - a[1]) * y) / (x * x + y * y);
+  const double part = std::clamp(along, 0.0, 1.0);
+  return std::hypot(point[0] - a[0] - part * x, point[1] - a[1] - part * y);
+}
+
+class Path : public test::TrajectoryBench {
+ protected:
+  void SetUp() override { build({plotterAxis("x"), plotterAxis("y")}); }
+
+  static config::AxisConfig plotterAxis(const std::string& name) {
+    config::AxisConfig config = test::linearAxis(name);
+    config.endstop_min.reset();
+    config.min_position = -0.1;
+    config.start_speed = 0.002;
+    return config;
+  }
+
+  CoordinatedMove followPath(const PathRequest& request) { return machine().followPath(request); }
+  CoordinatedResult finish(const PathRequest& request) {
+    return machine().wait(followPath(request));
+  }
+
+  // The places at which x and y are after each pulse of either.
+  std::vector<Place> pulsePlaces() {
+    struct Step {
+      double time;
+      std::size_t axis;
+      std::int64_t count;
+    };
+    std::vector<Step> steps;
+    const test::MotionTrace trace(*bench);
+    const std::array<std::string, 2> names{"x", "y"};
+    for (std::size_t k = 0; k < 2; ++k) {
+      for (const test::MotionTrace::Step& step : trace.steps(names[k])) {
+        steps.push_back({step.time, k, step.count});
+      }
+    }
+    std::sort(steps.begin(), steps.end(),
+              [](const Step& a, const Step& b) { return a.time < b.time; });
+    std::vector<Place> places;
+    Place now{0.0, 0.0};
+    for (const Step& step : steps) {
+      now[step.axis] = static_cast<double>(step.count) * kMicrostep;
+      places.push_back(now);
+    }
+    return places;
+  }
+
+  // The farthest that a place of the pulses is from a polyline.
+  static double farthest(const std::vector<Place>& places, const std::vector<Place>& polyline) {
+    double worst = 0.0;
+    for (const Place& place : places) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (std::size_t i = 1; i < polyline.size(); ++i) {
+        nearest = std::min(nearest, distanceTo(place, polyline[i - 1], polyline[i]));
+      }
+      worst = std::max(worst, nearest);
+    }
+    return worst;
+  }
+
+  static std::vector<Place> corners(const PathRequest& request) {
+    std::vector<Place> places{{0.0, 0.0}};
+    for (const PathSegment& segment : request.segments) {
+      places.push_back({segment.end[0], segment.end[1]});
+    }
+    return places;
+  }
+
+  void expectAtRest() {
+    for (const std::string name : {"x", "y"}) {
+      EXPECT_EQ(test::violationsOf(bench->report(name)), "") << name;
+      EXPECT_NEAR(state(name).position, static_cast<double>(bench->pulses(name)) * kMicrostep,
+                  1e-12);
+    }
+  }
+};
+
+// Half a microstep of each axis, the diagonal of half a microstep of both.
+const double kHalfMicrosteps = std::sqrt(0.5) * kMicrostep;
+
+TEST_F(Path, FollowsACircleOfLinesWithoutStopping) {
+  const CoordinatedMove move = followPath(circle());
+  // On the ideal circle: 2 pi r/v + v/a = 1.357 s.
+  EXPECT_LE(move.duration, 1.40);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_LE(result.duration, 1.40);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  EXPECT_EQ(bench->pulses("y"), 0);
+  expectAtRest();
+  const std::vector<Place> places = pulsePlaces();
+  // The circle has 4 * 3200; its rounded corners are a bit inside of it.
+  EXPECT_NEAR(static_cast<double>(places.size()), 12'800.0, 20.0);
+  // The plan deviates from the blended path by a fiftieth of a microstep at most.
+  EXPECT_LE(farthest(places, corners(circle())), kTolerance + kHalfMicrosteps + 0.02 * kMicrostep);
+  RecordProperty("duration", std::to_string(result.duration));
+}
+
+TEST_F(Path, KeepsTheLimitsOfBothAxes) {
+  finish(mixed());
+  expectAtRest();
+  for (const std::string name : {"x", "y"}) {
+    const test::Differences seen = differences(name, 0.004);
+    // Half a step of uncertainty at each end of 4 ms.
+    EXPECT_LE(seen.speed, 0.1 / kMicrostep * 1.001) << name;
+    EXPECT_LE(seen.acceleration, 1.0 / kMicrostep * 1.02) << name;
+  }
+}
+
+TEST_F(Path, GoesThroughArcsAndBeziersToItsEnd) {
+  const CoordinatedResult result = finish(mixed());
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_NEAR(result.positions[0], -0.010, kMicrostep / 2.0);
+  EXPECT_NEAR(result.positions[1], 0.010, kMicrostep / 2.0);
+  expectAtRest();
+}
+
+TEST_F(Path, TakesAnArcThroughAPointAndAHelix) {
+  PathRequest request{{"x", "y"}, {lineTo({-0.020, 0.020})}, false, 0.0, 0.0};
+  request.segments[0].shape = Shape::kArcThrough;
+  request.segments[0].plane = {"x", "y"};
+  request.segments[0].point = onCircle(0.125);
+  finish(request);
+  std::vector<Place> given;
+  for (int i = 0; i <= 500; ++i) given.push_back(onCircle(i / 2000.0));
+  EXPECT_LE(farthest(pulsePlaces(), given), kHalfMicrosteps + 0.03 * kMicrostep);
+  EXPECT_EQ(bench->pulses("y"), 1600);
+
+  build({plotterAxis("x"), plotterAxis("y"), plotterAxis("z")});
+  PathRequest helix{{"x", "y", "z"}, {arcTo({0.0, 0.0, 0.010}, {-kRadius, 0.0})}, false, 0.0, 0.0};
+  finish(helix);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  EXPECT_EQ(bench->pulses("z"), 800);
+}
+
+TEST_F(Path, StopsAtCornersWithoutATolerance) {
+  PathRequest request = mixed();
+  request.tolerance = 0.0;
+  request.segments.resize(2);
+  const CoordinatedMove move = followPath(request);
+  // Two lines of 10 mm, each from rest to rest: 2 sqrt(10 mm / 1000 mm/s^2).
+  EXPECT_NEAR(move.duration, 2.0 * 2.0 * std::sqrt(0.01), 1e-6);
+  machine().wait(move);
+  EXPECT_LE(farthest(pulsePlaces(), corners(request)), kMicrostep / 2.0 + 1e-12);
+}
+
+TEST_F(Path, KeepsToTheVelocityOfEachSegment) {
+  PathRequest request = mixed();
+  request.velocity = 0.05;
+  request.segments[1].velocity = 0.01;
+  const double duration = followPath(request).duration;
+  // 10 mm at 10 mm/s, and about 51 mm at 50 mm/s.
+  EXPECT_GT(duration, 1.0 + 0.8);
+  EXPECT_LT(duration, 1.0 + 1.5);
+  while (state("x").moving || state("y").moving) {
+    advance(0.001);
+    EXPECT_LE(std::hypot(state("x").velocity, state("y").velocity), 0.05 * 1.002);
+  }
+}
+
+TEST_F(Path, CountsRelativePositionsFromTheCommandedOnes) {
+  // A third of a microstep more each time: nothing is lost.
+  PathRequest request{{"x", "y"}, {lineTo({0.001 + kMicrostep / 3.0, 0.0})}, true, 0.0, 0.0};
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(finish(request).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 3 * 80 + 1);
+}
+
+TEST_F(Path, IsHeldOnThePathAndResumed) {
+  const CoordinatedMove move = followPath(circle());
+  advance(0.5);
+  machine().hold();
+  awaitRest();
+  EXPECT_TRUE(state("x").held);
+  advance(1.0);
+  machine().resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectAtRest();
+  EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
+            kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
+}
+
+TEST_F(Path, StopsOnThePath) {
+  const CoordinatedMove move = followPath(circle());
+  advance(0.7);
+  bench->axis("y").stop();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
+  awaitRest();
+  expectAtRest();
+  EXPECT_GT(std::abs(state("x").position), 0.01);
+  EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
+            kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
+  // The next path begins there.
+  EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 0);
+}
+
+TEST_F(Path, EndsOnThePathAtAnEmergencyStop) {
+  const CoordinatedMove move = followPath(circle());
+  advance(0.6);
+  machine().emergencyStop();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kEmergencyStop);
+  EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
+            kTolerance + kHalfMicrosteps + 0.02 * kMicrostep);
+  expectAtRest();
+}
+
+TEST_F(Path, RunsMoreSlowlyAtASpeedOverride) {
+  machine().setSpeedOverride(0.5);
+  const CoordinatedResult result = finish(circle());
+  EXPECT_EQ(result.end, MoveEnd::kReached);
+  EXPECT_GT(result.duration, 2.5);
+  EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
+            kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
+}
+
+TEST_F(Path, TakesUpTheBacklashOnTheWay) {
+  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+  for (config::AxisConfig& axis : axes) axis.backlash = 0.0001;
+  build(axes);
+  const CoordinatedResult result = finish(circle());
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_NEAR(result.positions[0], 0.0, 1e-12);
+  EXPECT_NEAR(result.positions[1], 0.0, 1e-12);
+  // From the left, up, and the whole backlash of 8 microsteps is taken up.
+  EXPECT_EQ(bench->pulses("x"), 8);
+  EXPECT_LE(result.duration, 1.8);
+}
+
+TEST_F(Path, BeginsOnlyAtRest) {
+  bench->axis("x").moveTo(0.05);
+  advance(0.1);
+  EXPECT_REFUSED(followPath(circle()), "x: it moves; a path begins at rest");
+}
+
+TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
+  const double kNan = std::numeric_limits<double>::quiet_NaN();
+  const double kInfinity = std::numeric_limits<double>::infinity();
+  const auto with = [](auto change) {
+    PathRequest request = mixed();
+    change(request);
+    return request;
+  };
+  const auto segment = [&](std::size_t index, auto change) {
+    return with([&](PathRequest& request) { change(request.segments[index]); });
+  };
+  EXPECT_REFUSED(followPath(with([&](auto& request) {
+                   request.names = {"x", "q"};
+                 })),
+                 "there is no axis q");
+  EXPECT_REFUSED(followPath(with([&](auto& request) {
+                   request.names = {"x", "x"};
+                 })),
+                 "the axis x is named twice");
+  EXPECT_REFUSED(followPath(with([&](auto& request) { request.segments.clear(); })),
+                 "the path has 0 segments, but must have 1 to 50000");
+  EXPECT_REFUSED(followPath(with([&](auto& request) {
+                   request.segments.assign(1'000'000, lineTo({0.0, 0.0}));
+                 })),
+                 "the path has 1000000 segments, but must have 1 to 50000");
+  EXPECT_REFUSED(followPath(with([&](auto& request) { request.tolerance = -1.0; })),
+                 "the tolerance of the path is -1, but must be a finite number from 0 on");
+  EXPECT_REFUSED(followPath(with([&](auto& request) { request.velocity = kNan; })),
+                 "the velocity of the path is nan");
+  EXPECT_REFUSED(followPath(segment(1, [&](auto& given) { given.end = {0.0}; })),
+                 "segment 1 of the path has 1 positions, but must have 2");
+  EXPECT_REFUSED(followPath(segment(1, [&](auto& given) { given.end[1] = kNan; })),
+                 "y: segment 1 of the path has nan among its positions, but they must be finite");
+  EXPECT_REFUSED(followPath(segment(3, [&](auto& given) { given.control1[0] = kInfinity; })),
+                 "x: segment 3 of the path has inf among its numbers in control1");
+  EXPECT_REFUSED(followPath(segment(0, [&](auto& given) { given.velocity = -0.1; })),
+                 "segment 0 of the path has the velocity -0.1, but it must be");
+  EXPECT_REFUSED(followPath(segment(0, [&](auto& given) { given.tolerance = kInfinity; })),
+                 "segment 0 of the path has the tolerance inf");
+  EXPECT_REFUSED(followPath(segment(1,
+                                    [&](auto& given) {
+                                      given.end = {0.010, 0.0};
+                                    })),
+                 "segment 1 of the path has a length of 0");
+  EXPECT_REFUSED(followPath(segment(0, [&](auto& given) { given.end[0] = -0.2; })),
+                 "x: segment 0 of the path leads to -0.2 m is below the soft limit");
+  EXPECT_REFUSED(followPath(segment(2,
+                                    [&](auto& given) {
+                                      given.point = {0.0, 0.011};
+                                    })),
+                 "segment 2 of the path is an arc that begins 0.0100498756 m from its centre and "
+                 "ends 0.009 m from it; these may differ by 5e-06 m");
+  EXPECT_REFUSED(followPath(segment(2,
+                                    [&](auto& given) {
+                                      given.shape = Shape::kArcThrough;
+                                      given.point = {0.005, 0.015};
+                                    })),
+                 "segment 2 of the path is an arc through three points that are in line");
+  EXPECT_REFUSED(followPath(segment(2,
+                                    [&](auto& given) {
+                                      given.plane = {"x", "z"};
+                                    })),
+                 "segment 2 of the path is an arc in a plane of 'z', which isn't among");
+  EXPECT_REFUSED(followPath(segment(2,
+                                    [&](auto& given) {
+                                      given.plane = {"x", "x"};
+                                    })),
+                 "must have two different axes of the same kind");
+  EXPECT_REFUSED(followPath(segment(3,
+                                    [&](auto& given) {
+                                      given.end = {0.010, 0.020};
+                                      given.control1 = {0.010, 0.030};
+                                      given.control2 = {0.0, 0.030};
+                                    })),
+                 "segment 3 is a Bezier with a cusp");
+  // The arc's farthest point, not its end.
+  EXPECT_REFUSED(followPath({{"x", "y"}, {arcTo({0.0, 0.0}, {-0.06, 0.0})}, false, 0.0, 0.0}),
+                 "x: segment 0 of the path leads to -0.12 m");
+  advance(1.0);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  EXPECT_EQ(bench->pulses("y"), 0);
+}
+
+TEST_F(Path, IsRefusedWithAJerkLimit) {
+  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+  axes[1].jerk = 20.0;
+  build(axes);
+  EXPECT_REFUSED(followPath(circle()), "y: it has a jerk limit of 20 m/s^3");
+  advance(1.0);
+  EXPECT_EQ(bench->pulses("y"), 0);
+}
+
+}  // namespace
+}  // namespace stepdriver

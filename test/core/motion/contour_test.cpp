@@ -1,0 +1,216 @@
+#include "motion/contour.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/random_contour.h"
+
+// The geometry of paths: what rounds a corner, and how far it is from the corner.
+
+namespace stepdriver {
+namespace {
+
+using motion::Contour;
+using motion::ContourPoint;
+using motion::ContourSegment;
+
+const double kPi = std::acos(-1.0);
+
+double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return std::sqrt(sum);
+}
+
+ContourSegment lineTo(std::vector<double> end, double tolerance) {
+  ContourSegment segment;
+  segment.end = std::move(end);
+  segment.tolerance = tolerance;
+  return segment;
+}
+
+// The direction and the curvature of a contour at a place.
+struct Shape {
+  std::vector<double> direction;
+  std::vector<double> curvature;
+};
+
+Shape shapeOf(const ContourPoint& point) {
+  const double rate = distance(point.first, std::vector<double>(point.first.size()));
+  double along = 0.0;
+  for (std::size_t i = 0; i < point.first.size(); ++i) along += point.first[i] * point.second[i];
+  Shape shape;
+  for (std::size_t i = 0; i < point.first.size(); ++i) {
+    shape.direction.push_back(point.first[i] / rate);
+    shape.curvature.push_back((point.second[i] - point.first[i] * along / (rate * rate)) /
+                              (rate * rate));
+  }
+  return shape;
+}
+
+TEST(Contour, RoundsACornerByTheTolerance) {
+  const Contour contour({0.0, 0.0}, {lineTo({100.0, 0.0}, 2.0), lineTo({100.0, 100.0}, 0.0)}, 1.0);
+  // d = tolerance / (3/8 sin 45)
+  const double d = 2.0 / (0.375 * std::sin(kPi / 4.0));
+  EXPECT_NEAR(contour.roundedFrom(0), 1.0 - d / 100.0, 1e-12);
+  EXPECT_NEAR(contour.roundedUntil(1), d / 100.0, 1e-12);
+  EXPECT_FALSE(contour.stopsAfter(0));
+  ContourPoint middle;
+  contour.evaluate(0, 1.0, middle);
+  EXPECT_NEAR(distance(middle.position, {100.0, 0.0}), 2.0, 1e-12);
+  EXPECT_NEAR(middle.position[0] - 100.0, -middle.position[1], 1e-12);
+}
+
+TEST(Contour, RoundsAtMostHalfOfASegment) {
+  const Contour contour(
+      {0.0, 0.0}, {lineTo({10.0, 0.0}, 50.0), lineTo({10.0, 6.0}, 50.0), lineTo({20.0, 6.0}, 0.0)},
+      1.0);
+  EXPECT_NEAR(contour.roundedUntil(1), 0.5, 1e-12);
+  EXPECT_NEAR(contour.roundedFrom(1), 0.5, 1e-12);
+  EXPECT_NEAR(contour.roundedFrom(0), 0.7, 1e-12);
+}
+
+TEST(Contour, StopsWithoutToleranceAndAtATurn) {
+  const double turn = 171.0 / 180.0 * kPi;
+  const std::vector<double> back{10.0 + 10.0 * std::cos(turn), 10.0 * std::sin(turn)};
+  const auto stops = [](const std::vector<double>& end, double tolerance) {
+    return Contour({0.0, 0.0}, {lineTo({10.0, 0.0}, tolerance), lineTo(end, 0.0)}, 1.0)
+        .stopsAfter(0);
+  };
+  EXPECT_TRUE(stops({10.0, 10.0}, 0.0));
+  EXPECT_FALSE(stops({10.0, 10.0}, 0.1));
+  EXPECT_TRUE(stops({0.0, 0.0}, 1.0));
+  EXPECT_TRUE(stops(back, 1.0));
+  EXPECT_FALSE(stops({20.0, 0.0}, 0.0)) << "a straight line has no corner";
+}
+
+TEST(Contour, PassesATangentArcUnchanged) {
+  ContourSegment arc;
+  arc.shape = ContourSegment::Shape::kArc;
+  arc.plane = {0, 1};
+  arc.centre = {10.0, 5.0};
+  arc.angle = kPi / 2.0;
+  arc.end = {15.0, 5.0, 7.0};
+  const Contour contour({0.0, 0.0, 0.0}, {lineTo({10.0, 0.0, 0.0}, 1.0), arc}, 1.0);
+  // The third axis begins to move with the arc: a corner.
+  EXPECT_LT(contour.roundedFrom(0), 1.0);
+  arc.end[2] = 0.0;
+  const Contour flat({0.0, 0.0, 0.0}, {lineTo({10.0, 0.0, 0.0}, 1.0), arc}, 1.0);
+  EXPECT_EQ(flat.roundedFrom(0), 1.0);
+  EXPECT_FALSE(flat.stopsAfter(0));
+  ContourPoint point;
+  flat.evaluate(1, 1.0, point);
+  EXPECT_NEAR(distance(point.position, arc.end), 0.0, 1e-12);
+  EXPECT_NEAR(point.first[1], 5.0 * kPi / 2.0, 1e-12);
+}
+
+TEST(Contour, FindsTheCircleOfAnArc) {
+  const motion::Arc arc = motion::arcThrough({1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0});
+  EXPECT_NEAR(arc.centre[0], 0.0, 1e-12);
+  EXPECT_NEAR(arc.centre[1], 0.0, 1e-12);
+  EXPECT_NEAR(arc.angle, kPi, 1e-12);
+  EXPECT_NEAR(motion::arcThrough({1.0, 0.0}, {0.0, -1.0}, {0.0, 1.0}).angle, -1.5 * kPi, 1e-12);
+  EXPECT_EQ(motion::arcThrough({0.0, 0.0}, {1.0, 1.0}, {3.0, 3.0}).angle, 0.0);
+  EXPECT_EQ(motion::arcThrough({0.0, 0.0}, {3.0, 3.0}, {3.0, 3.0}).angle, 0.0);
+  EXPECT_NEAR(motion::arcAround({1.0, 0.0}, {0.0, 0.0}, {1.0, 0.0}, true).angle, -2.0 * kPi, 1e-12);
+  EXPECT_NEAR(motion::arcAround({1.0, 0.0}, {0.0, 0.0}, {0.0, 1.0}, true).angle, -1.5 * kPi, 1e-12);
+  // 1 and 1.002 from the centre: it moves by 0.001 along the chord.
+  const motion::Arc moved = motion::arcAround({1.0, 0.0}, {0.0, 0.0}, {-1.002, 0.0}, false);
+  EXPECT_NEAR(moved.centre[0], -0.001, 1e-12);
+}
+
+TEST(Contour, RefusesACusp) {
+  ContourSegment bezier;
+  bezier.shape = ContourSegment::Shape::kBezier;
+  bezier.end = {10.0, 0.0};
+  bezier.control1 = {10.0, 10.0};
+  bezier.control2 = {0.0, 10.0};
+  EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), std::invalid_argument);
+  bezier.control1 = {9.0, 10.0};
+  EXPECT_NO_THROW(Contour({0.0, 0.0}, {bezier}, 1.0));
+  bezier.control1 = {0.0, 0.0};
+  EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), std::invalid_argument);
+}
+
+TEST(Contour, KnowsTheRangeOfEachAxis) {
+  std::mt19937 random(7);
+  for (int i = 0; i < 200; ++i) {
+    const Contour contour = test::randomContour(random).contour();
+    ContourPoint point;
+    for (std::size_t segment = 0; segment < contour.size(); ++segment) {
+      for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+        const auto [low, high] = contour.range(segment, axis);
+        double lowest = high;
+        double highest = low;
+        for (int k = 0; k <= 2000; ++k) {
+          contour.evaluateGiven(segment, k / 2000.0, point);
+          lowest = std::min(lowest, point.position[axis]);
+          highest = std::max(highest, point.position[axis]);
+        }
+        const double close = 1e-5 * (1.0 + high - low);
+        ASSERT_NEAR(low, lowest, close) << i << " segment " << segment << " axis " << axis;
+        ASSERT_NEAR(high, highest, close) << i << " segment " << segment << " axis " << axis;
+      }
+    }
+  }
+}
+
+// Corners of every two shapes: within the tolerance, tangential, with a curvature that is
+// continuous where the rounding begins and ends, and never without a direction.
+TEST(Contour, StaysWithinTheToleranceOnRandomPaths) {
+  std::mt19937 random(20);
+  int corners = 0;
+  for (int i = 0; i < 400; ++i) {
+    const test::RandomContour path = test::randomContour(random);
+    const Contour contour = path.contour();
+    ContourPoint point;
+    ContourPoint given;
+    const auto shape_at = [&](std::size_t segment, double parameter) {
+      contour.evaluate(segment, parameter, point);
+      return shapeOf(point);
+    };
+    for (std::size_t segment = 0; segment < contour.size(); ++segment) {
+      const double first = contour.roundedUntil(segment);
+      const double last = contour.roundedFrom(segment);
+      ASSERT_LE(first, last);
+      const double before = segment == 0 ? 0.0 : path.segments[segment - 1].tolerance;
+      for (int k = 0; k <= 1000; ++k) {
+        const double u = k / 1000.0;
+        contour.evaluate(segment, u, point);
+        contour.evaluateGiven(segment, u, given);
+        const double most = u < 0.5 ? before : path.segments[segment].tolerance;
+        ASSERT_LE(distance(point.position, given.position), most * (1.0 + 1e-9) + 1e-9)
+            << "path " << i << " segment " << segment << " at " << u;
+        ASSERT_GT(distance(point.first, std::vector<double>(contour.axes())), 0.0);
+      }
+      if (segment + 1 == contour.size() || contour.stopsAfter(segment)) continue;
+      ASSERT_LT(distance(shape_at(segment, 1.0).direction, shape_at(segment + 1, 0.0).direction),
+                1.1e-6)
+          << "path " << i << " segment " << segment;
+      if (last == 1.0) continue;
+      ++corners;
+      constexpr double kBeside = 1e-7;
+      const double scale = distance(point.first, std::vector<double>(contour.axes()));
+      for (const double edge : {first, last}) {
+        if (edge == 0.0) continue;
+        const Shape in = shape_at(segment, edge - kBeside);
+        const Shape out = shape_at(segment, edge + kBeside);
+        ASSERT_LT(distance(in.direction, out.direction), 1e-4);
+        // The curvature grows linearly from there, the faster the shorter the rounding is.
+        const double blend = edge == first ? first : 1.0 - last;
+        ASSERT_LT(distance(in.curvature, out.curvature) * scale, 1e-3 + 1e-6 / (blend * blend))
+            << "path " << i << " segment " << segment;
+      }
+    }
+  }
+  EXPECT_GT(corners, 500);
+}
+
+}  // namespace
+}  // namespace stepdriver
