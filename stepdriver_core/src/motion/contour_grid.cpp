@@ -15,7 +15,7 @@ constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an i
 constexpr double kMostArcDeviation = 0.005;  // of the resolution
 constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
-constexpr int kPartsOfCorner = 10;           // at least, of each half
+constexpr int kPartsOfCorner = 5;            // at least, of each half
 constexpr int kPartsOfCurve = 4;             // at least
 constexpr std::size_t kPlacesOfItem = 16;    // for giveWay()
 
@@ -54,6 +54,7 @@ void ContourGrid::divide(std::size_t segment, double from, double to, int parts)
     return;
   }
   std::vector<double> ahead;  // parameters of places, the next one last
+  ahead.reserve(2 * static_cast<std::size_t>(parts));
   for (int i = 0; i < parts; ++i) ahead.push_back(to + (from - to) * i / parts);
   Place middle;
   while (!ahead.empty()) {
