@@ -17,7 +17,6 @@ constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
 constexpr int kPartsOfCorner = 5;            // at least, of each half
 constexpr int kPartsOfCurve = 4;             // at least
-constexpr std::size_t kPlacesOfItem = 16;    // for giveWay()
 
 }  // namespace
 
@@ -86,7 +85,7 @@ std::vector<std::size_t> ContourGrid::quarter(const std::vector<bool>& which) {
   origins.reserve(before.size() + more);
   std::array<Place, 9> places;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    giveWay(i / kPlacesOfItem);
+    giveWayAt(i);
     const Interval& interval = before[i];
     if (which[i] && !interval.straight) {
       for (std::size_t k = 0; k < places.size(); ++k) {

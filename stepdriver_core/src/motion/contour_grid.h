@@ -3,9 +3,17 @@
 #include <cstddef>
 #include <vector>
 
+#include "give_way.h"
 #include "motion/contour.h"
 
 namespace stepdriver::motion {
+
+/// giveWay() for a loop over the places of a grid, each of which takes a fraction of what it
+/// counts.
+inline void giveWayAt(std::size_t place) {
+  constexpr std::size_t kPlaces = 16;
+  if (place % kPlaces == 0) giveWay(place / kPlaces);
+}
 
 /// A contour divided into short intervals of its length s, each from one place to the next. A
 /// straight part is one interval.

@@ -7,7 +7,6 @@
 
 #include "contour_grid.h"
 #include "contour_speed.h"
-#include "give_way.h"
 #include "motion/profile.h"
 
 namespace stepdriver::motion {
@@ -16,7 +15,6 @@ namespace {
 // [s] Knots aren't closer than this, so that rounded times and positions don't change
 // accelerations. In such a time an acceleration makes no difference to the position.
 constexpr double kShortestPiece = 20e-6;
-constexpr std::size_t kPlacesOfItem = 16;  // for giveWay()
 constexpr int kMostPlans = 12;
 // Of a limit: less is left for the whole motion to be slowed down by.
 constexpr double kSmallExcess = 1e-3;
@@ -78,7 +76,7 @@ class Knots {
     appendPlace(0, 0.0, 0.0, 0);
     double begin = 0.0;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
-      giveWay(i / kPlacesOfItem);
+      giveWayAt(i);
       const double end = std::sqrt(speed.square(i + 1));
       if (grid_[i].straight) {
         appendStraight(i, speed);

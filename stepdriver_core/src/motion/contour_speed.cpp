@@ -5,15 +5,12 @@
 #include <limits>
 #include <utility>
 
-#include "give_way.h"
-
 namespace stepdriver::motion {
 namespace {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-constexpr double kNegligible = 1e-12;      // of a derivative with respect to the length, which is 1
-constexpr std::size_t kPlacesOfItem = 16;  // for giveWay()
-constexpr int kMostSteps = 100;            // of the search for the largest x
+constexpr double kNegligible = 1e-12;  // of a derivative with respect to the length, which is 1
+constexpr int kMostSteps = 100;        // of the search for the largest x
 
 template <typename Bounds>
 typename Bounds::value_type lowestAt(const Bounds& bounds, double x) {
@@ -76,7 +73,7 @@ void ContourSpeed::plan() {
   const std::size_t size = grid_.size();
   std::vector<bool> changed(size + 1, false);  // at each place, what is controllable
   for (std::size_t i = size; i-- > 0;) {
-    giveWay(i / kPlacesOfItem);
+    giveWayAt(i);
     // The speeds of an interval also limit x at its end.
     const bool due = stale_[i] || changed[i + 1] || (i > 0 && stale_[i - 1]);
     if (!due) continue;
@@ -86,7 +83,7 @@ void ContourSpeed::plan() {
   }
   bool moved = false;  // x at the begin of the interval
   for (std::size_t i = 0; i < size; ++i) {
-    giveWay(i / kPlacesOfItem);
+    giveWayAt(i);
     if (!(moved || stale_[i] || changed[i + 1])) continue;
     const double x = largestAfter(i, squares_[i], controllable_[i + 1]);
     moved = x != squares_[i + 1];
