@@ -331,11 +331,11 @@ TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
                  })),
                  "the axis x is named twice");
   EXPECT_REFUSED(followPath(with([&](auto& request) { request.segments.clear(); })),
-                 "the path has 0 segments, but must have 1 to 50000");
+                 "the path has 0 segments, but must have 1 to 20000");
   EXPECT_REFUSED(followPath(with([&](auto& request) {
                    request.segments.assign(1'000'000, lineTo({0.0, 0.0}));
                  })),
-                 "the path has 1000000 segments, but must have 1 to 50000");
+                 "the path has 1000000 segments, but must have 1 to 20000");
   EXPECT_REFUSED(followPath(with([&](auto& request) { request.tolerance = -1.0; })),
                  "the tolerance of the path is -1, but must be a finite number from 0 on");
   EXPECT_REFUSED(followPath(with([&](auto& request) { request.velocity = kNan; })),

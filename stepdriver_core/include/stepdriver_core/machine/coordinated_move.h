@@ -34,6 +34,7 @@ struct TrajectoryRequest {
 /// A segment of a path, from the end of the one before it; the first begins where the axes stand.
 /// Positions have one number for each name of the path [unit].
 struct PathSegment {
+  /// The curve of a segment.
   enum class Shape {
     kLine,  ///< straight
     /// A circular arc around a centre, or a full turn if both ends are the same in its plane; axes
@@ -81,7 +82,7 @@ struct PathRequest {
 };
 
 /// A path of more segments is refused: give it in parts.
-constexpr std::size_t kMostPathSegments = 50'000;
+constexpr std::size_t kMostPathSegments = 20'000;
 
 /// An accepted motion of several axes.
 struct CoordinatedMove {
