@@ -4,6 +4,7 @@
 #include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
+#include <stepdriver/FollowPath.h>
 #include <stepdriver/Home.h>
 #include <stepdriver/HomeActionGoal.h>
 #include <stepdriver/HomeAxes.h>
@@ -38,6 +39,7 @@
 #include "node/calls/tcpros.h"
 #include "node/calls/trigger_session.h"
 #include "node/line_request.h"
+#include "node/path_request.h"
 #include "node/topics/trajectory_message.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
@@ -232,6 +234,11 @@ void takeLine(const Fields& fields) {
 void take(const MoveLine::Request& message) { takeLine(message); }
 void take(const MoveLineActionGoal& message) { takeLine(message.goal); }
 
+void take(const FollowPath::Request& message) {
+  MachineOnRig rig;
+  rig.serve([&] { rig.machine().followPath(ros_node::pathRequest(message)); });
+}
+
 void take(const HomeAxes::Request& message) {
   MachineOnRig rig;
   rig.serve([&] { rig.machine().checkHoming(message.name); });
@@ -315,6 +322,7 @@ const std::vector<Reader>& readers() {
       readAndTake<std_srvs::SetBool::Request>,
       readHeader,
       converse,
+      readAndTake<FollowPath::Request>,
   };
   return all;
 }

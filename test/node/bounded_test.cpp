@@ -6,6 +6,7 @@
 #include <ros/publisher.h>
 #include <ros/service_client.h>
 #include <stepdriver/FollowJointTrajectoryActionGoal.h>
+#include <stepdriver/FollowPath.h>
 #include <stepdriver/HomeAxes.h>
 #include <stepdriver/Jog.h>
 #include <stepdriver/MoveLine.h>
@@ -144,6 +145,10 @@ TEST(BoundedMessage, ThatClaimsMoreThanItHasCostsNoMemory) {
   EXPECT_THROW(read<Bounded<Jog>>(header + number(0) + many), Refused);
   EXPECT_THROW(read<Bounded<HomeAxes::Request>>(many + std::string(5, 'a')), Refused);
   EXPECT_THROW(read<Bounded<MoveLine::Request>>(many), Refused);
+  EXPECT_THROW(read<Bounded<FollowPath::Request>>(number(0) + many), Refused);
+  EXPECT_THROW(
+      read<Bounded<FollowPath::Request>>(number(0) + number(1) + std::string(1, '\0') + many),
+      Refused);
   const std::string names = kGoalHeaders + number(0);
   EXPECT_THROW(read<Bounded<Goal>>(kGoalHeaders + many), Refused);
   EXPECT_THROW(read<Bounded<Goal>>(names + many), Refused) << "points";
@@ -222,6 +227,7 @@ const std::string kLie = number(100'000'000) + std::string(5, '\0');
 
 TEST_F(LyingClient, OfHomeIsRefused) { call<HomeAxes>("home", kLie); }
 TEST_F(LyingClient, OfMoveLineIsRefused) { call<MoveLine>("move_line", kLie); }
+TEST_F(LyingClient, OfFollowPathIsRefused) { call<FollowPath>("follow_path", kLie); }
 TEST_F(LyingClient, OfJogIsRefused) { publish<Jog>("jog", bytesOf(std_msgs::Header()) + kLie); }
 TEST_F(LyingClient, OfCommandIsRefused) {
   publish<trajectory_msgs::JointTrajectory>("command", bytesOf(std_msgs::Header()) + kLie);

@@ -4,6 +4,7 @@
 #include <ros/console.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
+#include <stepdriver/FollowPath.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SpeedOverride.h>
@@ -15,6 +16,7 @@
 #include "common/text.h"
 #include "node/calls/bounded.h"
 #include "node/line_request.h"
+#include "node/path_request.h"
 #include "respond.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
@@ -22,11 +24,13 @@
 namespace stepdriver::ros_node {
 namespace {
 
-void moveLine(machine::Machine& machine, const MoveLine::Request& request,
-              MoveLine::Response& response) {
-  const machine::CoordinatedMove move = machine.moveLine(lineRequest(request));
+/// @param what "a line"
+/// @tparam Response of MoveLine or FollowPath
+template <typename Response>
+void tell(machine::Machine& machine, const machine::CoordinatedMove& move, bool wait,
+          const char* what, Response& response) {
   for (const auto& [name, own] : move.members) response.target.push_back(own.target);
-  if (request.wait != 0) {
+  if (wait) {
     machine::CoordinatedResult result = machine.wait(move);
     response.success = result.end == axis::MoveEnd::kReached;
     response.message = std::move(result.message);
@@ -41,7 +45,7 @@ void moveLine(machine::Machine& machine, const MoveLine::Request& request,
     response.position.push_back(own.rest);
   }
   response.message =
-      fmt::format("a line: {} in {} s", response.message, roundedText(move.duration));
+      fmt::format("{}: {} in {} s", what, response.message, roundedText(move.duration));
   response.duration = move.duration;
 }
 
@@ -118,16 +122,27 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
       "resume",
       triggerHandler("the hold is over: held motions continue", [&machine] { machine.resume(); })));
   advertiseSpeedOverride(machine);
-  advertiseMoveLine(machine);
+  advertiseCoordinatedMoves(machine);
 }
 
-void MachineServices::advertiseMoveLine(machine::Machine& machine) {
-  const boost::function<bool(MoveLine::Request&, MoveLine::Response&)> handler =
+void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
+  const boost::function<bool(MoveLine::Request&, MoveLine::Response&)> line =
       [&machine](MoveLine::Request& request, MoveLine::Response& response) {
-        return respond(response, [&] { moveLine(machine, request, response); });
+        return respond(response, [&] {
+          tell(machine, machine.moveLine(lineRequest(request)), request.wait != 0, "a line",
+               response);
+        });
+      };
+  const boost::function<bool(FollowPath::Request&, FollowPath::Response&)> path =
+      [&machine](FollowPath::Request& request, FollowPath::Response& response) {
+        return respond(response, [&] {
+          tell(machine, machine.followPath(pathRequest(request)), request.wait != 0, "a path",
+               response);
+        });
       };
   node_.setCallbackQueue(&queues_.lines());
-  servers_.push_back(advertiseBounded(node_, "move_line", handler));
+  servers_.push_back(advertiseBounded(node_, "move_line", line));
+  servers_.push_back(advertiseBounded(node_, "follow_path", path));
 }
 
 void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {

@@ -27,7 +27,7 @@ class MachineServices {
   void advertiseEndstop(setup::Simulation& simulation, const std::string& axis,
                         setup::Simulation::End end);
   void advertiseSpeedOverride(machine::Machine& machine);
-  void advertiseMoveLine(machine::Machine& machine);
+  void advertiseCoordinatedMoves(machine::Machine& machine);
 
   ros::NodeHandle node_;
   CallQueues& queues_;

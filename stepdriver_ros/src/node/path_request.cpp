@@ -1,0 +1,81 @@
+#include "path_request.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::ros_node {
+namespace {
+
+using Shape = machine::PathSegment::Shape;
+
+template <typename From, typename To>
+void takeTwo(const From& from, To& to, std::size_t index, const char* what) {
+  if (from.size() != to.size()) {
+    throw Refused(fmt::format("segment {} of the path is an arc with {} {}, but must have 2", index,
+                              from.size(), what));
+  }
+  std::copy(from.begin(), from.end(), to.begin());
+}
+
+machine::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
+  machine::PathSegment segment;
+  switch (fields.shape) {
+    case PathSegment::LINE:
+      segment.shape = Shape::kLine;
+      break;
+    case PathSegment::ARC_AROUND:
+      segment.shape = Shape::kArcAround;
+      break;
+    case PathSegment::ARC_THROUGH:
+      segment.shape = Shape::kArcThrough;
+      break;
+    case PathSegment::BEZIER:
+      segment.shape = Shape::kBezier;
+      break;
+    default:
+      throw Refused(fmt::format(
+          "segment {} of the path has the shape {}, but must be {} (a line), {} or {} (an arc), or "
+          "{} (a Bezier)",
+          index, fields.shape, +PathSegment::LINE, +PathSegment::ARC_AROUND,
+          +PathSegment::ARC_THROUGH, +PathSegment::BEZIER));
+  }
+  segment.end = fields.end;
+  if (segment.shape == Shape::kArcAround || segment.shape == Shape::kArcThrough) {
+    takeTwo(fields.plane, segment.plane, index, "names in plane");
+    takeTwo(fields.point, segment.point, index, "numbers in point");
+  }
+  segment.clockwise = fields.clockwise != 0;
+  segment.control1 = fields.control1;
+  segment.control2 = fields.control2;
+  segment.velocity = fields.velocity;
+  if (fields.tolerance != 0.0) {
+    segment.tolerance = fields.tolerance < 0.0 ? 0.0 : fields.tolerance;
+  }
+  return segment;
+}
+
+}  // namespace
+
+machine::PathRequest pathRequest(const FollowPath::Request& fields) {
+  const std::size_t size = fields.segments.size();
+  if (size > machine::kMostPathSegments) {  // before they are copied
+    throw Refused(fmt::format("the path has {} segments, but must have 1 to {}", size,
+                              machine::kMostPathSegments));
+  }
+  machine::PathRequest path;
+  path.names = fields.name;
+  path.segments.reserve(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    path.segments.push_back(segmentOf(fields.segments[i], i));
+  }
+  path.relative = fields.relative != 0;
+  path.velocity = fields.velocity;
+  path.tolerance = fields.tolerance;
+  return path;
+}
+
+}  // namespace stepdriver::ros_node

@@ -1,0 +1,187 @@
+#include <gtest/gtest.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/FollowPath.h>
+#include <stepdriver/PathSegment.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <future>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/node_under_test.h"
+#include "support/says.h"
+#include "support/two_axes.h"
+#include "support/wait.h"
+
+// The service follow_path; the core's tests have the geometry and the timing of paths.
+
+namespace stepdriver::node_test {
+namespace {
+
+constexpr double kHalfStep = 0.5 / 80000.0;  // [m]
+
+PathSegment line(const std::vector<double>& end) {
+  PathSegment segment;
+  segment.end = end;
+  return segment;
+}
+
+PathSegment arc(std::uint8_t shape, const std::vector<double>& point,
+                const std::vector<double>& end) {
+  PathSegment segment = line(end);
+  segment.shape = shape;
+  segment.plane = {"x", "y"};
+  segment.point = point;
+  return segment;
+}
+
+class PathTest : public testing::Test {
+ protected:
+  PathTest() { addSecondAxis(node); }
+
+  using Change = std::function<void(FollowPath::Request&)>;
+
+  FollowPath::Response follow(const std::vector<PathSegment>& segments, const Change& change = {}) {
+    FollowPath::Request request;
+    request.name = {"x", "y"};
+    request.segments = segments;
+    request.wait = true;
+    if (change) change(request);
+    return node.call<FollowPath>("follow_path", request);
+  }
+
+  void expectNoViolation() {
+    const auto report = node.rig();
+    for (std::size_t i = 0; i < report.violations.size(); ++i) {
+      EXPECT_EQ(report.violations[i], 0) << report.name[i] << ": " << report.violation_kinds[i];
+    }
+  }
+
+  NodeUnderTest node;
+};
+
+const std::vector<PathSegment> kSquare = {line({0.02, 0.0}), line({0.02, 0.02}), line({0.0, 0.02}),
+                                          line({0.0, 0.0})};
+
+TEST_F(PathTest, RoundsItsCornersWithinTheTolerance) {
+  node.start();
+  const auto stopping = follow(kSquare);
+  ASSERT_TRUE(stopping.success) << stopping.message;
+  const auto sharp = node.rig();
+  EXPECT_EQ(sharp.pulses_forward, (std::vector<std::int64_t>{1600, 1600}));
+  EXPECT_EQ(sharp.pulses_backward, (std::vector<std::int64_t>{1600, 1600}));
+
+  const auto rounded = follow(kSquare, [](auto& request) { request.tolerance = 0.0005; });
+  ASSERT_TRUE(rounded.success) << rounded.message;
+  EXPECT_EQ(rounded.target, (std::vector<double>{0.0, 0.0}));
+  EXPECT_EQ(rounded.position, (std::vector<double>{0.0, 0.0}));
+  EXPECT_LT(rounded.duration, 0.9 * stopping.duration);
+  // Neither axis reaches the corners that it passes: a part of the tolerance is left out.
+  const auto report = node.rig();
+  EXPECT_LT(report.pulses_forward[0], 3200);
+  EXPECT_GT(report.pulses_forward[0], 3200 - 40);
+  expectNoViolation();
+}
+
+TEST_F(PathTest, HasArcsABezierAndPlacesThatCountFromItsBegin) {
+  node.start();
+  PathSegment bezier = line({0.01, 0.02});
+  bezier.shape = PathSegment::BEZIER;
+  bezier.control1 = {0.02, 0.015};
+  bezier.control2 = {0.015, 0.02};
+  const std::vector<PathSegment> segments = {
+      arc(PathSegment::ARC_AROUND, {0.01, 0.0}, {0.02, 0.0}),  // upwards through (0.01, -0.01)
+      arc(PathSegment::ARC_THROUGH, {0.025, 0.005}, {0.02, 0.01}),
+      bezier,
+  };
+  for (const double from : {0.0, 0.01}) {
+    const auto answer = follow(segments, [](auto& request) {
+      request.relative = true;
+      request.tolerance = 0.0001;
+    });
+    ASSERT_TRUE(answer.success) << answer.message;
+    EXPECT_NEAR(answer.position[0], from + 0.01, kHalfStep);
+    EXPECT_NEAR(answer.position[1], 2.0 * from + 0.02, kHalfStep);
+  }
+  expectNoViolation();
+}
+
+TEST_F(PathTest, AnswersOnAcceptanceWithTargetsAndPlannedDuration) {
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const auto answer = follow({line({0.05, 0.0}), line({0.1, 0.04})}, [](auto& request) {
+    request.wait = false;
+    request.velocity = 0.05;
+  });
+  EXPECT_TRUE(answer.success) << answer.message;
+  EXPECT_EQ(answer.position, (std::vector<double>{0.1, 0.04}));
+  expectSays(answer.message, "a path: x to 0.1 m, y to 0.04 m in 2.4");
+  EXPECT_NEAR(answer.duration, 0.05 / 0.05 + std::hypot(0.05, 0.04) / 0.05 + 0.2, 0.03);
+  EXPECT_LT(node.pulses(), 11200) << "the answer came after the path";
+}
+
+TEST_F(PathTest, EndsIfOneOfItsAxesIsStopped) {
+  node.set("simulation/speed", 1.0);
+  node.start();
+  std::future<FollowPath::Response> path = std::async(std::launch::async, [this] {
+    return follow({line({0.05, 0.05}), line({0.1, 0.0})});
+  });
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 800; }));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
+  const auto answer = path.get();
+  EXPECT_FALSE(answer.success);
+  expectSays(answer.message, "stopped");
+  ASSERT_EQ(answer.position.size(), 2U);
+  EXPECT_NEAR(answer.position[0], answer.position[1], 2.0 * kHalfStep) << "not on the first line";
+  expectNoViolation();
+}
+
+TEST_F(PathTest, MovesNothingIfItIsRefused) {
+  node.start();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::pair<Change, std::string>> bad = {
+      {[](auto& r) {
+         r.name = {"x", "z"};
+       },
+       "there is no axis z; there are x, y"},
+      {[](auto& r) { r.segments.clear(); }, "the path has 0 segments, but must have 1 to 20000"},
+      {[](auto& r) { r.segments.resize(20'001); },
+       "the path has 20001 segments, but must have 1 to 20000"},
+      {[](auto& r) { r.segments[2].shape = 4; },
+       "segment 2 of the path has the shape 4, but must be 0 (a line), 1 or 2 (an arc), or 3"},
+      {[](auto& r) { r.segments[1].shape = PathSegment::ARC_AROUND; },
+       "segment 1 of the path is an arc with 0 names in plane, but must have 2"},
+      {[](auto& r) {
+         r.segments[1] = arc(PathSegment::ARC_THROUGH, {0.01}, {0.02, 0.02});
+       },
+       "segment 1 of the path is an arc with 1 numbers in point, but must have 2"},
+      {[](auto& r) { r.segments[3].end = {0.0}; },
+       "segment 3 of the path has 1 positions, but must have 2"},
+      {[nan](auto& r) {
+         r.segments[3].end = {0.0, nan};
+       },
+       "y: segment 3 of the path has nan among its positions, but they must be finite"},
+      {[](auto& r) {
+         r.segments[1].end = {5.0, 0.02};
+       },
+       "x: segment 1 of the path leads to 5 m"},
+      {[nan](auto& r) { r.tolerance = nan; },
+       "the tolerance of the path is nan, but must be a finite number from 0 on"},
+      {[](auto& r) { r.velocity = -0.1; },
+       "the velocity of the path is -0.1, but must be a finite number from 0 on"},
+  };
+  for (const auto& [change, message] : bad) {
+    const auto answer = follow(kSquare, change);
+    EXPECT_FALSE(answer.success) << message;
+    expectSays(answer.message, message);
+    EXPECT_TRUE(answer.target.empty());
+  }
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
