@@ -70,14 +70,16 @@ std::vector<TrajectoryPoint> pointsFor(std::size_t axes, int count) {
 }
 
 std::shared_ptr<const PreparedTrajectory> prepared(std::size_t axes, int count, double backlash) {
-  return std::make_shared<const PreparedTrajectory>(axesOf(axes, backlash), pointsFor(axes, count));
+  return std::make_shared<const PreparedTrajectory>(axesOf(axes, backlash), pointsFor(axes, count),
+                                                    std::vector<motion::MotionState>(axes), false);
 }
 
 void prepare(benchmark::State& state, std::size_t axes, double backlash) {
   const int count = static_cast<int>(state.range(0));
   const std::vector<TrajectoryPoint> points = pointsFor(axes, count);
   for (auto round : state) {
-    PreparedTrajectory trajectory(axesOf(axes, backlash), points);
+    PreparedTrajectory trajectory(axesOf(axes, backlash), points,
+                                  std::vector<motion::MotionState>(axes), false);
     benchmark::DoNotOptimize(&trajectory);
   }
   state.SetItemsProcessed(state.iterations());

@@ -23,7 +23,7 @@ TEST(TrajectoryAtTheEnd, IsTheClientToldOfByTheThreadThatEndsTheNode) {
   test::Bench bench({test::linearAxis("x")});
   ros_node::CallQueues queues(1);  // without threads
   ros_node::ActionStatuses statuses(node, 5.0);
-  ros_node::TrajectoryAction action(node, *bench.machine, queues, statuses);
+  ros_node::TrajectoryAction action(node, *bench.machine, queues, statuses, false);
   TrajectoryClient client(node.resolveName("follow_joint_trajectory"), false);
   const auto serve_until = [&](const auto& condition) {
     return waitUntil([&] {

@@ -102,6 +102,10 @@ double LinePath::durationAt(double speed) const {
   }
 }
 
+double LinePath::shortestDuration() const {
+  return length_ == 0 ? 0.0 : durationAt(limits_.max_speed);
+}
+
 double LinePath::speedFor(double duration) const {
   if (!(duration <= kLongestDuration)) {
     axes_.front().refuse(fmt::format("the duration of the line is {} s, but must be at most {} s",

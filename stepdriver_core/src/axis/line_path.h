@@ -20,6 +20,9 @@ class LinePath : public SharedPath {
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
            const std::vector<std::int64_t>& targets, double velocity, double duration);
 
+  /// [s] From rest to rest, as fast as the limits allow.
+  double shortestDuration() const;
+
   /// @return whether it was planned for these axes from these positions.
   bool isOf(const std::vector<PathAxis>& axes, const std::vector<PathStart>& starts) const;
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -11,7 +12,10 @@
 #include "give_way.h"
 #include "line_path.h"
 #include "message_text.h"
+#include "motion/interpolate.h"
+#include "motion/planner.h"
 #include "motion/profile_parts.h"
+#include "motion/spline_refusals.h"
 #include "nanoseconds.h"
 
 namespace stepdriver::axis {
@@ -26,6 +30,17 @@ using motion::ProfilePeaks;
 constexpr double kMore = 1.0 + kTrajectoryTolerance;
 // How many pieces may be planned again on joining if the prepared ones can't be used.
 constexpr std::size_t kFewPieces = 5000;
+// If the axes are at rest, the second attempt to slow a trajectory down is right. If they move, the
+// velocity at the start stays, and each attempt at least halves the logarithm of what is missing.
+constexpr int kMostSlowdowns = 30;
+// [s] A trajectory isn't slowed down to more than this.
+constexpr double kLongestSlowed = Profile::kLongest / 4.0;
+// A motion that is slowed down leaves this part of the limits of an axis for its backlash.
+constexpr double kShareForBacklash = 0.2;
+
+// Says how a refused trajectory could be followed; empty if that isn't known. It takes as long as
+// planning the trajectory, so it is called only for a refusal.
+using Remedy = std::function<std::string()>;
 
 std::string at(double seconds) { return roughText(seconds) + " s after its start"; }
 
@@ -35,13 +50,15 @@ Peak later(Peak peak, double seconds) {
 }
 
 void requireWithin(const PathAxis& axis, const Peak& peak, double most, const char* what,
-                   const char* per, std::optional<config::LimitSource> source = {}) {
+                   const char* per, const Remedy& remedy,
+                   std::optional<config::LimitSource> source = {}) {
   if (std::abs(peak.value) <= most * kMore) return;
   const double scale = axis.steps_per_unit;
   axis.refuse(fmt::format(
-      "the trajectory's {} is {} {}, but the axis has {}", what, axis.show(peak.value / scale, per),
-      at(peak.time_s),
-      source ? axis.showLimit(most / scale, *source, per) : axis.show(most / scale, per)));
+      "the trajectory's {} is {} {}, but the axis has {}{}", what,
+      axis.show(peak.value / scale, per), at(peak.time_s),
+      source ? axis.showLimit(most / scale, *source, per) : axis.show(most / scale, per),
+      remedy()));
 }
 
 void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double begin) {
@@ -51,7 +68,8 @@ void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double be
   }
 }
 
-void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double begin) {
+void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double begin,
+                   const Remedy& remedy) {
   if (axis.limits.jerk == 0.0) return;
   const Peak& jump = jerk.acceleration_jump;
   if (std::abs(jump.value) > kTrajectoryTolerance * axis.mostAcceleration()) {
@@ -60,18 +78,43 @@ void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double 
                     "all points must have velocities and accelerations, 0 at the last",
                     axis.show(jump.value / axis.steps_per_unit, "/s^2"), at(begin + jump.time_s)));
   }
-  requireWithin(axis, later(jerk.jerk, begin), axis.limits.jerk, "jerk", "/s^3");
+  requireWithin(axis, later(jerk.jerk, begin), axis.limits.jerk, "jerk", "/s^3", remedy);
 }
 
-void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin) {
-  requireWithin(axis, later(motor.velocity, begin), axis.limits.max_speed, "velocity", "/s",
+void requireLimits(const PathAxis& axis, const ProfilePeaks& motor, double begin,
+                   const Remedy& remedy) {
+  requireWithin(axis, later(motor.velocity, begin), axis.limits.max_speed, "velocity", "/s", remedy,
                 axis.max_speed_source);
   requireWithin(axis, later(motor.acceleration, begin), axis.mostAcceleration(), "acceleration",
-                "/s^2");
+                "/s^2", remedy);
   // A jump of less than a microstep/s is rounding.
   Peak jump = later(motor.velocity_jump, begin);
   if (std::abs(jump.value) < 1.0) jump.value = 0.0;
-  requireWithin(axis, jump, axis.limits.start_speed, "jump of the velocity", "/s");
+  requireWithin(axis, jump, axis.limits.start_speed, "jump of the velocity", "/s",
+                [] { return std::string(); });
+}
+
+double shareOfJoint(const PathAxis& axis) {
+  return axis.backlash > 0 ? 1.0 - kShareForBacklash : 1.0;
+}
+
+// The smallest factor on the times of a curve that keeps it within the limits; 1 if it does so
+// already. A factor k divides velocities by k, accelerations by k^2 and jerks by k^3.
+double slowdownOf(const PathAxis& axis, const ProfilePeaks& peaks, const motion::SplineJerk& jerk) {
+  double factor = 1.0;
+  const auto take = [&](const Peak& peak, double most, double order) {
+    const double excess = std::abs(peak.value) / (most * shareOfJoint(axis));
+    if (excess > kMore) factor = std::max(factor, std::pow(excess, 1.0 / order));
+  };
+  take(peaks.velocity, axis.limits.max_speed, 1.0);
+  take(peaks.acceleration, axis.mostAcceleration(), 2.0);
+  if (axis.limits.jerk > 0.0) take(jerk.jerk, axis.limits.jerk, 3.0);
+  return factor;
+}
+
+std::string remedyText(double shortest, double wanted) {
+  return fmt::format("; with allow_slower it takes {} s instead of {} s", lowerBoundText(shortest),
+                     roughText(wanted));
 }
 
 [[noreturn]] void refuseTurn(const PathAxis& axis, double time_s) {
@@ -102,6 +145,10 @@ void widen(motion::MotorBounds& bounds, const PathAxis& axis, const ProfilePeaks
   if (axis.limits.jerk > 0.0) bounds.jerk = std::max(bounds.jerk, jerkOf(profile));
 }
 
+motion::MotionState jointOf(const PathStart& start) {
+  return {start.motor.position - start.slack, start.motor.velocity, start.motor.acceleration};
+}
+
 double endVelocity(const Profile& profile) {
   const motion::Piece last = profile.pieces().back();
   return last.velocityAt(last.duration).value();
@@ -110,15 +157,72 @@ double endVelocity(const Profile& profile) {
 }  // namespace
 
 PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
-                                       const std::vector<TrajectoryPoint>& points)
-    : axes_(std::move(axes)) {
+                                       const std::vector<TrajectoryPoint>& points,
+                                       const std::vector<motion::MotionState>& expected,
+                                       bool allow_slower)
+    : axes_(std::move(axes)), allow_slower_(allow_slower) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
-  lone_position_ = points.size() == 1 && points.front().velocities.empty() &&
-                   points.front().accelerations.empty();
+  lone_position_ = points.size() == 1 && points.front().velocities.empty();
+  const Source source{points, expected, 1.0};
+  const bool moves = std::any_of(expected.begin(), expected.end(),
+                                 [](const auto& state) { return state.velocity != 0.0; });
+  // These have only a way from the start, which join() plans.
+  const bool only_way = lone_position_ || (points.size() == 1 && moves);
+  if (allow_slower && !only_way) slowdown_ = slowdownFor(source).value_or(1.0);
   parts_.reserve(axes_.size());
   for (std::size_t member = 0; member < axes_.size(); ++member) {
-    parts_.push_back(prepare(member, points));
+    parts_.push_back(prepare(member, {points, expected, slowdown_}));
   }
+}
+
+std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
+  for (int i = 0; i < kMostSlowdowns; ++i) {
+    double more = 1.0;
+    for (std::size_t member = 0; member < axes_.size(); ++member) {
+      const PathAxis& axis = axes_[member];
+      const motion::MotionState& from = source.expected[member];
+      const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
+      try {
+        const Profile curve = motion::planSpline(0, from, waypoints);
+        more = std::max(more, slowdownOf(axis, motion::profilePeaks(curve),
+                                         motion::splineJerk(from, waypoints)));
+      } catch (const std::invalid_argument& error) {
+        axis.refuse(error.what());
+      }
+    }
+    if (more == 1.0) return source.slowdown;
+    source.slowdown *= more;
+    if (!(source.slowdown * source.points.back().time <= kLongestSlowed)) break;
+  }
+  return std::nullopt;
+}
+
+std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
+                                                              const Source& source) const {
+  const PathAxis& axis = axes_[member];
+  std::vector<motion::Waypoint> waypoints;
+  waypoints.reserve(source.points.size());
+  for (std::size_t i = 0; i < source.points.size(); ++i) {
+    giveWay(i);
+    waypoints.push_back(waypointOf(member, i, source.points[i], waypoints));
+  }
+  if (source.slowdown > 1.0) {
+    for (std::size_t i = 0; i < waypoints.size(); ++i) {
+      giveWay(i);
+      motion::Waypoint& waypoint = waypoints[i];
+      waypoint.time_ns = nanoseconds(source.points[i].time * source.slowdown);
+      if (waypoint.velocity) *waypoint.velocity /= source.slowdown;
+      if (waypoint.acceleration) *waypoint.acceleration /= source.slowdown * source.slowdown;
+    }
+  }
+  try {
+    motion::requireWaypoints(waypoints);
+  } catch (const std::invalid_argument& error) {
+    axis.refuse(error.what());
+  }
+  return motion::interpolate(
+      source.expected[member], std::move(waypoints),
+      axis.limits.jerk > 0.0 ? motion::Smoothness::kJerk : motion::Smoothness::kAcceleration);
 }
 
 motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t index,
@@ -170,20 +274,16 @@ motion::MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {
   return limits;
 }
 
-PreparedTrajectory::Part PreparedTrajectory::prepare(
-    std::size_t member, const std::vector<TrajectoryPoint>& points) const {
+PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
+                                                     const Source& source) const {
   const PathAxis& axis = axes_[member];
-  std::vector<motion::Waypoint> waypoints;
-  waypoints.reserve(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    giveWay(i);
-    waypoints.push_back(waypointOf(member, i, points[i], waypoints));
-  }
-  if (lone_position_) {
-    // If the axis moves, it comes to rest there as smoothly as its limits require.
-    waypoints.front().velocity = 0.0;
-    if (axis.limits.jerk > 0.0) waypoints.front().acceleration = 0.0;
-  }
+  const auto remedy = [&]() -> std::string {
+    if (allow_slower_) return {};
+    const std::optional<double> slowdown = slowdownFor(source);
+    const double wanted = source.points.back().time;
+    return slowdown && *slowdown > 1.0 ? remedyText(*slowdown * wanted, wanted) : std::string();
+  };
+  const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
   Part part;
   part.ends = {waypoints.front(), waypoints.back()};
   part.begins_at_start = waypoints.size() > 1 && waypoints.front().time_ns == 0;
@@ -198,9 +298,9 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(
   const double begin = part.spline->beginS();
   const ProfilePeaks joint_peaks = motion::profilePeaks(*joint, joint->piece(0).v0);
   requirePositions(axis, joint_peaks, begin);
-  requireSmooth(axis, part.spline->jerk(), begin);
+  requireSmooth(axis, part.spline->jerk(), begin, remedy);
   if (axis.backlash == 0) {
-    requireLimits(axis, joint_peaks, begin);
+    requireLimits(axis, joint_peaks, begin, remedy);
     widen(part.bounds, axis, joint_peaks, *joint);
     return part;
   }
@@ -209,7 +309,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(
   if (const auto time = part.motor->noRoom()) refuseTurn(axis, begin + *time);
   const Profile& motor = part.motor->profile();
   const ProfilePeaks peaks = motion::profilePeaks(motor, motor.piece(0).v0);
-  requireLimits(axis, peaks, begin);
+  requireLimits(axis, peaks, begin, remedy);
   widen(part.bounds, axis, peaks, motor);
   return part;
 }
@@ -224,27 +324,49 @@ motion::MotorPlan PreparedTrajectory::planWhole(std::size_t member, const Profil
   return motion::planMotor(joint, slack, axes_[member].backlash, motorLimits(member));
 }
 
+PreparedTrajectory::Head PreparedTrajectory::headOf(std::size_t member,
+                                                    const PathStart& start) const {
+  const motion::SplineTail& spline = *parts_[member].spline;
+  const motion::MotionState from = jointOf(start);
+  try {
+    return {spline.head(from), spline.headJerk(from)};
+  } catch (const std::invalid_argument& error) {
+    axes_[member].refuse(error.what());
+  }
+}
+
+std::vector<motion::Piece> PreparedTrajectory::quickestTo(std::size_t member,
+                                                          const PathStart& start) const {
+  const PathAxis& axis = axes_[member];
+  motion::MotionLimits limits = axis.limits;
+  for (double* limit :
+       {&limits.max_speed, &limits.acceleration, &limits.deceleration, &limits.jerk}) {
+    *limit *= shareOfJoint(axis);
+  }
+  limits.start_speed = std::min(limits.start_speed, limits.max_speed);
+  const motion::Waypoint& point = parts_[member].ends.back();
+  const motion::MotionState from = jointOf(start);
+  const Profile plan =
+      motion::planMove(0, from, motion::restingCount(point.position), limits).profile;
+  std::vector<motion::Piece> pieces;
+  for (const motion::Piece& piece : plan.pieces()) pieces.push_back(piece);
+  // An axis that is there already waits for the others.
+  if (pieces.empty()) pieces.push_back({DoubleDouble(1e-9), from.position});
+  return pieces;
+}
+
 TrajectoryPath::Member PreparedTrajectory::joinMember(
     const std::shared_ptr<const PreparedTrajectory>& own, std::size_t member,
-    const PathStart& start) const {
+    const PathStart& start, const Head& given, const std::function<std::string()>& remedy) const {
   const PathAxis& axis = axes_[member];
   const Part& part = parts_[member];
   if (!start.moves && part.begins_at_start) requireStart(axis, part.ends.front(), start);
-  const motion::MotionState from{start.motor.position - start.slack, start.motor.velocity,
-                                 start.motor.acceleration};
-  std::vector<motion::Piece> pieces;
-  motion::SplineJerk jerk;
-  try {
-    pieces = part.spline->head(from);
-    jerk = part.spline->headJerk(from);
-  } catch (const std::invalid_argument& error) {
-    axis.refuse(error.what());
-  }
+  const std::vector<motion::Piece>& pieces = given.pieces;
   const Profile head(0, pieces);
   const DoubleDouble begin = head.duration();
   const Profile* tail = part.spline->profile();
   requirePositions(axis, motion::profilePeaks(head), 0.0);
-  requireSmooth(axis, jerk, 0.0);
+  requireSmooth(axis, given.jerk, 0.0, remedy);
 
   motion::Sections sections;
   sections.add(pieces);
@@ -285,7 +407,7 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
     widen(made.bounds, axis, own_peaks, planned);
     first = false;
   }
-  requireLimits(axis, peaks, 0.0);
+  requireLimits(axis, peaks, 0.0, remedy);
   made.stop_bounds = made.bounds;
   made.stop_bounds.acceleration = std::max(made.bounds.acceleration, axis.stop_limits.deceleration);
   made.stop_bounds.jerk =
@@ -304,8 +426,29 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::lineTo(
     // The backlash is taken up during the motion.
     targets.push_back(joint + (way > 0 ? axes_[i].backlash : way < 0 ? 0 : slack) - slack);
   }
-  const double duration = static_cast<double>(parts_.front().ends.back().time_ns) / 1e9;
+  const double duration = wantedDuration();
+  auto quickest = std::make_shared<const LinePath>(axes_, starts, targets, 0.0, 0.0);
+  const double shortest = quickest->shortestDuration();
+  if (duration < shortest * (1.0 - 1e-9)) {
+    if (allow_slower_) return quickest;
+    axes_.front().refuse(
+        fmt::format("the target can't be reached in {} s; the limits of the axes allow {} s, which "
+                    "it takes with allow_slower",
+                    numberText(duration), lowerBoundText(shortest)));
+  }
   return std::make_shared<const LinePath>(axes_, starts, targets, 0.0, duration);
+}
+
+double PreparedTrajectory::wantedDuration() const {
+  return static_cast<double>(parts_.front().ends.back().time_ns) / 1e9;
+}
+
+bool PreparedTrajectory::isOneRest() const {
+  return std::all_of(parts_.begin(), parts_.end(), [](const Part& part) {
+    const motion::Waypoint& point = part.ends.back();
+    return part.spline->profile() == nullptr && point.velocity.value_or(0.0) == 0.0 &&
+           point.acceleration.value_or(0.0) == 0.0;
+  });
 }
 
 std::shared_ptr<const SharedPath> PreparedTrajectory::join(
@@ -314,10 +457,39 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::join(
   const bool at_rest = std::none_of(starts.begin(), starts.end(),
                                     [](const PathStart& start) { return start.moves; });
   if (prepared->lone_position_ && at_rest) return prepared->lineTo(starts);
+  return prepared->joinAll(prepared, starts, at_rest);
+}
+
+std::shared_ptr<const SharedPath> PreparedTrajectory::joinAll(
+    const std::shared_ptr<const PreparedTrajectory>& own, const std::vector<PathStart>& starts,
+    bool at_rest) const {
+  std::vector<Head> heads;
+  double slowdown = 1.0;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    heads.push_back(headOf(i, starts[i]));
+    const ProfilePeaks peaks = motion::profilePeaks(Profile(0, heads[i].pieces));
+    slowdown = std::max(slowdown, slowdownOf(axes_[i], peaks, heads[i].jerk));
+  }
+  double shortest = 0.0;  // unknown
+  if (slowdown > 1.0 && isOneRest() && (allow_slower_ || !at_rest)) {
+    std::vector<Head> quickest;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      quickest.push_back({quickestTo(i, starts[i]), {}});
+      shortest = std::max(shortest, Profile(0, quickest[i].pieces).duration().value());
+    }
+    if (allow_slower_) heads = std::move(quickest);
+  } else if (at_rest) {
+    // The rest of the trajectory is within the limits, and all of it can be slowed down alike.
+    shortest = slowdown * wantedDuration();
+  }
+  const auto remedy = [&] {
+    const bool known = !allow_slower_ && shortest > wantedDuration();
+    return known ? remedyText(shortest, wantedDuration()) : std::string();
+  };
   std::vector<TrajectoryPath::Member> members;
   members.reserve(starts.size());
   for (std::size_t i = 0; i < starts.size(); ++i) {
-    members.push_back(prepared->joinMember(prepared, i, starts[i]));
+    members.push_back(joinMember(own, i, starts[i], heads[i], remedy));
   }
   return std::make_shared<const TrajectoryPath>(std::move(members));
 }

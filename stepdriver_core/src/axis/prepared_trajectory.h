@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,11 +25,20 @@ namespace stepdriver::axis {
 /// It is made from a copy of the facts about the axes. Before joining it, the caller compares that
 /// copy with the present facts: if axes() differs (other limits, another scale or origin), it must
 /// be prepared again.
+///
+/// Points that give only positions get the velocities of motion::interpolate(). If a limit doesn't
+/// allow the times of the points, all of them are multiplied by the same factor, the smallest that
+/// the limits allow, if the request has `allow_slower`; otherwise the trajectory is refused. A
+/// single point to rest is reached from moving axes by the fastest motion of each axis.
 class PreparedTrajectory {
  public:
+  /// @param expected [microsteps] the state of each joint in which the trajectory will probably
+  ///   begin. Velocities of points without them, and the factor, depend on it; the path begins in
+  ///   the actual state nevertheless.
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
   ///   first segment.
-  PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points);
+  PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points,
+                     const std::vector<motion::MotionState>& expected, bool allow_slower);
   PreparedTrajectory(const PreparedTrajectory&) = delete;
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
@@ -41,7 +52,7 @@ class PreparedTrajectory {
   /// @param prepared is shared by the path, and by all profiles along it.
   /// @param starts one for each axis, at the time at which the path begins.
   ///
-  /// A single point without velocities is a straight line to rest, in its time.
+  /// A single point without velocities is a straight line from rest to rest, in its time.
   ///
   /// @throw Refused if an axis can't do its part from there; or if reversals follow each other so
   ///   closely that the backlash is never at rest, so that checking would take unbounded time.
@@ -59,18 +70,46 @@ class PreparedTrajectory {
     motion::MotorBounds bounds;                      // reached by the tail
   };
 
+  // What a trajectory is made from.
+  struct Source {
+    const std::vector<TrajectoryPoint>& points;
+    const std::vector<motion::MotionState>& expected;
+    double slowdown = 1.0;  // the factor on all times
+  };
+  // The way to the first point.
+  struct Head {
+    std::vector<motion::Piece> pieces;
+    motion::SplineJerk jerk;
+  };
+
   std::shared_ptr<const SharedPath> lineTo(const std::vector<PathStart>& starts) const;
-  Part prepare(std::size_t member, const std::vector<TrajectoryPoint>& points) const;
+  std::shared_ptr<const SharedPath> joinAll(const std::shared_ptr<const PreparedTrajectory>& own,
+                                            const std::vector<PathStart>& starts,
+                                            bool at_rest) const;
+  /// @return the smallest factor that the limits allow, at least that of the source; empty: none
+  ///   does.
+  std::optional<double> slowdownFor(Source source) const;
+  Part prepare(std::size_t member, const Source& source) const;
+  std::vector<motion::Waypoint> waypointsOf(std::size_t member, const Source& source) const;
   motion::Waypoint waypointOf(std::size_t member, std::size_t index, const TrajectoryPoint& point,
                               const std::vector<motion::Waypoint>& before) const;
+  double wantedDuration() const;  // [s]
+  Head headOf(std::size_t member, const PathStart& start) const;
+  /// The fastest motion to rest at the last point.
+  std::vector<motion::Piece> quickestTo(std::size_t member, const PathStart& start) const;
+  /// Whether it has a single segment, which ends at rest.
+  bool isOneRest() const;
   TrajectoryPath::Member joinMember(const std::shared_ptr<const PreparedTrajectory>& own,
-                                    std::size_t member, const PathStart& start) const;
+                                    std::size_t member, const PathStart& start, const Head& given,
+                                    const std::function<std::string()>& remedy) const;
   motion::MotorPlan planWhole(std::size_t member, const motion::Profile& joint, double slack) const;
   motion::MotionLimits motorLimits(std::size_t member) const;
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
-  bool lone_position_ = false;  // its only point gives only positions
+  bool lone_position_ = false;  // its only point gives no velocities
+  bool allow_slower_ = false;
+  double slowdown_ = 1.0;
 };
 
 }  // namespace stepdriver::axis

@@ -120,8 +120,10 @@ class Machine::Impl {
 
   CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
     return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
+      std::vector<axis::PathAxis> facts = factsOf(now, wanted.axes);
+      const std::vector<motion::MotionState> expected = expectedStates(wanted.axes, facts);
       wanted.prepared = disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(
-          factsOf(now, wanted.axes), request.points));
+          std::move(facts), request.points, expected, request.allow_slower));
     });
   }
 
@@ -131,11 +133,28 @@ class Machine::Impl {
       const std::vector<PathOrigin> origins = originsOf(now, wanted.axes);
       PathPlan plan = planPath(request, facts, origins);
       wanted.path.emplace();
-      for (const PathOrigin& origin : origins) wanted.path->from.push_back(origin.rest);
+      std::vector<motion::MotionState> expected;
+      for (const PathOrigin& origin : origins) {
+        wanted.path->from.push_back(origin.rest);
+        expected.push_back({motion::fromInteger(origin.rest)});
+      }
       wanted.path->targets = std::move(plan.targets);
-      wanted.prepared =
-          disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(facts, plan.points));
+      wanted.prepared = disposer_.keep(
+          std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected, false));
     });
+  }
+
+  // The motion under way, now: about where a trajectory will begin.
+  std::vector<motion::MotionState> expectedStates(const std::vector<AxisId>& axes,
+                                                  const std::vector<axis::PathAxis>& facts) const {
+    std::vector<motion::MotionState> expected;
+    expected.reserve(axes.size());
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      const axis::AxisState state = shell_->state(axes[i]);
+      expected.push_back(
+          {facts[i].countOf(state.planned), state.velocity * facts[i].steps_per_unit, 0.0});
+    }
+    return expected;
   }
 
   // Prepares a trajectory from the facts about its axes, and again if these have changed meanwhile.

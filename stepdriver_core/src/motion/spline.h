@@ -37,9 +37,9 @@ inline std::int64_t restingCount(double position) { return std::llround(std::nea
 /// - velocity and acceleration at both ends: the quintic that has them;
 /// - velocity at both ends, an acceleration at one end at most: the cubic that has the velocities;
 /// - no velocity at one end: a straight line, whatever else is given. The velocity jumps at its
-///   ends, as profilePeaks() reports. The first segment begins at `from`, which gives all three. A
-///   waypoint at time 0 has passed when the motion starts: if it is the first of several, it is
-///   left out, and `from` replaces it.
+///   ends, as profilePeaks() reports; interpolate() avoids that. The first segment begins at
+///   `from`, which gives all three. A waypoint at time 0 has passed when the motion starts: if it
+///   is the first of several, it is left out, and `from` replaces it.
 ///
 /// A quintic of duration T is divided into n cubics of h = T/n that have its position and velocity
 /// at both ends. They deviate from it by at most h^4/384 max|p''''|, and n is the smallest number

@@ -33,6 +33,9 @@ NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& na
   }
   config.stop_on_master_lost =
       reader.oneOf("on_master_lost", {"continue", "stop"}, "continue") == "stop";
+  config::ConfigReader trajectory = reader.map("trajectory");
+  config.allow_slower = trajectory.boolean("allow_slower", config.allow_slower);
+  trajectory.rejectUnknown();
   config.hardware_id = reader.text("hardware_id", config.hardware_id);
   reader.rejectUnknown();
   return config;

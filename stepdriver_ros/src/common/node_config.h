@@ -16,6 +16,7 @@ struct NodeConfig : setup::MachineConfig {
   bool urdf_limits = true;           ///< the limits of robot_description apply as well
   bool publish_clock = false;        ///< the time of the simulated rig on /clock
   bool stop_on_master_lost = false;  ///< if the ROS master doesn't answer, all axes come to rest
+  bool allow_slower = false;         ///< machine::TrajectoryRequest::allow_slower
   std::string hardware_id;           ///< for diagnostics; empty: made from the other facts
 };
 
@@ -27,6 +28,8 @@ struct NodeConfig : setup::MachineConfig {
 /// urdf_limits: true              # apply the limits of robot_description as well
 /// publish_clock: false           # true: publish the time of the simulated rig on /clock
 /// on_master_lost: continue       # or stop: all axes come to rest
+/// trajectory:
+///   allow_slower: false          # true: what the limits don't allow is slowed down
 /// hardware_id: ""                # for diagnostics; empty: the host and the driver chips
 /// @endcode
 ///

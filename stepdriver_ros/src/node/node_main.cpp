@@ -81,7 +81,7 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
               ~state_file  ~recorder  ~hardware_id  ~urdf_limits  ~publish_clock
-              ~on_master_lost  ~simulation
+              ~on_master_lost  ~trajectory  ~simulation
               robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
@@ -218,8 +218,8 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   recorder.advertise(private_node, queues);
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
-  const TrajectoryCommand trajectory_command(private_node, machine, queues);
-  TrajectoryAction trajectory_action(private_node, machine, queues, statuses);
+  const TrajectoryCommand trajectory_command(private_node, machine, queues, config.allow_slower);
+  TrajectoryAction trajectory_action(private_node, machine, queues, statuses, config.allow_slower);
   const std::string description = hardware.description();
   MasterWatch master_watch([&] {
     if (config.stop_on_master_lost) stopForLostMaster(machine);

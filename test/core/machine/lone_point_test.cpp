@@ -54,8 +54,17 @@ TEST_F(LonePoint, IsRefusedWithTheShortestTime) {
   EXPECT_EQ(test::refusal([&] {
               follow({{"x"}, {{0.6, {1.0}, {}, {}}}});
             }),
-            "x: the target can't be reached in 0.6 s; the limits of the axes allow 0.7 s");
+            "x: the target can't be reached in 0.6 s; the limits of the axes allow 0.7 s, which it "
+            "takes with allow_slower");
   EXPECT_EQ(bench->pulses("x"), 0);
+}
+
+TEST_F(LonePoint, IsReachedMoreSlowlyIfThatIsAllowed) {
+  const auto move = follow({{"x"}, {{0.6, {1.0}, {}, {}}}, true});
+  EXPECT_NEAR(move.duration, 0.7, 1e-6);
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(state("x").position, 1.0);
+  expectClean();
 }
 
 TEST_F(LonePoint, IsRefusedBeyondTheSoftLimits) {

@@ -25,7 +25,7 @@ std::vector<Waypoint> randomPositions(std::mt19937& random, int count) {
 }
 
 // The integral of the squared nth derivative (2 or 3) from the start to the last waypoint, by
-// Simpson's rule over the exact polynomial of each segment. `from` is where it starts.
+// Simpson's rule over the exact polynomial of each segment. `from` is the state at the start.
 double energy(const MotionState& from, const std::vector<Waypoint>& waypoints, int derivative) {
   double sum = 0.0;
   Waypoint begin{0, from.position.value(), from.velocity, from.acceleration};

@@ -305,7 +305,7 @@ TEST_F(ConfigurationFile, GivesAMachineWhateverOfTheNodeIsInIt) {
       file(std::string(kAxis) + "gpio: {backend: simulated}\n"
                                 "realtime: {policy: enforce, max_lateness_ms: 2.0}\n"
                                 "joint_state_rate: 10.0\njog_timeout: 1.0\nhardware_id: h\n"
-                                "urdf_limits: false\n"
+                                "urdf_limits: false\ntrajectory: {allow_slower: true}\n"
                                 "simulation: {speed: 0.0}\n"));
   EXPECT_EQ(config.backend, setup::GpioBackend::kSimulated);
   ASSERT_EQ(config.axes.size(), 1U);

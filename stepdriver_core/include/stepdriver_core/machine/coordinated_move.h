@@ -29,6 +29,11 @@ struct LineRequest {
 struct TrajectoryRequest {
   std::vector<std::string> names;  ///< of the axes, each once; need not be all
   std::vector<axis::TrajectoryPoint> points;
+  /// If a limit of velocity, acceleration or jerk doesn't allow the times of the points, all times
+  /// are multiplied by the smallest factor that the limits allow; velocities are divided by it,
+  /// accelerations by its square. CoordinatedMove::duration is that of the slower trajectory.
+  /// (Default) such a trajectory is refused.
+  bool allow_slower = false;
 };
 
 /// A segment of a path, from the end of the one before it; the first begins where the axes stand.

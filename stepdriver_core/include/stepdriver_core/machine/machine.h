@@ -117,7 +117,8 @@ class Machine {
   /// @throw Refused as Axis::moveTo(), and if the request is malformed; then nothing moves.
   CoordinatedMove moveLine(const LineRequest& request);
 
-  /// Moves several axes through the points of a trajectory; it can interrupt their motions. The
+  /// Moves several axes through the points of a trajectory; it can interrupt their motions. Points
+  /// without velocities get those of a spline through all positions, see docs/motion.md. The
   /// points' time is the trajectory's: a hold or a speed override below 1 runs through it more
   /// slowly, one above 1 does nothing. A backlash is taken up in addition to the joint's own
   /// motion, which may last longer than the points. A long one is planned in the calling thread and

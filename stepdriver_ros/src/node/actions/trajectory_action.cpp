@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "common/text.h"
@@ -33,14 +34,25 @@ int errorCodeOf(BadTrajectory::Kind kind) {
   return Result::INVALID_GOAL;
 }
 
+// Empty if a motion wasn't planned to last noticeably longer than its points.
+std::string slowerText(const FollowingTrajectory& following) {
+  constexpr double kNoticeable = 1e-6;
+  const double planned = following.move.duration;
+  const std::optional<double>& wanted = following.wanted_duration;
+  if (!wanted || planned <= *wanted * (1.0 + kNoticeable) + kNoticeable) return {};
+  return fmt::format("; it was planned for {} s, but its last point asked for {} s",
+                     roundedText(planned), roundedText(*wanted));
+}
+
 }  // namespace
 
 TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine,
-                                   CallQueues& queues, ActionStatuses& statuses)
+                                   CallQueues& queues, ActionStatuses& statuses, bool allow_slower)
     : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory", statuses,
                    [this] { poll_.begin(); }),
       machine_(machine),
       axes_(axisOfJoint(machine)),
+      allow_slower_(allow_slower),
       poll_(onQueue(queues.trajectories(), node), kPollPeriod, [this] { return poll(); }) {
   start();
 }
@@ -59,9 +71,13 @@ FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
   following.handle = handle;
   following.tolerances = readTolerances(*goal);
   following.slipped_before = machine_.figures().slipped;
-  following.move = followMessage(machine_, goal->trajectory, axes_);
+  following.move = followMessage(machine_, goal->trajectory, axes_, allow_slower_);
   for (const std::string& joint : goal->trajectory.joint_names) {
     following.joints.push_back(jointOf(joint));
+  }
+  // Any other stamp changes how long the points may take from now on.
+  if (goal->trajectory.header.stamp.isZero()) {
+    following.wanted_duration = goal->trajectory.points.back().time_from_start.toSec();
   }
   following.goal = goal->trajectory.points.back().positions;
   following.began = ros::Time::now();
@@ -107,7 +123,8 @@ bool TrajectoryAction::conclude(Following& following) {
   } else if (const std::string why = shortOfGoal(following, *result); !why.empty()) {
     handle.setAborted(resultOf(Result::GOAL_TOLERANCE_VIOLATED, why), why);
   } else {
-    handle.setSucceeded(resultOf(Result::SUCCESSFUL, result->message), result->message);
+    const std::string how = result->message + slowerText(following);
+    handle.setSucceeded(resultOf(Result::SUCCESSFUL, how), how);
   }
   return true;
 }

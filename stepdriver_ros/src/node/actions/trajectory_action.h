@@ -2,6 +2,7 @@
 
 #include <ros/node_handle.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,9 +25,10 @@ struct FollowingTrajectory {
   TrajectoryTolerances tolerances;
   std::vector<double> goal;  // [unit] the last point
   ros::Time began;
-  double slipped_before = 0.0;  // [s] slip of the machine's timeline
-  std::string preempted_by;     // a cancel or a newer goal, in words; otherwise empty
-  std::string violated;         // a path tolerance, in words; empty: not violated
+  std::optional<double> wanted_duration;  // [s] up to the last point; empty: its stamp isn't 0
+  double slipped_before = 0.0;            // [s] slip of the machine's timeline
+  std::string preempted_by;               // a cancel or a newer goal, in words; otherwise empty
+  std::string violated;                   // a path tolerance, in words; empty: not violated
 };
 
 /// The action ~follow_joint_trajectory. A goal is checked before it is accepted. A goal that shares
@@ -36,8 +38,9 @@ class TrajectoryAction
  public:
   /// @param node the node's private handle.
   /// @param machine, queues, statuses outlive the action.
+  /// @param allow_slower see machine::TrajectoryRequest.
   TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-                   ActionStatuses& statuses);
+                   ActionStatuses& statuses, bool allow_slower);
 
  private:
   using Following = FollowingTrajectory;
@@ -66,6 +69,7 @@ class TrajectoryAction
 
   machine::Machine& machine_;
   const AxisOfJoint axes_;
+  const bool allow_slower_;
   PeriodicPoll poll_;
 };
 

@@ -13,8 +13,8 @@ constexpr std::uint32_t kQueuedTrajectories = 10;
 }  // namespace
 
 TrajectoryCommand::TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine,
-                                     CallQueues& queues)
-    : machine_(machine), axes_(axisOfJoint(machine)) {
+                                     CallQueues& queues, bool allow_slower)
+    : machine_(machine), axes_(axisOfJoint(machine)), allow_slower_(allow_slower) {
   node.setCallbackQueue(&queues.trajectories());
   subscriber_ = node.subscribe("command", kQueuedTrajectories, &TrajectoryCommand::take, this,
                                ros::TransportHints().tcpNoDelay());
@@ -25,7 +25,7 @@ void TrajectoryCommand::take(const boost::shared_ptr<const Message>& message) {
     if (message->points.empty()) {
       stop(message->joint_names);
     } else {
-      followMessage(machine_, *message, axes_);
+      followMessage(machine_, *message, axes_, allow_slower_);
     }
   } catch (const Error& error) {
     log_.warn(error.what());

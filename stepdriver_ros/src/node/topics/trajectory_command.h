@@ -18,7 +18,9 @@ class TrajectoryCommand {
  public:
   /// @param node the node's private handle.
   /// @param machine, queues outlive the subscriber.
-  TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues);
+  /// @param allow_slower see machine::TrajectoryRequest.
+  TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
+                    bool allow_slower);
   TrajectoryCommand(const TrajectoryCommand&) = delete;
   TrajectoryCommand& operator=(const TrajectoryCommand&) = delete;
 
@@ -30,6 +32,7 @@ class TrajectoryCommand {
 
   machine::Machine& machine_;
   const AxisOfJoint axes_;
+  const bool allow_slower_;
   RefusalLog log_{"command"};
   ros::Subscriber subscriber_;
 };

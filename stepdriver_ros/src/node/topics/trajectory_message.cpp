@@ -126,8 +126,9 @@ machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
 
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,
-                                       const AxisOfJoint& axes) {
-  const TimedTrajectory trajectory = timedTrajectory(message, axes, ros::Time::now());
+                                       const AxisOfJoint& axes, bool allow_slower) {
+  TimedTrajectory trajectory = timedTrajectory(message, axes, ros::Time::now());
+  trajectory.request.allow_slower = allow_slower;
   if (trajectory.delay == 0.0) return machine.followTrajectory(trajectory.request);
   return machine.followTrajectory(
       withDelay(trajectory, restingPositions(machine, trajectory.request.names, trajectory.delay)));

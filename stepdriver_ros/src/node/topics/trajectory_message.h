@@ -63,10 +63,11 @@ machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
 /// Makes the machine follow a message. A delayed trajectory keeps its axes at rest until its start;
 /// stops and later commands end that like a motion.
 ///
+/// @param allow_slower see machine::TrajectoryRequest.
 /// @throw BadTrajectory; Refused as Machine::followTrajectory(), and if the trajectory is delayed
 ///   and one of its axes moves.
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,
-                                       const AxisOfJoint& axes);
+                                       const AxisOfJoint& axes, bool allow_slower);
 
 }  // namespace stepdriver::ros_node
