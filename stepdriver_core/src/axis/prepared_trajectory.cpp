@@ -31,7 +31,8 @@ constexpr double kMore = 1.0 + kTrajectoryTolerance;
 // How many pieces may be planned again on joining if the prepared ones can't be used.
 constexpr std::size_t kFewPieces = 5000;
 // If the axes are at rest, the second attempt to slow a trajectory down is right. If they move, the
-// velocity at the start stays, and each attempt at least halves the logarithm of what is missing.
+// velocity at the start stays: its acceleration falls by k instead of k^2, so each attempt about
+// halves the logarithm of what is missing.
 constexpr int kMostSlowdowns = 30;
 // [s] A trajectory isn't slowed down to more than this.
 constexpr double kLongestSlowed = Profile::kLongest / 4.0;
@@ -346,10 +347,14 @@ std::vector<motion::Piece> PreparedTrajectory::quickestTo(std::size_t member,
   limits.start_speed = std::min(limits.start_speed, limits.max_speed);
   const motion::Waypoint& point = parts_[member].ends.back();
   const motion::MotionState from = jointOf(start);
-  const Profile plan =
-      motion::planMove(0, from, motion::restingCount(point.position), limits).profile;
   std::vector<motion::Piece> pieces;
-  for (const motion::Piece& piece : plan.pieces()) pieces.push_back(piece);
+  try {
+    const Profile plan =
+        motion::planMove(0, from, motion::restingCount(point.position), limits).profile;
+    for (const motion::Piece& piece : plan.pieces()) pieces.push_back(piece);
+  } catch (const std::range_error& error) {
+    axis.refuse(error.what());
+  }
   // An axis that is there already waits for the others.
   if (pieces.empty()) pieces.push_back({DoubleDouble(1e-9), from.position});
   return pieces;
