@@ -136,7 +136,7 @@ class Machine::Impl {
       std::vector<motion::MotionState> expected;
       for (const PathOrigin& origin : origins) {
         wanted.path->from.push_back(origin.rest);
-        expected.push_back({motion::fromInteger(origin.rest)});
+        expected.push_back({motion::DoubleDouble(origin.rest)});
       }
       wanted.path->targets = std::move(plan.targets);
       wanted.prepared = disposer_.keep(
