@@ -60,7 +60,7 @@ struct FollowTrajectory {
     std::vector<double> from;     ///< [microsteps] AxisSnapshot::rest of each axis
     std::vector<double> targets;  ///< [microsteps] the commanded positions at its end
   };
-  std::optional<Path> path;
+  std::optional<Path> path{};
 };
 struct StopAxis {
   AxisId axis = 0;
