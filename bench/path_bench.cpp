@@ -93,7 +93,8 @@ void plan(benchmark::State& state, PathRequest (*make)(std::size_t)) {
   for (auto round : state) {
     const machine::PathPlan plan = machine::planPath(request, axes, origins);
     points = plan.points.size();
-    const axis::PreparedTrajectory prepared(axes, plan.points);
+    const axis::PreparedTrajectory prepared(axes, plan.points,
+                                            std::vector<motion::MotionState>(axes.size()));
     benchmark::DoNotOptimize(&prepared);
   }
   const auto rounds = static_cast<std::int64_t>(state.iterations());

@@ -71,7 +71,7 @@ std::vector<TrajectoryPoint> pointsFor(std::size_t axes, int count) {
 
 std::shared_ptr<const PreparedTrajectory> prepared(std::size_t axes, int count, double backlash) {
   return std::make_shared<const PreparedTrajectory>(axesOf(axes, backlash), pointsFor(axes, count),
-                                                    std::vector<motion::MotionState>(axes), false);
+                                                    std::vector<motion::MotionState>(axes));
 }
 
 void prepare(benchmark::State& state, std::size_t axes, double backlash) {

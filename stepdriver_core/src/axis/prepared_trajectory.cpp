@@ -160,19 +160,19 @@ double endVelocity(const Profile& profile) {
 PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        const std::vector<TrajectoryPoint>& points,
                                        const std::vector<motion::MotionState>& expected,
-                                       bool allow_slower)
-    : axes_(std::move(axes)), allow_slower_(allow_slower) {
+                                       const SlowingDown& slowing)
+    : axes_(std::move(axes)), allow_slower_(slowing.allowed) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   lone_position_ = points.size() == 1 && points.front().velocities.empty();
-  const Source source{points, expected, 1.0};
+  Source source{points, expected, slowing.wait};
   const bool moves = std::any_of(expected.begin(), expected.end(),
                                  [](const auto& state) { return state.velocity != 0.0; });
   // These have only a way from the start, which join() plans.
   const bool only_way = lone_position_ || (points.size() == 1 && moves);
-  if (allow_slower && !only_way) slowdown_ = slowdownFor(source).value_or(1.0);
+  if (slowing.allowed && !only_way) source.slowdown = slowdownFor(source).value_or(1.0);
   parts_.reserve(axes_.size());
   for (std::size_t member = 0; member < axes_.size(); ++member) {
-    parts_.push_back(prepare(member, {points, expected, slowdown_}));
+    parts_.push_back(prepare(member, source));
   }
 }
 
@@ -193,7 +193,7 @@ std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
     }
     if (more == 1.0) return source.slowdown;
     source.slowdown *= more;
-    if (!(source.slowdown * source.points.back().time <= kLongestSlowed)) break;
+    if (!(source.duration() <= kLongestSlowed)) break;
   }
   return std::nullopt;
 }
@@ -211,7 +211,7 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
     for (std::size_t i = 0; i < waypoints.size(); ++i) {
       giveWay(i);
       motion::Waypoint& waypoint = waypoints[i];
-      waypoint.time_ns = nanoseconds(source.points[i].time * source.slowdown);
+      waypoint.time_ns = nanoseconds(source.timeOf(source.points[i].time));
       if (waypoint.velocity) *waypoint.velocity /= source.slowdown;
       if (waypoint.acceleration) *waypoint.acceleration /= source.slowdown * source.slowdown;
     }
@@ -280,9 +280,9 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
   const PathAxis& axis = axes_[member];
   const auto remedy = [&]() -> std::string {
     if (allow_slower_) return {};
-    const std::optional<double> slowdown = slowdownFor(source);
-    const double wanted = source.points.back().time;
-    return slowdown && *slowdown > 1.0 ? remedyText(*slowdown * wanted, wanted) : std::string();
+    Source slower = source;
+    slower.slowdown = slowdownFor(source).value_or(1.0);
+    return slower.slowdown > 1.0 ? remedyText(slower.duration(), source.duration()) : std::string();
   };
   const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
   Part part;

@@ -18,6 +18,12 @@
 
 namespace stepdriver::axis {
 
+/// Whether the times of a trajectory's points may become longer.
+struct SlowingDown {
+  bool allowed = false;
+  double wait = 0.0;  ///< [s] times up to this stay as they are
+};
+
 /// A trajectory that is planned and checked except for its first segment, which depends on the
 /// positions of the axes when it begins. Preparing it takes time in proportion to its points, in
 /// any thread; joining it to the motions of the axes then takes a bounded time.
@@ -38,7 +44,8 @@ class PreparedTrajectory {
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
   ///   first segment.
   PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points,
-                     const std::vector<motion::MotionState>& expected, bool allow_slower);
+                     const std::vector<motion::MotionState>& expected,
+                     const SlowingDown& slowing = {});
   PreparedTrajectory(const PreparedTrajectory&) = delete;
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
@@ -74,7 +81,13 @@ class PreparedTrajectory {
   struct Source {
     const std::vector<TrajectoryPoint>& points;
     const std::vector<motion::MotionState>& expected;
-    double slowdown = 1.0;  // the factor on all times
+    double wait = 0.0;      // s
+    double slowdown = 1.0;  // the factor on the times after that
+
+    double timeOf(double time) const {
+      return time > wait ? wait + slowdown * (time - wait) : time;
+    }
+    double duration() const { return timeOf(points.back().time); }
   };
   // The way to the first point.
   struct Head {
@@ -109,7 +122,6 @@ class PreparedTrajectory {
   std::vector<Part> parts_;
   bool lone_position_ = false;  // its only point gives no velocities
   bool allow_slower_ = false;
-  double slowdown_ = 1.0;
 };
 
 }  // namespace stepdriver::axis

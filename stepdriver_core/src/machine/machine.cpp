@@ -123,7 +123,8 @@ class Machine::Impl {
       std::vector<axis::PathAxis> facts = factsOf(now, wanted.axes);
       const std::vector<motion::MotionState> expected = expectedStates(wanted.axes, facts);
       wanted.prepared = disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(
-          std::move(facts), request.points, expected, request.allow_slower));
+          std::move(facts), request.points, expected,
+          axis::SlowingDown{request.allow_slower, request.wait}));
     });
   }
 
@@ -140,7 +141,7 @@ class Machine::Impl {
       }
       wanted.path->targets = std::move(plan.targets);
       wanted.prepared = disposer_.keep(
-          std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected, false));
+          std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected));
     });
   }
 

@@ -723,7 +723,9 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
   }
   std::shared_ptr<const axis::PreparedTrajectory> prepared;
   try {
-    prepared = std::make_shared<const axis::PreparedTrajectory>(facts, points);
+    // All points have velocities, so it doesn't matter where it begins.
+    prepared = std::make_shared<const axis::PreparedTrajectory>(
+        facts, points, std::vector<motion::MotionState>(axes.size()));
   } catch (const Refused& refused) {
     note(std::string("the trajectory is refused: ") + refused.what());
     return;

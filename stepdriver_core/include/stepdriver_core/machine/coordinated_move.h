@@ -34,6 +34,8 @@ struct TrajectoryRequest {
   /// accelerations by its square. CoordinatedMove::duration is that of the slower trajectory.
   /// (Default) such a trajectory is refused.
   bool allow_slower = false;
+  /// [s] The first point that `allow_slower` doesn't delay: a wait at rest before the motion.
+  double wait = 0.0;
 };
 
 /// A segment of a path, from the end of the one before it; the first begins where the axes stand.

@@ -121,6 +121,7 @@ machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
   rest.velocities.resize(positions.size());
   rest.accelerations.resize(positions.size());
   request.points.insert(first_to_come, rest);
+  request.wait = trajectory.delay;
   return request;
 }
 
