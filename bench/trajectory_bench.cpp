@@ -79,7 +79,7 @@ void prepare(benchmark::State& state, std::size_t axes, double backlash) {
   const std::vector<TrajectoryPoint> points = pointsFor(axes, count);
   for (auto round : state) {
     PreparedTrajectory trajectory(axesOf(axes, backlash), points,
-                                  std::vector<motion::MotionState>(axes), false);
+                                  std::vector<motion::MotionState>(axes));
     benchmark::DoNotOptimize(&trajectory);
   }
   state.SetItemsProcessed(state.iterations());
