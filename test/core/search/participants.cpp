@@ -723,7 +723,7 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
   }
   std::shared_ptr<const axis::PreparedTrajectory> prepared;
   try {
-    // All points have velocities, so it doesn't matter where it begins.
+    // All points have velocities, so the states at its begin don't count.
     prepared = std::make_shared<const axis::PreparedTrajectory>(
         facts, points, std::vector<motion::MotionState>(axes.size()));
   } catch (const Refused& refused) {
