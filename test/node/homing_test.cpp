@@ -177,6 +177,11 @@ class HomingAction : public Homing {
     });
   }
 
+  std::size_t toldPhases() {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return phases.size();
+  }
+
   bool told(const std::string& phase) {
     const std::lock_guard<std::mutex> lock(mutex);
     return phases.count(phase) > 0;
@@ -188,13 +193,18 @@ class HomingAction : public Homing {
 };
 
 TEST_F(HomingAction, TellsItsPhasesAndItsEnd) {
+  node.set("simulation/speed", 1.0);
   start();
-  send();
-  ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count())));
-  EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::SUCCEEDED);
-  const auto result = client->getResult();
-  expectSays(result->message, "x is homed");
-  expectStandsHomed(result->position);
+  // The feedback consists of samples: a test that had to wait for a processor meanwhile misses
+  // some.
+  for (int homings = 0; homings < 5 && toldPhases() < 4; ++homings) {
+    send();
+    ASSERT_TRUE(client->waitForResult(ros::Duration(kBound.count())));
+    EXPECT_EQ(client->getState(), actionlib::SimpleClientGoalState::SUCCEEDED);
+    const auto result = client->getResult();
+    expectSays(result->message, "x is homed");
+    expectStandsHomed(result->position);
+  }
   for (const std::string phase : {"seeking", "backing off", "latching", "pulling off"}) {
     EXPECT_TRUE(told(phase)) << phase;
   }
