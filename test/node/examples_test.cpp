@@ -1,3 +1,4 @@
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/Twist.h>
 #include <gtest/gtest.h>
 #include <nav_msgs/Odometry.h>
@@ -11,6 +12,7 @@
 #include <stepdriver/Plan.h>
 #include <stepdriver/RigReport.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -206,6 +208,14 @@ TEST(Examples, Stm32WheelRollsTwentyTurns) {
 TEST(Examples, Stm32CarDrivesByTheMessagesOfAKeyboard) {
   const std::string node = "/car/stepdriver";
   const Recorder<nav_msgs::Odometry> odom(std::string("/car/odom"));
+  // A key that is held before the base is ready counts only after a pause.
+  const Recorder<diagnostic_msgs::DiagnosticArray> diagnostics(std::string("/diagnostics"));
+  ASSERT_TRUE(diagnostics.waitFor([](const diagnostic_msgs::DiagnosticArray& message) {
+    return std::any_of(message.status.begin(), message.status.end(), [](const auto& status) {
+      return status.name.find("/base: wheels") != std::string::npos &&
+             status.message == "takes cmd_vel";
+    });
+  }));
   auto keyboard = ros::NodeHandle().advertise<geometry_msgs::Twist>("/car/cmd_vel", 1);
   geometry_msgs::Twist key;
   key.linear.x = 0.5;
