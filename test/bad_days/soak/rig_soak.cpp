@@ -121,6 +121,8 @@ class RigSoak {
             }
             // A line of another client may wait for the end of a hold.
             machine_->resume();
+          } catch (const Refused&) {
+            // An emergency stop of another client came in the middle of the resume.
           } catch (const std::exception& error) {
             const std::lock_guard<std::mutex> lock(mutex_);
             complain(std::string("a call ended with: ") + error.what());
