@@ -27,6 +27,7 @@
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
+#include "node/calls/frame_memory.h"
 #include "node/calls/memory_watch.h"
 #include "node/diagnostics/diagnostics.h"
 #include "node/flight_recorder_service.h"
@@ -321,6 +322,7 @@ int main(int argc, char** argv) {
   node::setThreadStacks();
   const node::MemoryReserve memory_reserve;
   node::limitXmlDepth();
+  node::limitFrameMemory();
   node::EndRequests end_requests(node::EndRequests::Usr1::kAsksForARecording);
   if (const auto code = node::handleArguments(argc, argv, node::kUsage)) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
