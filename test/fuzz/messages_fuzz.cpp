@@ -5,6 +5,7 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/FollowPath.h>
+#include <stepdriver/FollowPathActionGoal.h>
 #include <stepdriver/Home.h>
 #include <stepdriver/HomeActionGoal.h>
 #include <stepdriver/HomeAxes.h>
@@ -236,10 +237,13 @@ void takeLine(const Fields& fields) {
 void take(const MoveLine::Request& message) { takeLine(message); }
 void take(const MoveLineActionGoal& message) { takeLine(message.goal); }
 
-void take(const FollowPath::Request& message) {
+template <typename Fields>
+void takePath(const Fields& fields) {
   MachineOnRig rig;
-  rig.serve([&] { rig.machine().followPath(ros_node::pathRequest(message)); });
+  rig.serve([&] { rig.machine().followPath(ros_node::pathRequest(fields)); });
 }
+void take(const FollowPath::Request& message) { takePath(message); }
+void take(const FollowPathActionGoal& message) { takePath(message.goal); }
 
 void take(const HomeAxes::Request& message) {
   MachineOnRig rig;
@@ -325,6 +329,7 @@ const std::vector<Reader>& readers() {
       readHeader,
       converse,
       readAndTake<FollowPath::Request>,
+      readAndTake<FollowPathActionGoal>,
   };
   return all;
 }

@@ -7,6 +7,7 @@
 #include <ros/service_client.h>
 #include <stepdriver/FollowJointTrajectoryActionGoal.h>
 #include <stepdriver/FollowPath.h>
+#include <stepdriver/FollowPathActionGoal.h>
 #include <stepdriver/HomeAxes.h>
 #include <stepdriver/Jog.h>
 #include <stepdriver/MoveLine.h>
@@ -104,9 +105,10 @@ std::string number(std::uint32_t value) {
   return bytes;
 }
 
-/// What precedes the names of a goal's joints.
-const std::string kGoalHeaders =
-    bytesOf(std_msgs::Header()) + bytesOf(actionlib_msgs::GoalID()) + bytesOf(std_msgs::Header());
+/// What precedes the fields of a goal.
+const std::string kGoalId = bytesOf(std_msgs::Header()) + bytesOf(actionlib_msgs::GoalID());
+/// What precedes the names of the joints of a trajectory's goal.
+const std::string kGoalHeaders = kGoalId + bytesOf(std_msgs::Header());
 
 Goal goal() {
   Goal goal;
@@ -149,6 +151,7 @@ TEST(BoundedMessage, ThatClaimsMoreThanItHasCostsNoMemory) {
   EXPECT_THROW(
       read<Bounded<FollowPath::Request>>(number(0) + number(1) + std::string(1, '\0') + many),
       Refused);
+  EXPECT_THROW(read<Bounded<FollowPathActionGoal>>(kGoalId + many), Refused);
   const std::string names = kGoalHeaders + number(0);
   EXPECT_THROW(read<Bounded<Goal>>(kGoalHeaders + many), Refused);
   EXPECT_THROW(read<Bounded<Goal>>(names + many), Refused) << "points";
@@ -231,6 +234,9 @@ TEST_F(LyingClient, OfFollowPathIsRefused) { call<FollowPath>("follow_path", kLi
 TEST_F(LyingClient, OfJogIsRefused) { publish<Jog>("jog", bytesOf(std_msgs::Header()) + kLie); }
 TEST_F(LyingClient, OfCommandIsRefused) {
   publish<trajectory_msgs::JointTrajectory>("command", bytesOf(std_msgs::Header()) + kLie);
+}
+TEST_F(LyingClient, OfAPathActionIsRefused) {
+  publish<FollowPathActionGoal>("follow_path/goal", kGoalId + kLie);
 }
 TEST_F(LyingClient, OfATrajectoryActionIsRefused) {
   publish<Goal>("follow_joint_trajectory/goal", kGoalHeaders + kLie);

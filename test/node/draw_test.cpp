@@ -25,10 +25,21 @@ class Draw : public testing::Test {
 
   void write(const std::string& text) const { std::ofstream(points.path()) << text; }
 
-  std::vector<std::string> arguments() const {
-    return {points.path(), "--node", node.name(), "-o", picture.path()};
+  std::vector<std::string> arguments(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> all = {points.path(), "--node", node.name(), "-o", picture.path()};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
   }
-  ProgramEnd draw() const { return runProgram("draw", arguments()); }
+  ProgramEnd draw(const std::vector<std::string>& more = {}) const {
+    return runProgram("draw", arguments(more));
+  }
+  /// How far the pulses of an axis were off the lines [mm], as the output says.
+  static double offIn(const std::string& axis, const std::string& output) {
+    const std::size_t place = output.find(" mm in " + axis + " (microstep 0.0125 mm)");
+    EXPECT_NE(place, std::string::npos) << output;
+    if (place == std::string::npos) return -1.0;
+    return std::stod(output.substr(output.find_last_of(" \n", place - 1)));
+  }
 
   NodeUnderTest node;
   const TemporaryFile points;
@@ -42,15 +53,13 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   node.start();
   ASSERT_TRUE(node.moveTo(0.005, true).success) << "pulses before the drawing aren't of it";
   write("10 10\n30 10\n30 25\n10 10\n");
-  const auto end = draw();
+  const auto end = draw({"--tolerance", "0"});
   EXPECT_EQ(end.code, 0);
   // From (5, 0): 400 and 800, 1600, 1200, then back.
   expectSays(end.output, "6800 pulses, at most this far off the lines:");
-  expectSays(end.output, "line 4 of 4, 71 of 71 mm, 100 %");
+  expectSays(end.output, "71 of 71 mm, 100 %");
   for (const std::string axis : {"x", "y"}) {
-    const std::size_t place = end.output.find(" mm in " + axis + " (microstep 0.0125 mm)");
-    ASSERT_NE(place, std::string::npos) << end.output;
-    const double off = std::stod(end.output.substr(end.output.find_last_of(" \n", place - 1)));
+    const double off = offIn(axis, end.output);
     EXPECT_LE(off, 0.0125) << axis << " [mm]: no position is a microstep off the lines";
     EXPECT_GT(off, 0.001) << axis << " [mm]: no slope is more exact than its half steps";
   }
@@ -59,6 +68,35 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{2400, 2000}));
   EXPECT_EQ(report.pulses_backward, (std::vector<std::int64_t>{1600, 1200}));
   EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
+}
+
+TEST_F(Draw, RoundsCornersWithinTheTolerance) {
+  node.traced();
+  node.start();
+  ASSERT_TRUE(node.moveTo(0.005, true).success) << "pulses before the drawing aren't of it";
+  write("10 10\n30 10\n30 25\n10 10\n");
+  const auto end = draw({"--tolerance", "0.5"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  expectSays(end.output, "71 of 71 mm, 100 %");
+  for (const std::string axis : {"x", "y"}) {
+    const double off = offIn(axis, end.output);
+    EXPECT_LE(off, 0.5 + 0.0125) << axis << " [mm]";
+    EXPECT_GT(off, 0.1) << axis << " [mm]: the axes stopped at the corners";
+  }
+  const auto report = node.rig();
+  for (const std::size_t axis : {0U, 1U}) {
+    EXPECT_EQ(report.pulses_forward[axis] - report.pulses_backward[axis], 800) << axis;
+  }
+  EXPECT_LT(report.pulses_forward[1], 2000) << "the corner at (30, 25) wasn't rounded";
+  EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
+}
+
+TEST_F(Draw, StopsAtEachCornerIfAnAxisHasAJerkLimit) {
+  node.set("axes/x/jerk_mm_s3", 20'000.0);
+  node.start();
+  write("10 10\n30 10\n30 25\n");
+  EXPECT_EQ(draw().code, 0);
+  EXPECT_EQ(node.rig().pulses_forward, (std::vector<std::int64_t>{2400, 2000}));
 }
 
 TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {
@@ -82,10 +120,9 @@ TEST_F(Draw, RefusesBeforeAnythingMoves) {
   expect_fails("10 10\nten 30\n", "line 2: ten 30");
   expect_fails("", "contains no line");
   EXPECT_EQ(runProgram("draw", {points.path(), "--speed", "-1"}).code, 64);
+  EXPECT_EQ(runProgram("draw", {points.path(), "--tolerance", "-0.1"}).code, 64);
   write("10 10\n30 10\n");
-  std::vector<std::string> fast = arguments();
-  fast.insert(fast.end(), {"--speed", "5000"});
-  const auto refused = runProgram("draw", fast);
+  const auto refused = draw({"--speed", "5000"});
   EXPECT_EQ(refused.code, 1);
   expectSays(refused.output, "the speed 5000 mm/s is above the ");
   EXPECT_EQ(runProgram("draw", {"--help"}).code, 0);
@@ -98,9 +135,7 @@ TEST_F(Draw, StopsTheAxesWhereItIsInterrupted) {
   node.start();
   write("199 0\n199 10\n");
   const Recorder<AxisStates> states(node.full("axis_states"));
-  std::vector<std::string> words = arguments();
-  words.insert(words.end(), {"--speed", "5"});
-  NodeProcess process(words, std::string(STEPDRIVER_PROGRAMS) + "/draw");
+  NodeProcess process(arguments({"--speed", "5"}), std::string(STEPDRIVER_PROGRAMS) + "/draw");
   ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.position.at(0) > 0.001; }));
   EXPECT_TRUE(waitUntil([this] {
     ros::master::V_TopicInfo topics;

@@ -1,23 +1,28 @@
 #include <gtest/gtest.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/FollowPath.h>
+#include <stepdriver/FollowPathAction.h>
 #include <stepdriver/PathSegment.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <functional>
 #include <future>
 #include <limits>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "support/motion_client.h"
 #include "support/node_under_test.h"
+#include "support/recorder.h"
 #include "support/says.h"
 #include "support/two_axes.h"
 #include "support/wait.h"
 
-// The service follow_path; the core's tests have the geometry and the timing of paths.
+// The service and action follow_path; the core tests the geometry and the timing of paths.
 
 namespace stepdriver::node_test {
 namespace {
@@ -181,6 +186,100 @@ TEST_F(PathTest, MovesNothingIfItIsRefused) {
     EXPECT_TRUE(answer.target.empty());
   }
   EXPECT_EQ(node.pulses(), 0);
+}
+
+class PathActionTest : public PathTest {
+ protected:
+  void start(double speed) {
+    node.set("simulation/speed", speed);
+    node.start();
+    client = std::make_unique<MotionClient<FollowPathAction>>(node.full("follow_path"));
+  }
+  static FollowPathGoal goal(const std::vector<PathSegment>& segments) {
+    FollowPathGoal goal;
+    goal.name = {"x", "y"};
+    goal.segments = segments;
+    goal.tolerance = 0.0005;
+    return goal;
+  }
+
+  std::unique_ptr<MotionClient<FollowPathAction>> client;
+};
+
+TEST_F(PathActionTest, ReachesItsEndAndTellsHowFarItIs) {
+  start(1.0);
+  std::vector<FollowPathFeedback> told;
+  client->sendGoal(goal(kSquare), {}, {},
+                   [&](const FollowPathFeedbackConstPtr& feedback) { told.push_back(*feedback); });
+  EXPECT_EQ(client->await(), State::SUCCEEDED);
+  client->expectEnd(FollowPathResult::REACHED, "reached");
+  const auto result = client->getResult();
+  EXPECT_EQ(result->position, (std::vector<double>{0.0, 0.0}));
+  ASSERT_GT(told.size(), 3U);
+  double progress = 0.0;
+  for (const FollowPathFeedback& now : told) {
+    EXPECT_EQ(now.position.size(), 2U);
+    EXPECT_GE(now.progress, progress);
+    EXPECT_LE(now.progress, 1.0);
+    EXPECT_LE(now.time_left, result->duration + 1e-3);
+    progress = now.progress;
+  }
+  EXPECT_GT(progress, 0.5);
+  expectNoViolation();
+}
+
+TEST_F(PathActionTest, KeepsItsProgressWhileItIsHeld) {
+  start(1.0);
+  const Recorder<FollowPathActionFeedback> told(node.full("follow_path/feedback"));
+  ASSERT_TRUE(waitUntil([&] { return told.connected(); }));
+  client->sendGoal(goal({line({0.1, 0.0}), line({0.1, 0.1})}));
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 1600; }));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("hold").success);
+  ASSERT_TRUE(told.waitForLatest([](const FollowPathActionFeedback& now) {
+    return now.feedback.position.at(0) > 0.0 &&
+           now.feedback.velocity == std::vector<double>{0.0, 0.0};
+  }));
+  const double progress = told.messages().back().feedback.progress;
+  EXPECT_GT(progress, 0.0);
+  EXPECT_LT(progress, 0.5);
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("resume").success);
+  EXPECT_EQ(client->await(), State::SUCCEEDED);
+  client->expectEnd(FollowPathResult::REACHED, "reached");
+}
+
+TEST_F(PathActionTest, DeceleratesAlongThePathWhenItIsCancelled) {
+  start(1.0);
+  client->sendGoal(goal({line({0.1, 0.1}), line({0.2, 0.0})}));
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 1600; }));
+  client->cancelGoal();
+  EXPECT_EQ(client->await(), State::PREEMPTED);
+  client->expectEnd(FollowPathResult::STOPPED, "stop");
+  const auto place = client->getResult()->position;
+  ASSERT_EQ(place.size(), 2U);
+  EXPECT_LT(place[0], 0.09);
+  EXPECT_NEAR(place[0], place[1], 2.0 * kHalfStep) << "not on the first line";
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward[0], std::llround(place[0] * 80'000.0));
+  expectNoViolation();
+}
+
+TEST_F(PathActionTest, IsRejectedWithTheReasonAndMovesNothing) {
+  start(20.0);
+  FollowPathGoal bad = goal(kSquare);
+  bad.segments[1].end = {5.0, 0.02};
+  client->sendGoal(bad);
+  EXPECT_EQ(client->await(), State::REJECTED);
+  client->expectEnd(FollowPathResult::REFUSED, "x: segment 1 of the path leads to 5 m");
+  EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST_F(PathActionTest, IsToldIfTheNodeEnds) {
+  start(1.0);
+  client->sendGoal(goal({line({0.18, 0.12})}));
+  ASSERT_TRUE(waitUntil([&] { return node.pulses() > 1600; }));
+  node.process().signal(SIGTERM);
+  EXPECT_EQ(client->await(), State::ABORTED);
+  client->expectEnd(FollowPathResult::STOPPED, "shut down");
 }
 
 }  // namespace

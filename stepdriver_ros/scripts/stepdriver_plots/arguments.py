@@ -44,3 +44,10 @@ def positive(text):
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"{text}: must be above 0")
     return value
+
+
+def not_negative(text):
+    value = number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be 0 or more")
+    return value

@@ -1,5 +1,7 @@
 """The path that the two axes of a drawing really took, and how far it is from the lines."""
 
+import math
+
 
 def path_of_pulses(start, steps, unit_steps):
     """Positions after each pulse of either axis.
@@ -17,15 +19,6 @@ def path_of_pulses(start, steps, unit_steps):
     return path
 
 
-def cut_to_lines(path, pulses):
-    """Cuts the path into parts of that many pulses each. A part begins where the previous one ended."""
-    parts, begin = [], 0
-    for count in pulses:
-        parts.append(path[begin:begin + count + 1])
-        begin += count
-    return parts
-
-
 def offset(place, begin, end):
     """(x, y): a position minus the nearest point of the line between two points."""
     way = (end[0] - begin[0], end[1] - begin[1])
@@ -36,7 +29,43 @@ def offset(place, begin, end):
     return off[0] - along * way[0], off[1] - along * way[1]
 
 
-def deviations(parts, lines):
-    """(x, y): the largest distance in each axis between the positions of a part and its line."""
-    offsets = [offset(place, *line) for part, line in zip(parts, lines) for place in part]
-    return tuple(max(abs(value) for value in values) for values in zip(*offsets))
+class Follower:
+    """Finds the line that a path follows, place by place: a path leaves a line only near its end."""
+
+    def __init__(self, lines, near):
+        """lines: (begin, end) of each; near: how far from the end of a line the path may leave it."""
+        self._lines = lines
+        self._near = near
+        self._candidates = [0]  # the numbers of the lines that it may follow
+
+    def follow(self, place):
+        """The number of the nearest of these lines, and the offset from it."""
+        number = self._candidates[-1]
+        while number + 1 < len(self._lines) and math.dist(place, self._lines[number][1]) <= self._near:
+            number += 1
+            self._candidates.append(number)
+        offsets = {number: offset(place, *self._lines[number]) for number in self._candidates}
+        distances = {number: math.hypot(*off) for number, off in offsets.items()}
+        nearest = min(distances, key=lambda number: (distances[number], number))
+        self._candidates = [number for number in self._candidates
+                            if distances[number] <= max(self._near, distances[nearest])]
+        return nearest, offsets[nearest]
+
+
+def along(path, lines, near):
+    """The numbers of the lines that each position of a path follows, and (x, y): the largest distance in
+    each axis between a position and its line."""
+    follower = Follower(lines, near)
+    numbers, offsets = zip(*(follower.follow(place) for place in path))
+    return numbers, tuple(max(abs(value) for value in values) for values in zip(*offsets))
+
+
+def parts(path, flags):
+    """Cuts a path where the flag of its positions changes: (positions, flag) for each part. A part begins
+    where the previous one ended."""
+    cut, begin = [], 0
+    for index in range(1, len(path) + 1):
+        if index == len(path) or flags[index] != flags[begin]:
+            cut.append((path[max(0, begin - 1):index], flags[begin]))
+            begin = index
+    return cut

@@ -1,13 +1,15 @@
-"""The services and parameters of a running stepdriver_node. Needs ROS."""
+"""The services, actions and parameters of a running stepdriver_node. Needs ROS."""
 
 import math
+import time
 
 import rosgraph
 import rospy
 
 from .errors import NodeError
 
-CONNECT = 10.0  # [s] a node may take this long to advertise its services
+CONNECT = 10.0  # [s] a node may take this long to advertise its services and actions
+PAUSE = 0.05  # [s] between two looks at an action
 
 
 class DriverNode:
@@ -17,6 +19,7 @@ class DriverNode:
                             "running, and is ROS_MASTER_URI right?")
         self.name = rospy.resolve_name(name)
         self._proxies = {}
+        self._path_action = None
 
     def call(self, service, kind, **fields):
         """Calls a service below the node's name. Raises NodeError if the call fails or is refused."""
@@ -35,6 +38,14 @@ class DriverNode:
             raise NodeError(f"{self.name} refuses: {answer.message}")
         return answer
 
+    def follow_path(self, tell, **fields):
+        """Follows a path until its end. tell: is called with the covered part, 0 to 1, from time to time.
+        Returns the positions at its end. Raises NodeError if the path is refused, or if something else
+        ends it."""
+        if self._path_action is None:
+            self._path_action = PathAction(f"{self.name}/follow_path")
+        return self._path_action.follow(tell, **fields)
+
     def param(self, key, default=None):
         return rospy.get_param(f"{self.name}/{key}", default)
 
@@ -51,3 +62,50 @@ class DriverNode:
         raise NodeError(f"{self.name} has no axis {axis}: its axes are {axes}" if axes else
                         f"the parameter {self.name}/axes has no axis; it must have {axis}. Is {self.name} the "
                         "name of the node, and is it running?")
+
+
+class PathAction:
+    """A client of the action follow_path, through its topics."""
+
+    def __init__(self, name):
+        from stepdriver.msg import FollowPathActionFeedback, FollowPathActionGoal, FollowPathActionResult
+        self._name = name
+        self._id, self._result, self._progress = "", None, 0.0
+        self._goals = rospy.Publisher(f"{name}/goal", FollowPathActionGoal, queue_size=1)
+        self._subscribers = [
+            rospy.Subscriber(f"{name}/result", FollowPathActionResult, self._end),
+            rospy.Subscriber(f"{name}/feedback", FollowPathActionFeedback, self._see)]
+        peers = [self._goals.get_num_connections] + [
+            subscriber.get_num_connections for subscriber in self._subscribers]
+        latest = time.monotonic() + CONNECT
+        while not all(connections() for connections in peers):
+            if time.monotonic() > latest:
+                raise NodeError(f"the action {name} doesn't exist: is the node's name right?")
+            time.sleep(PAUSE)
+
+    def _end(self, message):
+        if message.status.goal_id.id == self._id:
+            self._result = message.result
+
+    def _see(self, message):
+        if message.status.goal_id.id == self._id:
+            self._progress = message.feedback.progress
+
+    def follow(self, tell, **fields):
+        from stepdriver.msg import FollowPathActionGoal, FollowPathResult
+        goal = FollowPathActionGoal()
+        for name, value in fields.items():
+            setattr(goal.goal, name, value)
+        goal.header.stamp = rospy.Time.now()
+        self._result, self._progress = None, 0.0
+        self._id = goal.goal_id.id = f"{rospy.get_name()}-{time.monotonic_ns()}"
+        self._goals.publish(goal)
+        while self._result is None:
+            if rospy.is_shutdown() or not self._goals.get_num_connections():
+                raise NodeError(f"{self._name}: the node is gone")
+            time.sleep(PAUSE)
+            tell(self._progress)
+        if self._result.end != FollowPathResult.REACHED:
+            raise NodeError(f"{self._name}: {self._result.message}")
+        tell(1.0)
+        return self._result.position

@@ -24,6 +24,7 @@
 #include "node/actions/homing_action.h"
 #include "node/actions/line_action.h"
 #include "node/actions/move_actions.h"
+#include "node/actions/path_action.h"
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
@@ -74,12 +75,13 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~home
-              ~move_line  ~hold  ~resume  ~dump
+              ~move_line  ~follow_path  ~hold  ~resume  ~dump
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  /diagnostics
               /clock (with ~publish_clock)  ~jog, ~command (subscribed)
-  actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_joint_trajectory
+  actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_path
+              ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
               ~state_file  ~recorder  ~hardware_id  ~urdf_limits  ~publish_clock
               ~on_master_lost  ~trajectory  ~simulation
@@ -95,7 +97,7 @@ Start it with: roslaunch stepdriver axis.launch
 ///
 /// @return the exit code.
 int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
-             LineAction& line_action, TrajectoryAction& trajectory_action,
+             LineAction& line_action, PathAction& path_action, TrajectoryAction& trajectory_action,
              StatePublisher& publisher, EndDespiteMaster& end) {
   int exit_code = kExitOk;
   try {
@@ -113,6 +115,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   }
   move_actions.tellEnded();
   line_action.tellEnded();
+  path_action.tellEnded();
   trajectory_action.tellEnded();
   if (!machine.whyHung().empty()) {
     // All that reads or releases lines would wait for the chip.
@@ -214,6 +217,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   const MachineHomingAction machine_homing_action(private_node, machine, statuses);
   MoveActions move_actions(private_node, machine, queues, statuses);
   LineAction line_action(private_node, machine, queues, statuses);
+  PathAction path_action(private_node, machine, queues, statuses);
   const MachineHomeService machine_home_service(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
@@ -259,8 +263,8 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   }
   ServiceManager::tellEnding();
   master_watch.stop();
-  const int exit_code =
-      shutDown(machine, queues, move_actions, line_action, trajectory_action, publisher, end);
+  const int exit_code = shutDown(machine, queues, move_actions, line_action, path_action,
+                                 trajectory_action, publisher, end);
   if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
   return MemoryReserve::isUsed() ? kExitExhausted : exit_code;
 }

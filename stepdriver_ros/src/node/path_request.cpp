@@ -60,22 +60,17 @@ machine::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
 
 }  // namespace
 
-machine::PathRequest pathRequest(const FollowPath::Request& fields) {
-  const std::size_t size = fields.segments.size();
-  if (size > machine::kMostPathSegments) {  // before they are copied
-    throw Refused(fmt::format("the path has {} segments, but must have 1 to {}", size,
+std::vector<machine::PathSegment> pathSegments(const std::vector<PathSegment>& fields) {
+  if (fields.size() > machine::kMostPathSegments) {  // before they are copied
+    throw Refused(fmt::format("the path has {} segments, but must have 1 to {}", fields.size(),
                               machine::kMostPathSegments));
   }
-  machine::PathRequest path;
-  path.names = fields.name;
-  path.segments.reserve(size);
-  for (std::size_t i = 0; i < size; ++i) {
-    path.segments.push_back(segmentOf(fields.segments[i], i));
+  std::vector<machine::PathSegment> segments;
+  segments.reserve(fields.size());
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    segments.push_back(segmentOf(fields[i], i));
   }
-  path.relative = fields.relative != 0;
-  path.velocity = fields.velocity;
-  path.tolerance = fields.tolerance;
-  return path;
+  return segments;
 }
 
 }  // namespace stepdriver::ros_node

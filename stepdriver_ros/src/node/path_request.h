@@ -1,13 +1,28 @@
 #pragma once
 
-#include <stepdriver/FollowPath.h>
 #include <stepdriver/PathSegment.h>
+
+#include <vector>
 
 #include "stepdriver_core/machine/coordinated_move.h"
 
 namespace stepdriver::ros_node {
 
-/// @throw Refused if a segment has no known shape, or an arc no plane or point.
-machine::PathRequest pathRequest(const FollowPath::Request& fields);
+/// @throw Refused if there are too many segments, if one has no known shape, or an arc no plane or
+///   point.
+std::vector<machine::PathSegment> pathSegments(const std::vector<PathSegment>& fields);
+
+/// @tparam Fields those of a request of the service follow_path, or of a goal of the action.
+/// @throw Refused as pathSegments().
+template <typename Fields>
+machine::PathRequest pathRequest(const Fields& fields) {
+  machine::PathRequest path;
+  path.names = fields.name;
+  path.segments = pathSegments(fields.segments);
+  path.relative = fields.relative != 0;
+  path.velocity = fields.velocity;
+  path.tolerance = fields.tolerance;
+  return path;
+}
 
 }  // namespace stepdriver::ros_node

@@ -3,45 +3,38 @@
 #include <ros/node_handle.h>
 #include <stepdriver/MoveLineAction.h>
 
-#include <string>
-#include <vector>
+#include <algorithm>
+#include <cstddef>
 
-#include "action_statuses.h"
-#include "motion_action.h"
-#include "node/calls/call_queues.h"
-#include "node/calls/periodic_poll.h"
-#include "stepdriver_core/machine/machine.h"
+#include "coordinated_action.h"
+#include "node/line_request.h"
 
 namespace stepdriver::ros_node {
 
-/// A current goal of ~move_line.
-struct FollowingLine {
-  actionlib::ServerGoalHandle<MoveLineAction> handle;
-  machine::CoordinatedMove move;
-  std::vector<double> began_at;  // [unit] of its axes
-  std::string preempted_by;      // a cancel, in words; empty: no cancel
-};
-
-/// The action ~move_line: the service as an action. A goal is accepted once its line begins; until
-/// then its axes come to rest, or wait for the end of a hold, and a cancel stops them.
-class LineAction : public MotionAction<MoveLineAction, FollowingLine> {
+/// The action ~move_line: the service as an action.
+class LineAction : public CoordinatedAction<MoveLineAction> {
  public:
   /// @param node the node's private handle.
   /// @param machine, queues, statuses outlive the action.
   LineAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-             ActionStatuses& statuses);
+             ActionStatuses& statuses)
+      : CoordinatedAction(node, "move_line", machine, queues, statuses) {
+    start();
+  }
 
  private:
-  FollowingLine begin(const GoalHandle& handle) override;
-  void reject(GoalHandle& handle, const Error& error) override;
-  void takeOver(const FollowingLine& /*newer*/, FollowingLine& /*older*/) override {}
-  void stop(const FollowingLine& following) override;
-  void cancelBeginning(const GoalHandle& handle) override;
-  bool conclude(FollowingLine& following) override;
-  void watch(FollowingLine& following, bool tell) override;
+  machine::CoordinatedMove move(const MoveLineGoal& goal) override {
+    return machine().moveLine(lineRequest(goal));
+  }
 
-  machine::Machine& machine_;
-  PeriodicPoll poll_;
+  double progressOfGoal(const Following& following, const States& states) const override {
+    double progress = 1.0;
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      progress = std::min(progress, progressOf(following.began_at[i], states[i].position,
+                                               following.move.members[i].move.target));
+    }
+    return progress;
+  }
 };
 
 }  // namespace stepdriver::ros_node

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <stepdriver/FollowPathAction.h>
+
+#include <algorithm>
+
+#include "coordinated_action.h"
+#include "node/path_request.h"
+
+namespace stepdriver::ros_node {
+
+/// The action ~follow_path: the service as an action.
+class PathAction : public CoordinatedAction<FollowPathAction> {
+ public:
+  /// @param node the node's private handle.
+  /// @param machine, queues, statuses outlive the action.
+  PathAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
+             ActionStatuses& statuses)
+      : CoordinatedAction(node, "follow_path", machine, queues, statuses) {
+    start();
+  }
+
+ private:
+  machine::CoordinatedMove move(const FollowPathGoal& goal) override {
+    return machine().followPath(pathRequest(goal));
+  }
+
+  // By the planned time: a path may pass the same place several times. While it is held, the time
+  // left is that until it is at rest.
+  double progressOfGoal(const Following& following, const States& states) const override {
+    double time_left = 0.0;
+    for (const axis::AxisState& state : states) {
+      if (state.held) return following.progress;
+      time_left = std::max(time_left, state.time_left);
+    }
+    const double duration = following.move.duration;
+    const double covered = duration > 0.0 ? 1.0 - time_left / duration : 1.0;
+    return std::clamp(covered, following.progress, 1.0);
+  }
+};
+
+}  // namespace stepdriver::ros_node
