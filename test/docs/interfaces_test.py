@@ -90,7 +90,7 @@ def actions(topics):
         "action",
         # Debian has no control_msgs: the node's own action is the same on the wire.
         {
-            name: of_type.replace("stepdriver/Follow", "control_msgs/Follow")
+            name: of_type.replace("stepdriver/FollowJoint", "control_msgs/FollowJoint")
             for name, of_type in there.items()
         },
         {name: row[1] for name, row in said.items()},
