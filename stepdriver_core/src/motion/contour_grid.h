@@ -40,6 +40,11 @@ class ContourGrid {
   /// Of the place before an interval; with the index size(), of the end.
   const double* position(std::size_t place) const { return &positions_[place * axes_]; }
   bool stopsAt(std::size_t place) const { return stops_[place]; }
+  /// The point at the middle parameter of an interval.
+  void evaluateMiddle(std::size_t interval, ContourPoint& point) const {
+    const Interval& of = intervals_[interval];
+    contour_.evaluate(of.segment, (of.from + of.to) / 2.0, point);
+  }
 
   /// @name The first two derivatives of the position with respect to s, at the ends of an interval.
   /// The second one jumps at a place if the curvature does; the first one only at a stop.

@@ -25,13 +25,13 @@ constexpr double kLowerBy = 1.005;
 
 // An interval is divided if it isn't at a limit to this part, unless it takes less than a small
 // part of its segment's time.
-constexpr double kFullUse = 0.9;
+constexpr double kFullUse = 0.94;
 constexpr double kMostSquareRatio = 1.5;
 constexpr double kSmallPart = 0.005;
 // Of a limit: if a cubic exceeds it by so much, its interval is divided.
-constexpr double kPoorCubic = 1.03;
+constexpr double kPoorCubic = 1.01;
 constexpr double kMostDeviation = 0.02;  // of the resolution
-constexpr int kMostDivisions = 3;
+constexpr int kMostDivisions = 4;
 
 // A straight part, from a speed to another one, and what lies between.
 struct Trapezoid {
@@ -219,21 +219,40 @@ bool wastesTime(const ContourGrid& grid, const ContourSpeed& speed, std::size_t 
                   std::max(demand.acceleration_at_end, end_use)) < kFullUse;
 }
 
-// How far the cubic of an interval may be from the contour [unit]. Let L be its length, b the angle
-// by which it turns, and r = (v1 - v0)/(v1 + v0) for the speeds at its ends. The fourth derivative
-// of q(s(t)) with constant s'' and curvature is 3 q'' s''^2 + 6 q''' s'' s'^2 + q'''' s'^4, and the
-// cubic deviates by T^4/384 of that.
-double deviationOf(const ContourGrid& grid, const ContourSpeed& speed, std::size_t interval) {
+// How far the cubic of an interval may be from the contour [unit] if its curvature changes evenly.
+// Let L be its length, b the angle by which it turns, and r = (v1 - v0)/(v1 + v0) for the speeds at
+// its ends. The fourth derivative of q(s(t)) with constant s'' and curvature is 3 q'' s''^2 +
+// 6 q''' s'' s'^2 + q'''' s'^4, and the cubic deviates by T^4/384 of that.
+double evenDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end) {
   double square = 0.0;
   for (std::size_t j = 0; j < grid.axes(); ++j) {
     const double change = grid.firstAtEnd(interval)[j] - grid.firstAtBegin(interval)[j];
     square += change * change;
   }
-  const double begin = std::sqrt(speed.square(interval));
-  const double end = std::sqrt(speed.square(interval + 1));
   const double r = std::abs(end - begin) / (end + begin);
   const double b = std::sqrt(square);
   return grid[interval].length * b * (r * r + b * r + b * b / 12.0) / 32.0;
+}
+
+// How far the middle of that cubic is from the contour [unit], at a right angle to the contour's
+// direction in the middle of the interval.
+double middleDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end,
+                       ContourPoint& middle) {
+  grid.evaluateMiddle(interval, middle);
+  const double eighth = 0.25 * grid[interval].length / (begin + end);  // of the duration
+  double off_square = 0.0;
+  double along = 0.0;
+  double rate_square = 0.0;
+  for (std::size_t j = 0; j < grid.axes(); ++j) {
+    const double change =
+        grid.firstAtBegin(interval)[j] * begin - grid.firstAtEnd(interval)[j] * end;
+    const double off = (grid.position(interval)[j] + grid.position(interval + 1)[j]) / 2.0 +
+                       eighth * change - middle.position[j];
+    off_square += off * off;
+    along += off * middle.first[j];
+    rate_square += middle.first[j] * middle.first[j];
+  }
+  return std::sqrt(std::max(0.0, off_square - along * along / rate_square));
 }
 
 // Divides the intervals that deviate, and those that waste time, unless they take only a small part
@@ -255,9 +274,15 @@ bool divideLong(const Knots& knots, const std::vector<ContourLimits>& limits, do
     if (small && demand.acceleration() < kPoorCubic) continue;
     if (wastesTime(grid, speed, interval, demand)) divided[interval] = any = true;
   }
+  ContourPoint middle;
   for (std::size_t i = 0; i < grid.size(); ++i) {
-    if (grid[i].straight || deviationOf(grid, speed, i) <= deviation) continue;
-    divided[i] = any = true;
+    if (grid[i].straight || divided[i]) continue;
+    const double begin = std::sqrt(speed.square(i));
+    const double end = std::sqrt(speed.square(i + 1));
+    if (evenDeviation(grid, i, begin, end) > deviation ||
+        middleDeviation(grid, i, begin, end, middle) > deviation) {
+      divided[i] = any = true;
+    }
   }
   if (any) speed.regrid(grid.quarter(divided), divided);
   return any;

@@ -239,10 +239,9 @@ TEST(ContourMotion, StopsOnlyWhereItHasTo) {
 // the fine grid's.
 TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
   std::mt19937 random(2026);
-  constexpr int kPaths = 300;
+  constexpr int kPaths = 1000;
   double worst_ratio = 0.0;
   double ratios = 0.0;
-  int slow = 0;
   double worst_excess = 0.0;
   double worst_distance = 0.0;
   for (int i = 0; i < kPaths; ++i) {
@@ -281,8 +280,7 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
     const double ratio = durationOf(knots) / shortest;
     worst_ratio = std::max(worst_ratio, ratio);
     ratios += ratio;
-    slow += ratio > 1.02 ? 1 : 0;
-    EXPECT_LE(ratio, 1.03) << "path " << i << " of " << contour.size() << " segments, "
+    EXPECT_LE(ratio, 1.02) << "path " << i << " of " << contour.size() << " segments, "
                            << contour.axes() << " axes";
     EXPECT_GE(ratio, 0.98) << "path " << i;
     if (i % 10 != 0) continue;
@@ -310,7 +308,6 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
       ASSERT_LE(nearest, tolerance + 0.1) << "path " << i << " knot " << k;
     }
   }
-  EXPECT_LE(slow, kPaths / 100) << "paths that take more than 1.02 times the optimum";
   EXPECT_LE(ratios / kPaths, 1.005);
   RecordProperty("worst_ratio", std::to_string(worst_ratio));
   RecordProperty("worst_acceleration", std::to_string(worst_excess));
