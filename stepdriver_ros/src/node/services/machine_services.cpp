@@ -70,6 +70,7 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
     response.trace_error = error.what();
   }
   for (const config::AxisConfig& axis : simulation.axes()) {
+    const double first = simulation.rig().report(axis.traceName(0)).carriage;
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const std::string name = axis.traceName(i);
       const sim::RigAxisReport report = simulation.rig().report(name);
@@ -77,6 +78,7 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
       response.pulses_forward.push_back(report.pulses_forward);
       response.pulses_backward.push_back(report.pulses_backward);
       response.carriage.push_back(report.carriage / config::configUnitsPerUnit(axis.kind));
+      response.skew.push_back((report.carriage - first) / config::configUnitsPerUnit(axis.kind));
       response.fell.push_back(report.fell / config::configUnitsPerUnit(axis.kind));
       response.microsteps.push_back(report.microsteps);
       response.violations.push_back(report.totalViolations());
