@@ -58,10 +58,17 @@ class Dump {
     all(motor.motor, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,
         motor.in_position, motor.offset);
   }
+  void add(const config::Kinematics& kinematics) {
+    for (const std::string& name : kinematics.axes) add(name);
+    for (const auto& row : kinematics.matrix) {
+      for (const double value : row) add(value);
+    }
+  }
   void add(const config::AxisConfig& axis) {
     all(axis.name, axis.joint, static_cast<int>(axis.kind), axis.driver, axis.microsteps,
         axis.steps_per_unit, axis.steps_per_round, axis.max_skew);
     for (std::size_t i = 0; i < axis.motors(); ++i) add(axis.motorAt(i));
+    if (axis.kinematics) add(*axis.kinematics);
     all(axis.max_speed, axis.start_speed, axis.acceleration, axis.deceleration,
         axis.stop_deceleration, axis.jerk, axis.backlash, axis.min_position, axis.max_position);
     all(axis.brake, axis.homing, axis.require_homing, axis.enable_on_start,

@@ -5,6 +5,7 @@
 #include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
 #include <stepdriver/Home.h>
+#include <stepdriver/HomeAxes.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/RigReport.h>
@@ -69,6 +70,28 @@ TEST(Launch, BringsUpAGantryAndMakesItSquare) {
   const auto after = callWhenThere<RigReport>(node + "/rig/report");
   EXPECT_NEAR(after.carriage[0], 0.02, 2.0 / 80'000.0);
   EXPECT_NEAR(after.skew[1], 0.0, 1.01 / 80'000.0);
+  EXPECT_EQ(after.violations, (std::vector<std::int64_t>{0, 0}));
+}
+
+TEST(Launch, BringsUpACoreXyAndHomesItsAxes) {
+  const std::string node = "/corexy/stepdriver";
+  HomeAxes::Request waiting;
+  waiting.wait = true;
+  const auto homed = callWhenThere<HomeAxes>(node + "/home", waiting);
+  EXPECT_TRUE(homed.success) << homed.message;
+  const auto before = callWhenThere<RigReport>(node + "/rig/report");
+  ASSERT_EQ(before.name, (std::vector<std::string>{"x", "y"}));
+  MoveTo::Request request;
+  request.position = 0.02;
+  request.wait = true;
+  EXPECT_TRUE(callWhenThere<MoveTo>(node + "/x/move_to", request).success);
+  const auto after = callWhenThere<RigReport>(node + "/rig/report");
+  EXPECT_NEAR(after.carriage[0], 0.02, 2.0 / 80'000.0);
+  EXPECT_NEAR(after.carriage[1], before.carriage[1], 1e-9);
+  // Both motors turn for x, from the microstep that is nearest to the end of the homing.
+  const auto turned = after.pulses_forward[0] - before.pulses_forward[0];
+  EXPECT_NEAR(static_cast<double>(turned), 1600.0, 1.0);
+  EXPECT_EQ(after.pulses_forward[1] - before.pulses_forward[1], turned);
   EXPECT_EQ(after.violations, (std::vector<std::int64_t>{0, 0}));
 }
 

@@ -287,8 +287,7 @@ Steps RestorePosition::plan() {
         }));
   }
   add(steps, std::make_unique<RunStep>([this, &axis] {
-        const double origin =
-            kept_.position - static_cast<double>(axis.jointCount()) / axis.stepsPerUnit();
+        const double origin = kept_.position - axis.exactCount() / axis.stepsPerUnit();
         axis.position.restore(origin, doubt_, kept_.homed);
       }));
   return steps;

@@ -349,7 +349,7 @@ std::optional<std::int64_t> Homing::triggerEdge() const {
 
 double Homing::triggerCount() const {
   const auto slack = static_cast<double>(latched_.slack);
-  const double count = towards_ * static_cast<double>(latched_.count);
+  const double count = towards_ * (static_cast<double>(latched_.count) + latched_.between);
   const auto edge = squares_ ? std::nullopt : triggerEdge();
   // An edge may be lost. The switch has closed between the last step and the one that wasn't made.
   if (!edge || !latch_profile_) return towards_ * count - slack;

@@ -23,6 +23,11 @@ double durationOf(const Context& context, const Goal& goal, std::int64_t end_ns)
 }
 
 bool isAt(const axis::AxisModel& axis, const Goal& goal) {
+  if (!axis.sharers().empty() && goal.target) {
+    constexpr double kRounding = 1e-6;
+    return std::abs(static_cast<double>(*goal.target) - axis.exactCount()) <=
+           axis.reach() + kRounding;
+  }
   return goal.target == (goal.of_motor ? axis.motor.state().count : axis.jointCount());
 }
 

@@ -20,13 +20,25 @@ void PinsStep::post(pulse::Command::Kind kind) {
   context_.out->commands.push_back(command);
 }
 
+bool PinsStep::sharersMove() const {
+  const auto& sharers = axis_.sharers();
+  return std::any_of(sharers.begin(), sharers.end(),
+                     [](const axis::AxisModel* sharer) { return sharer->moving(); });
+}
+
 void PinsStep::begin() {
+  if (sharersMove()) return;
   writes_ = build_();
   post(pulse::Command::Kind::kReserve);
+  phase_ = Phase::kReserving;
 }
 
 bool PinsStep::look() {
   const pulse::ChannelState& state = axis_.motor.state();
+  if (phase_ == Phase::kAwaitingRest) {
+    begin();
+    return false;
+  }
   if (phase_ == Phase::kReserving) {
     if (state.taken < serial_) return false;
     if (state.accepted != serial_) axis_.refuse("it moves");
@@ -71,7 +83,7 @@ void PinsStep::fail(int error) {
   const pulse::LineFailure failure{error, write.line, false};
   const std::string text = axis_.failureText(failure);
   axis_.fault.latch(text, "then call recover");
-  axis_.position.distrust();
+  axis_.distrust();
   axis_.motor.doubtPins();
   axis_.motor.brake().noteFailed(write.line, write.level);
   axis_.rest_since = context_.now;

@@ -44,7 +44,8 @@ class WaitStep : public Step {
 };
 
 /// Writes pins of one driver chip, at rest, one after the other, each with the time that the chip
-/// needs after it. The engine has the channel reserved meanwhile.
+/// needs after it. The engine has the channel reserved meanwhile. Axes that share its motors come
+/// to rest before.
 class PinsStep : public Step {
  public:
   /// The writes.
@@ -66,7 +67,9 @@ class PinsStep : public Step {
   }
 
  private:
-  enum class Phase { kReserving, kWaiting, kWriting, kReleasing };
+  enum class Phase { kAwaitingRest, kReserving, kWaiting, kWriting, kReleasing };
+
+  bool sharersMove() const;
 
   void post(pulse::Command::Kind kind);
   void writeNext();
@@ -76,7 +79,7 @@ class PinsStep : public Step {
   axis::AxisModel& axis_;
   std::function<Writes()> build_;
   Writes writes_;
-  Phase phase_ = Phase::kReserving;
+  Phase phase_ = Phase::kAwaitingRest;
   std::size_t next_ = 0;
   std::uint64_t serial_ = 0;
   std::uint64_t job_ = 0;

@@ -164,6 +164,14 @@ void AxisModel::refuseUnlessReady() const {
   if (fault) refuse("at fault: " + fault.what() + "; call recover first");
   if (!motor.power().wantsEnabled()) refuse("disabled; enable it first");
   if (motor.power().wantsSleep()) refuse("asleep; wake it first");
+  if (sharerAtFault() != nullptr) refuse(faultText() + "; call recover first");
+  for (const AxisModel* sharer : sharers_) {
+    const motor::Power& power = sharer->motor.power();
+    const char* const why = !power.wantsEnabled() ? "disabled; enable it first"
+                            : power.wantsSleep()  ? "asleep; wake it first"
+                                                  : nullptr;
+    if (why != nullptr) refuse(sharer->name() + ", which shares its motors, is " + why);
+  }
 }
 
 void AxisModel::refuseUnlessFinite(const char* what, double value, const char* per) const {
@@ -198,6 +206,12 @@ void AxisModel::refuseIntoEndstop(std::int64_t steps) const {
 
 void AxisModel::refuseMicrosteps(int wanted) const {
   const driver::DriverChip& chip = config.driver;
+  if (config.kinematics) {
+    refuse(
+        fmt::format("it shares its motors, and keeps its microsteps, 1/{}: its place may be "
+                    "between microsteps of each, which another mode doesn't have",
+                    motor.microsteps()));
+  }
   if (config.motors() > 1) {
     refuse(
         fmt::format("it has {} motors, and keeps its microsteps, 1/{}: after a squaring the "
@@ -241,6 +255,10 @@ bool AxisModel::anyEndstopActive(bool at_max) const {
 }
 
 std::string AxisModel::chipText(std::size_t motor_index) const {
+  if (!sharers_.empty()) {
+    const AxisModel& owner = motor_index == 0 ? *this : *sharers_.at(motor_index - 1);
+    return "the " + owner.config.driver.title + " of " + owner.name();
+  }
   const std::string& name = config.motorAt(motor_index).motor;
   return "the " + config.driver.title + (name.empty() ? "" : " of motor " + name);
 }
@@ -249,6 +267,51 @@ int AxisModel::readInput(int line) const {
   const int level = inputs.level(line);
   if (level < 0) throw GpioError(config.name + ": " + failureText({-level, line, true}));
   return level;
+}
+
+std::string AxisModel::failureText(const pulse::LineFailure& failure) const {
+  if (!isLineOf(failure, motor.lines())) {
+    for (const AxisModel* sharer : sharers_) {
+      if (!isLineOf(failure, sharer->motor.lines())) continue;
+      return sharer->name() + ": " +
+             lineFailureText(failure, sharer->config, sharer->motor.lines(), lines);
+    }
+  }
+  return lineFailureText(failure, config, motor.lines(), lines);
+}
+
+// ---- axes that share motors ----
+
+void AxisModel::shareMotors(const std::vector<AxisModel*>& axes) {
+  const std::size_t own = config.kinematics->numberOf(name());
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (i != own) sharers_.push_back(axes[i]);
+    reach_ += 0.5 * std::abs(config.kinematics->inverse[own][i]) * config.steps_per_unit /
+              axes[i]->config.steps_per_unit;
+  }
+}
+
+const AxisModel* AxisModel::sharerAtFault() const {
+  const auto faulty = std::find_if(sharers_.begin(), sharers_.end(), [](const AxisModel* sharer) {
+    return static_cast<bool>(sharer->fault);
+  });
+  return faulty != sharers_.end() ? *faulty : nullptr;
+}
+
+std::string AxisModel::faultText() const {
+  const AxisModel* const sharer = sharerAtFault();
+  if (fault || sharer == nullptr) return fault.what();
+  return sharer->name() + ", which shares its motors, is at fault: " + sharer->fault.what();
+}
+
+std::string AxisModel::remedyText() const {
+  const AxisModel* const sharer = sharerAtFault();
+  return fault || sharer == nullptr ? fault.remedy() : sharer->fault.remedy();
+}
+
+void AxisModel::distrust() {
+  position.distrust();
+  for (AxisModel* sharer : sharers_) sharer->position.distrust();
 }
 
 // ---- the driver chip ----
@@ -264,11 +327,11 @@ bool AxisModel::mustWake() const {
 }
 
 void AxisModel::noteUnpowered() {
-  if (!config.holds_position_unpowered) position.distrust();
+  if (!config.holds_position_unpowered) distrust();
 }
 
 void AxisModel::noteHome() {
-  if (!motor.areAtHome()) position.distrust();
+  if (!motor.areAtHome()) distrust();
   motor.wentHome();
 }
 
@@ -298,7 +361,9 @@ void AxisModel::rememberRest() {
   rest_.slack = static_cast<double>(motor.state().slack) / stepsPerUnit();
   rest_.valid = position.isValid();
   rest_.homed = position.isHomed();
-  rest_.at_home = motor.areAtHome();
+  rest_.at_home = motor.areAtHome() &&
+                  std::all_of(sharers_.begin(), sharers_.end(),
+                              [](const AxisModel* sharer) { return sharer->motor.areAtHome(); });
 }
 
 std::string AxisModel::whyImpossible(const AxisMemory& kept, const std::string& source) const {

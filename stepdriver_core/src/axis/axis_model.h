@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "axis/axis_memory.h"
 #include "fault.h"
@@ -52,9 +53,18 @@ class AxisModel {
   double countOf(double at) const { return (at - position.origin()) * stepsPerUnit(); }
   std::int64_t backlash() const;  ///< [microsteps]
   std::int64_t jointCount() const { return motor.state().count - motor.state().slack; }
+  /// [microsteps] The same of an axis that shares motors, whose steps may be parts of its own.
+  double exactCount() const { return static_cast<double>(jointCount()) + motor.state().between; }
+  /// [microsteps] The end of its last motion, if it is at rest: within reach() of exactCount().
+  double restCount() const {
+    return config.kinematics ? motor.state().rests_at : static_cast<double>(jointCount());
+  }
+  /// [microsteps] How far it may be from a target that it has reached. Each motor is on the whole
+  /// microstep that is nearest to its part of the target.
+  double reach() const { return reach_; }
   /// [microsteps] The position of the joint when the motor has moved to a count without a reversal.
   double jointAt(double motor_count) const;
-  double positionNow() const { return positionOf(static_cast<double>(jointCount())); }
+  double positionNow() const { return positionOf(exactCount()); }
   /// A value with its unit, for messages.
   std::string show(double value, const char* per = "") const { return pathAxis().show(value, per); }
   /// Where it stands or comes to rest, as messages show it.
@@ -116,9 +126,7 @@ class AxisModel {
   /// "the A4988", and of which motor if there are several.
   std::string chipText(std::size_t motor_index) const;
   /// A line that failed, in words.
-  std::string failureText(const pulse::LineFailure& failure) const {
-    return lineFailureText(failure, config, motor.lines(), lines);
-  }
+  std::string failureText(const pulse::LineFailure& failure) const;
 
   /// @name The driver chip
   /// @{ The motor was without current for a while.
@@ -134,6 +142,20 @@ class AxisModel {
   /// What sleep and disabling do to the motor and the translator.
   void noteAsleep();
   void noteDisabled();
+  /// @}
+
+  /// @name Axes that share motors
+  /// @{
+  /// @param axes all of them, or none; they live as long as this one.
+  void shareMotors(const std::vector<AxisModel*>& axes);
+  /// All others that do; empty if its motors are its own.
+  const std::vector<AxisModel*>& sharers() const { return sharers_; }
+  /// The fault of this axis, or that of a sharer, which lets it not move either; empty if there is
+  /// none.
+  std::string faultText() const;
+  std::string remedyText() const;
+  /// Its position can't be trusted any more: nor can that of any axis that its motors move.
+  void distrust();
   /// @}
 
   /// @name Over a restart
@@ -166,6 +188,10 @@ class AxisModel {
                       const char* per,
                       config::LimitSource source = config::LimitSource::kConfiguration) const;
 
+  const AxisModel* sharerAtFault() const;
+
+  std::vector<AxisModel*> sharers_;
+  double reach_ = 0.0;
   AxisMemory rest_;         // when it was last at rest
   AxisLimits limits_now_;   // of the current motion
   AxisLimits limits_next_;  // of motions that begin at rest; the speed also applies now

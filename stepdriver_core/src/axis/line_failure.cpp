@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstddef>
 #include <utility>
@@ -55,6 +56,18 @@ std::pair<std::string, std::string> roleOf(const pulse::LineFailure& failure,
 }
 
 }  // namespace
+
+bool isLineOf(const pulse::LineFailure& failure, const motor::MotorLines& own) {
+  if (!failure.input && failure.line == own.brake) return true;
+  for (std::size_t i = 0; i < own.motors(); ++i) {
+    const motor::ChipLines& lines = own.motorAt(i);
+    const Roles roles = failure.input ? inputRoles(lines) : outputRoles(lines, own.cw_ccw);
+    const bool is_its = std::any_of(roles.begin(), roles.end(),
+                                    [&](const auto& role) { return role.first == failure.line; });
+    if (is_its) return true;
+  }
+  return false;
+}
 
 std::string lineFailureText(const pulse::LineFailure& failure, const config::AxisConfig& axis,
                             const motor::MotorLines& own, const LineNames& names) {

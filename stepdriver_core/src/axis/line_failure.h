@@ -12,4 +12,7 @@ namespace stepdriver::axis {
 std::string lineFailureText(const pulse::LineFailure& failure, const config::AxisConfig& axis,
                             const motor::MotorLines& own, const LineNames& names);
 
+/// Whether it is one of its lines.
+bool isLineOf(const pulse::LineFailure& failure, const motor::MotorLines& own);
+
 }  // namespace stepdriver::axis

@@ -52,4 +52,15 @@ const char* sourceText(LimitSource source) {
   return "the configuration";
 }
 
+double highestMotorSpeed(const Kinematics& kinematics, std::size_t motor,
+                         const std::vector<AxisConfig>& axes) {
+  double speed = 0.0;
+  for (const AxisConfig& axis : axes) {
+    const std::size_t number = kinematics.numberOf(axis.name);
+    if (number == kinematics.axes.size()) continue;
+    speed += std::abs(kinematics.matrix[motor][number]) * axis.max_speed;
+  }
+  return speed;
+}
+
 }  // namespace stepdriver::config

@@ -82,6 +82,22 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
         axes[i], lines[i], static_cast<int>(i), context_.mode, context_.levels, context_.lines));
     context_.axes.back()->rememberRest();
   }
+  for (const auto& axis : context_.axes) {
+    if (!axis->config.kinematics) continue;
+    std::vector<axis::AxisModel*> sharing;
+    for (const std::string& name : axis->config.kinematics->axes) {
+      const auto other = std::find_if(context_.axes.begin(), context_.axes.end(),
+                                      [&](const auto& any) { return any->name() == name; });
+      sharing.push_back(other->get());
+    }
+    axis->shareMotors(sharing);
+  }
+}
+
+std::vector<axis::AxisModel*> Controller::withSharers(AxisId id) {
+  std::vector<axis::AxisModel*> axes{&axis(id)};
+  axes.insert(axes.end(), axis(id).sharers().begin(), axis(id).sharers().end());
+  return axes;
 }
 
 Controller::~Controller() { context_.out = &last_; }
@@ -135,7 +151,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
   const bool was_faulty = static_cast<bool>(axis.fault);
   if (state.line_errors != before.line_errors) {
     axis.fault.latch(axis.failureText(state.failure), "then call recover");
-    axis.position.distrust();
+    axis.distrust();
     axis.motor.doubtPins();
   }
   if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep()) {
@@ -144,7 +160,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
                                  "over-temperature",
                                  axis.chipText(state.chip_at_fault), chip.fault_name),
                      kChipRemedy);
-    axis.position.distrust();
+    axis.distrust();
   }
   if (state.ended != before.ended) {
     axis.rest_since = std::min(context_.now, state.end_time + context_.slipped);
@@ -154,7 +170,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
           fmt::format("a pulse was {} late, too much for the motor to continue at this speed",
                       millisecondsText(state.end_lateness)),
           kLateRemedy);
-      axis.position.distrust();
+      axis.distrust();
     }
     if (state.end == pulse::EndReason::kNotInPosition) {
       const driver::DriverChip& chip = axis.config.driver;
@@ -163,9 +179,9 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
                                    axis.chipText(state.unsettled), chip.in_position_name,
                                    millisecondsText(state.waited)),
                        kPositionRemedy);
-      axis.position.distrust();
+      axis.distrust();
     }
-    if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.position.distrust();
+    if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.distrust();
   }
   if (!axis.moving()) axis.atRest();
   if (!was_faulty && axis.fault) axis.noteStop();
@@ -205,6 +221,10 @@ void Controller::supervise() {
       const auto end =
           axis->fault.isEmergencyStop() ? axis::MoveEnd::kEmergencyStop : axis::MoveEnd::kFault;
       activities_.end(*axis, {end, axis->fault.what()});
+    }
+    const bool by_sharer = !axis->fault && !axis->faultText().empty();
+    if (by_sharer && (axis->moving() || activities_.heir(*axis) != nullptr)) {
+      activities_.end(*axis, {axis::MoveEnd::kFault, axis->faultText()});
     }
     if (disables_all_ && axis->motor.pins().hasEnable()) {
       disable(*axis, {axis::MoveEnd::kEmergencyStop, axis->fault.what()}, nullptr);
@@ -246,8 +266,22 @@ void Controller::on(const Requested& requested) {
   }
 }
 
+void Controller::refuseUnlessSharersAreFree(const axis::AxisModel& axis,
+                                            const std::string& what) const {
+  for (const axis::AxisModel* sharer : axis.sharers()) {
+    const Activity* const owner = activities_.owner(*sharer);
+    const bool busy = sharer->moving() || (owner != nullptr && !owner->isInBackground()) ||
+                      activities_.heir(*sharer) != nullptr;
+    if (busy) {
+      axis.refuse("busy: " + sharer->name() + ", which shares its motors, is at work; " + what +
+                  " when both are at rest");
+    }
+  }
+}
+
 void Controller::refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const {
   axis.refuseUnlessOpen();
+  refuseUnlessSharersAreFree(axis, what);
   const Activity* owner = activities_.owner(axis);
   if (owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone) {
     axis.refuse("busy: it is being homed; " + what + " at rest");
@@ -272,6 +306,15 @@ void Controller::refuseUnlessReadyToMove(const axis::AxisModel& axis) const {
       axis.refuse("busy: its driver's pins are being written");
     }
   }
+  for (const axis::AxisModel* sharer : axis.sharers()) {
+    for (const Activity* busy : {activities_.owner(*sharer), activities_.heir(*sharer)}) {
+      if (busy == nullptr) continue;
+      const bool homes = busy->homingPhase() != axis::HomingPhase::kNone;
+      if (!homes && busy->work() == Activity::Work::kMoves) continue;
+      axis.refuse("busy: " + sharer->name() + ", which shares its motors, " +
+                  (homes ? "is being homed" : "has its driver's pins written"));
+    }
+  }
   axis.refuseWhileHeld();
 }
 
@@ -288,7 +331,7 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
   const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
   const motor::Motion* latest = axis.motor.motions().latest();
   if (motion == nullptr || latest == nullptr) {
-    return static_cast<double>(axis.jointCount()) + axis.position.remainder() * axis.stepsPerUnit();
+    return axis.restCount() + axis.position.remainder() * axis.stepsPerUnit();
   }
   const Goal* goal = motion->goalOf(axis);
   // A motion that slows down or takes up backlash ends at the end of its motor's motion.
@@ -331,6 +374,9 @@ void Controller::serve(const MoveTo& wanted, const Ack& call) {
 
 void Controller::serve(const MoveRounds& wanted, const Ack& call) {
   const axis::AxisModel& moved = axis(wanted.axis);
+  if (moved.config.kinematics) {
+    moved.refuse("it shares its motors, none of which turns for it alone: move it by a distance");
+  }
   if (moved.config.steps_per_round <= 0.0) {
     moved.refuse(
         "the steps per revolution are not known: configure steps_per_round or "
@@ -560,6 +606,14 @@ void Controller::serve(const Home& wanted, const Ack& call) {
     refuseUnlessFree(axis(id), "it is homed");
   }
   if (wanted.only_check) return;
+  for (const AxisId id : wanted.axes) {
+    for (const AxisId other : wanted.axes) {
+      const auto& sharers = axis(id).sharers();
+      if (std::find(sharers.begin(), sharers.end(), &axis(other)) == sharers.end()) continue;
+      axis(id).refuse("it shares its motors with " + axis(other).name() +
+                      ": home them one after the other");
+    }
+  }
   activity::AcceptedHoming accepted;
   for (const AxisId id : wanted.axes) {
     const auto outcome = std::make_shared<activity::Homing::Result>();
@@ -578,27 +632,43 @@ void Controller::serve(const CancelHoming& wanted, const Ack& /*call*/) {
 // ---- the driver chip ----
 
 void Controller::serve(const Enable& wanted, const Ack& call) {
-  axis::AxisModel& changed = axis(wanted.axis);
-  changed.refuseUnlessOpen();
-  if (!changed.motor.pins().hasEnable()) {
-    changed.refuse("pins/enable isn't configured: the motor is energized as long as the chip is");
-  }
-  if (!wanted.on) return disable(changed, {axis::MoveEnd::kStopped, "it was disabled"}, call);
-  if (changed.fault) changed.refuse("at fault: " + changed.fault.what() + "; call recover first");
-  for (const Activity* busy : {activities_.owner(changed), activities_.heir(changed)}) {
-    if (busy != nullptr && busy->work() == Activity::Work::kDisables) {
-      changed.refuse("busy: it is being disabled");
+  const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
+  for (const axis::AxisModel* changed : all) {
+    changed->refuseUnlessOpen();
+    if (!changed->motor.pins().hasEnable()) {
+      changed->refuse(
+          "pins/enable isn't configured: the motor is energized as long as the chip is");
     }
   }
-  const motor::Power& power = changed.motor.power();
-  const Activity* owner = activities_.owner(changed);
-  const bool is_awake = power.wantsEnabled() && !changed.mustWake();
-  if (is_awake && (owner == nullptr || !owner->isInBackground())) {
+  if (!wanted.on) {
+    for (axis::AxisModel* changed : all) {
+      disable(*changed, {axis::MoveEnd::kStopped, "it was disabled"}, call);
+    }
     return;
   }
-  if (!power.wantsEnabled()) refuseUnlessFree(changed, "it is enabled");
-  ++changed.stops;
-  activities_.begin(std::make_unique<activity::Enable>(context_, changed, call), kTakenOver);
+  std::vector<axis::AxisModel*> to_enable;
+  for (axis::AxisModel* changed : all) {
+    if (mustEnable(*changed)) to_enable.push_back(changed);
+  }
+  for (axis::AxisModel* changed : to_enable) {
+    ++changed->stops;
+    activities_.begin(std::make_unique<activity::Enable>(context_, *changed, call), kTakenOver);
+  }
+}
+
+bool Controller::mustEnable(const axis::AxisModel& axis) const {
+  if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+  for (const Activity* busy : {activities_.owner(axis), activities_.heir(axis)}) {
+    if (busy != nullptr && busy->work() == Activity::Work::kDisables) {
+      axis.refuse("busy: it is being disabled");
+    }
+  }
+  const motor::Power& power = axis.motor.power();
+  const Activity* owner = activities_.owner(axis);
+  const bool is_awake = power.wantsEnabled() && !axis.mustWake();
+  if (is_awake && (owner == nullptr || !owner->isInBackground())) return false;
+  if (!power.wantsEnabled()) refuseUnlessFree(axis, "it is enabled");
+  return true;
 }
 
 void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call) {
@@ -610,27 +680,35 @@ void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call)
 }
 
 void Controller::serve(const Sleep& wanted, const Ack& call) {
-  axis::AxisModel& changed = axis(wanted.axis);
-  refuseUnlessFree(changed, wanted.asleep ? "it is put to sleep" : "it is woken");
-  const driver::DriverChip& chip = changed.config.driver;
-  if (!changed.motor.pins().hasSleep()) {
-    changed.refuse(chip.sleep_asleep ? "pins/sleep isn't configured"
-                                     : "a " + chip.title + " has no SLEEP pin");
+  const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
+  for (const axis::AxisModel* changed : all) {
+    refuseUnlessFree(*changed, wanted.asleep ? "it is put to sleep" : "it is woken");
+    const driver::DriverChip& chip = changed->config.driver;
+    if (!changed->motor.pins().hasSleep()) {
+      changed->refuse(chip.sleep_asleep ? "pins/sleep isn't configured"
+                                        : "a " + chip.title + " has no SLEEP pin");
+    }
   }
-  ++changed.stops;
-  activities_.begin(std::make_unique<activity::Sleep>(context_, changed, wanted.asleep, call),
-                    kTakenOver);
+  for (axis::AxisModel* changed : all) {
+    ++changed->stops;
+    activities_.begin(std::make_unique<activity::Sleep>(context_, *changed, wanted.asleep, call),
+                      kTakenOver);
+  }
 }
 
 void Controller::serve(const Reset& wanted, const Ack& call) {
-  axis::AxisModel& changed = axis(wanted.axis);
-  refuseUnlessFree(changed, "it is reset");
-  const driver::DriverChip& chip = changed.config.driver;
-  if (!changed.motor.pins().hasReset()) {
-    changed.refuse(chip.reset_held ? "pins/reset isn't configured"
-                                   : "a " + chip.title + " has no RESET pin");
+  const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
+  for (const axis::AxisModel* changed : all) {
+    refuseUnlessFree(*changed, "it is reset");
+    const driver::DriverChip& chip = changed->config.driver;
+    if (!changed->motor.pins().hasReset()) {
+      changed->refuse(chip.reset_held ? "pins/reset isn't configured"
+                                      : "a " + chip.title + " has no RESET pin");
+    }
   }
-  activities_.begin(std::make_unique<activity::Reset>(context_, changed, call), kTakenOver);
+  for (axis::AxisModel* changed : all) {
+    activities_.begin(std::make_unique<activity::Reset>(context_, *changed, call), kTakenOver);
+  }
 }
 
 void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
@@ -663,8 +741,7 @@ void Controller::serve(const SetPosition& wanted, const Ack& /*call*/) {
   refuseUnlessFree(changed, "its position is set");
   changed.refuseUnlessFinite("position", wanted.position);
   changed.refuseBeyondLimits(wanted.position, "the position");
-  changed.position.declare(wanted.position -
-                           static_cast<double>(changed.jointCount()) / changed.stepsPerUnit());
+  changed.position.declare(wanted.position - changed.exactCount() / changed.stepsPerUnit());
 }
 
 // ---- beginning and end ----
@@ -732,8 +809,8 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   state.position_valid = axis.position.isValid();
   state.microsteps = axis.motor.microsteps();
   state.speed_override = context_.mode.speed_override;
-  state.fault = axis.fault.what();
-  state.remedy = axis.fault.remedy();
+  state.fault = axis.faultText();
+  state.remedy = axis.remedyText();
   state.stops = axis.stops;
   state.position_note = axis.position.note();
   shown.steps_per_unit = axis.stepsPerUnit();
@@ -758,7 +835,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
     }
   }
   shown.path_axis = axis.pathAxis();
-  shown.commanded = axis.positionNow() + axis.position.remainder();
+  shown.commanded = axis.positionOf(axis.restCount()) + axis.position.remainder();
   if (!axis.moving()) shown.rest = restOf(axis.pathStart(0));
   shown.channel = axis.motor.state();
   shown.memory = axis.memory();

@@ -80,6 +80,8 @@ class Controller {
   void serve(const PowerDown& wanted, const Ack& call);
 
   axis::AxisModel& axis(AxisId id) { return *context_.axes.at(id); }
+  /// The axis, and all that share its motors.
+  std::vector<axis::AxisModel*> withSharers(AxisId id);
   activity::Goal goalOf(const MoveTo& wanted);
   void setTarget(activity::Goal& goal, axis::AxisModel& axis, double position, bool relative);
   /// [microsteps] The position of the joint from which a relative move counts.
@@ -89,7 +91,11 @@ class Controller {
   /// Requires that the axis neither moves nor changes its pins. @param what is refused, in words.
   void refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const;
   void refuseUnlessReadyToMove(const axis::AxisModel& axis) const;
+  /// Refuses what concerns all axes that share its motors while one of the others is busy.
+  void refuseUnlessSharersAreFree(const axis::AxisModel& axis, const std::string& what) const;
   void refuseWhileEmergencyStopInput() const;
+  /// Whether an enable has something to do. @throw Refused
+  bool mustEnable(const axis::AxisModel& axis) const;
   void disable(axis::AxisModel& axis, const activity::Why& why, const Ack& call);
 
   // The engine.

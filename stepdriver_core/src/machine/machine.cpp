@@ -52,8 +52,9 @@ class Machine::Impl {
     for (std::size_t i = 0; i < wiring.inputs.size(); ++i) {
       names_.inputs.push_back(lines_->inputName(static_cast<int>(i)));
     }
-    engine_ = std::make_unique<pulse::PulseEngine>(
-        *lines_, clock, wiring.channels, nanoseconds(options.max_lateness), wiring.emergency_stop);
+    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
+                                                   nanoseconds(options.max_lateness),
+                                                   wiring.emergency_stop, wiring.shared);
     controller_ = std::make_unique<Controller>(configs, wiring.motor_lines, names_,
                                                wiring.emergency_stop, options.emergency_disable);
     if (wiring.heartbeat) engine_->beat(*wiring.heartbeat);

@@ -23,7 +23,8 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
     return axis.origin + count / axis.steps_per_unit;
   };
   axis::AxisState state = axis.state;
-  state.position = position_of(static_cast<double>(channel.count - channel.slack));
+  const double count = static_cast<double>(channel.count) + channel.between;
+  state.position = position_of(count - static_cast<double>(channel.slack));
   state.planned = state.position;
   state.slack = static_cast<double>(channel.slack) / axis.steps_per_unit;
   state.skew = static_cast<double>(pulse::skewOf(channel.lags, axis.square_lags, axis.motors)) /
@@ -34,7 +35,7 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
   const motion::MotionState now = motion->profile->stateAt(after);
   const auto [low, high] =
       std::minmax({motion->profile->stateAt(before).position.value(), now.position.value()});
-  const double planned = std::clamp(static_cast<double>(channel.count), low, high);
+  const double planned = std::clamp(count, low, high);
   state.planned = position_of(planned - static_cast<double>(channel.slack));
   // While the backlash is taken up, the joint stands still.
   const bool joint_moves = channel.slack == (now.velocity > 0.0 ? axis.backlash : 0);

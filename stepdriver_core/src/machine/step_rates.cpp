@@ -130,6 +130,18 @@ std::string reasonOf(const Interval& interval, const Load& load, const Others& o
       of_others);
 }
 
+// With the top speed of the motor that has the pins of an axis, for axes that share motors.
+std::vector<config::AxisConfig> atMotorSpeeds(const std::vector<config::AxisConfig>& axes) {
+  std::vector<config::AxisConfig> motors = axes;
+  for (config::AxisConfig& motor : motors) {
+    if (!motor.kinematics) continue;
+    const std::size_t number = motor.kinematics->numberOf(motor.name);
+    motor.max_speed = config::highestMotorSpeed(*motor.kinematics, number, axes);
+    motor.kinematics.reset();
+  }
+  return motors;
+}
+
 constexpr double kRounding = 1e-9;  // of a rate, in its calculation
 
 // Rounded away from each other: a rate that is too high doesn't look like one that can be
@@ -164,8 +176,9 @@ std::vector<std::string> StepRates::complaints() const {
   return complaints;
 }
 
-StepRates stepRates(const std::vector<config::AxisConfig>& axes,
+StepRates stepRates(const std::vector<config::AxisConfig>& configs,
                     const pulse::Capability& capability) {
+  const std::vector<config::AxisConfig> axes = atMotorSpeeds(configs);
   std::vector<Load> loads;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     loads.push_back(loadOf(axes[i], capability.channels.at(i), capability));
@@ -186,15 +199,19 @@ StepRates stepRates(const std::vector<config::AxisConfig>& axes,
 
 StepRates stepRatesInMotion(const std::vector<config::AxisConfig>& axes,
                             const pulse::Capability& capability, const std::vector<double>& rates) {
-  std::vector<config::AxisConfig> moving;
+  std::vector<config::AxisConfig> moving = axes;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    moving[i].max_speed = rates.at(i) / axes[i].steps_per_unit;
+  }
+  moving = atMotorSpeeds(moving);
   pulse::Capability of_moving = capability;
   of_moving.channels.clear();
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (rates.at(i) <= 0.0) continue;
-    moving.push_back(axes[i]);
-    moving.back().max_speed = rates[i] / axes[i].steps_per_unit;
-    of_moving.channels.push_back(capability.channels.at(i));
+    if (moving[i].max_speed > 0.0) of_moving.channels.push_back(capability.channels.at(i));
   }
+  moving.erase(std::remove_if(moving.begin(), moving.end(),
+                              [](const auto& axis) { return axis.max_speed <= 0.0; }),
+               moving.end());
   return stepRates(moving, of_moving);
 }
 

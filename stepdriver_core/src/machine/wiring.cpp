@@ -1,15 +1,45 @@
 #include "wiring.h"
 
+#include <algorithm>
+
 #include "nanoseconds.h"
 #include "pulse/measure.h"
 #include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::machine {
+namespace {
+
+// In microsteps instead of units.
+pulse::SharedAxes sharedAxes(const config::Kinematics& kinematics,
+                             const std::vector<config::AxisConfig>& axes) {
+  pulse::SharedAxes shared;
+  for (const std::string& name : kinematics.axes) {
+    const auto axis = std::find_if(axes.begin(), axes.end(),
+                                   [&](const auto& other) { return other.name == name; });
+    shared.channels.push_back(static_cast<std::size_t>(axis - axes.begin()));
+  }
+  const auto scale = [&](std::size_t i) { return axes.at(shared.channels[i]).steps_per_unit; };
+  const auto scaled = [&](config::Matrix matrix) {
+    for (std::size_t i = 0; i < matrix.size(); ++i) {
+      for (std::size_t k = 0; k < matrix.size(); ++k) matrix[i][k] *= scale(i) / scale(k);
+    }
+    return matrix;
+  };
+  shared.matrix = scaled(kinematics.matrix);
+  shared.inverse = scaled(kinematics.inverse);
+  return shared;
+}
+
+}  // namespace
 
 Wiring::Wiring(const std::vector<config::AxisConfig>& axes) {
   for (const config::AxisConfig& axis : axes) {
     motor_lines.push_back(motor::requestLines(axis, motor_lines, outputs, inputs));
     channels.push_back(motor::channelConfig(axis, motor_lines.back()));
+    const auto& kinematics = axis.kinematics;
+    if (kinematics && axis.name == kinematics->axes.front()) {
+      shared.push_back(sharedAxes(*kinematics, axes));
+    }
   }
 }
 

@@ -22,6 +22,7 @@ struct Wiring {
   std::vector<gpio::InputRequest> inputs;
   std::vector<motor::MotorLines> motor_lines;  // by axis
   std::vector<pulse::ChannelConfig> channels;  // by axis
+  std::vector<pulse::SharedAxes> shared;
   std::optional<pulse::Signal> emergency_stop;
   std::optional<pulse::HeartbeatLine> heartbeat;
 };

@@ -30,7 +30,12 @@ double firstCut(const Piece& piece, double after) {
 
 }  // namespace
 
-StepFinder::StepFinder(const Profile& profile, std::int64_t count) : profile_(&profile) {
+StepFinder::StepFinder(const Profile& profile, std::int64_t count)
+    : profile_(&profile), start_ns_(profile.startNs()) {
+  stretch_.anchor_count = count;
+}
+
+StepFinder::StepFinder(ProfileSum& sum, std::int64_t count) : sum_(&sum), start_ns_(sum.startNs()) {
   stretch_.anchor_count = count;
 }
 
@@ -108,6 +113,7 @@ bool StepFinder::nextOfOther(Step& step, double way) {
 }
 
 bool StepFinder::enterNext() {
+  if (sum_ != nullptr) return enterNextOfSum();
   if (profile_ == nullptr || piece_ >= profile_->pieceCount()) return false;
   const Piece piece = profile_->piece(piece_);
   const double cut = firstCut(piece, done_);
@@ -115,6 +121,16 @@ bool StepFinder::enterNext() {
   enter(piece, done_, last ? piece.duration : DoubleDouble(cut), profile_->pieceStart(piece_));
   done_ = last ? 0.0 : cut;
   if (last) ++piece_;
+  return true;
+}
+
+bool StepFinder::enterNextOfSum() {
+  if (done_ == 0.0 && !sum_->next()) return false;
+  const Piece& piece = sum_->piece();
+  const double cut = firstCut(piece, done_);
+  const bool last = !(cut < piece.duration.value());
+  enter(piece, done_, last ? piece.duration : DoubleDouble(cut), sum_->pieceStart());
+  done_ = last ? 0.0 : cut;
   return true;
 }
 
@@ -145,7 +161,7 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   stretch_.ns_per_s = 1e9 * stretch_.time_sign;
   const auto motion_time = [&](DoubleDouble after) {
     const Split ns = splitNanoseconds(piece_start + after);
-    return Split{profile_->startNs() + ns.whole, ns.rest};
+    return Split{start_ns_ + ns.whole, ns.rest};
   };
   stretch_.anchor_ns = motion_time(anchor);
   const Split anchor_position = backwards ? goal : split(from);

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "motion/profile.h"
+#include "motion/profile_sum.h"
 
 namespace stepdriver::motion {
 
@@ -39,6 +40,9 @@ class StepFinder {
   /// @param profile outlives the finder.
   /// @param count the position of the axis: within one step of the profile's beginning.
   StepFinder(const Profile& profile, std::int64_t count);
+  /// Of a motor that several axes share.
+  /// @param sum outlives the finder, which calls its next().
+  StepFinder(ProfileSum& sum, std::int64_t count);
 
   /// @return false if no step is left; `step` is then unchanged.
   bool next(Step& step);
@@ -81,6 +85,7 @@ class StepFinder {
   };
 
   bool enterNext();
+  bool enterNextOfSum();
   void enter(const Piece& piece, DoubleDouble begin, DoubleDouble end, DoubleDouble piece_start);
   bool give(Step& step, std::int64_t time_ns);
   bool nextOfNewStretch(Step& step);
@@ -91,6 +96,8 @@ class StepFinder {
   std::int64_t refined(double t) const;
 
   const Profile* profile_ = nullptr;
+  ProfileSum* sum_ = nullptr;  // instead of a profile
+  std::int64_t start_ns_ = 0;  // of either
   std::size_t piece_ = 0;
   double done_ = 0.0;  // s of the piece that earlier stretches have covered
   Stretch stretch_;

@@ -8,6 +8,7 @@ namespace stepdriver::motor {
 Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int channel)
     : channel_(channel),
       lines_(lines),
+      is_shared_(config.kinematics != nullptr),
       pins_(config, lines),
       power_(config.idle_action, !pins_.hasEnable()),
       brake_(config, lines),
@@ -30,6 +31,7 @@ void Motor::take(const pulse::ChannelState& state) {
 
 motion::MotionState Motor::stateAt(std::int64_t at) const {
   if (const Motion* motion = motions_.latest()) return motion->profile->stateAt(at);
+  if (is_shared_) return {state_.rests_at, 0.0, 0.0};
   const motion::DoubleDouble count = motion::fromInteger(state_.count);
   // A stop on a path ends between two microsteps: the next motion continues from there.
   const Motion* last = motions_.find(state_.ended);

@@ -17,7 +17,8 @@
 
 namespace stepdriver::motor {
 
-/// The motor of an axis, or several that step together: their driver chips and their channel of the
+/// The motor of an axis, or several that step together, or one of those that it shares with other
+/// axes: their driver chips and their channel of the
 /// pulse engine, as the controller knows them. It counts in microsteps and doesn't know the scale
 /// of the axis.
 class Motor {
@@ -101,10 +102,13 @@ class Motor {
 
   bool isHeldByOthers(int enable_line) const;
   /// The count of one of the motors.
-  std::int64_t countOf(std::size_t motor) const { return state_.count + state_.lags.at(motor); }
+  std::int64_t countOf(std::size_t motor) const {
+    return is_shared_ ? state_.own : state_.count + state_.lags.at(motor);
+  }
 
   const int channel_;
   const MotorLines lines_;
+  const bool is_shared_;
   const DriverPins pins_;
   pulse::ChannelState state_;
   Motions motions_;

@@ -74,6 +74,17 @@ struct ChannelConfig : MotorSignals {
   std::int64_t backlash = 0;  ///< [microsteps] of the motor at a reversal before the joint moves
 };
 
+/// Axes that share motors, as on a CoreXY: each motor moves by a sum of the motions of the axes.
+/// The n-th motor has the lines, times and driver chip of the n-th channel; what ends one of the
+/// channels early ends all of them.
+struct SharedAxes {
+  std::vector<std::size_t> channels;
+  /// By motor: [microsteps of the motor] for a microstep of each axis.
+  std::vector<std::vector<double>> matrix;
+  /// By axis: [microsteps of the axis] for a microstep of each motor.
+  std::vector<std::vector<double>> inverse;
+};
+
 enum class EndReason {
   kDone,
   kEndstopMin,
@@ -122,6 +133,13 @@ struct ChannelState {
   /// By motor: its own edges forward minus those backward, less `count`. 0 for motors that have
   /// made every step of the axis.
   MotorCounts lags{};
+  /// @name Of an axis that shares motors: `count` is the whole microstep nearest to its place
+  ///   by the motors' edges, and `pulses` and `rose` are those of the motor with its chip
+  /// @{
+  double between = 0.0;   ///< [microsteps] that place minus count
+  double rests_at = 0.0;  ///< [microsteps] where a motion from rest begins
+  std::int64_t own = 0;   ///< [microsteps] edges of the motor with its chip, forward minus backward
+  /// @}
 
   std::uint64_t faults() const { return chip_faults + line_errors; }
 };

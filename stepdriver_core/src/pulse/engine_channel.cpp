@@ -1,8 +1,24 @@
 #include "engine_channel.h"
 
 #include <algorithm>
+#include <limits>
+
+#include "shared_motors.h"
 
 namespace stepdriver::pulse {
+
+Nanoseconds EngineChannel::madeUntil() const {
+  if (shared != nullptr) return shared->madeUntil();
+  return profile != nullptr ? last_planned : std::numeric_limits<Nanoseconds>::min();
+}
+
+bool EngineChannel::isRunning() const {
+  return shared != nullptr ? shared->isRunning() : profile != nullptr && running;
+}
+
+bool EngineChannel::isReserved() const {
+  return shared != nullptr ? shared->isReserved() : reserved;
+}
 
 bool EngineChannel::has(std::optional<Signal> MotorSignals::*signal) const {
   for (std::size_t i = 0; i < motors(); ++i) {
@@ -27,12 +43,14 @@ void EngineChannel::pullNext() {
 
 void EngineChannel::adopt(const Successors::Entry& followed) {
   profile = followed.profile;
-  finder = motion::StepFinder(*followed.profile, state.count);
   state.following = followed.serial;
   settles = followed.settles && has(&MotorSignals::in_position);
-  pullNext();
+  if (shared == nullptr) {
+    finder = motion::StepFinder(*followed.profile, state.count);
+    pullNext();
+  }
   // A plan without a step, as for another speed, doesn't begin the wait again.
-  if (next) settling = false;
+  if (next || shared != nullptr) settling = false;
   look_at = 0;
 }
 
@@ -43,7 +61,8 @@ void EngineChannel::follow(const Follow& order) {
     state.still = order.still;
     squares = order.squares;
     if (order.is_square) square_lags = state.lags;
-    adopt({order.profile, order.serial, order.settles});
+    const Successors::Entry first{order.profile, order.serial, order.settles};
+    shared != nullptr ? shared->begin(*this, first) : adopt(first);
     last_planned = order.profile->startNs();
     late = 0;
     running = false;
@@ -54,6 +73,7 @@ void EngineChannel::follow(const Follow& order) {
 
 bool EngineChannel::reserve() {
   if (profile != nullptr || reserved) return false;
+  if (shared != nullptr && shared->moves()) return false;
   reserved = true;
   faulty = 0;  // it must be read again when the pins have been written
   return true;
@@ -63,6 +83,7 @@ void EngineChannel::release(const Command& command) {
   reserved = false;
   unchecked = has(&MotorSignals::fault);
   state.ready = std::max(state.ready, command.ready);
+  if (shared != nullptr) shared->noteReady(command.ready);
   if (const auto& scale = command.scale) {
     state.count = scale->count;
     state.slack = scale->slack;
@@ -92,7 +113,7 @@ void EngineChannel::endMotion(EndReason reason, Nanoseconds motion_now) {
   // A failure after the end of a motion doesn't change how that motion ended.
   if (profile != nullptr) {
     state.end = reason;
-    state.end_abrupt = isFast();
+    state.end_abrupt = shared != nullptr ? shared->ends_fast : isFast();
     state.ended = latest();
     state.end_time = motion_now;
   }

@@ -12,6 +12,8 @@
 
 namespace stepdriver::pulse {
 
+class SharedMotors;
+
 /// The pulse thread's state of one channel: the motion that it follows, and its last edges.
 struct EngineChannel {
   /// What to do when the channel is due.
@@ -31,13 +33,21 @@ struct EngineChannel {
 
   /// The next step is obsolete: it would come after the first successor has begun.
   bool isSucceeded() const {
-    return !successors.empty() && (!next || next->time_ns >= successors.first().profile->startNs());
+    return !successors.empty() && shared == nullptr &&
+           (!next || next->time_ns >= successors.first().profile->startNs());
   }
 
   /// Serial of the profile that the next one must continue; 0: the channel is at rest.
   std::uint64_t latest() const {
     return successors.empty() ? state.following : successors.last().serial;
   }
+
+  /// Motion time before which its steps have been made, and no profile may begin.
+  Nanoseconds madeUntil() const;
+  /// Its motion has made a step, or that of an axis that shares its motors.
+  bool isRunning() const;
+  /// The pins of its chip are being written, or of one that it shares.
+  bool isReserved() const;
 
   bool isAlone() const { return all_motors == 1; }
   std::size_t motors() const { return 1 + config.twins.size(); }
@@ -74,9 +84,11 @@ struct EngineChannel {
   void endMotion(EndReason reason, Nanoseconds motion_now);
 
   std::size_t index = 0;
-  bool high = false;        // the pulse is out; never so if both edges are steps
-  MotorSet all_motors = 1;  // 1: the axis has one motor
-  MotorSet pulsed = 1;      // the motors that took part in the last edge
+  SharedMotors* shared = nullptr;  // of an axis that shares motors, or of such a motor
+  bool drives = false;             // it is such a motor
+  bool high = false;               // the pulse is out; never so if both edges are steps
+  MotorSet all_motors = 1;         // 1: the axis has one motor
+  MotorSet pulsed = 1;             // the motors that took part in the last edge
   MotorSet toggled = 0;  // both edges are steps, and these motors' lines are at their active level
   bool squares = false;  // the current motion does
   bool running = false;  // the current motion has made a step

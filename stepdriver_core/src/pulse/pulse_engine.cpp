@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <utility>
 
 #include "engine_channel.h"
+#include "shared_motors.h"
 
 namespace stepdriver::pulse {
 
@@ -15,27 +17,59 @@ namespace {
 // How often the in-position output is read at the end of a motion, if no edge is reported.
 constexpr Nanoseconds kLookPeriod = 1'000'000;
 
+// Of axes that share motors: whether it concerns all of them, and not just one axis's own inputs.
+bool isOfAllAxes(EndReason reason) {
+  switch (reason) {
+    case EndReason::kEmergencyStop:
+    case EndReason::kChipFault:
+    case EndReason::kTooLate:
+    case EndReason::kLineError:
+      return true;
+    default:
+      return false;
+  }
+}
+
+std::size_t sharedMotors(const std::vector<SharedAxes>& shared) {
+  std::size_t motors = 0;
+  for (const SharedAxes& axes : shared) motors += axes.channels.size();
+  return motors;
+}
+
 }  // namespace
 
 PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
                          const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
-                         std::optional<Signal> emergency_stop)
+                         std::optional<Signal> emergency_stop,
+                         const std::vector<SharedAxes>& shared)
     : lines_(lines),
       clock_(clock),
       max_lateness_(max_lateness),
       emergency_input_(emergency_stop),
-      channels_(channels.size()),
-      dues_(channels.size()) {
+      axes_(channels.size()),
+      channels_(channels.size() + sharedMotors(shared)),
+      dues_(channels_.size()) {
+  for (std::size_t i = 0; i < channels_.size(); ++i) channels_[i].index = i;
+  for (std::size_t i = 0; i < axes_; ++i) channels_[i].config = channels[i];
+  std::size_t motor = axes_;
+  for (const SharedAxes& axes : shared) {
+    std::vector<Channel*> axis_channels;
+    std::vector<Channel*> motor_channels;
+    for (const std::size_t axis : axes.channels) {
+      axis_channels.push_back(&channels_.at(axis));
+      motor_channels.push_back(&channels_[motor++]);
+    }
+    shared_.push_back(
+        std::make_unique<SharedMotors>(axes, std::move(axis_channels), std::move(motor_channels)));
+  }
   std::size_t motors = 0;
-  for (std::size_t i = 0; i < channels.size(); ++i) {
-    channels_[i].index = i;
-    channels_[i].config = channels[i];
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
     channels_[i].pulse_line = channels_[i].stepOf(0, channels_[i].direction);
     channels_[i].all_motors = static_cast<MotorSet>(motorBit(channels_[i].motors()) - 1);
     motors += channels_[i].motors();
   }
-  due_.reserve(channels.size());
-  changed_.reserve(channels.size());
+  due_.reserve(channels_.size());
+  changed_.reserve(channels_.size());
   writes_.reserve(motors);
   writers_.reserve(motors);
   errors_.resize(motors);
@@ -44,7 +78,7 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
 
 PulseEngine::~PulseEngine() = default;
 
-std::size_t PulseEngine::channels() const { return channels_.size(); }
+std::size_t PulseEngine::channels() const { return axes_; }
 
 ChannelState PulseEngine::channel(int index) const {
   return channels_.at(static_cast<std::size_t>(index)).published.load();
@@ -136,9 +170,8 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
 bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
   const Nanoseconds start = order.profile->startNs();
-  const bool late =
-      start < now - state_.slipped || (channel.profile != nullptr && start < channel.last_planned);
-  return !late && !channel.reserved && order.continues == channel.latest() &&
+  const bool late = start < now - state_.slipped || start < channel.madeUntil();
+  return !late && !channel.isReserved() && order.continues == channel.latest() &&
          channel.successors.hasRoom(start) && order.faults == channel.state.faults() &&
          order.stops == stopsAsked() && !emergencyStopped();
 }
@@ -201,7 +234,7 @@ void PulseEngine::readInputs(Nanoseconds now) {
 
 void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
   // While its pins change, and while it wakes, a chip's fault line means nothing.
-  if (channel.reserved || now < channel.state.ready) return;
+  if (channel.isReserved() || now < channel.state.ready) return;
   for (std::size_t i = 0; i < channel.motors(); ++i) {
     const auto& fault = channel.motor(i).fault;
     if (!fault) continue;
@@ -217,7 +250,7 @@ void PulseEngine::readFault(Channel& channel, Nanoseconds now) {
     }
     ++channel.state.chip_faults;
     channel.state.chip_at_fault = static_cast<std::uint8_t>(i);
-    if (channel.config.ramps_at_fault && channel.profile != nullptr && channel.running) {
+    if (channel.config.ramps_at_fault && channel.isRunning()) {
       channel.publish();
       news_ = true;
     } else {
@@ -234,6 +267,7 @@ bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
     if (!channel.next) return false;
   }
   if (!channel.isAlone()) return mayStepTogether(channel, now);
+  if (channel.shared != nullptr) return mayStepShared(channel, now);
   const auto& endstop =
       channel.next->direction > 0 ? channel.config.endstop_max : channel.config.endstop_min;
   return !endstop || mayStepOn(channel, 0, now);
@@ -250,9 +284,30 @@ bool PulseEngine::mayStepTogether(Channel& channel, Nanoseconds now) {
   return true;
 }
 
+// Each axis that the step moves must be allowed to move on: its direction is that of its own
+// profile, whichever way the motor turns.
+bool PulseEngine::mayStepShared(Channel& motor, Nanoseconds now) {
+  for (Channel* axis : motor.shared->axes()) {
+    if (axis->unchecked && now >= axis->state.ready) {
+      axis->unchecked = false;
+      readFault(*axis, now);
+    }
+    if (!motor.next) return false;
+    const bool has_switch = axis->config.endstop_min || axis->config.endstop_max;
+    if (axis->profile == nullptr || !has_switch) continue;
+    const double velocity = axis->profile->stateAt(motor.next->time_ns).velocity;
+    if (velocity != 0.0 && !mayStepTowards(*axis, 0, velocity > 0.0, now)) return false;
+  }
+  return true;
+}
+
 // Whether the endstop of a motor allows a step of the axis.
 bool PulseEngine::mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now) {
-  const bool forward = channel.next->direction > 0;
+  return mayStepTowards(channel, motor, channel.next->direction > 0, now);
+}
+
+bool PulseEngine::mayStepTowards(Channel& channel, std::size_t motor, bool forward,
+                                 Nanoseconds now) {
   const MotorSignals& signals = channel.motor(motor);
   const auto& endstop = forward ? signals.endstop_max : signals.endstop_min;
   if (!endstop) return true;
@@ -302,7 +357,11 @@ bool PulseEngine::meetLateness(Nanoseconds now) {
     const Nanoseconds late = now - dues_[index];
     if (late == 0 || channel.action() != Action::kRise) continue;
     channel.late = std::max(channel.late, late);
-    if (late > max_lateness_ && channel.isFast()) {
+    const bool too_late =
+        late > max_lateness_ &&
+        (channel.shared != nullptr ? channel.shared->isFast(now - state_.slipped - late)
+                                   : channel.isFast());
+    if (too_late) {
       channel.state.end_lateness = late;
       end(channel, EndReason::kTooLate, now);
       continue;
@@ -425,6 +484,7 @@ void PulseEngine::written(Channel& channel, Nanoseconds now) {
   state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
   lateness_.add(now, channel.late);
   channel.countStep();
+  if (channel.shared != nullptr) channel.shared->stepped(channel);
 }
 
 void PulseEngine::writeOthers(Nanoseconds now) {
@@ -480,6 +540,15 @@ void PulseEngine::turn(Channel& channel, Nanoseconds now) {
 }
 
 void PulseEngine::finish(Channel& channel, Nanoseconds now) {
+  if (channel.shared != nullptr) {
+    changed(channel);
+    // Another axis may have changed what is left to be done before it.
+    if (!channel.shared->dueOf(channel)) return;
+    if (!channel.successors.empty()) {
+      channel.shared->takeOver(channel);
+      return channel.publish();
+    }
+  }
   if (!channel.settles) return end(channel, EndReason::kDone, now);
   std::size_t unsettled = channel.motors();
   for (std::size_t i = channel.motors(); i-- > 0;) {
@@ -503,21 +572,59 @@ void PulseEngine::finish(Channel& channel, Nanoseconds now) {
 }
 
 void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds now) {
-  channel.state.failure = failure;
-  ++channel.state.line_errors;
+  if (channel.shared != nullptr) {
+    for (Channel* axis : channel.shared->axes()) {
+      axis->state.failure = failure;
+      ++axis->state.line_errors;
+    }
+  } else {
+    channel.state.failure = failure;
+    ++channel.state.line_errors;
+  }
   end(channel, EndReason::kLineError, now);
 }
 
 void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
+  if (channel.shared != nullptr) return endShared(channel, reason, now);
   const bool together =
       channel.group != 0 && channel.profile != nullptr && reason != EndReason::kDone;
   endOne(channel, reason, now);
   if (!together) return;
   for (Channel& other : channels_) {
     if (other.profile != nullptr && other.group == channel.group) {
-      endOne(other, EndReason::kCompanion, now);
+      end(other, EndReason::kCompanion, now);
     }
   }
+}
+
+// Whatever ends one of them early ends all of them, and each one's companions.
+void PulseEngine::endShared(Channel& channel, EndReason reason, Nanoseconds now) {
+  SharedMotors& shared = *channel.shared;
+  if (reason == EndReason::kDone) {
+    shared.finish(channel);
+    return endOne(channel, reason, now);
+  }
+  if (shared.ends) return;
+  shared.ends = true;
+  shared.ends_fast = shared.isFast(now - state_.slipped);
+  for (Channel* axis : shared.axes()) {
+    if (channel.drives) axis->state.end_lateness = channel.state.end_lateness;
+    const bool moved = axis->profile != nullptr;
+    if (!moved && axis != &channel) {
+      changed(*axis);
+      continue;
+    }
+    endOne(*axis, axis == &channel || isOfAllAxes(reason) ? reason : EndReason::kCompanion, now);
+    if (!moved || axis->group == 0) continue;
+    for (Channel& other : channels_) {
+      if (other.profile != nullptr && other.group == axis->group && other.shared != &shared) {
+        end(other, EndReason::kCompanion, now);
+      }
+    }
+  }
+  shared.halt();
+  shared.ends = shared.ends_fast = false;
+  news_ = true;
 }
 
 void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
@@ -532,6 +639,11 @@ void PulseEngine::changed(Channel& channel) {
   if (channel.changed) return;
   channel.changed = true;
   changed_.push_back(&channel);
+  if (channel.shared == nullptr) return;
+  // A step of one motor may be what another axis waits for.
+  for (const auto* all : {&channel.shared->axes(), &channel.shared->motors()}) {
+    for (Channel* other : *all) changed(*other);
+  }
 }
 
 void PulseEngine::scheduleChanged() {
@@ -553,7 +665,23 @@ void PulseEngine::scheduleAll() {
   }
 }
 
+// An axis that shares motors makes no step of its own.
+void PulseEngine::scheduleShared(const Channel& axis) {
+  const auto at = axis.shared->dueOf(axis);
+  dues_.set(axis.index, at ? std::max(*at + state_.slipped, axis.look_at) : kNever);
+}
+
 bool PulseEngine::schedule(Channel& channel) {
+  if (channel.shared != nullptr) {
+    if (!channel.drives) {
+      scheduleShared(channel);
+      return false;
+    }
+    if (!channel.high && channel.shared->isObsolete(channel)) {
+      dues_.set(channel.index, kNever);
+      return false;
+    }
+  }
   while (!channel.high && channel.isSucceeded()) {
     channel.adopt(channel.successors.takeFirst());
     channel.publish();
@@ -570,6 +698,7 @@ bool PulseEngine::schedule(Channel& channel) {
       // The time that a slow write takes from the next interval belongs to the same slip as its
       // lateness.
       slid = channel.next && !channel.isSucceeded() &&
+             !(channel.shared != nullptr && channel.shared->isObsolete(channel)) &&
              slideUpTo(closestRise(channel), channel.next->time_ns + state_.slipped);
       break;
     case Action::kTurn:

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct EngineState {
 };
 
 struct EngineChannel;
+class SharedMotors;
 
 /// Is told when the engine has news for the controller: an order was accepted or refused, a motion
 /// has ended, a chip has reported a fault, or an emergency stop was served.
@@ -62,8 +64,10 @@ class PulseEngine {
   /// @param lines, clock outlive the engine. STEP and DIR lines are at their inactive levels.
   /// @param emergency_stop an input that has the same effect as emergencyStop() if it becomes
   ///   active or can't be read. It is read here for the first time.
+  /// @param shared channels that share motors; each channel is in at most one of them.
   PulseEngine(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels,
-              Nanoseconds max_lateness, std::optional<Signal> emergency_stop = {});
+              Nanoseconds max_lateness, std::optional<Signal> emergency_stop = {},
+              const std::vector<SharedAxes>& shared = {});
   ~PulseEngine();
   PulseEngine(const PulseEngine&) = delete;
   PulseEngine& operator=(const PulseEngine&) = delete;
@@ -145,7 +149,9 @@ class PulseEngine {
   void readFault(Channel& channel, Nanoseconds now);
   bool mayStep(Channel& channel, Nanoseconds now);
   bool mayStepTogether(Channel& channel, Nanoseconds now);
+  bool mayStepShared(Channel& motor, Nanoseconds now);
   bool mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now);
+  bool mayStepTowards(Channel& channel, std::size_t motor, bool forward, Nanoseconds now);
 
   // Lines.
   int writeLines(const gpio::LineWrite* writes, std::size_t count);
@@ -166,6 +172,7 @@ class PulseEngine {
   void finish(Channel& channel, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
+  void endShared(Channel& channel, EndReason reason, Nanoseconds now);
   void endOne(Channel& channel, EndReason reason, Nanoseconds now);
 
   // Times.
@@ -173,6 +180,7 @@ class PulseEngine {
   void scheduleChanged();
   void scheduleAll();
   bool schedule(Channel& channel);
+  void scheduleShared(const Channel& axis);
   bool scheduleRise(Channel& channel);
   static Nanoseconds closestRise(const Channel& channel);
   bool slideUpTo(Nanoseconds earliest, Nanoseconds planned);
@@ -183,7 +191,9 @@ class PulseEngine {
   const Nanoseconds max_lateness_;
   const std::optional<Signal> emergency_input_;
   bool emergency_input_active_ = false;  // its last reading
-  std::vector<Channel> channels_;
+  const std::size_t axes_;
+  std::vector<Channel> channels_;  // of the axes, and then of motors that they share
+  std::vector<std::unique_ptr<SharedMotors>> shared_;
   DueTree dues_;
   // Of one pass: the due channels, those to schedule, and the writes with their channels.
   std::vector<std::size_t> due_;

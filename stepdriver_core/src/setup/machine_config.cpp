@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "config/read_axes.h"
+#include "config/read_kinematics.h"
 #include "pulse/cpu_latency.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 #include "stepdriver_core/setup/simulation.h"
@@ -151,6 +152,10 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   config.axes =
       config::readAxes(reader.value("axes"), reader.fullName("axes"), reader.issues(), used);
   const bool axes_are_right = reader.issues().size() == issues_before;
+  ConfigReader kinematics = reader.map("kinematics");
+  if (reader.has("kinematics")) {
+    config::readKinematics(std::move(kinematics), axes_are_right, config.axes);
+  }
   readEmergencyStop(reader, axes_are_right, config, used);
   config.heartbeat = readHeartbeat(reader, used);
   ConfigReader simulation = reader.map("simulation");

@@ -129,6 +129,16 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
   return rig;
 }
 
+std::vector<sim::RigCoupling> couplingsOf(const std::vector<AxisConfig>& axes) {
+  std::vector<sim::RigCoupling> couplings;
+  for (const AxisConfig& axis : axes) {
+    const auto& shared = axis.kinematics;
+    if (shared == nullptr || shared->axes.front() != axis.name) continue;
+    couplings.push_back({shared->axes, shared->matrix, shared->inverse});
+  }
+  return couplings;
+}
+
 std::shared_ptr<sim::PinTrace> traceOf(const SimulationConfig& config) {
   if (config.trace.empty()) return nullptr;
   using Replaces = sim::VcdTrace::Replaces;
@@ -163,7 +173,7 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
     : axes_(axes),
       emergency_stop_(std::move(emergency_stop)),
       clock_(config.speed),
-      rig_(rigOf(axes, config), traceOf(config)),
+      rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes)),
       backend_(rig_, [this] { return clock_.now(); }) {
   for (const AxisConfig& axis : axes) {
     for (std::size_t i = 0; i < axis.motors(); ++i) {

@@ -60,7 +60,8 @@ struct Line {
 
 class Rig::Impl {
  public:
-  Impl(const std::vector<RigAxisSpec>& specs, std::shared_ptr<PinTrace> trace)
+  Impl(const std::vector<RigAxisSpec>& specs, std::shared_ptr<PinTrace> trace,
+       const std::vector<RigCoupling>& couplings)
       : feed(std::move(trace)) {
     axes.reserve(specs.size());
     for (const RigAxisSpec& spec : specs) {
@@ -71,6 +72,7 @@ class Rig::Impl {
       axes.push_back(std::make_unique<RigAxis>(spec));
       wire(*axes.back());
     }
+    for (const RigCoupling& coupling : couplings) couple(coupling);
   }
 
   ~Impl() { feed.finish(); }
@@ -124,6 +126,18 @@ class Rig::Impl {
   std::int64_t latest_ns = kForEver;
 
  private:
+  void couple(const RigCoupling& coupling) const {
+    std::vector<RigAxis*> coupled;
+    for (const std::string& name : coupling.axes) coupled.push_back(&axisOf(name));
+    for (std::size_t i = 0; i < coupled.size(); ++i) {
+      std::vector<RigAxis::Drive> drives;
+      for (std::size_t k = 0; k < coupled.size(); ++k) {
+        drives.push_back({coupled[k], coupling.inverse.at(i).at(k), coupling.matrix.at(k).at(i)});
+      }
+      coupled[i]->couple(std::move(drives));
+    }
+  }
+
   void wire(RigAxis& axis) {
     for (std::size_t i = 0; i < kPinCount; ++i) {
       const Pin pin = static_cast<Pin>(i);
@@ -154,8 +168,9 @@ class Rig::Impl {
   std::unordered_map<std::string, std::size_t> indexes_;  // of the lines, by their names
 };
 
-Rig::Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace)
-    : impl_(std::make_unique<Impl>(axes, std::move(trace))) {}
+Rig::Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace,
+         const std::vector<RigCoupling>& couplings)
+    : impl_(std::make_unique<Impl>(axes, std::move(trace), couplings)) {}
 
 Rig::~Rig() = default;
 

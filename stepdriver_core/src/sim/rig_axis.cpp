@@ -108,7 +108,7 @@ void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t 
 void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   ++(pulse.forward ? pulses_forward_ : pulses_backward_);
   for (const Side side : {Side::kMin, Side::kMax}) {
-    SwitchModel* const contact = switchAt(side);
+    SwitchModel* const contact = drives_.empty() ? switchAt(side) : nullptr;
     const bool is_ahead = pulse.forward == (side == Side::kMax);
     if (contact != nullptr && contact->noteStep(time_ns) && is_ahead) {
       chip_.count(Violation::kStepIntoSwitch);
@@ -119,6 +119,7 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
 
   if (!energized_ || braked || pulse.moved == 0) return;
   rotor_ += static_cast<double>(pulse.moved);
+  for (const Drive& drive : drives_) drive.axis->noteMoved(time_ns);
   ++motor_steps_;
   // The loss is in the coupling, not in the rotor: the rotor then still agrees with the translator,
   // and the lost steps stay lost when the current is switched.
@@ -140,14 +141,52 @@ void RigAxis::snapRotor() {
   rotor_ = phase + cycle * std::round((rotor_ - phase) / cycle);
 }
 
-double RigAxis::carriage(double rotor) const {
-  const double microsteps = rotor - static_cast<double>(slipped_);
-  return spec_.start + microsteps * spec_.full_step_travel / chip_.finest();
+void RigAxis::couple(std::vector<Drive> drives) {
+  drives_ = std::move(drives);
+  farthest_ = {-spec_.start, spec_.start};
+}
+
+double RigAxis::motorWay() const {
+  const double microsteps = rotor_ - static_cast<double>(slipped_);
+  return microsteps * spec_.full_step_travel / chip_.finest();
+}
+
+double RigAxis::carriage() const {
+  if (drives_.empty()) return spec_.start + motorWay();
+  double way = 0.0;
+  for (const Drive& drive : drives_) way += drive.carriage_way * drive.axis->motorWay();
+  return spec_.start + way;
 }
 
 void RigAxis::moveSwitches(std::int64_t time_ns) {
-  if (min_switch_) min_switch_->follow(carriage(rotor_), time_ns);
-  if (max_switch_) max_switch_->follow(carriage(rotor_), time_ns);
+  if (drives_.empty()) return moveOwnSwitches(time_ns);
+  for (const Drive& drive : drives_) drive.axis->moveOwnSwitches(time_ns);
+}
+
+void RigAxis::moveOwnSwitches(std::int64_t time_ns) {
+  if (min_switch_) min_switch_->follow(carriage(), time_ns);
+  if (max_switch_) max_switch_->follow(carriage(), time_ns);
+}
+
+// The steps of its motors are not at the same time: each may be half a microstep ahead or behind.
+void RigAxis::noteMoved(std::int64_t time_ns) {
+  double apart = 0.25 * spec_.full_step_travel / chip_.microsteps();
+  for (const Drive& drive : drives_) {
+    apart += std::abs(drive.carriage_way) * drive.axis->spec_.full_step_travel /
+             drive.axis->chip_.microsteps();
+  }
+  for (const Side side : {Side::kMin, Side::kMax}) {
+    SwitchModel* const contact = switchAt(side);
+    if (contact == nullptr) continue;
+    const double place = side == Side::kMax ? carriage() : -carriage();
+    double& farthest = farthest_.at(side == Side::kMax ? 1 : 0);
+    if (!contact->noteStep(time_ns)) {
+      farthest = place;
+      continue;
+    }
+    if (place > farthest + apart) chip_.count(Violation::kStepIntoSwitch);
+    farthest = std::min(farthest, place);
+  }
 }
 
 void RigAxis::setFaults(const RigFaults& faults, std::int64_t time_ns) {
@@ -175,11 +214,16 @@ void RigAxis::mendChip() {
   if (fault_) fault_->stick({});
 }
 
+void RigAxis::turnBy(double way) {
+  rotor_ += way * chip_.finest() / spec_.full_step_travel;
+  if (energized_) snapRotor();
+}
+
 void RigAxis::placeCarriage(double position, std::int64_t time_ns) {
   fall(time_ns);
-  rotor_ = (position - spec_.start) * chip_.finest() / spec_.full_step_travel +
-           static_cast<double>(slipped_);
-  if (energized_) snapRotor();
+  const double way = position - carriage();
+  if (drives_.empty()) turnBy(way);
+  for (const Drive& drive : drives_) drive.axis->turnBy(drive.motor_way * way);
   moveSwitches(time_ns);
 }
 
@@ -190,7 +234,7 @@ RigAxisReport RigAxis::report(std::int64_t time_ns) const {
   report.translator = chip_.translator();
   const double falling = fallUntil(time_ns);
   report.fell = fell_ + falling;
-  report.carriage = carriage(rotor_) - falling;
+  report.carriage = carriage() - falling;
   report.microsteps = chip_.microsteps();
   report.energized = energized_;
   report.min_pressed = min_switch_ && min_switch_->active(time_ns);

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "brake_model.h"
 #include "chip_model.h"
@@ -15,6 +18,15 @@ class RigAxis {
  public:
   /// @throw std::invalid_argument if the chip can't do what the specification says.
   explicit RigAxis(const RigAxisSpec& spec);
+
+  /// A motor that moves the carriage of a coupled axis.
+  struct Drive {
+    RigAxis* axis = nullptr;    ///< whose motor it is
+    double carriage_way = 0.0;  ///< [mm|deg] of this carriage for each of the motor
+    double motor_way = 0.0;     ///< [mm|deg] of the motor for each of this carriage
+  };
+  /// @param drives of its carriage, its own motor among them. They live as long as this.
+  void couple(std::vector<Drive> drives);
 
   const RigAxisSpec& spec() const { return spec_; }
   const ChipModel& chip() const { return chip_; }
@@ -37,7 +49,13 @@ class RigAxis {
   RigAxisReport report(std::int64_t time_ns) const;
 
  private:
-  double carriage(double rotor) const;
+  double carriage() const;
+  double motorWay() const;
+  /// A motor has moved its carriage, which others move too.
+  void noteMoved(std::int64_t time_ns);
+  void moveOwnSwitches(std::int64_t time_ns);
+  /// By hand. @param way [mm|deg] of the motor.
+  void turnBy(double way);
   void follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns);
   void takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns);
   void breakChip(std::int64_t time_ns);
@@ -66,6 +84,9 @@ class RigAxis {
   std::optional<SwitchModel> fault_;
   std::optional<SwitchModel> in_position_;
   std::optional<BrakeModel> brake_;
+  std::vector<Drive> drives_;  // empty: its own motor alone
+  // [mm|deg] Of a coupled axis: how far outwards it may get, by side.
+  std::array<double, 2> farthest_{};
 };
 
 }  // namespace stepdriver::sim

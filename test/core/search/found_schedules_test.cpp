@@ -89,7 +89,7 @@ TEST(FoundSchedules, AMoveThatIsAboutToTurnIsStoppedWithoutGoingToItsTarget) {
 
 // What is refused for one axis leaves all others held.
 TEST(FoundSchedules, AResumeThatIsRefusedForOneAxisResumesNone) {
-  for (int variant = 0; variant < 3; ++variant) {
+  for (int variant = 0; variant < 4; ++variant) {
     expectGood({variant,
                 {does(0, 0, "move x to 8 mm"), does(0, 0, "move z to 6 mm"), does(1, 60, "hold"),
                  does(1, 200, "press x"), does(1, 8, "resume")},
@@ -132,7 +132,7 @@ TEST(FoundSchedules, AnAxisHasOneOwnerIfItsTrajectoryIsTakenOverBeforeItBegan) {
 }
 
 TEST(FoundSchedules, AHeldTrajectoryDoesNotReachItsEndIfAMoveTakesOverBeforeItGoesOn) {
-  for (int variant = 0; variant < 3; ++variant) {
+  for (int variant = 0; variant < 4; ++variant) {
     expectGood({variant,
                 {does(0, 1, "trajectory of x and y"), does(0, 1, "hold"), does(0, 1, "resume"),
                  does(1, 0, "move y to -5 mm")},

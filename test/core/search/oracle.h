@@ -42,6 +42,9 @@ class Oracle {
 
   std::vector<std::string> complaints;
 
+  /// These axes share motors: a pulse is allowed if the motion of any of them allows it.
+  void share(std::vector<std::size_t> axes) { sharing_ = std::move(axes); }
+
   /// A call was handed to the controller.
   void served(std::uint64_t call, const std::string& name, const Meaning& meaning) {
     calls_[call] = {meaning.as_of != 0 ? meaning.as_of : moment(), name, meaning};
@@ -115,13 +118,12 @@ class Oracle {
   std::uint64_t moment() { return ++order_; }
 
   void rose(std::size_t axis, pulse::Nanoseconds time) {
-    for (const Quiet& quiet : quiets_[axis]) {
-      // A late pulse slides the rest of a motion, and its deceleration too.
-      if (time - (quiet.slows ? slipped_() : 0) < quiet.since || mayHaveBegun(axis, quiet))
-        continue;
-      complain("axis " + std::to_string(axis) + " steps at " + std::to_string(time) +
-               " ns, but must not from " + std::to_string(quiet.since) + " ns on: " + quiet.name);
-    }
+    const bool shares = std::find(sharing_.begin(), sharing_.end(), axis) != sharing_.end();
+    const bool is_of_another =
+        shares && std::any_of(sharing_.begin(), sharing_.end(),
+                              [&](std::size_t sharer) { return brokenBy(sharer, time).empty(); });
+    if (is_of_another) return;
+    for (const std::string& broken : brokenBy(axis, time)) complain(broken);
   }
 
   void complain(const std::string& what) {
@@ -219,6 +221,20 @@ class Oracle {
                  quiets.end());
   }
 
+  /// The promises of an axis that a pulse breaks, in words.
+  std::vector<std::string> brokenBy(std::size_t axis, pulse::Nanoseconds time) const {
+    std::vector<std::string> broken;
+    for (const Quiet& quiet : quiets_[axis]) {
+      // A late pulse slides the rest of a motion, and its deceleration too.
+      if (time - (quiet.slows ? slipped_() : 0) < quiet.since || mayHaveBegun(axis, quiet))
+        continue;
+      broken.push_back("axis " + std::to_string(axis) + " steps at " + std::to_string(time) +
+                       " ns, but must not from " + std::to_string(quiet.since) +
+                       " ns on: " + quiet.name);
+    }
+    return broken;
+  }
+
   // A later motion may already be under way before its answer.
   bool mayHaveBegun(std::size_t axis, const Quiet& quiet) const {
     return std::any_of(open_.begin(), open_.end(), [&](std::uint64_t id) {
@@ -231,6 +247,7 @@ class Oracle {
 
   std::array<pulse::Nanoseconds, kAxes> slowing_;
   std::array<bool, kAxes> on_curve_{};
+  std::vector<std::size_t> sharing_;
   const std::function<pulse::Nanoseconds()> slipped_;
   std::uint64_t order_ = 0;
   std::uint64_t hold_ended_ = 0;

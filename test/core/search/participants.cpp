@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "stepdriver_core/error.h"
+#include "support/corexy_bench.h"
 #include "support/gantry_bench.h"
 
 namespace stepdriver::search {
@@ -33,6 +34,9 @@ constexpr std::size_t kMostSteps = 200'000;
 constexpr double kLoadFalls = 20.0;
 /// How far the second motor of an axis is ahead at the start. [mm]
 constexpr double kRacked = 1.5;
+
+/// In this variant x and y share their motors, as on a CoreXY.
+constexpr int kSharing = 3;
 
 std::vector<config::AxisConfig> configsOf(int variant) {
   std::vector<config::AxisConfig> configs;
@@ -66,7 +70,13 @@ std::vector<config::AxisConfig> configsOf(int variant) {
     config.brake =
         config::BrakeConfig{config.name + ".brake", true, 6 * kMillisecond, 4 * kMillisecond};
   };
-  if (variant != 0) add_brake(configs[0]);
+  if (variant == 1 || variant == 2) add_brake(configs[0]);
+  if (variant == kSharing) {
+    configs[1].backlash = 0.0;
+    std::vector<config::AxisConfig> sharing(configs.begin(), configs.begin() + 2);
+    test::share(sharing, {{1.0, 1.0}, {1.0, -1.0}});
+    for (std::size_t i = 0; i < sharing.size(); ++i) configs[i].kinematics = sharing[i].kinematics;
+  }
   if (variant == 2) {
     add_brake(configs[2]);
     config::MotorConfig right = test::motorNamed("right");
@@ -147,7 +157,7 @@ Participants::Participants(const Schedule& schedule)
       oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
       clock_(0.0),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
-      rig_(rigOf(configs_), trace_),
+      rig_(rigOf(configs_), trace_, test::Bench::couplings(configs_)),
       backend_(rig_, [this] { return clock_.now(); }),
       wiring_(configs_, withButton()),
       lines_(std::make_shared<FailingReads>(backend_.request(wiring_.outputs, wiring_.inputs))) {
@@ -155,7 +165,8 @@ Participants::Participants(const Schedule& schedule)
   for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
   for (const gpio::InputRequest& input : wiring_.inputs) names.inputs.push_back(input.line);
   engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
-                                                 wiring_.emergency_stop);
+                                                 wiring_.emergency_stop, wiring_.shared);
+  if (schedule.variant == kSharing) oracle_.share({0, 1});
   controller_ = std::make_unique<machine::Controller>(configs_, wiring_.motor_lines,
                                                       std::move(names), wiring_.emergency_stop,
                                                       emergencyDisableOf(schedule.variant));
@@ -519,8 +530,16 @@ void Participants::post(int client, const std::string& name, machine::Request re
   asked.id = ++calls_;
   asked.client = client;
   asked.name = name;
-  asked.request = std::move(request);
   asked.meaning = meaning;
+  // Motors that are shared are switched together.
+  const bool switches = std::holds_alternative<machine::Enable>(request) ||
+                        std::holds_alternative<machine::Sleep>(request);
+  if (switches && schedule_.variant == kSharing) {
+    bool& x = asked.meaning.axes[0];
+    bool& y = asked.meaning.axes[1];
+    x = y = x || y;
+  }
+  asked.request = std::move(request);
   noteGoals(asked);
   asked.reading = readInputs();
   asked.posted = clock_.now();
@@ -892,7 +911,8 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
                      " pulses, the rig " + std::to_string(pulses));
   }
   const std::int64_t count = report.pulses_forward - report.pulses_backward;
-  const std::int64_t counted = state.count + state.lags[0];
+  const bool shares = configs_[axis].kinematics != nullptr;
+  const std::int64_t counted = shares ? state.own : state.count + state.lags[0];
   if (!steps_failed_[axis] && state.epoch == 0 && counted != count) {
     oracle_.complain(who + ": the engine stands at " + std::to_string(counted) + ", the rig at " +
                      std::to_string(count));
@@ -955,6 +975,8 @@ void Participants::checkPower() {
 }
 
 void Participants::checkOutcomes() {
+  // Another axis may have made only one of the two steps that together leave this one in place.
+  const double reached = schedule_.variant == kSharing ? 0.51 / 20'000.0 : 1e-9;
   for (const auto& [name, move] : moves_) {
     const auto result = move.outcome->get();
     if (!result) {
@@ -962,7 +984,7 @@ void Participants::checkOutcomes() {
     } else if (endsWith(result->message, ": ")) {
       oracle_.complain(name + " ends without a reason: " + result->message);
     } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
-               std::abs(result->position - move.rest) > 1e-9) {
+               std::abs(result->position - move.rest) > reached) {
       oracle_.complain(name + " has reached " + std::to_string(result->position) +
                        " m, but was to come to rest at " + std::to_string(move.rest) +
                        " m: " + result->message);

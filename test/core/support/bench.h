@@ -100,7 +100,7 @@ class Bench {
         bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
-        rig(rig_axes, trace),
+        rig(rig_axes, trace, couplings(axes)),
         backend(rig, [this] { return clock.now(); }) {
     options.threaded = threaded;
     machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
@@ -111,6 +111,16 @@ class Bench {
     specs.reserve(axes.size());
     for (const config::AxisConfig& config : axes) specs.push_back(rigAxis(config));
     return specs;
+  }
+
+  static std::vector<sim::RigCoupling> couplings(const std::vector<config::AxisConfig>& axes) {
+    std::vector<sim::RigCoupling> couplings;
+    for (const config::AxisConfig& config : axes) {
+      const auto& shared = config.kinematics;
+      if (shared == nullptr || shared->axes.front() != config.name) continue;
+      couplings.push_back({shared->axes, shared->matrix, shared->inverse});
+    }
+    return couplings;
   }
 
   axis::Axis& axis(const std::string& name = "x") { return machine->axis(name); }

@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/bias.h"
+#include "stepdriver_core/config/kinematics.h"
 #include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::config {
@@ -144,6 +146,8 @@ struct AxisConfig : MotorConfig {
   Kind kind = Kind::kLinear;
   driver::DriverChip driver;  ///< with the overrides of the configuration
   std::vector<MotorConfig> twins;
+  /// Of an axis that shares motors, the same for all of them; null: its motors are its own.
+  std::shared_ptr<const Kinematics> kinematics;
 
   int microsteps = 1;            ///< microsteps per full step, as counted by steps_per_unit
   double steps_per_unit = 0.0;   ///< [steps/unit]
@@ -199,5 +203,9 @@ struct AxisConfig : MotorConfig {
     return index == 0 ? name : name + "." + motorAt(index).motor;
   }
 };
+
+/// [unit/s] The top speed of a motor that axes share, if all of them move at theirs.
+double highestMotorSpeed(const Kinematics& kinematics, std::size_t motor,
+                         const std::vector<AxisConfig>& axes);
 
 }  // namespace stepdriver::config

@@ -76,6 +76,8 @@ struct MachineConfig {
 ///   keep: 20                     # recordings in that folder
 /// simulation: {...}              # see readSimulation(); only a simulated machine reads it
 /// axes: {...}                    # see config::readAxes()
+/// kinematics:                    # optional: axes that share motors
+///   {type: corexy, axes: [x, y]} # or h_bot, differential, or matrix: [[1, 1], [1, -1]]
 /// @endcode
 ///
 /// @param reader of that map. It takes every issue.

@@ -64,6 +64,16 @@ struct RigAxisSpec {
   double load_falls = 0.0;
 };
 
+/// Axes whose motors together move their carriages, as on a CoreXY. A turn of the n-th axis's motor
+/// is a way of the n-th column of `inverse`.
+struct RigCoupling {
+  std::vector<std::string> axes;
+  /// By motor: [mm|deg] for each mm or degree of each carriage, in full_step_travel of its axis.
+  std::vector<std::vector<double>> matrix;
+  /// By carriage: [mm|deg] for each mm or degree of each motor.
+  std::vector<std::vector<double>> inverse;
+};
+
 /// Everything that the chip must never see. One edge may violate several of these. A time of
 /// exactly the limit is no violation.
 enum class Violation {
@@ -81,6 +91,8 @@ enum class Violation {
   kStepInReset,    ///< while RESET is held, or before the time after it is over
   kBothInputs,     ///< a pulse on CW while CCW is active, or the other way round
   /// A step towards a switch that is active, unless it was read as inactive since the step before.
+  /// An axis of a RigCoupling may get about a microstep further: motors that stop it together make
+  /// their steps one after the other.
   kStepIntoSwitch,
   kStepAgainstBrake,  ///< before the brake is released and its release time is over
 };
@@ -147,9 +159,11 @@ class Rig : public gpio::Board {
  public:
   /// @param trace receives every edge in the order of time, including those of bouncing switches;
   ///   levels are those of the lines. May be null.
+  /// @param couplings the motors of all other axes move only their own carriages.
   /// @throw std::invalid_argument if an axis is named twice, doesn't travel, or has microsteps that
   ///   its chip doesn't have.
-  explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr);
+  explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr,
+               const std::vector<RigCoupling>& couplings = {});
   ~Rig() override;
 
   /// @throw std::out_of_range if there is no such axis; so do all functions that take an axis.
