@@ -2,8 +2,11 @@
 """Prints the table of bench/figures.txt from the JSON files of the benchmarks.
 
 bench.sh calls it: bench_table.py FIGURES.TXT TABLE.JSON RESULT.JSON...
+               or: bench_table.py --compare STORED_TABLE.JSON TABLE.JSON...
 
-Exit code 0: no benchmark failed, and every target that was measured is met.
+Exit code 0: no benchmark failed, and every target that was measured is met. With --compare: no ratio is
+above that of the stored run by more than 25 % in all of the tables. Only ratios of two measurements are
+compared, because a computer that is slower, or busy, changes both.
 """
 
 import json
@@ -12,6 +15,7 @@ import statistics
 import sys
 
 QUANTITY = re.compile(r"\{([^{}]+):([a-z0-9_]+)\}")
+MOST_GROWTH = 1.25
 
 
 def read_results(names):
@@ -66,14 +70,48 @@ def shown(value):
     return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
+def ratios(table):
+    with open(table) as file:
+        rows = json.load(file)["figures"]
+    group, found = "", {}
+    for row in rows:
+        # "the same ..." is a figure of the one before it.
+        if not row["figure"].startswith("the same"):
+            group = row["figure"]
+        if row["ratio"] and row["measured"] is not None:
+            found[(group, row["figure"])] = row["measured"]
+    return found
+
+
+def compare(stored, *tables):
+    before, runs = ratios(stored), [ratios(table) for table in tables]
+    missing = [figure for group, figure in before if not all((group, figure) in run for run in runs)]
+    if missing:
+        sys.exit(f"not measured: {', '.join(missing)}")
+    width = max(len(figure) for _, figure in before)
+    print(f"{'ratio':{width}} | stored  | now, over the stored one")
+    print(f"{'-' * width} | ------- | ------------------------")
+    grown = 0
+    for key in before:
+        # 0 bytes over 0 bytes, or a stored 0, can't grow by a part.
+        growths = [run[key] / before[key] if before[key] > 0 else 1.0 + run[key] for run in runs]
+        above = all(growth > MOST_GROWTH for growth in growths)
+        grown += above
+        shown_growths = " ".join(f"{growth:.2f}" for growth in growths) + above * " GROWN"
+        print(f"{key[1]:{width}} | {shown(before[key]):7} | {shown_growths}")
+    return grown > 0
+
+
 def main():
+    if sys.argv[1] == "--compare":
+        sys.exit(compare(*sys.argv[2:]))
     figures, table, *results = sys.argv[1:]
     values, failed = read_results(results)
     rows = []
     for figure, target, expression, unit in read_figures(figures):
         value = measured(expression, values)
         rows.append({"figure": figure, "target": target, "measured": value, "unit": unit,
-                     "verdict": verdict(target, value)})
+                     "ratio": not unit and "} / {" in expression, "verdict": verdict(target, value)})
     with open(table, "w") as file:
         json.dump({"figures": rows, "failed": failed}, file, indent=1)
     width = max(len(row["figure"]) for row in rows)

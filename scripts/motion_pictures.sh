@@ -8,7 +8,7 @@ usage() {
   cat <<'END'
 usage: scripts/motion_pictures.sh [--check]
 
-Builds the core's machine_tests, runs their test MotionPictures, and draws docs/pictures from its traces.
+Builds the core's trace_tests, runs their test MotionPictures, and draws docs/pictures from its traces.
 Installs missing packages.
 
   --check  draws the pictures into another folder, and checks that docs/motion.md shows each of them and
@@ -33,8 +33,8 @@ rm -rf "$traces" "$build/pictures"
 mkdir -p "$traces" "$pictures"
 
 quietly pictures-configure configure_core
-quietly pictures-build cmake --build "$build/core" -j "$jobs" --target machine_tests
-STEPDRIVER_TRACES=$traces quietly pictures-traces "$build/core/test/core/machine_tests" \
+quietly pictures-build cmake --build "$build/core" -j "$jobs" --target trace_tests
+STEPDRIVER_TRACES=$traces quietly pictures-traces "$build/core/test/core/trace_tests" \
   --gtest_filter='MotionPictures.*'
 /usr/bin/python3 "$root/scripts/motion_pictures.py" "$traces" "$pictures"
 [[ -n $check ]] || exit 0

@@ -7,9 +7,9 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 usage() {
   cat <<'END'
 usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize] [--bad-days]
-                       [--soak] [--fuzz]
+                       [--soak] [--fuzz] [--arm64]
 
-Installs missing packages, builds, and runs the named parts; all of them by default.
+Installs missing packages, builds, and runs the named parts; by default all but --soak and --arm64.
 
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
           headers; the keys of package.xml; the links of the pages, and the files that they name; the tests
@@ -28,6 +28,8 @@ Installs missing packages, builds, and runs the named parts; all of them by defa
   --bad-days  floods of clients against a node (test/bad_days), for two seconds each
   --soak  the same for a minute each
   --fuzz  random inputs for everything that reads files, messages and commands (scripts/fuzz.sh)
+  --arm64  some tests of the core as a Raspberry Pi with 64 bits runs them, under an emulator, and the
+          times of its steps, which must be those of this computer (scripts/cross.sh)
 
 If a stage fails, the others still run. Exit code 0: every stage passed.
 END
@@ -37,7 +39,7 @@ parts=() flood_seconds=2
 for argument; do
   case $argument in
     --soak) parts+=(bad-days) flood_seconds=60 ;;
-    --lint | --core | --kernel | --ros | --sanitize | --bad-days | --fuzz) parts+=("${argument#--}") ;;
+    --lint | --core | --kernel | --ros | --sanitize | --bad-days | --fuzz | --arm64) parts+=("${argument#--}") ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
@@ -440,6 +442,19 @@ check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --seed 1; }
 # All of it stays in the group that an interrupt ends.
 build_fuzz() { in_group=1 bash "$root/scripts/fuzz.sh" --build; }
 
+# The rooms that depend most on the processor. scripts/cross.sh tests all of them.
+rooms_for_arm64=(config driver motion pulse)
+build_arm64() { in_group=1 bash "$root/scripts/cross.sh" --build arm64 "${rooms_for_arm64[@]}"; }
+check_arm64() {
+  local status=0
+  # It has built, or the next command says why it can't.
+  await build_arm64 >"$build/log/await-arm64.log" || true
+  bash "$root/scripts/cross.sh" arm64 "${rooms_for_arm64[@]}" 2>"$build/log/arm64.log" || status=$?
+  ((status != skip_status)) || skip "$(tail -n 1 "$build/log/arm64.log")"
+  cat "$build/log/arm64.log" >&2
+  return "$status"
+}
+
 choose_build_folder
 rm -rf "$build/ros"
 install_packages core ccache "${parts[@]}" "$(wants ros && echo trace)" \
@@ -478,6 +493,7 @@ if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
 fi
 ! wants sanitize || later+=(build_core_asan build_node_asan build_core_tsan build_node_tsan)
 ! wants fuzz || later+=(build_fuzz)
+! wants arm64 || later+=(build_arm64)
 begin_background "${later[@]}"
 if wants kernel; then
   stage kernel test_kernel core-build
@@ -506,6 +522,7 @@ if wants sanitize; then
 fi
 ! wants bad-days || stage bad-days test_bad_days
 ! wants fuzz || stage fuzz check_fuzz
+! wants arm64 || stage arm64 check_arm64
 
 say "" "$summary"
 say "$passed passed, $failed failed, $skipped skipped"

@@ -6,12 +6,13 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--demo | --packages] [--keep]
+usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--keep]
+                              [--demo | --packages | --arch arm64|armhf]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
 copies the checkout into it, and runs scripts/demo.sh, scripts/test.sh and the demo again there as root,
 without a terminal. On Ubuntu, whose own packages have no diagnostic_updater, it only runs
-scripts/test.sh --core, which currently fails because its Google Benchmark is too old. Prints their exit
+scripts/test.sh --core, without the benchmarks: its Google Benchmark is too old. Prints their exit
 codes, and exits with 0 if all of them are 0. Needs root.
 
 The base root is kept in ~/.cache/stepdriver/roots (or in the folder that STEPDRIVER_ROOTS names) for
@@ -21,21 +22,29 @@ the next time; the working copy is removed at the end.
            elsewhere
   --demo   only runs scripts/demo.sh, once: a newcomer's first command
   --packages  only runs scripts/package.sh --twice --try: makes the Debian packages and tries them
+  --arch arm64|armhf  only runs scripts/cross.sh for that processor: builds the core with a cross compiler,
+           and runs all of its tests under an emulator
   --keep   keeps the working copy, and prints its path
 END
 }
 
 suite='' keep='' only='' checkout=/home/user/stepdriver
-for argument; do
-  case $argument in
-    bookworm | trixie | focal) suite=$argument ;;
+while (($# > 0)); do
+  case $1 in
+    bookworm | trixie | focal) suite=$1 ;;
     --blank) checkout="/home/new user/step driver" ;;
     --demo) only=demo.sh ;;
     --packages) only='package.sh --twice --try' ;;
+    --arch)
+      [[ ${2:-} == arm64 || ${2:-} == armhf ]] || { usage >&2 && exit 2; }
+      only="cross.sh $2"
+      shift
+      ;;
     --keep) keep=1 ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
+  shift
 done
 [[ -n $suite ]] || { usage >&2 && exit 2; }
 [[ -z $only || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core can be tried"

@@ -4,13 +4,14 @@ set -euo pipefail
 
 usage() {
   cat <<'END_OF_USAGE'
-usage: test/kernel/check_waveform_test.sh CHECK_WAVEFORM
+usage: test/kernel/check_waveform_test.sh [EMULATOR...] CHECK_WAVEFORM
 
-CHECK_WAVEFORM is the program that CMake builds from check_waveform.cpp.
+CHECK_WAVEFORM is the program that CMake builds from check_waveform.cpp. If it is for another processor,
+the command that runs it comes first.
 END_OF_USAGE
 }
-(($# == 1)) || { usage >&2 && exit 2; }
-check_waveform=$1
+(($# > 0)) || { usage >&2 && exit 2; }
+check_waveform=("$@")
 
 fail() {
   printf 'FAILED: %s\n' "$*" >&2
@@ -43,7 +44,7 @@ END_OF_EVENTS
 ends() {
   local wanted=$1 status=0
   shift
-  "$check_waveform" "$scratch/trace" "$@" >"$scratch/out" 2>&1 || status=$?
+  "${check_waveform[@]}" "$scratch/trace" "$@" >"$scratch/out" 2>&1 || status=$?
   ((status == wanted)) || fail "exit status $status, not $wanted: $* gives: $(<"$scratch/out")"
 }
 says() { grep -qF -e "$1" "$scratch/out" || fail "not printed: $1; the output: $(<"$scratch/out")"; }

@@ -43,6 +43,7 @@ void makeFolder(const std::string& path) {
   if (!S_ISDIR(facts.st_mode)) failed("the folder " + path, ENOTDIR);
 }
 
+static_assert(sizeof(timespec::tv_sec) >= 8, "32 bits of seconds end in 2038");
 timespec wallTime() {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);

@@ -121,24 +121,40 @@ TEST(StepFinder, StaysExactOverYears) {
   EXPECT_FALSE(finder.next(step));
 }
 
+// Times of years to fractions of a nanosecond: in integers, because a long double may be only a
+// double.
+struct LongTime {
+  std::int64_t whole_ns;
+  double rest_ns;
+
+  double behind(std::int64_t time_ns) const {
+    return static_cast<double>(time_ns - whole_ns) - rest_ns;
+  }
+};
+
 TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
   const std::int64_t steps = std::int64_t{1} << 40;
-  const double speed = 19999.7;
+  const double speed = 19999.75;  // 79999/4
   const double acceleration = 12345.6;
   const Profile profile = planFromRest(0, 0, steps, {0.0, speed, acceleration, acceleration});
-  const long double ramp = static_cast<long double>(speed) / acceleration;
-  const long double way = static_cast<long double>(speed) * speed / (2.0L * acceleration);
-  const long double total = 2.0L * ramp + (steps - 2.0L * way) / speed;
-  EXPECT_LE(std::abs(static_cast<long double>(profile.endNs()) - total * 1e9L), 1.0L);
+  const double ramp = speed / acceleration;
+  const double way = speed * ramp / 2.0;
+  // The time for so many half steps at full speed, after or before some seconds.
+  const auto cruise = [](std::int64_t half_steps, double seconds) {
+    const std::int64_t ns = 2'000'000'000;
+    const std::int64_t rest = half_steps % 79'999 * ns;
+    return LongTime{half_steps / 79'999 * ns + rest / 79'999,
+                    static_cast<double>(rest % 79'999) / 79'999.0 + seconds * 1e9};
+  };
+  EXPECT_LE(std::abs(cruise(2 * steps, ramp).behind(profile.endNs())), 1.0);
 
   StepFinder finder(profile, 0);
   Step step;
   for (int k = 0; k < 30000; ++k) {
     ASSERT_TRUE(finder.next(step));
-    const long double line = k + 0.5L;
-    const long double exact =
-        line <= way ? std::sqrt(2.0L * line / acceleration) : ramp + (line - way) / speed;
-    ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 1.0L) << "step " << k;
+    const LongTime exact = k < way ? LongTime{0, std::sqrt((2.0 * k + 1.0) / acceleration) * 1e9}
+                                   : cruise(2 * k + 1, ramp / 2.0);
+    ASSERT_LE(std::abs(exact.behind(step.time_ns)), 1.0) << "step " << k;
   }
   // The same motion, entered 30,000 steps before its end.
   const std::int64_t late = steps - 30000;
@@ -146,10 +162,12 @@ TEST(StepFinder, IsExactAtBothEndsOf2To40Steps) {
   for (std::int64_t k = late; k < steps; ++k) {
     ASSERT_TRUE(tail.next(step)) << k;
     if (k - late < 2) continue;  // the finder owes these at once: it was not there when they came
-    const long double left = steps - (k + 0.5L);
-    const long double exact = left <= way ? total - std::sqrt(2.0L * left / acceleration)
-                                          : ramp + (k + 0.5L - way) / speed;
-    ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 1.0L) << "step " << k;
+    const std::int64_t half_steps_left = 2 * (steps - k) - 1;
+    const auto left = static_cast<double>(half_steps_left);
+    const LongTime exact = left / 2.0 <= way
+                               ? cruise(2 * steps, ramp - std::sqrt(left / acceleration))
+                               : cruise(2 * k + 1, ramp / 2.0);
+    ASSERT_LE(std::abs(exact.behind(step.time_ns)), 1.0) << "step " << k;
   }
   EXPECT_FALSE(tail.next(step));
 }
