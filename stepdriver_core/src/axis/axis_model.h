@@ -146,7 +146,8 @@ class AxisModel {
 
   /// @name Axes that share motors
   /// @{
-  /// @param axes all of them, or none; they live as long as this one.
+  /// @param axes all of them, in the order of the kinematics; they live as long as this one.
+  /// @throw Refused if it has something that such an axis can't have.
   void shareMotors(const std::vector<AxisModel*>& axes);
   /// All others that do; empty if its motors are its own.
   const std::vector<AxisModel*>& sharers() const { return sharers_; }

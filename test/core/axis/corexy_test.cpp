@@ -162,6 +162,14 @@ TEST_F(CoreXy, RefusesWhatMakesNoSense) {
             "rest");
 }
 
+TEST(CoreXyMachine, RefusesAnIdleTimeoutDuringWhichTheOtherAxisMayMove) {
+  std::vector<config::AxisConfig> axes = coreXyAxes();
+  axes[1].idle_timeout = 1.0;
+  EXPECT_EQ(refusal([&] { const Bench bench(axes); }),
+            "y: it shares its motors, and can't have motors of its own, a backlash, an idle "
+            "timeout or a brake");
+}
+
 // A thread reports the edge of a fault output, so this is on the rig in real time.
 TEST(CoreXyWithFaults, AFaultOfOneMotorEndsBothAndBothRecover) {
   std::vector<config::AxisConfig> axes{test::linearAxis("x", "drv8825"),

@@ -12,7 +12,8 @@ using Matrix = std::vector<std::vector<double>>;
 
 /// Axes that share motors, as on a CoreXY. There are as many motors as axes; the n-th motor is the
 /// one whose driver chip and pins stand in the n-th axis. Endstops, scales and limits in an axis
-/// are those of the axis.
+/// are those of the axis. Such an axis can't have motors of its own, a backlash, an idle timeout or
+/// a brake.
 struct Kinematics {
   std::vector<std::string> axes;  ///< their names
   /// By motor: [unit] how far it moves for a unit of each axis. A unit of a motor is as many steps
