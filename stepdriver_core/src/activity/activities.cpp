@@ -55,6 +55,7 @@ void Activities::takeOver(std::unique_ptr<Activity> activity) {
   Activity& begun = *activity;
   all_.push_back(std::move(activity));
   begun.begin(std::move(predecessors));
+  beginParts(begun);
   // An axis that was given another goal has left its path, and the others can't continue without
   // it.
   const std::string left_by = begun.axes().front()->name();
@@ -90,7 +91,17 @@ bool Activities::mayBegin(const Activity& activity) const {
                      [this](const axis::AxisModel* axis) { return owner(*axis) == nullptr; });
 }
 
+void Activities::beginParts(Activity& of) {
+  for (Activity::Part& part : of.takeParts()) {
+    all_.push_back(std::move(part.activity));
+    all_.back()->begin(std::move(part.predecessors));
+  }
+}
+
 bool Activities::sweep() {
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    if (all_[i]->isFinished()) beginParts(*all_[i]);
+  }
   all_.erase(std::remove_if(all_.begin(), all_.end(),
                             [](const auto& activity) { return activity->isFinished(); }),
              all_.end());

@@ -47,6 +47,7 @@ class Activities {
  private:
   Activity* find(const axis::AxisModel& axis, bool begun) const;
   void takeOver(std::unique_ptr<Activity> activity);
+  void beginParts(Activity& of);
   bool sweep();
   bool mayBegin(const Activity& activity) const;
 

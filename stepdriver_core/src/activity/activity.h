@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -61,6 +62,14 @@ class Activity {
   virtual bool canHandOver() const { return false; }
   /// Leaves its axes. @param by the successor, in words. @pre canHandOver()
   virtual std::vector<Predecessor> handOver(const std::string& /*by*/) { return {}; }
+  /// What continues for it when it has finished: they begin at once on its axes, each on its own.
+  struct Part {
+    std::unique_ptr<Activity> activity;
+    std::vector<Predecessor> predecessors;
+  };
+  virtual std::vector<Part> takeParts() { return {}; }
+  /// Whether it lasts only as long as its client sends messages, also before it moves.
+  virtual bool isStreamed() const { return false; }
   /// Whether other commands wait for it instead of being refused, because no client has requested
   /// it.
   virtual bool isInBackground() const { return false; }

@@ -32,10 +32,14 @@ struct AcceptedHoming {
   std::vector<std::shared_ptr<const axis::Outcome<axis::HomingResult>>> outcomes;
 };
 
+/// Why each part of a call was refused or failed; empty if it was carried out.
+using Refusals = std::vector<std::string>;
+
 /// The answer to a call.
 struct Reply {
   std::optional<Failure> failure;
-  std::variant<std::monostate, std::vector<axis::Move>, axis::MovePlan, AcceptedHoming> value;
+  std::variant<std::monostate, std::vector<axis::Move>, axis::MovePlan, AcceptedHoming, Refusals>
+      value;
 };
 
 /// Receives answers.
@@ -76,5 +80,42 @@ class PendingCall {
 
 /// Shared by everything that contributes to the answer; may be empty if nobody waits for it.
 using Ack = std::shared_ptr<PendingCall>;
+
+/// A call in several parts, each of which may be refused by itself. It is answered with its
+/// Refusals when all parts are answered.
+class PartedCall : public AnswerSink {
+ public:
+  PartedCall(Ack whole, std::size_t parts) : whole_(std::move(whole)), refusals_(parts) {}
+  ~PartedCall() override { whole_->succeed(std::move(refusals_)); }
+  PartedCall(const PartedCall&) = delete;
+  PartedCall& operator=(const PartedCall&) = delete;
+
+  /// @return for each part its call.
+  static std::vector<Ack> divide(Ack whole, std::size_t parts) {
+    const auto parted = std::make_shared<PartedCall>(std::move(whole), parts);
+    std::vector<Ack> calls;
+    for (std::size_t i = 0; i < parts; ++i) {
+      const auto part = std::make_shared<Part>(parted, i);
+      calls.emplace_back(part, &part->call);
+    }
+    return calls;
+  }
+
+  void answer(CallId part, Reply reply) override {
+    if (reply.failure) refusals_.at(part) = std::move(reply.failure->text);
+  }
+
+ private:
+  struct Part {
+    Part(std::shared_ptr<PartedCall> parted, CallId number)
+        : of(std::move(parted)), call(*of, number) {}
+
+    std::shared_ptr<PartedCall> of;
+    PendingCall call;  // answers `of` when it ends
+  };
+
+  Ack whole_;
+  Refusals refusals_;
+};
 
 }  // namespace stepdriver::activity

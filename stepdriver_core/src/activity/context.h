@@ -64,15 +64,33 @@ class Context : public AnswerSink {
   std::uint64_t newGroup() { return ++groups_; }
   std::uint64_t newMove() { return ++moves_; }
   std::uint64_t newJob() { return ++jobs_; }
+  std::uint64_t newStart() { return ++starts_; }
+
+  /// A turn begins.
+  void beginTurn(Outputs& outputs) { out = &outputs; }
+  /// All its commands are complete.
+  void endTurn();
+  /// A command to follow profiles, to be filled in this turn. The engine accepts all of them or
+  /// none.
+  /// @param start those of one turn with the same number share a command, unless it is 0.
+  std::shared_ptr<std::vector<pulse::Follow>> newCommand(std::uint64_t start);
 
   void answer(CallId call, Reply reply) override {
     if (call != 0) out->answers.emplace_back(call, std::move(reply));
   }
 
  private:
+  struct FollowCommand {
+    std::size_t index = 0;  // in Outputs::commands
+    std::uint64_t start = 0;
+    std::shared_ptr<std::vector<pulse::Follow>> follows;
+  };
+
+  std::vector<FollowCommand> follow_commands_;  // of this turn
   std::uint64_t groups_ = 0;
   std::uint64_t moves_ = 0;
   std::uint64_t jobs_ = 0;
+  std::uint64_t starts_ = 0;
 };
 
 /// Why something ends early.

@@ -36,15 +36,17 @@ Activity::Handover handoverOf(const std::vector<Order>& orders) {
 
 }  // namespace
 
-FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call)
+FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call,
+                       std::shared_ptr<const CommonStart> start)
     : Script(context, axesOf(orders), handoverOf(orders), std::move(call)),
       orders_(std::move(orders)),
-      join_(std::move(join)) {}
+      join_(std::move(join)),
+      start_(std::move(start)) {}
 
 std::unique_ptr<FollowStep> FollowGoal::follow() {
   return std::make_unique<FollowStep>(
       context(), orders_, join_, [this] { return takePredecessors(); },
-      [this] { return takeCall(); });
+      [this] { return takeCall(); }, start_);
 }
 
 void FollowGoal::prepare() {
@@ -52,8 +54,15 @@ void FollowGoal::prepare() {
   prepared_->prepare();
 }
 
+// Nobody may want it anymore when the hold ends.
+void FollowGoal::hold(const Ack& call) {
+  if (motion() == nullptr && isStreamed()) return end(kEndedByHold, call);
+  Script::hold(call);
+}
+
 Steps FollowGoal::plan() {
   Steps steps;
+  if (isStreamed()) orders_.front().axis->refuseWhileHeld();
   for (const Order& order : orders_) {
     order.axis->refuseUnlessReady();  // as an heir it begins later than it was accepted
     append(steps, wakeSteps(context(), *order.axis));

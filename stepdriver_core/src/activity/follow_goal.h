@@ -16,10 +16,13 @@ namespace stepdriver::activity {
 /// come to rest first, and it is woken up.
 class FollowGoal : public Script {
  public:
-  /// @param join empty for a single axis.
-  FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call);
+  /// @param join empty for a single axis. @param start see Manoeuvre.
+  FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call,
+             std::shared_ptr<const CommonStart> start = {});
 
   void prepare() override;
+  void hold(const Ack& call) override;
+  bool isStreamed() const override { return orders_.front().goal.isStreamed(); }
 
  protected:
   Steps plan() override;
@@ -29,6 +32,7 @@ class FollowGoal : public Script {
 
   std::vector<Order> orders_;
   const JoinPath join_;
+  const std::shared_ptr<const CommonStart> start_;
   std::unique_ptr<FollowStep> prepared_;
 };
 

@@ -12,6 +12,7 @@
 #include "axis/shared_path.h"
 #include "call.h"
 #include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::activity {
 
@@ -22,25 +23,53 @@ struct MotorsTogether {
   bool are_square = false;
 };
 
+/// A setpoint, of a stream of them. Positions are of the joint, times are motion times.
+struct Setpoint {
+  bool of_position = false;    ///< otherwise Goal::velocity is the setpoint
+  double position = 0.0;       ///< [microsteps]
+  double velocity = 0.0;       ///< [microsteps/s] of the position
+  std::int64_t reach_ns = 0;   ///< the position is reached then, with that velocity
+  std::int64_t return_ns = 0;  ///< without another setpoint it comes to rest at the position then
+  double period = 0.0;         ///< [s] of the stream
+  std::int64_t until_ns = 0;   ///< without another setpoint it begins to come to rest then
+};
+
 /// A command for an axis: everything that a plan needs, from any state of the axis.
 struct Goal {
-  enum class Kind { kMove, kJog, kTogether };
+  enum class Kind { kMove, kJog, kSetpoint, kTogether };
 
   Kind kind = Kind::kMove;
   std::uint64_t move = 0;  ///< its number; 0: no client has requested it
-  /// [microsteps] Of a move; of a jog the position at which it must stop, empty without a limit.
+  /// [microsteps] Of a move or a setpoint of position; of a jog or a setpoint of velocity the
+  /// position at which it must stop, empty without a limit.
   std::optional<std::int64_t> target;
   double remainder = 0.0;  ///< [microsteps] of a move: the commanded position minus the target
-  double velocity = 0.0;   ///< [unit/s] as requested, without the override; of a jog with its sign
+  /// [unit/s] As requested, without the override; of a jog or a setpoint of velocity with its sign.
+  double velocity = 0.0;
+  Setpoint setpoint;       ///< of a kSetpoint
   bool of_motor = false;   ///< true: the target is the motor's; false: the joint's
   MotorsTogether motors;
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
   pulse::Nanoseconds slipped_ns = 0;  ///< how far the timeline had slid by then
+
+  /// It is a velocity, not a position.
+  bool runs() const {
+    return kind == Kind::kJog || (kind == Kind::kSetpoint && !setpoint.of_position);
+  }
+  /// It lasts only as long as its client sends messages: a hold ends it.
+  bool isStreamed() const { return kind == Kind::kJog || kind == Kind::kSetpoint; }
 };
 
 /// Makes the shared path of axes that are taken over at a motion time. @throw Refused
 using JoinPath = std::function<std::shared_ptr<const axis::SharedPath>(std::int64_t at)>;
+
+/// Axes whose motions begin at the same motion time, and are independent from then on. The engine
+/// accepts all of them or none.
+struct CommonStart {
+  std::uint64_t number = 0;  ///< Context::newStart()
+  std::vector<const axis::AxisModel*> axes;
+};
 
 /// A goal and its axis.
 struct Order {

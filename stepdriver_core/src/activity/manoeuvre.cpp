@@ -118,10 +118,12 @@ std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::s
                      not_at, why);
 }
 
-Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join)
+Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join,
+                     std::shared_ptr<const CommonStart> start)
     : context_(context),
       orders_(std::move(orders)),
       join_(std::move(join)),
+      start_(std::move(start)),
       group_(join_ ? context.newGroup() : 0),
       lead_(kLead) {}
 
@@ -149,6 +151,11 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
   for (const Order& order : orders_) {
     if (alone && slowsDown() && !order.axis->moving()) continue;
     plans.at = std::max(plans.at, earliestStart(context_, *order.axis, lead));
+  }
+  if (beginsTogether()) {
+    for (const axis::AxisModel* axis : start_->axes) {
+      plans.at = std::max(plans.at, earliestStart(context_, *axis, lead));
+    }
   }
   try {
     if (!alone) {
@@ -195,9 +202,9 @@ std::vector<axis::Move> Manoeuvre::prepare() {
 // ---- orders to the engine ----
 
 void Manoeuvre::order(Plans plans) {
-  auto follows = std::make_shared<std::vector<pulse::Follow>>();
   OpenOrder open;
   open.mode = mode_;
+  open.follows = context_.newCommand(beginsTogether() ? start_->number : 0);
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     if (plans.planned[i].profile == nullptr) {
       open.serials.push_back(0);
@@ -206,7 +213,7 @@ void Manoeuvre::order(Plans plans) {
     axis::AxisModel& axis = *orders_[i].axis;
     const motor::Motion* before = axis.motor.motions().latest();
     open.serials.push_back(axis.motor.nextSerial());
-    pulse::Follow& follow = follows->emplace_back();
+    pulse::Follow& follow = open.follows->emplace_back();
     follow.channel = axis.motor.channel();
     follow.serial = open.serials[i];
     follow.profile = plans.planned[i].profile.get();
@@ -228,7 +235,7 @@ void Manoeuvre::order(Plans plans) {
     motion.serial = open.serials[i];
     motion.overshoot = plans.planned[i].overshoot;
     motion.profile = plans.planned[i].profile;
-    motion.order = follows;
+    motion.order = open.follows;
     motion.target = order.goal.target;
     motion.slows_down = mode_ == Mode::kStop;
     order.axis->motor.ordered(std::move(motion));
@@ -236,10 +243,6 @@ void Manoeuvre::order(Plans plans) {
   path_ = plans.path;
   open.plans = std::move(plans);
   open_.push_back(std::move(open));
-  pulse::Command command;
-  command.follows = follows->data();
-  command.follow_count = follows->size();
-  context_.out->commands.push_back(command);
 }
 
 void Manoeuvre::begin(std::vector<Predecessor> predecessors, Ack call) {
@@ -295,9 +298,7 @@ void Manoeuvre::drop() {
 
 void Manoeuvre::hold(const Ack& call) {
   if (over_ || mode_ != Mode::kRun) return;
-  if (orders_.front().goal.kind == Goal::Kind::kJog) {
-    return stop({axis::MoveEnd::kStopped, "it was held, which ends a jog"}, call);
-  }
+  if (orders_.front().goal.isStreamed()) return stop(kEndedByHold, call);
   change(Mode::kHold, call);
 }
 
@@ -329,13 +330,14 @@ bool Manoeuvre::isDone() const {
   });
 }
 
+// Also while the engine has not handled what was ordered with it.
 bool Manoeuvre::isOpen() const {
-  for (std::size_t i = 0; i < orders_.size(); ++i) {
-    if (!open_.empty() && orders_[i].axis->motor.state().taken < open_.back().serials[i]) {
-      return true;
-    }
-  }
-  return false;
+  if (open_.empty()) return false;
+  const std::vector<pulse::Follow>& follows = *open_.back().follows;
+  return std::any_of(follows.begin(), follows.end(), [this](const pulse::Follow& follow) {
+    const motor::Motor& motor = context_.axes[static_cast<std::size_t>(follow.channel)]->motor;
+    return motor.state().taken < follow.serial;
+  });
 }
 
 bool Manoeuvre::look() {
@@ -579,6 +581,8 @@ axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Orde
   std::string what;
   if (by.goal.kind == Goal::Kind::kJog) {
     what = "a jog";
+  } else if (by.goal.kind == Goal::Kind::kSetpoint) {
+    what = "a setpoint";
   } else if (by.goal.kind == Goal::Kind::kTogether) {
     what = "a motion together with other axes";
   } else {

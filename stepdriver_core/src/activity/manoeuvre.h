@@ -21,7 +21,9 @@ namespace stepdriver::activity {
 class Manoeuvre {
  public:
   /// @param join of orders that are kTogether; empty for one order alone.
-  Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join = {});
+  /// @param start of one order alone that begins at the same time as others; may be empty.
+  Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join = {},
+            std::shared_ptr<const CommonStart> start = {});
 
   /// Plans the first order; nothing is ordered yet.
   ///
@@ -84,8 +86,11 @@ class Manoeuvre {
     std::vector<std::uint64_t> serials;  // by axis; 0: it has no part in it
     Mode mode = Mode::kRun;
     Plans plans;
+    std::shared_ptr<std::vector<pulse::Follow>> follows;  // of its command
   };
 
+  /// The next order is its first, and begins at the same time as others.
+  bool beginsTogether() const { return start_ && !started_ && mode_ == Mode::kRun; }
   Plans plan(pulse::Nanoseconds lead);
   std::shared_ptr<const motion::Profile> planPath(std::int64_t at);
   void order(Plans plans);
@@ -113,6 +118,7 @@ class Manoeuvre {
   Context& context_;
   std::vector<Order> orders_;
   const JoinPath join_;
+  const std::shared_ptr<const CommonStart> start_;
   std::shared_ptr<const axis::SharedPath> shared_path_;  // that was joined last
   std::uint64_t group_ = 0;
   std::vector<Predecessor> predecessors_;
@@ -135,6 +141,10 @@ class Manoeuvre {
   Ack call_;                                              // of the beginning
   std::vector<Ack> calls_;                                // of the open orders
 };
+
+/// Of a goal that isStreamed().
+inline const Why kEndedByHold{axis::MoveEnd::kStopped,
+                              "it was held, which ends jogs and setpoints"};
 
 /// "x stands at 0.01 m, not at 0.02 m: it was stopped"
 std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why);

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <optional>
 
+#include "setpoint_motion.h"
+
 namespace stepdriver::activity {
-namespace {
 
 // If the joint reaches its target upwards, all of the backlash is taken up there; if it reaches it
 // downwards, nothing is. It depends on where the joint would stop, which the motor's place alone
@@ -24,18 +25,24 @@ std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
   return from.velocity > 0.0 ? up : down;
 }
 
-}  // namespace
+std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal) {
+  std::optional<std::int64_t> stand_at = goal.target;
+  if (stand_at && goal.velocity > 0.0) *stand_at += axis.backlash();
+  return stand_at;
+}
 
 motion::Plan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at) {
   const motion::MotionState from = axis.motor.stateAt(at);
+  const bool slows_down = goal.runs() && goal.velocity == 0.0;
   const double velocity =
-      std::min(std::abs(goal.velocity) * axis.mode.speed_override, axis.maxSpeed());
+      slows_down ? axis.maxSpeed()
+                 : std::min(std::abs(goal.velocity) * axis.mode.speed_override, axis.maxSpeed());
   const motion::MotionLimits within = axis.limits(velocity);
+  if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
   if (goal.kind == Goal::Kind::kJog) {
-    std::optional<std::int64_t> stand_at = goal.target;
-    if (stand_at && goal.velocity > 0.0) *stand_at += axis.backlash();
     return motion::planVelocity(
-        at, from, std::copysign(velocity * axis.stepsPerUnit(), goal.velocity), within, stand_at);
+        at, from, std::copysign(velocity * axis.stepsPerUnit(), goal.velocity), within,
+        standAt(axis, goal));
   }
   return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
 }
@@ -65,7 +72,7 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
 }
 
 std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
-  if (goal.kind == Goal::Kind::kJog) return goal.velocity > 0.0 ? 1 : -1;
+  if (goal.runs()) return goal.velocity > 0.0 ? 1 : -1;
   return *goal.target - axis.jointCount();
 }
 
@@ -74,7 +81,7 @@ axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::P
   axis::Move move;
   // A motion may reverse, which takes up the backlash again: the motor's end doesn't determine the
   // joint's.
-  const bool jogs = goal.kind == Goal::Kind::kJog;
+  const bool jogs = goal.runs();
   const double rest = jogs || goal.of_motor ? axis.jointAt(profile.endPosition().value())
                                             : static_cast<double>(*goal.target);
   move.rest = axis.positionOf(rest);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "context.h"
 #include "goal.h"
@@ -15,6 +16,14 @@ constexpr pulse::Nanoseconds kLead = 1'000'000;
 ///
 /// @throw std::range_error if the motion takes too long.
 motion::Plan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at);
+
+/// The count at which the motor has to stop for a goal of the joint: a backlash is taken up or open
+/// there. @param within the limits of the motion from this state.
+std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
+                         const motion::MotionState& from, const motion::MotionLimits& within);
+
+/// The count at which the motor has to stop a goal that runs(); empty without a limit.
+std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal);
 
 /// The fastest stop within the limits of stops. @pre the axis moves.
 motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at);

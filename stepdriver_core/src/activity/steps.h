@@ -118,10 +118,11 @@ class ReleaseBrakeStep : public BrakeStep {
 /// Follows a motion to its end.
 class FollowStep : public Step {
  public:
-  /// @param predecessors, call are taken when it begins.
+  /// @param predecessors, call are taken when it begins. @param start see Manoeuvre.
   FollowStep(Context& context, std::vector<Order> orders, JoinPath join,
-             std::function<std::vector<Predecessor>()> predecessors, std::function<Ack()> call)
-      : manoeuvre_(context, std::move(orders), std::move(join)),
+             std::function<std::vector<Predecessor>()> predecessors, std::function<Ack()> call,
+             std::shared_ptr<const CommonStart> start = {})
+      : manoeuvre_(context, std::move(orders), std::move(join), std::move(start)),
         predecessors_(std::move(predecessors)),
         call_(std::move(call)) {}
 

@@ -17,6 +17,7 @@
 #include "motor/motor.h"
 #include "path_axis.h"
 #include "position.h"
+#include "setpoint_stream.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/config/axis_config.h"
 
@@ -38,6 +39,7 @@ class AxisModel {
   motor::Motor motor;
   Position position;
   Fault fault;
+  SetpointStream setpoints;
   const MachineMode& mode;
   const InputLevels& inputs;
   const LineNames& lines;

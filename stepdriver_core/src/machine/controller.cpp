@@ -11,6 +11,7 @@
 #include "activity/follow_goal.h"
 #include "activity/homing.h"
 #include "activity/point_motion.h"
+#include "axis/setpoint_stream.h"
 #include "message_text.h"
 #include "motion/spline.h"
 #include "nanoseconds.h"
@@ -106,7 +107,7 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   context_.now = input.now;
   context_.slipped = input.slipped;
   context_.stops_asked = input.stops_asked;
-  context_.out = &out;
+  context_.beginTurn(out);
   std::visit([this](const auto& what) { on(what); }, input.what);
   activities_.look();
   supervise();
@@ -117,7 +118,8 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
                                     [](const auto& axis) { return axis->moving(); });
     if (rests) awaiting_rest_.clear();
   }
-  context_.out = &last_;
+  context_.endTurn();
+  context_.beginTurn(last_);
 }
 
 pulse::Nanoseconds Controller::due() const {
@@ -410,16 +412,41 @@ void Controller::serve(const PlanMove& wanted, const Ack& call) {
   call->succeed(std::move(shown));
 }
 
-void Controller::serve(const Jog& wanted, const Ack& call) {
+const Goal* Controller::streamedGoal(const axis::AxisModel& axis) const {
+  const Activity* owner = activities_.owner(axis);
+  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const Goal* current = motion != nullptr && axis.moving() ? motion->goalOf(axis) : nullptr;
+  return current != nullptr && current->isStreamed() ? current : nullptr;
+}
+
+void Controller::limitVelocity(Goal& goal, const axis::AxisModel& axis, const char* moves) const {
+  const bool up = goal.velocity > 0.0;
+  const auto& limit = up ? axis.config.max_position : axis.config.min_position;
+  if (limit) goal.target = std::llround(axis.countOf(*limit));
+  if (axis.moving()) return;
+  const std::int64_t sign = up ? 1 : -1;
+  if (goal.target && (*goal.target - axis.jointCount()) * sign <= 0) {
+    axis.refuse(
+        fmt::format("it stands at the soft limit {}; it {} only away from it",
+                    axis.pathAxis().showLimit(*limit, up ? axis.config.max_position_source
+                                                         : axis.config.min_position_source),
+                    moves));
+  }
+  axis.refuseIntoEndstop(sign);
+}
+
+Controller::MayBegin Controller::goalOf(const Jog& wanted, const Ack& call) {
   axis::AxisModel& moved = axis(wanted.axis);
   moved.refuseUnlessFinite("velocity", wanted.velocity, "/s");
-  const Activity* owner = activities_.owner(moved);
-  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
-  const Goal* current = motion != nullptr && moved.moving() ? motion->goalOf(moved) : nullptr;
-  const bool jogs = current != nullptr && current->kind == Goal::Kind::kJog;
+  const Goal* current = streamedGoal(moved);
   if (wanted.velocity == 0.0) {
-    if (jogs) activities_.end(moved, {axis::MoveEnd::kStopped, "the jog ended"}, call);
-    return;
+    const bool waits = !moved.moving();
+    for (Activity* at : {activities_.heir(moved), activities_.owner(moved)}) {
+      if (at != nullptr && at->isStreamed() && (current != nullptr || waits)) {
+        at->end({axis::MoveEnd::kStopped, "the jog ended"}, call);
+      }
+    }
+    return std::nullopt;
   }
   if (moved.stops != wanted.unless_stopped_since.value_or(moved.stops)) {
     moved.refuse("the jog was stopped; let it pause or send 0 before it begins again");
@@ -429,25 +456,134 @@ void Controller::serve(const Jog& wanted, const Ack& call) {
   Goal goal;
   goal.kind = Goal::Kind::kJog;
   goal.velocity = wanted.velocity;
-  const bool up = wanted.velocity > 0.0;
-  const auto& limit = up ? moved.config.max_position : moved.config.min_position;
-  if (limit) goal.target = std::llround(moved.countOf(*limit));
-  if (!moved.moving()) {
-    const std::int64_t sign = up ? 1 : -1;
-    if (goal.target && (*goal.target - moved.jointCount()) * sign <= 0) {
-      moved.refuse(
-          fmt::format("it stands at the soft limit {}; it jogs only away from it",
-                      moved.pathAxis().showLimit(*limit, up ? moved.config.max_position_source
-                                                            : moved.config.min_position_source)));
-    }
-    moved.refuseIntoEndstop(sign);
-  } else if (jogs && !motion->slowsDown() && current->velocity == wanted.velocity) {
-    return;  // it does that already
+  limitVelocity(goal, moved, "jogs");
+  const bool jogs = current != nullptr && current->kind == Goal::Kind::kJog;
+  if (jogs && !activities_.owner(moved)->motion()->slowsDown() &&
+      current->velocity == wanted.velocity) {
+    return std::nullopt;  // it does that already
   }
+  return goalWithOutcome(goal);
+}
+
+Controller::MayBegin Controller::positionGoal(const Setpoint& wanted, double timeout) {
+  // Without a setpoint the axis returns to the last one after a period, but not sooner than this:
+  // messages come irregularly.
+  constexpr std::int64_t kLeastPatience = 10'000'000;
+  axis::AxisModel& moved = axis(wanted.axis);
+  moved.refuseUnlessHomed();
+  double position = wanted.value;
+  if (moved.config.max_position) position = std::min(position, *moved.config.max_position);
+  if (moved.config.min_position) position = std::max(position, *moved.config.min_position);
+  const std::int64_t now = context_.motionNow();
+  Goal goal;
+  goal.kind = Goal::Kind::kSetpoint;
+  goal.velocity = moved.maxSpeed();
+  activity::Setpoint& setpoint = goal.setpoint;
+  setpoint.of_position = true;
+  setpoint.position = moved.countOf(position);
+  goal.target = std::llround(setpoint.position);
+  goal.remainder = setpoint.position - static_cast<double>(*goal.target);
+  const axis::SetpointStream::Course course =
+      moved.setpoints.take(setpoint.position, now, nanoseconds(timeout), moved.stops);
+  setpoint.velocity = course.velocity;
+  setpoint.period = static_cast<double>(course.period_ns) * 1e-9;
+  setpoint.reach_ns = course.came_ns + course.period_ns;
+  setpoint.return_ns = setpoint.reach_ns + std::max(course.period_ns, kLeastPatience);
+  setpoint.until_ns = now + nanoseconds(timeout);
+  if (!moved.moving()) {
+    const std::int64_t way = *goal.target - moved.jointCount();
+    if (way == 0) return std::nullopt;
+    moved.refuseIntoEndstop(way);
+  }
+  return goal;
+}
+
+Controller::MayBegin Controller::velocityGoal(const Setpoint& wanted, double timeout) {
+  axis::AxisModel& moved = axis(wanted.axis);
+  moved.refuseTooFast(std::abs(wanted.value));
+  // As with a jog, 0 leaves other motions alone.
+  if (wanted.value == 0.0 && streamedGoal(moved) == nullptr) return std::nullopt;
+  Goal goal;
+  goal.kind = Goal::Kind::kSetpoint;
+  goal.velocity = wanted.value;
+  goal.setpoint.until_ns = context_.motionNow() + nanoseconds(timeout);
+  if (wanted.value != 0.0) limitVelocity(goal, moved, "moves");
+  return goal;
+}
+
+template <typename Message, typename GoalOf>
+void Controller::beginStreamed(const std::vector<Message>& messages, const Ack& call,
+                               const GoalOf& goal_of) {
+  const std::vector<Ack> calls = activity::PartedCall::divide(call, messages.size());
+  std::vector<activity::StartTogether::Start> starts;
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    try {
+      const MayBegin goal = goal_of(messages[i], calls[i]);
+      if (goal) starts.push_back({{&axis(messages[i].axis), *goal}, calls[i]});
+    } catch (const Error& error) {
+      calls[i]->fail(activity::failureOf(error));
+    }
+  }
+  beginTogether(std::move(starts));
+}
+
+// Axes that move need not wait for others that are at rest and must be woken first.
+void Controller::beginTogether(std::vector<activity::StartTogether::Start> starts) {
+  using Start = activity::StartTogether::Start;
+  const auto moves = [this](const Start& start) {
+    const Activity* owner = activities_.owner(*start.order.axis);
+    return start.order.axis->moving() && owner != nullptr && owner->canHandOver();
+  };
+  const bool any_waits = std::any_of(starts.begin(), starts.end(), [this](const Start& start) {
+    const Activity* owner = activities_.owner(*start.order.axis);
+    return start.order.axis->mustWake() || (owner != nullptr && !owner->canHandOver());
+  });
+  const auto first_waiting =
+      any_waits ? std::stable_partition(starts.begin(), starts.end(), moves) : starts.end();
+  const auto begin = [this](std::vector<Start> group) {
+    if (group.empty()) return;
+    std::vector<Ack> calls;
+    for (const Start& start : group) calls.push_back(start.call);
+    try {
+      activities_.begin(
+          std::make_unique<activity::StartTogether>(context_, std::move(group)), kTakenOver);
+    } catch (const Error& error) {
+      for (const Ack& call : calls) call->fail(activity::failureOf(error));
+    }
+  };
+  begin({starts.begin(), first_waiting});
+  begin({first_waiting, starts.end()});
+}
+
+void Controller::serve(const Jog& wanted, const Ack& call) {
+  const MayBegin goal = goalOf(wanted, call);
+  if (!goal) return;
   activities_.begin(std::make_unique<activity::FollowGoal>(
-                        context_, std::vector<Order>{{&moved, goalWithOutcome(goal)}},
+                        context_, std::vector<Order>{{&axis(wanted.axis), *goal}},
                         activity::JoinPath(), call),
                     kTakenOver);
+}
+
+void Controller::serve(const JogTogether& wanted, const Ack& call) {
+  beginStreamed(wanted.jogs, call,
+                [this](const Jog& jog, const Ack& part) { return goalOf(jog, part); });
+}
+
+void Controller::serve(const FollowSetpoints& wanted, const Ack& call) {
+  beginStreamed(wanted.setpoints, call, [&](const Setpoint& setpoint, const Ack& /*part*/) {
+    axis::AxisModel& moved = axis(setpoint.axis);
+    const bool is_position = wanted.mode == SetpointMode::kPosition;
+    moved.refuseUnlessFinite("setpoint", setpoint.value, is_position ? "" : "/s");
+    if (moved.stops != setpoint.unless_stopped_since.value_or(moved.stops)) {
+      moved.refuse(is_position
+                       ? "the setpoints were stopped; let them pause before they begin again"
+                       : "the setpoints were stopped; let them pause or send 0 before they begin "
+                         "again");
+    }
+    refuseUnlessReadyToMove(moved);
+    return is_position ? positionGoal(setpoint, wanted.timeout)
+                       : velocityGoal(setpoint, wanted.timeout);
+  });
 }
 
 void Controller::serve(const MoveLine& wanted, const Ack& call) {

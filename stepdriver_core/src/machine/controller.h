@@ -6,6 +6,7 @@
 
 #include "activity/activities.h"
 #include "activity/context.h"
+#include "activity/start_together.h"
 #include "motor/motor_lines.h"
 #include "requests.h"
 #include "snapshot.h"
@@ -55,6 +56,8 @@ class Controller {
   void serve(const MoveRounds& wanted, const Ack& call);
   void serve(const PlanMove& wanted, const Ack& call);
   void serve(const Jog& wanted, const Ack& call);
+  void serve(const JogTogether& wanted, const Ack& call);
+  void serve(const FollowSetpoints& wanted, const Ack& call);
   void serve(const MoveLine& wanted, const Ack& call);
   void serve(const FollowTrajectory& wanted, const Ack& call);
   void serve(const StopAxis& wanted, const Ack& call);
@@ -83,6 +86,18 @@ class Controller {
   /// The axis, and all that share its motors.
   std::vector<axis::AxisModel*> withSharers(AxisId id);
   activity::Goal goalOf(const MoveTo& wanted);
+  using MayBegin = std::optional<activity::Goal>;
+  /// @return empty if nothing new must begin. @throw Refused
+  MayBegin goalOf(const Jog& wanted, const Ack& call);
+  MayBegin positionGoal(const Setpoint& wanted, double timeout);
+  MayBegin velocityGoal(const Setpoint& wanted, double timeout);
+  /// The goal of the axis's present motion if that is streamed.
+  const activity::Goal* streamedGoal(const axis::AxisModel& axis) const;
+  /// Sets the soft limit ahead as the end of a velocity. @throw Refused if it can't begin.
+  void limitVelocity(activity::Goal& goal, const axis::AxisModel& axis, const char* moves) const;
+  template <typename Message, typename GoalOf>
+  void beginStreamed(const std::vector<Message>& messages, const Ack& call, const GoalOf& goal_of);
+  void beginTogether(std::vector<activity::StartTogether::Start> starts);
   void setTarget(activity::Goal& goal, axis::AxisModel& axis, double position, bool relative);
   /// [microsteps] The position of the joint from which a relative move counts.
   double relativeOrigin(const axis::AxisModel& axis) const;

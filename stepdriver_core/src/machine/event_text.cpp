@@ -22,6 +22,20 @@ class RequestText {
     return fmt::format("jog {}: {} {}/s", name(wanted.axis), numberText(wanted.velocity),
                        unit(wanted.axis));
   }
+  std::string operator()(const JogTogether& wanted) const {
+    std::string text;
+    for (const Jog& jog : wanted.jogs) text += (text.empty() ? "" : ", ") + (*this)(jog);
+    return text;
+  }
+  std::string operator()(const FollowSetpoints& wanted) const {
+    std::string text;
+    for (const Setpoint& setpoint : wanted.setpoints) {
+      text += fmt::format("{}setpoint of {}: {} {}{}", text.empty() ? "" : ", ",
+                          name(setpoint.axis), numberText(setpoint.value), unit(setpoint.axis),
+                          wanted.mode == SetpointMode::kVelocity ? "/s" : "");
+    }
+    return text;
+  }
   std::string operator()(const MoveLine& wanted) const {
     std::string text = "line";
     for (std::size_t i = 0; i < wanted.axes.size(); ++i) {

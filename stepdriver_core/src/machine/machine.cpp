@@ -30,6 +30,9 @@ namespace {
 constexpr double kLeastOverride = 0.01;
 constexpr double kMostOverride = 2.0;
 constexpr int kMostPreparations = 8;
+// [s] Of setpoints.
+constexpr double kShortestTimeout = 0.005;
+constexpr double kLongestTimeout = 60.0;
 
 }  // namespace
 
@@ -117,6 +120,40 @@ class Machine::Impl {
     }
     return moveOf(request.names, ask(*shell_, MoveLine{axes, request.positions, request.relative,
                                                        request.velocity, request.duration}));
+  }
+
+  static std::vector<std::string> refusalsOf(const activity::Reply& reply) {
+    return std::get<activity::Refusals>(reply.value);
+  }
+
+  std::vector<AxisId> idsOf(const std::vector<StreamMessage>& messages) const {
+    std::vector<std::string> names;
+    names.reserve(messages.size());
+    for (const StreamMessage& message : messages) names.push_back(message.name);
+    return idsOf(axesOf(names));
+  }
+
+  std::vector<std::string> jog(const std::vector<StreamMessage>& messages) {
+    const std::vector<AxisId> axes = idsOf(messages);
+    JogTogether wanted;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      wanted.jogs.push_back({axes[i], messages[i].value, messages[i].unless_stopped_since});
+    }
+    return refusalsOf(ask(*shell_, std::move(wanted)));
+  }
+
+  std::vector<std::string> followSetpoints(SetpointMode mode, double timeout,
+                                           const std::vector<StreamMessage>& messages) {
+    if (!(timeout >= kShortestTimeout && timeout <= kLongestTimeout)) {
+      throw Refused(fmt::format("the timeout of setpoints is {:.9g} s, but must be from {:g} to {:g} s",
+                                timeout, kShortestTimeout, kLongestTimeout));
+    }
+    const std::vector<AxisId> axes = idsOf(messages);
+    FollowSetpoints wanted{mode, timeout, {}};
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      wanted.setpoints.push_back({axes[i], messages[i].value, messages[i].unless_stopped_since});
+    }
+    return refusalsOf(ask(*shell_, std::move(wanted)));
   }
 
   CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
@@ -354,6 +391,15 @@ void Machine::setSpeedOverride(double factor) {
                               kLeastOverride, kMostOverride));
   }
   ask(*impl_->shell_, SetSpeedOverride{factor});
+}
+
+std::vector<std::string> Machine::jog(const std::vector<StreamMessage>& messages) {
+  return impl_->jog(messages);
+}
+
+std::vector<std::string> Machine::followSetpoints(SetpointMode mode, double timeout,
+                                                  const std::vector<StreamMessage>& messages) {
+  return impl_->followSetpoints(mode, timeout, messages);
 }
 
 CoordinatedMove Machine::moveLine(const LineRequest& request) { return impl_->moveLine(request); }

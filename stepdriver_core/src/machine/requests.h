@@ -15,6 +15,7 @@
 #include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/machine/streams.h"
 
 namespace stepdriver::machine {
 
@@ -41,6 +42,21 @@ struct Jog {
   AxisId axis = 0;
   double velocity = 0.0;
   std::optional<std::uint64_t> unless_stopped_since;
+};
+/// Jogs that begin at the same motion time; answered with activity::Refusals.
+struct JogTogether {
+  std::vector<Jog> jogs;
+};
+struct Setpoint {
+  AxisId axis = 0;
+  double value = 0.0;  ///< [unit] or [unit/s]
+  std::optional<std::uint64_t> unless_stopped_since;
+};
+/// Setpoints that take effect at the same motion time; answered with activity::Refusals.
+struct FollowSetpoints {
+  SetpointMode mode = SetpointMode::kPosition;
+  double timeout = 0.0;
+  std::vector<Setpoint> setpoints;
 };
 struct MoveLine {
   std::vector<AxisId> axes;
@@ -133,7 +149,7 @@ struct PowerDown {};
 /// @}
 
 using Request =
-    std::variant<MoveTo, MoveRounds, PlanMove, Jog, MoveLine, FollowTrajectory, StopAxis, StopMove,
+    std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine, FollowTrajectory, StopAxis, StopMove,
                  StopAll, Hold, Resume, SetSpeedOverride, SetLimits, Home, CancelHoming, Enable,
                  Sleep, Reset, SetMicrosteps, SetPosition, Recover, BringUp, RestorePosition,
                  NotePosition, Close, AwaitRest, PowerDown>;

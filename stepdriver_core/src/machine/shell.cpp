@@ -32,6 +32,8 @@ constexpr std::int64_t kFewestLooksOnRig = 30;
 bool asksForLevels(const Request& request) {
   return std::holds_alternative<MoveTo>(request) || std::holds_alternative<MoveRounds>(request) ||
          std::holds_alternative<PlanMove>(request) || std::holds_alternative<Jog>(request) ||
+         std::holds_alternative<JogTogether>(request) ||
+         std::holds_alternative<FollowSetpoints>(request) ||
          std::holds_alternative<MoveLine>(request) || std::holds_alternative<Resume>(request) ||
          std::holds_alternative<Home>(request) || std::holds_alternative<SetMicrosteps>(request) ||
          std::holds_alternative<Recover>(request);

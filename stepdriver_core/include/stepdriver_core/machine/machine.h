@@ -14,6 +14,7 @@
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/machine/recording.h"
+#include "stepdriver_core/machine/streams.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -108,6 +109,29 @@ class Machine {
 
   /// Decelerates every axis to rest, and ends a hold.
   void stop();
+
+  /// Jogs several axes, see Axis::jog(). Those that begin a motion do so at the same nanosecond;
+  /// axes that must be woken first begin together with the others that are at rest, when all are
+  /// awake. From then on they are independent.
+  ///
+  /// @return for each message why its axis does not jog; empty if it does. An axis that is refused
+  ///   doesn't keep the others from moving.
+  /// @throw Refused if a name isn't known or comes twice; then nothing moves.
+  [[nodiscard]] std::vector<std::string> jog(const std::vector<StreamMessage>& messages);
+
+  /// The next setpoints of a stream, of some axes; they begin as for jog(). Each call gives new
+  /// targets, from the present states of the axes. In a regular stream of positions within the
+  /// limits, an axis passes each position about one period after it came, at the velocity of the
+  /// stream, which is estimated. A position beyond a soft limit is replaced by the limit. When no
+  /// setpoint follows, an axis comes to rest on the last position. Velocities are as for
+  /// Axis::jog(); 0 slows down at the axis's own deceleration.
+  ///
+  /// @param timeout [s] from 0.005 to 60: without another setpoint, an axis then slows down to
+  ///   rest, wherever it is.
+  /// @return as jog().
+  /// @throw Refused as jog(), or if the timeout is out of its range.
+  [[nodiscard]] std::vector<std::string> followSetpoints(
+      SetpointMode mode, double timeout, const std::vector<StreamMessage>& messages);
 
   /// A straight line of several axes: all begin and end together, each within its own limits. Axes
   /// that move come to rest first; relative positions count from where their motions would have

@@ -1,0 +1,170 @@
+#include "setpoint_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "motion/pursuit.h"
+#include "point_motion.h"
+
+namespace stepdriver::activity {
+namespace {
+
+// A faster stream is followed as if it had this part of the highest speed: the rest is for catching
+// up with it.
+constexpr double kFastestPoint = 0.98;
+constexpr double kNoStep = 0.5;  // microsteps: nothing closer than this makes a step
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+/// The highest and the lowest position of a motion.
+struct Extent {
+  double lowest = 0.0;
+  double highest = 0.0;
+};
+
+Extent extentOf(const motion::Profile& profile) {
+  const double end = profile.endPosition().value();
+  Extent extent{end, end};
+  const auto consider = [&extent](motion::DoubleDouble position) {
+    extent.lowest = std::min(extent.lowest, position.value());
+    extent.highest = std::max(extent.highest, position.value());
+  };
+  for (const motion::Piece& piece : profile.pieces()) {
+    consider(piece.p0);
+    for (double t = piece.firstTurn(0.0); t < piece.duration.hi; t = piece.firstTurn(t)) {
+      consider(piece.positionAt(t));
+    }
+  }
+  return extent;
+}
+
+/// How far a motion passes its own end before it comes back [microsteps].
+double overshootOf(const motion::Profile& profile, const motion::MotionState& from) {
+  const Extent extent = extentOf(profile);
+  const double end = profile.endPosition().value();
+  const double way = end - from.position.value();
+  const double above = extent.highest - end;
+  const double below = end - extent.lowest;
+  const double beyond = way > 0.0 ? above : way < 0.0 ? below : std::max(above, below);
+  return beyond > kNoStep ? beyond : 0.0;
+}
+
+motion::Profile profileOf(std::int64_t at, const motion::MotionState& from,
+                          std::vector<motion::Piece> pieces) {
+  if (pieces.empty()) return {at, from.position};
+  return {at, std::move(pieces)};
+}
+
+void append(std::vector<motion::Piece>& pieces, const motion::Profile& more) {
+  for (const motion::Piece& piece : more.pieces()) pieces.push_back(piece);
+}
+
+bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& profile) {
+  const Extent extent = extentOf(profile);
+  const auto& lowest = axis.config.min_position;
+  const auto& highest = axis.config.max_position;
+  const auto backlash = static_cast<double>(axis.backlash());
+  return (!lowest || extent.lowest >= axis.countOf(*lowest) - kNoStep) &&
+         (!highest || extent.highest <= axis.countOf(*highest) + backlash + kNoStep);
+}
+
+// The motor's target for coming to rest on the position after it was passed, or before it is reached.
+// @param taken_up [microsteps] of the backlash, in this state
+std::int64_t returnTarget(const axis::AxisModel& axis, const Goal& goal,
+                          const motion::MotionState& from, std::int64_t taken_up,
+                          const motion::MotionLimits& within) {
+  if (axis.backlash() == 0) return *goal.target;
+  const std::int64_t rest =
+      std::llround(motion::planStop(0, from, within).endPosition().value()) - taken_up;
+  if (rest == *goal.target) return *goal.target + taken_up;
+  return rest < *goal.target ? *goal.target + axis.backlash() : *goal.target;
+}
+
+motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
+                                const motion::MotionState& from, std::int64_t at,
+                                const motion::MotionLimits& within) {
+  const Setpoint& wanted = goal.setpoint;
+  const double fastest = kFastestPoint * within.max_speed;
+  const double velocity = std::clamp(wanted.velocity, -fastest, fastest);
+  const std::int64_t target = velocity == 0.0  ? motorTarget(axis, goal, from, within)
+                              : velocity > 0.0 ? *goal.target + axis.backlash()
+                                               : *goal.target;
+  if (velocity == 0.0) return motion::planMove(at, from, target, within).profile;
+  const std::int64_t taken_up = target - *goal.target;
+  const motion::MovingPoint point{
+      motion::DoubleDouble(wanted.position + static_cast<double>(taken_up)) +
+          velocity * seconds(at - wanted.reach_ns),
+      velocity};
+  std::vector<motion::Piece> pieces = motion::joinPoint(from, point, within, wanted.period);
+  motion::DoubleDouble left = seconds(wanted.return_ns - at);
+  for (const motion::Piece& piece : pieces) left = left - piece.duration;
+  const motion::MotionState joined = motion::endOf(pieces, from);
+  if (left.hi > 0.0) {
+    motion::Piece keeping_up;
+    keeping_up.duration = left;
+    keeping_up.p0 = joined.position;
+    keeping_up.v0 = joined.velocity;
+    pieces.push_back(keeping_up);
+  }
+  const motion::MotionState last = motion::endOf(pieces, from);
+  const std::int64_t rest = returnTarget(axis, goal, last, taken_up, within);
+  append(pieces, motion::planMove(0, last, rest, within).profile);
+  motion::Profile profile = profileOf(at, from, std::move(pieces));
+  if (isWithinSoftLimits(axis, profile)) return profile;
+  return motion::planMove(at, from, target, within).profile;
+}
+
+motion::Profile velocityProfile(const axis::AxisModel& axis, const Goal& goal,
+                                const motion::MotionState& from, std::int64_t at,
+                                const motion::MotionLimits& within) {
+  if (goal.velocity != 0.0) {
+    const double velocity = std::copysign(within.max_speed, goal.velocity);
+    return motion::planVelocity(at, from, velocity, within, standAt(axis, goal)).profile;
+  }
+  const bool up = from.velocity > 0.0;
+  const auto& limit = up ? axis.config.max_position : axis.config.min_position;
+  std::optional<std::int64_t> not_beyond;
+  if (limit) not_beyond = std::llround(axis.countOf(*limit)) + (up ? axis.backlash() : 0);
+  return motion::planStop(at, from, within, not_beyond);
+}
+
+// Slows down when the timeout is over.
+motion::Profile untilTimeout(const axis::AxisModel& axis, const Goal& goal,
+                             const motion::MotionState& from, const motion::Profile& profile) {
+  const std::int64_t until = goal.setpoint.until_ns;
+  if (profile.endNs() <= until) return profile;
+  std::vector<motion::Piece> pieces;
+  append(pieces, profile);
+  pieces = motion::firstPart(std::move(pieces), seconds(until - profile.startNs()));
+  std::optional<std::int64_t> not_beyond;
+  if (goal.target && overshootOf(profile, from) == 0.0) {
+    not_beyond = std::llround(profile.endPosition().value());
+  }
+  append(pieces,
+         motion::planStop(until, motion::endOf(pieces, from), axis.stopLimits(), not_beyond));
+  return profileOf(profile.startNs(), from, std::move(pieces));
+}
+
+}  // namespace
+
+motion::Plan planSetpoint(const axis::AxisModel& axis, const Goal& goal,
+                          const motion::MotionState& from, std::int64_t at,
+                          const motion::MotionLimits& within) {
+  const Setpoint& wanted = goal.setpoint;
+  if (at >= wanted.until_ns) {
+    if (axis.moving()) return {planStop(axis, at)};
+    throw std::range_error("no other setpoint came before the timeout");
+  }
+  const motion::Profile profile = wanted.of_position
+                                      ? positionProfile(axis, goal, from, at, within)
+                                      : velocityProfile(axis, goal, from, at, within);
+  motion::Plan plan{untilTimeout(axis, goal, from, profile)};
+  plan.overshoot = overshootOf(plan.profile, from);
+  return plan;
+}
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+
+#include "goal.h"
+#include "motion/limits.h"
+#include "motion/planner.h"
+
+namespace stepdriver::activity {
+
+/// The motion for a setpoint, from a state of the axis at a motion time.
+///
+/// A position is joined as if it moved on at the velocity of the stream, and passed one period
+/// after it came: then the next setpoint is there, and continues from that. If there is none, the
+/// axis comes to rest on the last position. In any case it slows down when the timeout is over.
+///
+/// @param within the limits of the axis, with the highest speed.
+/// @throw std::range_error if the motion takes too long, or its timeout is over before it begins.
+motion::Plan planSetpoint(const axis::AxisModel& axis, const Goal& goal,
+                          const motion::MotionState& from, std::int64_t at,
+                          const motion::MotionLimits& within);
+
+}  // namespace stepdriver::activity

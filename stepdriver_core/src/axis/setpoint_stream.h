@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace stepdriver::axis {
+
+/// The position setpoints of one axis as they arrive: how far apart they come, and how fast the
+/// position changes. Times of arrival jitter, so the period and the times are smoothed.
+class SetpointStream {
+ public:
+  /// What is known when a setpoint has come.
+  struct Course {
+    std::int64_t came_ns = 0;    ///< motion time at which it came, smoothed
+    std::int64_t period_ns = 0;  ///< of the stream; 0: it is the first setpoint
+    double velocity = 0.0;       ///< [microsteps/s] of the position
+  };
+
+  /// @param position [microsteps] @param now motion time
+  /// @param timeout_ns A setpoint that comes later than this after the last one begins a stream.
+  /// @param stops AxisModel::stops: a stop ends a stream too.
+  Course take(double position, std::int64_t now, std::int64_t timeout_ns, std::uint64_t stops);
+
+ private:
+  struct Last {
+    double position = 0.0;
+    std::int64_t arrived_ns = 0;
+    Course course;
+    std::uint64_t stops = 0;
+  };
+
+  std::optional<Last> last_;
+};
+
+}  // namespace stepdriver::axis
