@@ -119,7 +119,8 @@ std::string dump(const ros_node::NodeConfig& config) {
            config.keep_cpus_awake, config.cpu, config.emergency_stop, config.heartbeat,
            config.state_file, config.recorder.seconds, config.recorder.memory_mb,
            config.recorder.folder, config.recorder.keep, config.hardware_id, config.urdf_limits,
-           config.publish_clock, config.stop_on_master_lost, config.allow_slower);
+           config.publish_clock, config.stop_on_master_lost, config.allow_slower,
+           static_cast<int>(config.setpoint_mode), config.setpoint_timeout);
   for (const auto& axis : config.axes) dump.add(axis);
   dump.all(config.simulation.speed, config.simulation.trace,
            config.simulation.trace_overwrites_any_file, config.simulation.emergency_stop);

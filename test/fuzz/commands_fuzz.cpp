@@ -78,7 +78,7 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
 /// The last act of a run moves each axis by 2 mm in two minutes, so the limits are at least that
 /// high.
 Act readAct(Input& input) {
-  constexpr std::size_t kKinds = 9;
+  constexpr std::size_t kKinds = 11;
   const std::size_t kind = input.any(kKinds);
   const std::size_t axis = input.any(search::kAxes);
   switch (kind) {
@@ -106,6 +106,26 @@ Act readAct(Input& input) {
       const double velocity = input.number(0.1);
       return request(fmt::format("jog {} at {}", axis, velocity), machine::Jog{axis, velocity, {}},
                      moving({axis}));
+    }
+    case 8: {
+      const std::size_t other = (axis + 1) % search::kAxes;
+      const bool positions = input.any(2) == 1;
+      const double most = positions ? 0.02 : 0.1;
+      machine::FollowSetpoints wanted{
+          positions ? machine::SetpointMode::kPosition : machine::SetpointMode::kVelocity,
+          input.between(0.01, 0.3),
+          {}};
+      for (const std::size_t moved : {axis, other}) {
+        wanted.setpoints.push_back({moved, input.number(most), {}});
+      }
+      return request(fmt::format("setpoints of {} and {}", axis, other), wanted,
+                     moving({axis, other}));
+    }
+    case 9: {
+      const std::size_t other = (axis + 1) % search::kAxes;
+      const machine::JogTogether jogs{
+          {{axis, input.number(0.1), {}}, {other, input.number(0.1), {}}}};
+      return request(fmt::format("jog {} and {}", axis, other), jogs, moving({axis, other}));
     }
     case 4: {
       axis::AxisLimits limits;

@@ -133,6 +133,7 @@ void checkConfig(const ros_node::NodeConfig& config) {
   }
   checkRange("joint_state_rate", config.joint_state_rate, 1.0, 1000.0);
   checkRange("jog_timeout", config.jog_timeout, 0.02, 60.0);
+  checkRange("setpoint/timeout", config.setpoint_timeout, 0.02, 60.0);
   require(std::isfinite(config.simulation.speed) && config.simulation.speed >= 0.0,
           "the speed of the simulation is at least 0");
 }

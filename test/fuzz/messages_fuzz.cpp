@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <ros/serialization.h>
 #include <sensor_msgs/Joy.h>
+#include <std_msgs/Float64MultiArray.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/FollowPath.h>
@@ -140,6 +141,19 @@ void take(const Jog& message) {
   if (message.name.size() != 1 || message.velocity.size() != 1) return;
   MachineOnRig rig;
   rig.serve([&] { rig.machine().axis(message.name.front()).jog(message.velocity.front()); });
+}
+
+void take(const std_msgs::Float64MultiArray& message) {
+  if (message.data.size() != 2) return;
+  MachineOnRig rig;
+  rig.serve([&] {
+    const auto mode = message.layout.data_offset % 2 == 1 ? machine::SetpointMode::kVelocity
+                                                          : machine::SetpointMode::kPosition;
+    for (const std::string& why : rig.machine().followSetpoints(
+             mode, 0.1, {{"x", message.data[0], {}}, {"y", message.data[1], {}}})) {
+      if (!why.empty()) requireMessage(why);
+    }
+  });
 }
 
 void take(const trajectory_msgs::JointTrajectory& message) {
@@ -330,6 +344,7 @@ const std::vector<Reader>& readers() {
       converse,
       readAndTake<FollowPath::Request>,
       readAndTake<FollowPathActionGoal>,
+      readAndTake<std_msgs::Float64MultiArray>,
   };
   return all;
 }

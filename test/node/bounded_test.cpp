@@ -5,6 +5,7 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/service_client.h>
+#include <std_msgs/Float64MultiArray.h>
 #include <stepdriver/FollowJointTrajectoryActionGoal.h>
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/FollowPathActionGoal.h>
@@ -232,6 +233,13 @@ TEST_F(LyingClient, OfHomeIsRefused) { call<HomeAxes>("home", kLie); }
 TEST_F(LyingClient, OfMoveLineIsRefused) { call<MoveLine>("move_line", kLie); }
 TEST_F(LyingClient, OfFollowPathIsRefused) { call<FollowPath>("follow_path", kLie); }
 TEST_F(LyingClient, OfJogIsRefused) { publish<Jog>("jog", bytesOf(std_msgs::Header()) + kLie); }
+TEST_F(LyingClient, OfSetpointIsRefused) {
+  // An empty list of dimensions, no offset, and the numbers.
+  publish<std_msgs::Float64MultiArray>("setpoint", number(0) + number(0) + kLie);
+}
+TEST_F(LyingClient, OfTheDimensionsOfSetpointIsRefused) {
+  publish<std_msgs::Float64MultiArray>("setpoint", kLie);
+}
 TEST_F(LyingClient, OfCommandIsRefused) {
   publish<trajectory_msgs::JointTrajectory>("command", bytesOf(std_msgs::Header()) + kLie);
 }

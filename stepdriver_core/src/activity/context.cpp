@@ -5,9 +5,9 @@
 namespace stepdriver::activity {
 
 std::shared_ptr<std::vector<pulse::Follow>> Context::newCommand(std::uint64_t start) {
-  const auto shared =
-      std::find_if(follow_commands_.begin(), follow_commands_.end(),
-                   [start](const FollowCommand& other) { return start != 0 && other.start == start; });
+  const auto shared = std::find_if(
+      follow_commands_.begin(), follow_commands_.end(),
+      [start](const FollowCommand& other) { return start != 0 && other.start == start; });
   if (shared != follow_commands_.end()) return shared->follows;
   auto follows = std::make_shared<std::vector<pulse::Follow>>();
   follow_commands_.push_back({out->commands.size(), start, follows});

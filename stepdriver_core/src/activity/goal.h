@@ -46,8 +46,8 @@ struct Goal {
   double remainder = 0.0;  ///< [microsteps] of a move: the commanded position minus the target
   /// [unit/s] As requested, without the override; of a jog or a setpoint of velocity with its sign.
   double velocity = 0.0;
-  Setpoint setpoint;       ///< of a kSetpoint
-  bool of_motor = false;   ///< true: the target is the motor's; false: the joint's
+  Setpoint setpoint;      ///< of a kSetpoint
+  bool of_motor = false;  ///< true: the target is the motor's; false: the joint's
   MotorsTogether motors;
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
   std::int64_t began_ns = 0;                                 ///< motion time at which it began

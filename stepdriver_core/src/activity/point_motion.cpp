@@ -40,9 +40,9 @@ motion::Plan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_
   const motion::MotionLimits within = axis.limits(velocity);
   if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
   if (goal.kind == Goal::Kind::kJog) {
-    return motion::planVelocity(
-        at, from, std::copysign(velocity * axis.stepsPerUnit(), goal.velocity), within,
-        standAt(axis, goal));
+    return motion::planVelocity(at, from,
+                                std::copysign(velocity * axis.stepsPerUnit(), goal.velocity),
+                                within, standAt(axis, goal));
   }
   return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
 }

@@ -72,7 +72,8 @@ bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& prof
          (!highest || extent.highest <= axis.countOf(*highest) + backlash + kNoStep);
 }
 
-// The motor's target for coming to rest on the position after it was passed, or before it is reached.
+// The motor's target for coming to rest on the position after it was passed, or before it is
+// reached.
 // @param taken_up [microsteps] of the backlash, in this state
 std::int64_t returnTarget(const axis::AxisModel& axis, const Goal& goal,
                           const motion::MotionState& from, std::int64_t taken_up,

@@ -14,9 +14,8 @@ std::vector<axis::AxisModel*> axesOfStarts(const std::vector<StartTogether::Star
 }
 
 Activity::Handover handoverOfStarts(const std::vector<StartTogether::Start>& starts) {
-  const bool wakes = std::any_of(starts.begin(), starts.end(), [](const auto& start) {
-    return start.order.axis->mustWake();
-  });
+  const bool wakes = std::any_of(starts.begin(), starts.end(),
+                                 [](const auto& start) { return start.order.axis->mustWake(); });
   return wakes ? Activity::Handover::kAfterRest : Activity::Handover::kAtSpeed;
 }
 
@@ -59,8 +58,8 @@ void StartTogether::prepare() {
   start->axes.assign(axes().begin(), axes().end());
   goals_.clear();
   for (const Start& each : starts_) {
-    goals_.push_back(std::make_unique<FollowGoal>(
-        context(), std::vector<Order>{each.order}, JoinPath(), each.call, start));
+    goals_.push_back(std::make_unique<FollowGoal>(context(), std::vector<Order>{each.order},
+                                                  JoinPath(), each.call, start));
     goals_.back()->prepare();
   }
 }

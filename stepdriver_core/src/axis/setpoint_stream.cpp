@@ -34,9 +34,8 @@ void smooth(SetpointStream::Course& course, std::int64_t expected, std::int64_t 
 
 SetpointStream::Course SetpointStream::take(double position, std::int64_t now,
                                             std::int64_t timeout_ns, std::uint64_t stops) {
-  const bool continues =
-      last_ && last_->stops == stops && now >= last_->arrived_ns &&
-      now - last_->arrived_ns < timeout_ns;
+  const bool continues = last_ && last_->stops == stops && now >= last_->arrived_ns &&
+                         now - last_->arrived_ns < timeout_ns;
   Course course;
   course.came_ns = now;
   if (continues) {

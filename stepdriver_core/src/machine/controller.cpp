@@ -426,11 +426,10 @@ void Controller::limitVelocity(Goal& goal, const axis::AxisModel& axis, const ch
   if (axis.moving()) return;
   const std::int64_t sign = up ? 1 : -1;
   if (goal.target && (*goal.target - axis.jointCount()) * sign <= 0) {
-    axis.refuse(
-        fmt::format("it stands at the soft limit {}; it {} only away from it",
-                    axis.pathAxis().showLimit(*limit, up ? axis.config.max_position_source
-                                                         : axis.config.min_position_source),
-                    moves));
+    axis.refuse(fmt::format("it stands at the soft limit {}; it {} only away from it",
+                            axis.pathAxis().showLimit(*limit, up ? axis.config.max_position_source
+                                                                 : axis.config.min_position_source),
+                            moves));
   }
   axis.refuseIntoEndstop(sign);
 }
@@ -474,6 +473,7 @@ Controller::MayBegin Controller::positionGoal(const Setpoint& wanted, double tim
   double position = wanted.value;
   if (moved.config.max_position) position = std::min(position, *moved.config.max_position);
   if (moved.config.min_position) position = std::max(position, *moved.config.min_position);
+  moved.refuseBeyondLimits(position, "the position");
   const std::int64_t now = context_.motionNow();
   Goal goal;
   goal.kind = Goal::Kind::kSetpoint;
@@ -545,8 +545,8 @@ void Controller::beginTogether(std::vector<activity::StartTogether::Start> start
     std::vector<Ack> calls;
     for (const Start& start : group) calls.push_back(start.call);
     try {
-      activities_.begin(
-          std::make_unique<activity::StartTogether>(context_, std::move(group)), kTakenOver);
+      activities_.begin(std::make_unique<activity::StartTogether>(context_, std::move(group)),
+                        kTakenOver);
     } catch (const Error& error) {
       for (const Ack& call : calls) call->fail(activity::failureOf(error));
     }
@@ -558,10 +558,10 @@ void Controller::beginTogether(std::vector<activity::StartTogether::Start> start
 void Controller::serve(const Jog& wanted, const Ack& call) {
   const MayBegin goal = goalOf(wanted, call);
   if (!goal) return;
-  activities_.begin(std::make_unique<activity::FollowGoal>(
-                        context_, std::vector<Order>{{&axis(wanted.axis), *goal}},
-                        activity::JoinPath(), call),
-                    kTakenOver);
+  activities_.begin(
+      std::make_unique<activity::FollowGoal>(
+          context_, std::vector<Order>{{&axis(wanted.axis), *goal}}, activity::JoinPath(), call),
+      kTakenOver);
 }
 
 void Controller::serve(const JogTogether& wanted, const Ack& call) {

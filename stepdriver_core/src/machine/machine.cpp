@@ -145,8 +145,9 @@ class Machine::Impl {
   std::vector<std::string> followSetpoints(SetpointMode mode, double timeout,
                                            const std::vector<StreamMessage>& messages) {
     if (!(timeout >= kShortestTimeout && timeout <= kLongestTimeout)) {
-      throw Refused(fmt::format("the timeout of setpoints is {:.9g} s, but must be from {:g} to {:g} s",
-                                timeout, kShortestTimeout, kLongestTimeout));
+      throw Refused(
+          fmt::format("the timeout of setpoints is {:.9g} s, but must be from {:g} to {:g} s",
+                      timeout, kShortestTimeout, kLongestTimeout));
     }
     const std::vector<AxisId> axes = idsOf(messages);
     FollowSetpoints wanted{mode, timeout, {}};

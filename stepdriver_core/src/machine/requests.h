@@ -149,10 +149,10 @@ struct PowerDown {};
 /// @}
 
 using Request =
-    std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine, FollowTrajectory, StopAxis, StopMove,
-                 StopAll, Hold, Resume, SetSpeedOverride, SetLimits, Home, CancelHoming, Enable,
-                 Sleep, Reset, SetMicrosteps, SetPosition, Recover, BringUp, RestorePosition,
-                 NotePosition, Close, AwaitRest, PowerDown>;
+    std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine,
+                 FollowTrajectory, StopAxis, StopMove, StopAll, Hold, Resume, SetSpeedOverride,
+                 SetLimits, Home, CancelHoming, Enable, Sleep, Reset, SetMicrosteps, SetPosition,
+                 Recover, BringUp, RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
 
 /// @name Inputs of the controller
 /// @{

@@ -44,8 +44,8 @@ std::vector<Piece> withPoint(const Profile& seen, const MovingPoint& point) {
 double highestSpeed(const std::vector<Piece>& pieces) {
   double highest = 0.0;
   for (const Piece& piece : pieces) {
-    highest = std::max({highest, std::abs(piece.v0),
-                        std::abs(piece.velocityAt(piece.duration).value())});
+    highest =
+        std::max({highest, std::abs(piece.v0), std::abs(piece.velocityAt(piece.duration).value())});
     // Inside a piece the speed has an extreme where the acceleration is 0.
     const double level = piece.j != 0.0 ? -piece.a / piece.j : -1.0;
     if (level > 0.0 && level < piece.duration.hi) {
@@ -64,8 +64,7 @@ std::vector<Piece> joinPoint(const MotionState& from, const MovingPoint& point,
   // The point leaves a motion behind it at its own speed, and comes towards one that is ahead.
   const bool behind = away * point.velocity < 0.0;
   double highest = behind ? spare : limits.max_speed + std::abs(point.velocity);
-  const double allowed =
-      std::max(limits.max_speed, std::abs(from.velocity)) * (1.0 + kRounding);
+  const double allowed = std::max(limits.max_speed, std::abs(from.velocity)) * (1.0 + kRounding);
   const auto join = [&](double softness) {
     std::vector<Piece> pieces =
         withPoint(relativeMove(from, point, limits, highest, softness), point);

@@ -16,9 +16,9 @@ struct MovingPoint {
 /// Joins a moving point: the motion ends at its position and with its velocity, without
 /// acceleration. Seen from the point, this is a move to rest, and the plan of such a move plus the
 /// motion of the point is again a sequence of cubic pieces. The speed is at most max_speed, apart
-/// from a higher one at the beginning. The acceleration is at most the lower one of acceleration and
-/// deceleration, because a change of speed as seen from the point may be either. The start speed is
-/// not used.
+/// from a higher one at the beginning. The acceleration is at most the lower one of acceleration
+/// and deceleration, because a change of speed as seen from the point may be either. The start
+/// speed is not used.
 ///
 /// @param within [s] If the fastest motion takes less, a lower acceleration is used, so that it
 ///   takes up to about this time: small corrections are then smooth.

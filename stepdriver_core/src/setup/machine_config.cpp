@@ -31,7 +31,7 @@ const std::vector<std::string> kPolicies = {"warn", "enforce"};
 /// Keys of a configuration that only the ROS node uses.
 constexpr const char* kNodeKeys[] = {"joint_state_rate", "jog_timeout",   "urdf_limits",
                                      "hardware_id",      "publish_clock", "on_master_lost",
-                                     "trajectory"};
+                                     "trajectory",       "setpoint"};
 
 void readGpio(ConfigReader gpio, MachineConfig& config) {
   const std::string backend = gpio.oneOf("backend", {"simulated", "libgpiod"});

@@ -7,6 +7,7 @@ namespace {
 
 constexpr config::Range kJointStateRates{1.0, 1000.0};
 constexpr config::Range kJogTimeouts{0.02, 60.0};
+constexpr config::Range kSetpointTimeouts{0.02, 60.0};
 
 }  // namespace
 
@@ -36,6 +37,12 @@ NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& na
   config::ConfigReader trajectory = reader.map("trajectory");
   config.allow_slower = trajectory.boolean("allow_slower", config.allow_slower);
   trajectory.rejectUnknown();
+  config::ConfigReader setpoint = reader.map("setpoint");
+  if (setpoint.oneOf("mode", {"position", "velocity"}, "position") == "velocity") {
+    config.setpoint_mode = machine::SetpointMode::kVelocity;
+  }
+  config.setpoint_timeout = setpoint.number("timeout", kSetpointTimeouts, config.setpoint_timeout);
+  setpoint.rejectUnknown();
   config.hardware_id = reader.text("hardware_id", config.hardware_id);
   reader.rejectUnknown();
   return config;

@@ -5,6 +5,7 @@
 
 #include "stepdriver_core/config/config_value.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/streams.h"
 #include "stepdriver_core/setup/machine_config.h"
 
 namespace stepdriver::ros_node {
@@ -17,7 +18,9 @@ struct NodeConfig : setup::MachineConfig {
   bool publish_clock = false;        ///< the time of the simulated rig on /clock
   bool stop_on_master_lost = false;  ///< if the ROS master doesn't answer, all axes come to rest
   bool allow_slower = false;         ///< machine::TrajectoryRequest::allow_slower
-  std::string hardware_id;           ///< for diagnostics; empty: made from the other facts
+  machine::SetpointMode setpoint_mode = machine::SetpointMode::kPosition;
+  double setpoint_timeout = 0.2;  ///< [s] without a setpoint until the axis comes to rest
+  std::string hardware_id;        ///< for diagnostics; empty: made from the other facts
 };
 
 /// Reads the node's private parameters: in addition to those of setup::readMachineConfig()
@@ -30,6 +33,9 @@ struct NodeConfig : setup::MachineConfig {
 /// on_master_lost: continue       # or stop: all axes come to rest
 /// trajectory:
 ///   allow_slower: false          # true: what the limits don't allow is slowed down
+/// setpoint:
+///   mode: position               # or velocity: what the setpoints are
+///   timeout: 0.2                 # [s] from 0.02 to 60
 /// hardware_id: ""                # for diagnostics; empty: the host and the driver chips
 /// @endcode
 ///

@@ -43,6 +43,7 @@
 #include "node/systemd/service_manager.h"
 #include "node/topics/clock_publisher.h"
 #include "node/topics/jog_subscriber.h"
+#include "node/topics/setpoint_subscriber.h"
 #include "node/topics/state_publisher.h"
 #include "node/topics/trajectory_command.h"
 #include "stepdriver_core/error.h"
@@ -79,12 +80,13 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  /diagnostics
-              /clock (with ~publish_clock)  ~jog, ~command (subscribed)
+              /clock (with ~publish_clock)
+              ~jog  ~setpoint  ~AXIS/setpoint  ~command  (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_path
               ~follow_joint_trajectory
   parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
               ~state_file  ~recorder  ~hardware_id  ~urdf_limits  ~publish_clock
-              ~on_master_lost  ~trajectory  ~simulation
+              ~on_master_lost  ~trajectory  ~setpoint  ~simulation
               robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
@@ -223,6 +225,8 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   recorder.advertise(private_node, queues);
   const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
+  const SetpointSubscriber setpoint_subscriber(private_node, machine, queues, config.setpoint_mode,
+                                               config.setpoint_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues, config.allow_slower);
   TrajectoryAction trajectory_action(private_node, machine, queues, statuses, config.allow_slower);
   const std::string description = hardware.description();

@@ -100,8 +100,7 @@ class Setpoints : public testing::Test {
   void expectClean() {
     for (const auto& axis : bench->machine->axes()) {
       EXPECT_EQ(violationsOf(bench->report(axis->config().name)), "");
-      EXPECT_EQ(std::llround(axis->state().position * kScale),
-                bench->pulses(axis->config().name));
+      EXPECT_EQ(std::llround(axis->state().position * kScale), bench->pulses(axis->config().name));
     }
     EXPECT_EQ(bench->machine->figures().slips, 0U);
   }
@@ -109,8 +108,7 @@ class Setpoints : public testing::Test {
     const double apart = 0.002;
     const Differences most = test::differencesOf(crossings(axis), apart);
     EXPECT_LE(most.speed, config.max_speed * kScale * (1.0 + 1e-9) + 2e-9 / apart * 2e4);
-    EXPECT_LE(most.acceleration,
-              config.acceleration * kScale + 4.0 * 2e4 * 1e-9 / apart / apart);
+    EXPECT_LE(most.acceleration, config.acceleration * kScale + 4.0 * 2e4 * 1e-9 / apart / apart);
     if (config.jerk > 0.0) {
       EXPECT_LE(most.jerk, config.jerk * kScale + 8.0 * 2e4 * 1e-9 / apart / apart / apart);
     }
@@ -321,22 +319,21 @@ TEST_F(Setpoints, AVelocityOfZeroLeavesOtherMotionsAlone) {
 // ---- other commands ----
 
 TEST_F(Setpoints, AStreamDoesNotContinueThroughWhatStopsTheAxis) {
-  const std::vector<std::function<void()>> stops = {
-      [this] { x().stop(); },
-      [this] { bench->machine->stop(); },
-      [this] {
-        bench->machine->hold();
-        advance(0.2);
-        bench->machine->resume();
-      },
-      [this] {
-        x().enable(false);
-        x().enable(true);
-      },
-      [this] {
-        bench->machine->emergencyStop();
-        bench->machine->recover();
-      }};
+  const std::vector<std::function<void()>> stops = {[this] { x().stop(); },
+                                                    [this] { bench->machine->stop(); },
+                                                    [this] {
+                                                      bench->machine->hold();
+                                                      advance(0.2);
+                                                      bench->machine->resume();
+                                                    },
+                                                    [this] {
+                                                      x().enable(false);
+                                                      x().enable(true);
+                                                    },
+                                                    [this] {
+                                                      bench->machine->emergencyStop();
+                                                      bench->machine->recover();
+                                                    }};
   for (const auto& stop : stops) {
     for (const SetpointMode mode : {SetpointMode::kPosition, SetpointMode::kVelocity}) {
       build({configOf("x")});
@@ -424,8 +421,7 @@ TEST_F(Setpoints, OneMessageStartsAllItsAxesAtTheSameNanosecond) {
     }
   });
   // They change their velocities at the same time too.
-  for (const std::string& why :
-       bench->machine->jog({{"x", 0.04, {}}, {"y", -0.04, {}}})) {
+  for (const std::string& why : bench->machine->jog({{"x", 0.04, {}}, {"y", -0.04, {}}})) {
     EXPECT_EQ(why, "");
   }
   advance(0.1);

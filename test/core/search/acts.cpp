@@ -50,6 +50,10 @@ std::deque<Turn> turns(std::size_t steps) {
           {short_pause, "stop z", machine::StopAxis{kZ}, slows_down}};
 }
 
+machine::FollowSetpoints positions(const std::vector<machine::Setpoint>& setpoints) {
+  return {machine::SetpointMode::kPosition, 0.1, setpoints};
+}
+
 std::vector<Act> makeActs() {
   using Quiet = Meaning::Quiet;
   const std::vector<std::size_t> every = {kX, kY, kZ};
@@ -94,6 +98,20 @@ std::vector<Act> makeActs() {
       request("jog z back", machine::Jog{kZ, -0.05, {}}, moving({kZ})),
       request("end the jog of x", machine::Jog{kX, 0.0, {}}, {}),
       {"stream a jog of x", [](Participants& all, int client) { all.streamJog(client, kX); }},
+      request("jog x and z", machine::JogTogether{{{kZ, -0.04, {}}, {kX, 0.05, {}}}},
+              moving({kX, kZ})),
+      request("end the jog of x, and jog y", machine::JogTogether{{{kX, 0.0, {}}, {kY, 0.05, {}}}},
+              moving({kX, kY})),
+      request("setpoints of x and y", positions({{kX, 0.006, {}}, {kY, -0.004, {}}}),
+              moving({kX, kY})),
+      request("velocities of y and z",
+              machine::FollowSetpoints{
+                  machine::SetpointMode::kVelocity, 0.1, {{kY, -0.05, {}}, {kZ, 0.04, {}}}},
+              moving({kY, kZ})),
+      {"stream setpoints of x and z",
+       [](Participants& all, int client) {
+         all.streamSetpoints(client, {kX, kZ});
+       }},
       request("home x", machine::Home{{kX}, false}, moving({kX})),
       {"cancel homing", [](Participants& all, int client) { all.cancelHomings(client); }},
       request("plan x", machine::PlanMove{{kX, 0.004, true, 0.0}}, {}),

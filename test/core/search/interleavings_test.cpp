@@ -113,7 +113,7 @@ Schedule tripleOf(std::mt19937_64& random) {
 /// Many requests in close succession: motions that take over from each other before they have
 /// begun, and what ends them.
 Schedule crowdOf(std::mt19937_64& random) {
-  static const std::array<std::size_t, 14> motions = {actNamed("move x to 8 mm"),
+  static const std::array<std::size_t, 17> motions = {actNamed("move x to 8 mm"),
                                                       actNamed("move x by -6 mm"),
                                                       actNamed("move y by 7 mm"),
                                                       actNamed("move y to -5 mm"),
@@ -124,6 +124,9 @@ Schedule crowdOf(std::mt19937_64& random) {
                                                       actNamed("trajectory of x and z"),
                                                       actNamed("jog x"),
                                                       actNamed("jog z back"),
+                                                      actNamed("jog x and z"),
+                                                      actNamed("setpoints of x and y"),
+                                                      actNamed("velocities of y and z"),
                                                       actNamed("hold"),
                                                       actNamed("resume"),
                                                       actNamed("stop x")};

@@ -97,6 +97,14 @@ class Oracle {
     }
   }
 
+  /// A call will be answered as a success, but not for this axis.
+  void refused(std::uint64_t call, std::size_t axis, pulse::Nanoseconds now) {
+    const auto found = calls_.find(call);
+    if (found == calls_.end()) return;
+    isSlowingDown(found->second, axis, now);
+    found->second.meaning.axes[axis] = false;
+  }
+
   /// After the answer of this call, no later motion may move the axis.
   bool isLatest(std::uint64_t call, std::size_t axis) const {
     const std::uint64_t order = calls_.at(call).order;
@@ -201,13 +209,14 @@ class Oracle {
 
   /// A motion of several axes that fails may already have begun to take up their backlash.
   void isSlowingDown(const Call& failed, pulse::Nanoseconds now) {
-    for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      if (!failed.meaning.axes[axis]) continue;
-      for (Quiet& quiet : quiets_[axis]) {
-        if (quiet.order > failed.order || quiet.kind == Meaning::Quiet::kEmergency) continue;
-        quiet.since = std::max(quiet.since, now + slowingOf(axis) - slipped_());
-        quiet.slows = true;
-      }
+    for (std::size_t axis = 0; axis < kAxes; ++axis) isSlowingDown(failed, axis, now);
+  }
+  void isSlowingDown(const Call& failed, std::size_t axis, pulse::Nanoseconds now) {
+    if (!failed.meaning.axes[axis]) return;
+    for (Quiet& quiet : quiets_[axis]) {
+      if (quiet.order > failed.order || quiet.kind == Meaning::Quiet::kEmergency) continue;
+      quiet.since = std::max(quiet.since, now + slowingOf(axis) - slipped_());
+      quiet.slows = true;
     }
   }
 

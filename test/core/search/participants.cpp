@@ -242,6 +242,9 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     at_fault[axis] = !snapshot->axes[axis].state.fault.empty();
   }
+  if (const auto* refusals = std::get_if<activity::Refusals>(&reply.value)) {
+    noteRefusals(call, asked, *refusals);
+  }
   oracle_.answered(call, !reply.failure, clock_.now(), at_fault);
   if (!reply.failure && asked.meaning.quiet == Meaning::Quiet::kSlowsDown) checkSlowing(asked);
   const auto* moves = std::get_if<std::vector<axis::Move>>(&reply.value);
@@ -265,6 +268,16 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   if (client.waits_for != call) return;
   client.waits_for = 0;
   if (client.on_answer) std::exchange(client.on_answer, nullptr)(reply);
+}
+
+// A message for several axes, of which some may be refused.
+void Participants::noteRefusals(std::uint64_t call, const Ask& asked,
+                                const activity::Refusals& refusals) {
+  for (std::size_t i = 0; i < refusals.size(); ++i) {
+    if (refusals[i].empty()) continue;
+    note("refused in part: " + refusals[i]);
+    oracle_.refused(call, asked.parts.at(i), clock_.now());
+  }
 }
 
 machine::InputReading Participants::readInputs() {
@@ -573,6 +586,10 @@ void Participants::noteGoals(Ask& asked) {
   } else if (const auto* trajectory = std::get_if<machine::FollowTrajectory>(&asked.request)) {
     asked.goals = trajectory->axes;
     asked.together = true;
+  } else if (const auto* jogs = std::get_if<machine::JogTogether>(&asked.request)) {
+    for (const machine::Jog& jog : jogs->jogs) asked.parts.push_back(jog.axis);
+  } else if (const auto* setpoints = std::get_if<machine::FollowSetpoints>(&asked.request)) {
+    for (const auto& setpoint : setpoints->setpoints) asked.parts.push_back(setpoint.axis);
   }
 }
 
@@ -705,6 +722,34 @@ void Participants::postStreamedJog(int client, std::size_t axis, const machine::
     Client& streams = clients_[static_cast<std::size_t>(client)];
     streams.from = clock_.now() + kJogPeriod;
     streams.next = [=] { postStreamedJog(client, axis, next, as_of, left - 1); };
+  };
+}
+
+void Participants::streamSetpoints(int client, const std::vector<std::size_t>& axes) {
+  const auto snapshot = controller_->snapshot();
+  machine::FollowSetpoints setpoints{machine::SetpointMode::kPosition, 0.1, {}};
+  for (const std::size_t axis : axes) {
+    setpoints.setpoints.push_back({axis, 0.0, snapshot->axes.at(axis).state.stops});
+  }
+  postStreamedSetpoints(client, setpoints, oracle_.moment(), 0);
+}
+
+void Participants::postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,
+                                         std::uint64_t as_of, int number) {
+  Meaning meaning;
+  meaning.moves = true;
+  meaning.as_of = as_of;
+  machine::FollowSetpoints next = setpoints;
+  for (machine::Setpoint& setpoint : next.setpoints) {
+    meaning.axes[setpoint.axis] = true;
+    setpoint.value = 0.0004 * (number < kJogs / 2 ? number + 1 : kJogs - number);
+  }
+  post(client, "setpoint stream", next, meaning);
+  clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply&) {
+    if (number + 1 == kJogs) return;
+    Client& streams = clients_[static_cast<std::size_t>(client)];
+    streams.from = clock_.now() + kJogPeriod;
+    streams.next = [=] { postStreamedSetpoints(client, next, as_of, number + 1); };
   };
 }
 

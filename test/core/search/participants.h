@@ -109,6 +109,8 @@ class Participants {
   void postInTurn(int client, std::deque<Turn> turns);
   /// Jogs as a joystick does, without waiting for a result.
   void streamJog(int client, std::size_t axis);
+  /// Streams positions, forward and back, at the period of streamJog().
+  void streamSetpoints(int client, const std::vector<std::size_t>& axes);
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
   void emergencyStop(int client);
   void shutDown(int client);
@@ -138,6 +140,7 @@ class Participants {
     machine::InputReading reading;  // before it was posted
     Meaning meaning;
     std::vector<std::size_t> goals;  ///< axes for which it has a goal
+    std::vector<std::size_t> parts;  ///< axes that it may move, or refuse, one by one
     bool together = false;           ///< along one path
     bool relative = false;
     std::vector<double> ways;  ///< of a relative goal, by goal
@@ -194,6 +197,9 @@ class Participants {
                       const std::vector<std::uint64_t>& stops, int tries);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
                        int left);
+  void postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,
+                             std::uint64_t as_of, int number);
+  void noteRefusals(std::uint64_t call, const Ask& asked, const activity::Refusals& refusals);
   void noteGoals(Ask& asked);
   void noteServed(Ask& asked);
   std::optional<double> relativeOrigin(std::size_t axis);

@@ -1,6 +1,8 @@
 #include "storm/driver_calls.h"
 
 #include <actionlib_msgs/GoalID.h>
+#include <std_msgs/Float64.h>
+#include <std_msgs/Float64MultiArray.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/Home.h>
@@ -17,7 +19,9 @@
 #include <trajectory_msgs/JointTrajectory.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <type_traits>
 #include <utility>
 
@@ -100,7 +104,9 @@ DriverTopics::DriverTopics(const std::string& node, RequestLog& log) : log_(log)
   trajectory_goal_ = handle.advertise<TrajectoryGoal>("follow_joint_trajectory/goal", 100);
   trajectory_cancel_ =
       handle.advertise<actionlib_msgs::GoalID>("follow_joint_trajectory/cancel", 100);
+  setpoints_ = handle.advertise<std_msgs::Float64MultiArray>("setpoint", 100);
   for (const std::string& axis : kAxisNames) {
+    setpoint_.push_back(handle.advertise<std_msgs::Float64>(axis + "/setpoint", 100));
     move_goals_.push_back(handle.advertise<MoveActionGoal>(axis + "/move/goal", 100));
     move_cancels_.push_back(handle.advertise<actionlib_msgs::GoalID>(axis + "/move/cancel", 100));
   }
@@ -108,7 +114,8 @@ DriverTopics::DriverTopics(const std::string& node, RequestLog& log) : log_(log)
 
 bool DriverTopics::connected() const {
   const auto heard = [](const ros::Publisher& topic) { return topic.getNumSubscribers() > 0; };
-  return heard(jog_) && heard(command_) && heard(trajectory_goal_) && heard(trajectory_cancel_) &&
+  return heard(jog_) && heard(setpoints_) && heard(command_) && heard(trajectory_goal_) &&
+         heard(trajectory_cancel_) && std::all_of(setpoint_.begin(), setpoint_.end(), heard) &&
          std::all_of(move_goals_.begin(), move_goals_.end(), heard) &&
          std::all_of(move_cancels_.begin(), move_cancels_.end(), heard);
 }
@@ -132,6 +139,44 @@ void DriverTopics::jog(int client, std::size_t axis, double velocity) {
   }
   last = message;
   jog_.publish(jog);
+}
+
+void DriverTopics::noteSetpoints(int client, const std::vector<std::size_t>& axes,
+                                 const std::vector<double>& positions) {
+  const std::int64_t now = steadyNow();
+  std::vector<std::size_t> beginning;
+  std::vector<double> of_these;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const auto last = setpoints_sent_.find(axes[i]);
+    const bool begins =
+        last == setpoints_sent_.end() || now - last->second > std::llround(kJogTimeout * 0.4e9);
+    setpoints_sent_[axes[i]] = now;
+    if (!begins) continue;
+    beginning.push_back(axes[i]);
+    of_these.push_back(positions[i]);
+  }
+  if (beginning.empty()) return;
+  Request request = messageOf(client, setOf(beginning), "setpoints" + shown(beginning, of_these));
+  request.kind = Kind::kJog;
+  log_.begin(request);
+}
+
+void DriverTopics::setpoint(int client, std::size_t axis, double position) {
+  std_msgs::Float64 message;
+  message.data = position;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  noteSetpoints(client, {axis}, {position});
+  setpoint_.at(axis).publish(message);
+}
+
+void DriverTopics::setpoints(int client, const std::vector<double>& positions) {
+  std_msgs::Float64MultiArray message;
+  message.data = positions;
+  std::vector<std::size_t> axes(positions.size());
+  std::iota(axes.begin(), axes.end(), 0);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  noteSetpoints(client, axes, positions);
+  setpoints_.publish(message);
 }
 
 void DriverTopics::command(int client, const std::vector<std::size_t>& axes,

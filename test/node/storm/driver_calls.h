@@ -20,6 +20,10 @@ class DriverTopics {
 
   /// A message of a jog. It counts as a request only if it may begin a jog: after a pause or a 0.
   void jog(int client, std::size_t axis, double velocity);
+  /// Messages of setpoints, for one axis or for all. They count as a request of those axes for
+  /// which they may begin a stream: after a pause.
+  void setpoint(int client, std::size_t axis, double position);
+  void setpoints(int client, const std::vector<double>& positions);
   void command(int client, const std::vector<std::size_t>& axes,
                const std::vector<double>& positions, double duration);
   void followTrajectory(int client, const std::vector<std::size_t>& axes,
@@ -37,6 +41,10 @@ class DriverTopics {
     bool moves = false;
   };
 
+  /// Logs the message if it may begin streams.
+  void noteSetpoints(int client, const std::vector<std::size_t>& axes,
+                     const std::vector<double>& positions);
+
   RequestLog& log_;
   mutable std::mutex mutex_;
   ros::Publisher jog_;
@@ -45,7 +53,10 @@ class DriverTopics {
   ros::Publisher trajectory_cancel_;
   std::vector<ros::Publisher> move_goals_;
   std::vector<ros::Publisher> move_cancels_;
-  std::map<std::size_t, JogMessage> jogs_;  // the last message of each axis
+  ros::Publisher setpoints_;
+  std::vector<ros::Publisher> setpoint_;
+  std::map<std::size_t, JogMessage> jogs_;              // the last message of each axis
+  std::map<std::size_t, std::int64_t> setpoints_sent_;  // when the last one of each axis was sent
 };
 
 /// The driver's services, called by one client thread over connections that stay open. Each call is

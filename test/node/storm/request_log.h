@@ -13,7 +13,7 @@ namespace stepdriver::storm {
 enum class Kind {
   kMotion,  ///< begins a motion of its axes
   kHoming,  ///< begins a motion, and changes the origin of the positions
-  kJog,     ///< the first message of a jog, after a pause or a 0
+  kJog,     ///< the first message of a jog, after a pause or a 0, or of setpoints, after a pause
   kStop,
   kHold,
   kResume,

@@ -10,8 +10,9 @@ namespace stepdriver::storm {
 namespace {
 
 constexpr double kWaits = 0.3;
-constexpr double kLongestPause = 0.08;  // [s]
-constexpr double kJogPeriod = 0.04;     // [s]
+constexpr double kLongestPause = 0.08;    // [s]
+constexpr double kJogPeriod = 0.04;       // [s]
+constexpr double kSetpointPeriod = 0.02;  // [s]
 // Moves are short, so that there are many of them.
 constexpr double kLowest = 0.0;      // [m]
 constexpr double kHighest = 0.06;    // [m]
@@ -92,6 +93,7 @@ void StormClient::sendMotion() {
         }
       },
       [&] { jog(); },
+      [&] { streamSetpoints(); },
       [&] {
         // A homing takes a long time.
         if (!chance(0.2)) return;
@@ -171,6 +173,25 @@ void StormClient::jog() {
     sleepFor(kJogPeriod);
   }
   if (chance(0.5)) topics_.jog(number_, axis, 0.0);
+}
+
+// As with jogs, a stream that continues through a calm isn't a new one.
+void StormClient::streamSetpoints() {
+  const bool all = chance(0.3);
+  const std::size_t axis = anyAxis();
+  std::vector<double> positions;
+  for (std::size_t i = 0; i < kAxisNames.size(); ++i) positions.push_back(anyPosition());
+  const bool stubborn = chance(0.3);
+  const int messages = std::uniform_int_distribution<int>(1, 60)(random_);
+  for (int i = 0; i < messages && (storms() || stubborn); ++i) {
+    for (double& position : positions) position += between(-0.0002, 0.0004);
+    if (all) {
+      topics_.setpoints(number_, positions);
+    } else {
+      topics_.setpoint(number_, axis, positions[axis]);
+    }
+    sleepFor(kSetpointPeriod);
+  }
 }
 
 void StormClient::pressSwitch() {

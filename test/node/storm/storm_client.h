@@ -39,6 +39,7 @@ class StormClient {
   void sendPower();
   void sendEnding();
   void jog();
+  void streamSetpoints();
   void pressSwitch();
 
   bool storms() const { return weather_ == Weather::kStorm; }

@@ -43,6 +43,7 @@ AxisFacts setUpAxis(node_test::NodeUnderTest& node, const std::string& name,
 std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node) {
   node.set("simulation/speed", 1.0);
   node.set("jog_timeout", kJogTimeout);
+  node.set("setpoint/timeout", kJogTimeout);
   const auto pins = {"step", "dir", "ms1", "ms2", "ms3", "sleep", "reset"};
   std::vector<AxisFacts> facts;
   facts.push_back(setUpAxis(node, "x", pins, {100.0, 250.0, 0.0}));

@@ -8,7 +8,7 @@
 
 namespace stepdriver::storm {
 
-/// The timeout of the machine's jogs, in seconds.
+/// The timeout of the machine's jogs and setpoints, in seconds.
 constexpr double kJogTimeout = 0.2;
 
 /// Gives a node three linear axes of 20 steps/mm: x, with homing, switches, microstep pins, sleep

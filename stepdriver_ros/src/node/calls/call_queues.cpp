@@ -17,6 +17,7 @@ constexpr std::chrono::milliseconds kPoll{5};
 CallQueues::CallQueues(std::size_t axes)
     : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
       trajectories_(waiting_pool_, kTrajectoryThreads),
+      streams_(waiting_pool_, static_cast<int>(axes) + 1),
       recordings_(waiting_pool_, 1),
       control_(control_pool_, kControlThreads),
       stops_("stops"),

@@ -46,6 +46,8 @@ class CallQueues {
   ros::CallbackQueue& lines() { return lines_; }
   /// Trajectories: goals, messages, cancels and results. Planning one takes a while.
   ros::CallbackQueue& trajectories() { return trajectories_; }
+  /// Messages of setpoints. One that must wake its axes waits for them.
+  ros::CallbackQueue& streams() { return streams_; }
   /// Calls that write files, one after another.
   ros::CallbackQueue& recordings() { return recordings_; }
   /// Calls that enable or disable this axis.
@@ -73,6 +75,7 @@ class CallQueues {
   std::deque<PooledQueue> power_;
   PooledQueue lines_;
   PooledQueue trajectories_;
+  PooledQueue streams_;
   PooledQueue recordings_;
   PooledQueue control_;
   TriggerServer stops_;

@@ -35,8 +35,7 @@ JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, Ca
 void JogSubscriber::take(const boost::shared_ptr<const Bounded<Jog>>& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    const std::vector<std::size_t> axes = axesOf(*message);
-    for (std::size_t i = 0; i < axes.size(); ++i) jog(axes[i], message->velocity[i]);
+    jog(axesOf(*message), message->velocity);
   } catch (const Refused& refused) {
     ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", refused.what());
   }
@@ -66,44 +65,49 @@ std::vector<std::size_t> JogSubscriber::axesOf(const Jog& message) const {
   return axes;
 }
 
-void JogSubscriber::jog(std::size_t axis, double velocity) {
-  if (velocity == 0.0) {
-    streams_[axis] = Stream();
-    return end(axis);
+void JogSubscriber::jog(const std::vector<std::size_t>& axes,
+                        const std::vector<double>& velocities) {
+  std::vector<machine::StreamMessage> messages;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const axis::Axis& wanted = *machine_.axes()[axes[i]];
+    machine::StreamMessage& message = messages.emplace_back();
+    message.name = wanted.config().name;
+    message.value = velocities[i];
+    if (velocities[i] != 0.0) {
+      message.unless_stopped_since = streams_[axes[i]].stopsAtBegin(wanted, timeout_);
+    } else {
+      streams_[axes[i]].end();
+      heard_[axes[i]] = ros::SteadyTime();
+    }
   }
-  axis::Axis& wanted = *machine_.axes()[axis];
-  Stream& stream = streams_[axis];
-  const bool goes_on = !stream.last.isZero() && ros::SteadyTime::now() - stream.last < timeout_;
+  std::vector<std::string> refusals;
   try {
-    if (!goes_on) stream.stops = wanted.state().stops;
-    wanted.jog(velocity, stream.stops);
-    heard_[axis] = ros::SteadyTime::now();
-    poll_.begin();
+    refusals = machine_.jog(messages);
   } catch (const Error& error) {
-    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
+    refusals.assign(axes.size(), error.what());
   }
-  // The time after handling it: a call that had to wait is no pause of the stream.
-  stream.last = ros::SteadyTime::now();
-}
-
-void JogSubscriber::end(std::size_t axis) {
-  heard_[axis] = ros::SteadyTime();
-  try {
-    machine_.axes()[axis]->jog(0.0);
-  } catch (const Error& error) {
-    ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", error.what());
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (!refusals[i].empty()) {
+      ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", refusals[i].c_str());
+    } else if (velocities[i] != 0.0) {
+      heard_[axes[i]] = ros::SteadyTime::now();
+      poll_.begin();
+    }
+    if (velocities[i] != 0.0) streams_[axes[i]].noteHandled();
   }
 }
 
 bool JogSubscriber::endWhatIsOver() {
   const std::lock_guard<std::mutex> lock(mutex_);
   const ros::SteadyTime now = ros::SteadyTime::now();
+  std::vector<std::size_t> silent;
   for (std::size_t axis = 0; axis < heard_.size(); ++axis) {
     if (heard_[axis].isZero() || now - heard_[axis] < timeout_) continue;
+    silent.push_back(axis);
     ROS_INFO_NAMED("jog", "%s: no jog for %g s, so it comes to rest",
                    machine_.axes()[axis]->config().name.c_str(), timeout_.toSec());
-    end(axis);
   }
+  if (!silent.empty()) jog(silent, std::vector<double>(silent.size()));
   return std::any_of(heard_.begin(), heard_.end(),
                      [](const ros::SteadyTime& heard) { return !heard.isZero(); });
 }

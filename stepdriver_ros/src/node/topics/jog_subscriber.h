@@ -6,11 +6,11 @@
 #include <stepdriver/Jog.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "message_stream.h"
 #include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/periodic_poll.h"
@@ -19,9 +19,9 @@
 namespace stepdriver::ros_node {
 
 /// The topic ~jog. A message that can't be understood moves nothing; if one axis refuses its
-/// velocity, the others still move. Both are logged, at most once a second. A stream of messages
-/// does not continue after a stop of the axis: messages are refused until the stream has paused for
-/// the timeout or sent 0.
+/// velocity, the others still move, all from the same time on. Both are logged, at most once a
+/// second. A stream of messages does not continue after a stop of the axis: messages are refused
+/// until the stream has paused for the timeout or sent 0.
 class JogSubscriber {
  public:
   /// @param node the node's private handle.
@@ -33,24 +33,17 @@ class JogSubscriber {
   JogSubscriber& operator=(const JogSubscriber&) = delete;
 
  private:
-  /// Consecutive messages for one axis within the timeout.
-  struct Stream {
-    ros::SteadyTime last;     // time of its last message, refused or not; zero: there is no stream
-    std::uint64_t stops = 0;  // AxisState::stops when it began
-  };
-
   void take(const boost::shared_ptr<const Bounded<Jog>>& message);
   /// @return the indices of the axes that the message names. @throw Refused
   std::vector<std::size_t> axesOf(const Jog& message) const;
-  void jog(std::size_t axis, double velocity);
-  void end(std::size_t axis);
+  void jog(const std::vector<std::size_t>& axes, const std::vector<double>& velocities);
   /// @return whether there are axes that still jog.
   bool endWhatIsOver();
 
   machine::Machine& machine_;
   const ros::WallDuration timeout_;
   std::mutex mutex_;
-  std::vector<Stream> streams_;  // of each axis
+  std::vector<MessageStream> streams_;  // of each axis
   // Time of each axis's last accepted message; zero: there is no jog.
   std::vector<ros::SteadyTime> heard_;
   PeriodicPoll poll_;
