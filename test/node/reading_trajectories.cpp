@@ -167,6 +167,15 @@ TEST(ReadingTrajectories, HasNoLimitWhereNoToleranceIsGivenOrItIsLifted) {
   EXPECT_EQ(read.path.at(1), 0.01);
   EXPECT_TRUE(std::isinf(read.goal.at(0)) && std::isinf(read.goal.at(1)));
   EXPECT_TRUE(std::isinf(read.goal_time));
+  goal.path_tolerance[0].velocity = 0.5;
+  goal.goal_tolerance.resize(1);
+  goal.goal_tolerance[0].name = "elbow";
+  goal.goal_tolerance[0].velocity = 0.25;
+  const auto again = ros_node::readTolerances(goal);
+  EXPECT_TRUE(std::isinf(again.path_velocity.at(0)));
+  EXPECT_EQ(again.path_velocity.at(1), 0.5);
+  EXPECT_EQ(again.goal_velocity.at(0), 0.25);
+  EXPECT_TRUE(std::isinf(again.goal_velocity.at(1)));
 }
 
 TEST(ReadingTrajectories, RefusesTolerancesOfOtherJointsAndOfNoNumber) {
@@ -181,6 +190,11 @@ TEST(ReadingTrajectories, RefusesTolerancesOfOtherJointsAndOfNoNumber) {
   goal.goal_tolerance[0].position = std::numeric_limits<double>::quiet_NaN();
   expectBad(BadTrajectory::Kind::kInvalid,
             "goal_tolerance of the joint elbow is nan, but must be a number",
+            [&] { ros_node::readTolerances(goal); });
+  goal.goal_tolerance[0].position = 0.0;
+  goal.goal_tolerance[0].velocity = std::numeric_limits<double>::quiet_NaN();
+  expectBad(BadTrajectory::Kind::kInvalid,
+            "goal_tolerance's velocity of the joint elbow is nan, but must be a number",
             [&] { ros_node::readTolerances(goal); });
 }
 
@@ -210,6 +224,31 @@ TEST(ReadingTrajectories, SaysWhichJointIsTooFarOff) {
   EXPECT_EQ(ros_node::violation("goal_tolerance", joints, limits, {1.0, 0.02 + 0.4 / 80'000.0},
                                 {1.0, 0.02}),
             "slide is at 0.02 m, 0.000005 m from 0.020005 m; goal_tolerance is 1e-06 m");
+}
+
+TEST(ReadingTrajectories, SaysWhichJointHasAnotherVelocity) {
+  const std::vector<ros_node::TrajectoryJoint> joints{{"elbow", config::Kind::kRotary, 509.3},
+                                                      {"slide", config::Kind::kLinear, 80'000.0}};
+  const std::vector<double> limits{0.1, 1e-3};
+  const auto said = [&](const std::vector<double>& actual) {
+    return ros_node::velocityViolation("path_tolerance", joints, limits, {1.0, 0.02}, actual);
+  };
+  EXPECT_EQ(said({1.09, 0.0191}), "");
+  EXPECT_EQ(said({1.0, 0.0175}),
+            "slide moves at 0.0175 m/s, 0.0025 m/s from 0.02 m/s; path_tolerance is 0.001 m/s");
+}
+
+TEST(ReadingTrajectories, TakesVelocitiesOverATenthOfASecondOrALittleMore) {
+  ros_node::MeanVelocities means;
+  // At 1 per second by the plan, and a quarter of it lost.
+  for (int i = 0; i < 100; ++i) {
+    const double time = 5.0 + 0.03 * i;
+    const auto velocities = means.take(time, {{0.03 * i}, {0.0225 * i}});
+    ASSERT_EQ(velocities.has_value(), i >= 4) << i;
+    if (!velocities) continue;
+    EXPECT_NEAR(velocities->planned.at(0), 1.0, 1e-9);
+    EXPECT_NEAR(velocities->actual.at(0), 0.75, 1e-9);
+  }
 }
 
 // The figures are those of clients of control_msgs 1.5 (MoveIt, rosserial's libraries).

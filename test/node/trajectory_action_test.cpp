@@ -283,6 +283,24 @@ TEST_F(TrajectoryActionTest, StopsWhereItLeavesThePathTolerance) {
   EXPECT_EQ(node.pulses(), pulses);
 }
 
+TEST_F(TrajectoryActionTest, ComparesTheVelocityOfThePulsesWithThatOfThePlan) {
+  start(1.0);
+  Goal goal = there(0.15, 4.0);
+  goal.path_tolerance.emplace_back();
+  goal.path_tolerance.back().name = "x_joint";
+  goal.path_tolerance.back().velocity = 0.01 * kStep;
+  send(goal);
+  expectAborted(Result::PATH_TOLERANCE_VIOLATED, "x_joint moves at");
+  expectSays(said(), "path_tolerance is 1.25e-07 m/s");
+  EXPECT_LT(node.pulses(), 18000) << "not the whole way";
+  goal = goalOf({{1.0, {0.0, 0.0}, {0.0, 0.0}}});
+  goal.path_tolerance.emplace_back();
+  goal.path_tolerance.back().name = "x_joint";
+  goal.path_tolerance.back().velocity = 0.05;
+  goal.trajectory.points.back().time_from_start = ros::Duration(5.0);
+  EXPECT_EQ(run(goal), State::SUCCEEDED) << said();
+}
+
 TEST_F(TrajectoryActionTest, EndsAbortedOutsideTheGoalTolerance) {
   start();
   Goal goal = goalOf({{1.0, {0.02 + 0.3 * kStep, 0.01}, {0.0, 0.0}}});

@@ -80,6 +80,7 @@ FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
     following.wanted_duration = goal->trajectory.points.back().time_from_start.toSec();
   }
   following.goal = goal->trajectory.points.back().positions;
+  following.goal_velocity = goal->trajectory.points.back().velocities;
   following.began = ros::Time::now();
   return following;
 }
@@ -141,8 +142,12 @@ std::string TrajectoryAction::shortOfGoal(const Following& following,
     return fmt::format("it ended {} s later than planned; goal_time_tolerance is {} s",
                        roundedText(late), roundedText(following.tolerances.goal_time));
   }
-  return violation("goal_tolerance", following.joints, following.tolerances.goal, following.goal,
-                   result.positions);
+  std::string why = violation("goal_tolerance", following.joints, following.tolerances.goal,
+                              following.goal, result.positions);
+  if (!why.empty() || following.goal_velocity.empty()) return why;
+  return velocityViolation("goal_tolerance", following.joints, following.tolerances.goal_velocity,
+                           following.goal_velocity,
+                           std::vector<double>(following.goal_velocity.size()));
 }
 
 TrajectoryAction::Places TrajectoryAction::placesOf(const Following& following) const {
@@ -160,6 +165,12 @@ void TrajectoryAction::keepToPath(Following& following, const Places& places) {
   if (!following.violated.empty() || !following.preempted_by.empty()) return;
   following.violated = violation("path_tolerance", following.joints, following.tolerances.path,
                                  places.planned, places.actual);
+  const auto means = following.velocities.take(ros::SteadyTime::now().toSec(), places);
+  if (following.violated.empty() && means) {
+    following.violated =
+        velocityViolation("path_tolerance", following.joints, following.tolerances.path_velocity,
+                          means->planned, means->actual);
+  }
   if (!following.violated.empty()) stopMotion(following);
 }
 

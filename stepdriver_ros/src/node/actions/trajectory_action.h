@@ -23,7 +23,9 @@ struct FollowingTrajectory {
   machine::CoordinatedMove move;
   std::vector<TrajectoryJoint> joints;
   TrajectoryTolerances tolerances;
-  std::vector<double> goal;  // [unit] the last point
+  std::vector<double> goal;           // [unit] the last point
+  std::vector<double> goal_velocity;  // [unit/s] the last point's; empty: it gives none
+  MeanVelocities velocities;
   ros::Time began;
   std::optional<double> wanted_duration;  // [s] up to the last point; empty: its stamp isn't 0
   double slipped_before = 0.0;            // [s] slip of the machine's timeline
@@ -46,9 +48,7 @@ class TrajectoryAction
   using Following = FollowingTrajectory;
 
   /// The states of a goal's joints, in their order.
-  struct Places {
-    std::vector<double> planned;
-    std::vector<double> actual;
+  struct Places : JointPlaces {
     std::vector<double> velocities;
   };
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <deque>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "follow_joint_trajectory.h"
@@ -13,6 +16,8 @@ namespace stepdriver::ros_node {
 struct TrajectoryTolerances {
   std::vector<double> path;
   std::vector<double> goal;
+  std::vector<double> path_velocity;
+  std::vector<double> goal_velocity;
   double goal_time = 0.0;  ///< [s]
 };
 
@@ -26,10 +31,33 @@ struct TrajectoryJoint {
   double steps_per_unit = 1.0;
 };
 
+/// Where the joints are planned to be, and where their pulses have brought them.
+struct JointPlaces {
+  std::vector<double> planned;
+  std::vector<double> actual;
+};
+
+/// The mean velocities of the plan and of the pulses over the last tenth of a second, or a little
+/// more. A shorter time would only show how the pulses are spread.
+class MeanVelocities {
+ public:
+  /// @param now [s] on any clock.
+  /// @return empty until a tenth of a second has passed since the first call.
+  std::optional<JointPlaces> take(double now, const JointPlaces& places);
+
+ private:
+  std::deque<std::pair<double, JointPlaces>> past_;  // the first one is old enough, or the oldest
+};
+
 /// @param tolerance its name, for the sentence. @param limits, wanted, actual of each joint.
 /// @return a sentence about the first joint that is too far off; empty: there is none.
 std::string violation(const char* tolerance, const std::vector<TrajectoryJoint>& joints,
                       const std::vector<double>& limits, const std::vector<double>& wanted,
                       const std::vector<double>& actual);
+
+/// The same for velocities.
+std::string velocityViolation(const char* tolerance, const std::vector<TrajectoryJoint>& joints,
+                              const std::vector<double>& limits, const std::vector<double>& wanted,
+                              const std::vector<double>& actual);
 
 }  // namespace stepdriver::ros_node
