@@ -236,7 +236,9 @@ void Manoeuvre::order(Plans plans) {
     motion.overshoot = plans.planned[i].overshoot;
     motion.profile = plans.planned[i].profile;
     motion.order = open.follows;
-    motion.target = order.goal.target;
+    if (order.goal.kind != Goal::Kind::kSetpoint || order.goal.setpoint.of_position) {
+      motion.target = order.goal.target;
+    }
     motion.slows_down = mode_ == Mode::kStop;
     order.axis->motor.ordered(std::move(motion));
   }

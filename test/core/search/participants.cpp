@@ -600,11 +600,13 @@ void Participants::noteServed(Ask& asked) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     found->second.orders[axis] = ordered_[axis].size();
   }
-  if (!asked.relative) return;
-  for (std::size_t i = 0; i < asked.goals.size(); ++i) {
+  for (std::size_t i = 0; asked.relative && i < asked.goals.size(); ++i) {
     const std::optional<double> origin = relativeOrigin(asked.goals[i]);
     found->second.targets.push_back(origin ? std::optional(*origin + asked.ways[i]) : origin);
   }
+  const bool setpoints = std::holds_alternative<machine::FollowSetpoints>(asked.request);
+  for (const std::size_t axis : asked.parts) follows_setpoints_[axis] = setpoints;
+  for (const std::size_t axis : asked.goals) follows_setpoints_[axis] = false;
 }
 
 // The position at which the joint will come to rest from its present state; no value if that is
@@ -613,6 +615,8 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes.at(axis);
   if (!now.state.moving) return now.memory.position;
+  // It counts from the last setpoint, before which the timeout may stop the axis.
+  if (follows_setpoints_[axis]) return std::nullopt;
   const machine::AxisSnapshot::Motion& last = now.motions.back();
   if (!last.target && !last.slows_down) return std::nullopt;
   // Each turn on the way takes up the backlash again. The motor turns by whole microsteps.
