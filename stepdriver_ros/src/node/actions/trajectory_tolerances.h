@@ -31,7 +31,7 @@ struct TrajectoryJoint {
   double steps_per_unit = 1.0;
 };
 
-/// Where the joints are planned to be, and where their pulses have brought them.
+/// The positions of joints by the plan, and by their pulses.
 struct JointPlaces {
   std::vector<double> planned;
   std::vector<double> actual;
