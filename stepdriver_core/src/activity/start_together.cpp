@@ -41,6 +41,7 @@ Ack callOfAll(const std::vector<StartTogether::Start>& starts) {
     PendingCall call;  // ends first
   };
   std::vector<Ack> calls;
+  calls.reserve(starts.size());
   for (const StartTogether::Start& start : starts) calls.push_back(start.call);
   const auto all = std::make_shared<All>(std::move(calls));
   return {all, &all->call};

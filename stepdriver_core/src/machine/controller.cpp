@@ -543,6 +543,7 @@ void Controller::beginTogether(std::vector<activity::StartTogether::Start> start
   const auto begin = [this](std::vector<Start> group) {
     if (group.empty()) return;
     std::vector<Ack> calls;
+    calls.reserve(group.size());
     for (const Start& start : group) calls.push_back(start.call);
     try {
       activities_.begin(std::make_unique<activity::StartTogether>(context_, std::move(group)),
