@@ -604,9 +604,8 @@ void Participants::noteServed(Ask& asked) {
     const std::optional<double> origin = relativeOrigin(asked.goals[i]);
     found->second.targets.push_back(origin ? std::optional(*origin + asked.ways[i]) : origin);
   }
-  const bool setpoints = std::holds_alternative<machine::FollowSetpoints>(asked.request);
-  for (const std::size_t axis : asked.parts) follows_setpoints_[axis] = setpoints;
-  for (const std::size_t axis : asked.goals) follows_setpoints_[axis] = false;
+  if (!std::holds_alternative<machine::FollowSetpoints>(asked.request)) return;
+  for (const std::size_t axis : asked.parts) had_setpoints_[axis] = true;
 }
 
 // The position at which the joint will come to rest from its present state; no value if that is
@@ -615,8 +614,8 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes.at(axis);
   if (!now.state.moving) return now.memory.position;
-  // It counts from the last setpoint, before which the timeout may stop the axis.
-  if (follows_setpoints_[axis]) return std::nullopt;
+  // It may count from a setpoint, before which the timeout stops the axis.
+  if (had_setpoints_[axis]) return std::nullopt;
   const machine::AxisSnapshot::Motion& last = now.motions.back();
   if (!last.target && !last.slows_down) return std::nullopt;
   // Each turn on the way takes up the backlash again. The motor turns by whole microsteps.

@@ -265,7 +265,7 @@ class Participants {
   std::optional<std::size_t> never_in_position_;  // how many moves there were by then
   std::array<std::uint64_t, kAxes> last_move_{};
   std::array<std::vector<Ordered>, kAxes> ordered_;
-  std::array<bool, kAxes> follows_setpoints_{};
+  std::array<bool, kAxes> had_setpoints_{};
   std::array<bool, kAxes> steps_failed_{};
   std::array<bool, kAxes> chip_broke_{};
   std::uint64_t input_stops_ = 0;
