@@ -438,10 +438,11 @@ Controller::MayBegin Controller::goalOf(const Jog& wanted, const Ack& call) {
   axis::AxisModel& moved = axis(wanted.axis);
   moved.refuseUnlessFinite("velocity", wanted.velocity, "/s");
   const Goal* current = streamedGoal(moved);
+  const bool jogs = current != nullptr && current->kind == Goal::Kind::kJog;
   if (wanted.velocity == 0.0) {
     const bool waits = !moved.moving();
     for (Activity* at : {activities_.heir(moved), activities_.owner(moved)}) {
-      if (at != nullptr && at->isStreamed() && (current != nullptr || waits)) {
+      if (at != nullptr && at->isStreamed() && (jogs || waits)) {
         at->end({axis::MoveEnd::kStopped, "the jog ended"}, call);
       }
     }
@@ -456,7 +457,6 @@ Controller::MayBegin Controller::goalOf(const Jog& wanted, const Ack& call) {
   goal.kind = Goal::Kind::kJog;
   goal.velocity = wanted.velocity;
   limitVelocity(goal, moved, "jogs");
-  const bool jogs = current != nullptr && current->kind == Goal::Kind::kJog;
   if (jogs && !activities_.owner(moved)->motion()->slowsDown() &&
       current->velocity == wanted.velocity) {
     return std::nullopt;  // it does that already
@@ -502,7 +502,9 @@ Controller::MayBegin Controller::velocityGoal(const Setpoint& wanted, double tim
   axis::AxisModel& moved = axis(wanted.axis);
   moved.refuseTooFast(std::abs(wanted.value));
   // As with a jog, 0 leaves other motions alone.
-  if (wanted.value == 0.0 && streamedGoal(moved) == nullptr) return std::nullopt;
+  const Goal* current = streamedGoal(moved);
+  const bool follows = current != nullptr && current->kind == Goal::Kind::kSetpoint;
+  if (wanted.value == 0.0 && !follows) return std::nullopt;
   Goal goal;
   goal.kind = Goal::Kind::kSetpoint;
   goal.velocity = wanted.value;

@@ -316,6 +316,18 @@ TEST_F(Setpoints, AVelocityOfZeroLeavesOtherMotionsAlone) {
   expectClean();
 }
 
+TEST_F(Setpoints, TheEndOfAJogLeavesSetpointsAloneAndTheOtherWayRound) {
+  expectTaken(SetpointMode::kVelocity, 0.05);
+  advance(0.05);
+  x().jog(0.0);
+  advance(0.02);
+  EXPECT_NEAR(x().state().velocity, 0.05, 1e-9);
+  x().jog(0.05);
+  expectTaken(SetpointMode::kVelocity, 0.0);
+  advance(2.0 * kTimeout);
+  EXPECT_NEAR(x().state().velocity, 0.05, 1e-9);
+}
+
 // ---- other commands ----
 
 TEST_F(Setpoints, AStreamDoesNotContinueThroughWhatStopsTheAxis) {
