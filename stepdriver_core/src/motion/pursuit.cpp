@@ -10,7 +10,7 @@ namespace {
 
 // Of the acceleration, at least, however small a correction is.
 constexpr double kSoftest = 0.02;
-constexpr double kRounding = 1e-9;  // relative, of a speed
+constexpr double kSpeedRounding = 1e-9;  // relative
 
 // The motion as seen from the point.
 Profile relativeMove(const MotionState& from, const MovingPoint& point, const MotionLimits& limits,
@@ -64,7 +64,8 @@ std::vector<Piece> joinPoint(const MotionState& from, const MovingPoint& point,
   // The point leaves a motion behind it at its own speed, and comes towards one that is ahead.
   const bool behind = away * point.velocity < 0.0;
   double highest = behind ? spare : limits.max_speed + std::abs(point.velocity);
-  const double allowed = std::max(limits.max_speed, std::abs(from.velocity)) * (1.0 + kRounding);
+  const double allowed =
+      std::max(limits.max_speed, std::abs(from.velocity)) * (1.0 + kSpeedRounding);
   const auto join = [&](double softness) {
     std::vector<Piece> pieces =
         withPoint(relativeMove(from, point, limits, highest, softness), point);
