@@ -61,7 +61,7 @@ class SetpointTest : public testing::Test {
       return happened();
     });
   }
-  /// Where x is, by its pulses.
+  /// The position of x, by its pulses.
   std::int64_t steps() {
     const auto report = node.rig();
     return report.pulses_forward.at(0) - report.pulses_backward.at(0);
