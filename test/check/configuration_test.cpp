@@ -121,6 +121,48 @@ TEST_F(Configuration, HasTheFlightRecorder) {
   }
 }
 
+TEST_F(Configuration, HasTheMotorPower) {
+  const auto read = [&](const std::string& more) {
+    return readConfiguration(file(kAxis + more), BackendChoice::kAsInTheFile).options().motor_power;
+  };
+  EXPECT_FALSE(read(""));
+  const auto least = read("motor_power: {pin: P, on_ms: 200}\n");
+  ASSERT_TRUE(least);
+  EXPECT_EQ(least->line, "P");
+  EXPECT_TRUE(least->active_level);
+  EXPECT_EQ(least->on_ns, 200'000'000);
+  EXPECT_EQ(least->off_delay_ns, 0);
+  EXPECT_FALSE(least->feedback);
+  const auto all = read(
+      "motor_power:\n  {pin: P, active_level: low, on_ms: 0, off_delay_ms: 1.5, feedback: {pin: Q, "
+      "active_level: low, bias: pull_up}, feedback_timeout_ms: 20}\n");
+  ASSERT_TRUE(all && all->feedback);
+  EXPECT_FALSE(all->active_level);
+  EXPECT_EQ(all->off_delay_ns, 1'500'000);
+  EXPECT_EQ(all->feedback->line, "Q");
+  EXPECT_FALSE(all->feedback->active_level);
+  EXPECT_EQ(all->feedback->bias, Bias::kPullUp);
+  EXPECT_EQ(all->feedback_timeout_ns, 20'000'000);
+  for (const auto& [text, words] : std::vector<std::pair<std::string, std::string>>{
+           {"motor_power: {on_ms: 1}\n", "motor_power/pin: is missing"},
+           {"motor_power: {pin: P}\n", "motor_power/on_ms: is missing"},
+           {"motor_power: {pin: P, on_ms: -1}\n",
+            "motor_power/on_ms: is -1, but must be from 0 to 60000"},
+           {"motor_power: {pin: P, on_ms: 1, feedback: {pin: Q}}\n",
+            "motor_power/feedback/active_level: is missing"},
+           {"motor_power: {pin: P, on_ms: 1, feedback: {pin: P, active_level: low}}\n",
+            "which is used twice"},
+           {"motor_power: {pin: P, on_ms: 1, feedback_timeout_ms: 5}\n",
+            "motor_power/feedback_timeout_ms: is not known"}}) {
+    try {
+      read(text);
+      ADD_FAILURE() << "it was accepted: " << text;
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST_F(Configuration, HasTheHeartbeat) {
   const auto read = [&](const std::string& more) {
     return readConfiguration(file(kAxis + more), BackendChoice::kAsInTheFile).options().heartbeat;

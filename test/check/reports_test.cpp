@@ -127,9 +127,12 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   machine::MachineOptions options;
   options.emergency_stop = config::InputSwitch{"T", true, Bias::kAsIs};
   options.heartbeat = machine::HeartbeatConfig{"H"};
+  options.motor_power = config::MotorPowerConfig{};
+  options.motor_power->line = "P";
+  options.motor_power->feedback = config::InputSwitch{"Q", false};
   pins.clear();
   for (const NamedLine& line : linesOf({}, options)) pins += line.pin + "=" + line.line + " ";
-  EXPECT_EQ(pins, "emergency_stop=T heartbeat=H ");
+  EXPECT_EQ(pins, "emergency_stop=T motor_power=P motor_power/feedback=Q heartbeat=H ");
 }
 
 SystemFacts facts() {

@@ -24,6 +24,10 @@ class Dump {
   void add(const config::Pin& pin) { all(pin.line, pin.inverted); }
   void add(const config::InputSwitch& input) { all(input.line, input.active_level, input.bias); }
   void add(const machine::HeartbeatConfig& heartbeat) { all(heartbeat.line, heartbeat.rate); }
+  void add(const config::MotorPowerConfig& power) {
+    all(power.line, power.active_level, power.on_ns, power.off_delay_ns, power.feedback,
+        power.feedback_timeout_ns);
+  }
   void add(const config::FaultPin& fault) { all(fault.line, fault.bias, fault.ramps); }
   void add(const config::InPositionPin& in_position) {
     all(in_position.line, in_position.bias, in_position.timeout);
@@ -116,7 +120,8 @@ std::string dump(const ros_node::NodeConfig& config) {
   Dump dump;
   dump.all(static_cast<int>(config.backend), config.joint_state_rate, config.jog_timeout,
            config.max_lateness, config.write_timeout, config.enforce_realtime,
-           config.keep_cpus_awake, config.cpu, config.emergency_stop, config.heartbeat,
+           config.keep_cpus_awake, config.cpu, config.emergency_stop,
+           static_cast<int>(config.emergency_disable), config.heartbeat, config.motor_power,
            config.state_file, config.recorder.seconds, config.recorder.memory_mb,
            config.recorder.folder, config.recorder.keep, config.hardware_id, config.urdf_limits,
            config.publish_clock, config.stop_on_master_lost, config.allow_slower,

@@ -91,6 +91,7 @@ gpio: {backend: simulated}
 realtime: {}
 emergency_stop: {pin: Z, active_level: high}
 heartbeat: {pin: Y}
+motor_power: {pin: W, on_ms: 5.0, feedback: {pin: V, active_level: low}}
 simulation: {axes: {x: {}}}
 axes:
   x:)" + kAxisMap;
@@ -283,9 +284,10 @@ std::string wantedWords(const Parameter& parameter) {
 /// Whether the bases have the key: they have a map of each kind, and their axes are scaled in the
 /// first of the ways.
 bool isRequired(const Parameter& parameter) {
-  static const std::set<std::string> words = {
-      "required", "required with it", "no homing",   "no switch",       "no button",
-      "no brake", "no heartbeat",     "no steering", "by the mechanics"};
+  static const std::set<std::string> words = {"required",     "required with it", "no homing",
+                                              "no switch",    "no button",        "no brake",
+                                              "no heartbeat", "no relay",         "no feedback",
+                                              "no steering",  "by the mechanics"};
   return words.count(parameter.fallback) > 0;
 }
 

@@ -159,7 +159,8 @@ void startMachine(ros_node::NodeConfig config) {
   config.simulation.speed = 0.0;
   config.simulation.trace.clear();
   config.state_file.clear();
-  setup::Simulation simulation(config.axes, config.emergency_stop, config.simulation);
+  setup::Simulation simulation(config.axes, config.emergency_stop, config.motor_power,
+                               config.simulation);
   machine::MachineOptions options = config.options();
   options.threaded = false;
   machine::Machine machine(config.axes, simulation.backend(), simulation.clock(), options);

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
@@ -20,8 +21,7 @@ void runGpioTrace(const std::string& arguments) {
   if (std::system(command.c_str()) != 0) throw std::runtime_error(command + " failed");
 }
 
-machine::MachineOptions patient() {
-  machine::MachineOptions options;
+machine::MachineOptions patient(machine::MachineOptions options) {
   options.max_lateness = 60.0;
   options.record_seconds = 60.0;
   return options;
@@ -64,9 +64,14 @@ config::AxisConfig axisAt(const std::string& name, const std::string& model, con
 }
 
 KernelBench::KernelBench(const std::vector<config::AxisConfig>& axes, pulse::Nanoseconds guard)
+    : KernelBench(axes, {}, guard) {}
+
+KernelBench::KernelBench(const std::vector<config::AxisConfig>& axes,
+                         machine::MachineOptions options, pulse::Nanoseconds guard)
     : clock_(guard),
       backend_(gpio::makeLibgpiodBackend()),
-      machine_(std::make_unique<machine::Machine>(axes, *backend_, clock_, patient())) {}
+      machine_(std::make_unique<machine::Machine>(axes, *backend_, clock_,
+                                                  patient(std::move(options)))) {}
 
 std::int64_t KernelBench::count(const std::string& name) {
   const axis::Axis& of = machine_->axis(name);

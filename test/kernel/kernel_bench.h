@@ -50,6 +50,9 @@ class KernelBench {
   /// @param guard of the clock (pulse::SteadyClock).
   explicit KernelBench(const std::vector<config::AxisConfig>& axes,
                        pulse::Nanoseconds guard = 60'000);
+  /// @param options of the machine; its lateness and its recording are those of the other machines.
+  KernelBench(const std::vector<config::AxisConfig>& axes, machine::MachineOptions options,
+              pulse::Nanoseconds guard = 60'000);
 
   machine::Machine& machine() { return *machine_; }
   axis::Axis& axis(const std::string& name) { return machine_->axis(name); }

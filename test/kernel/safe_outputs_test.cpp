@@ -107,6 +107,52 @@ TEST_F(SafeOutputs, TheBrakeHoldsWhileThereIsNoCurrent) {
   }
 }
 
+TEST_F(SafeOutputs, TheMotorPowerComesFirstAndGoesLast) {
+  constexpr std::int64_t kOn = 40 * kMillisecond;
+  constexpr std::int64_t kRelease = 30 * kMillisecond;
+  constexpr std::int64_t kEngage = 20 * kMillisecond;
+  config::AxisConfig config = axisAt("z", "a4988", placeAt("board-0", 0));
+  config.brake = config::BrakeConfig{"board-0:3", true, kRelease, kEngage};
+  machine::MachineOptions options;
+  options.emergency_disable = machine::EmergencyDisable::kRamp;
+  options.motor_power = config::MotorPowerConfig{};
+  options.motor_power->line = "board-0:4";
+  options.motor_power->on_ns = kOn;
+  KernelBench bench({config}, options);
+  axis::Axis& z = bench.axis("z");
+  const axis::Move move = bench.start("z", 5000);
+  bench.awaitCount("z", 300);
+  bench.emergencyStop();
+  z.wait(move);
+  ASSERT_TRUE(bench.awaitLevel(0, 4, false));
+  bench.recover();
+  z.enable(true);
+  z.wait(bench.start("z", -50));
+  const KernelTrace seen = bench.finish("MotorPower");
+
+  const bool on = config.driver.enable_on;
+  const std::vector<LineEdge> enable = edgesFromRequest(seen, config.pins.enable.line);
+  const std::vector<LineEdge> brake = edgesFromRequest(seen, "board-0:3");
+  const std::vector<LineEdge> power = edgesFromRequest(seen, "board-0:4");
+  ASSERT_EQ(power.size(), 5U) << "on at the start, off after the stop, on again, off at the end";
+  EXPECT_FALSE(power.front().level);
+  for (std::size_t i = 1; i < power.size(); ++i) {
+    EXPECT_GT(since(enable, !on, power[i].time_ns), -1) << "the motor is enabled";
+    const std::int64_t engaged = since(brake, false, power[i].time_ns);
+    ASSERT_GT(engaged, -1) << "the brake is released";
+    EXPECT_TRUE(power[i].level || power[i].time_ns - engaged >= kEngage);
+  }
+  for (std::size_t i = 1; i < enable.size(); ++i) {
+    const std::int64_t there = since(power, true, enable[i].time_ns);
+    ASSERT_GT(there, 0) << "ENABLE changes without power";
+    EXPECT_TRUE(enable[i].level != on || enable[i].time_ns - there >= kOn);
+  }
+  for (const std::int64_t step : seen.times(seen.line(config.pins.step.line), true)) {
+    EXPECT_GT(since(power, true, step), 0) << "a step without power";
+    EXPECT_GT(since(brake, true, step), 0) << "a step against the brake";
+  }
+}
+
 /// A machine with a heartbeat in a process of its own, whose axis moves back and forth.
 class BeatingProcess {
  public:

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include "axis/axis_model.h"
 #include "call.h"
+#include "motor_power.h"
 #include "pulse/command.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -35,6 +37,7 @@ struct Outputs {
   std::vector<PinJob> pin_jobs;
   std::vector<std::pair<CallId, Reply>> answers;
   std::uint64_t clear_stops = 0;  ///< emergency stops up to this count are cleared
+  bool stops = false;             ///< an emergency stop, because the motor power is lost
 };
 
 /// The environment of activities: the axes, the state of the machine, the time of this turn, and
@@ -47,6 +50,7 @@ class Context : public AnswerSink {
   axis::InputLevels levels;
   axis::LineNames lines;
   std::vector<std::unique_ptr<axis::AxisModel>> axes;
+  MotorPower motor_power;
 
   /// @name Of this turn
   /// @{
@@ -59,6 +63,10 @@ class Context : public AnswerSink {
   /// Emergency stops that were handled, and those of them that were cleared.
   std::uint64_t stops_handled = 0;
   std::uint64_t stops_cleared = 0;
+  /// The count when the last ramp of an emergency stop began.
+  std::uint64_t stops_ramping = 0;
+  /// Whether an emergency stop was requested that the controller hasn't been told of.
+  bool hasUnknownStop() const { return stops_asked != std::max(stops_handled, stops_ramping); }
 
   pulse::Nanoseconds motionNow() const { return now - slipped; }
   std::uint64_t newGroup() { return ++groups_; }

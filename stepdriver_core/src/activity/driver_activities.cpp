@@ -34,11 +34,24 @@ std::unique_ptr<Step> powerStep(Context& context, axis::AxisModel& axis, bool on
 Steps BringUp::plan() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
+  const bool enables = axis.config.enable_on_start && axis.motor.pins().hasEnable();
+  const bool stopped = context().stops_asked != context().stops_handled || axis.fault;
+  // A fault of the power doesn't keep the machine from beginning: recover switches it on.
+  if ((enables || axis.motor.power().wantsEnabled()) && !stopped &&
+      context().motor_power.isWired()) {
+    add(steps, std::make_unique<RunStep>([this] { context().motor_power.switchOn(); }));
+    add(steps, std::make_unique<WaitStep>(
+                   context(), [] { return pulse::kNever; },
+                   [this] {
+                     const MotorPower& power = context().motor_power;
+                     return power.isThere() || !power.isWanted();
+                   }));
+  }
   if (const auto sequence = axis.motor.pins().bringUp(); sequence.size > 0) {
     add(steps, pinsStep(context(), axis, sequence));
   }
-  add(steps, std::make_unique<RunStep>([this, &axis] {
-        if (!axis.config.enable_on_start || !axis.motor.pins().hasEnable() || axis.fault) return;
+  add(steps, std::make_unique<RunStep>([this, &axis, enables] {
+        if (!enables || axis.fault) return;
         if (context().stops_asked != context().stops_handled) return;
         Steps enabling;
         add(enabling, powerStep(context(), axis, true));
@@ -52,6 +65,7 @@ Steps Enable::plan() {
   if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
   Steps steps = wakeSteps(context(), axis);
   if (axis.motor.power().wantsEnabled()) return steps;
+  append(steps, powerSteps(context(), axis));
   Steps enabling;
   add(enabling, powerStep(context(), axis, true));
   append(steps, braked(context(), axis, std::move(enabling)));
@@ -121,6 +135,8 @@ Steps GoIdle::plan() {
 Steps Recover::plan() {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
+  // It stays off for a motor that is to have no current.
+  if (axis.motor.power().wantsEnabled()) append(steps, powerSteps(context(), axis));
   if (axis.motor.pinsAreDoubtful()) {
     add(steps, pinsStep(context(), axis, axis.motor.restore()));
     // Each pin on the way back that the failed change did not reach is already right.
@@ -137,7 +153,7 @@ Steps Recover::plan() {
 
 bool Recover::isFaulty() {
   axis::AxisModel& axis = *axes().front();
-  if (!axis.config.fault || axis.motor.power().isAsleep()) return false;
+  if (!axis.config.fault || axis.motor.power().isAsleep() || !context().mode.powered) return false;
   const motor::MotorLines& lines = axis.motor.lines();
   for (std::size_t i = 0; i < lines.motors(); ++i) {
     if (lines.motorAt(i).fault < 0) continue;

@@ -222,6 +222,7 @@ void Manoeuvre::order(Plans plans) {
     follow.group = plans.path != nullptr ? group_ : 0;
     follow.stops = context_.stops_handled;
     follow.faults = axis.motor.state().faults();
+    follow.slows = slowsDown();
     follow.settles = mode_ == Mode::kRun;
     follow.still = orders_[i].goal.motors.still;
     follow.squares = orders_[i].goal.motors.square;
@@ -410,7 +411,7 @@ void Manoeuvre::refused() {
     if (slowsDown()) return calls_.clear();
   }
   // An emergency stop has come; its news will arrive soon, and end this.
-  if (context_.stops_asked != context_.stops_handled) return;
+  if (context_.hasUnknownStop()) return;
   tryAgain();
 }
 
@@ -545,9 +546,10 @@ void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
 }
 
 axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
-  const bool by_fault = why_.end == axis::MoveEnd::kFault;
+  const bool by_fault =
+      why_.end == axis::MoveEnd::kFault || why_.end == axis::MoveEnd::kEmergencyStop;
   auto [end, why] = endOf(*order.axis, order.goal, accepted_mode_ != Mode::kRun,
-                          {by_fault ? axis::MoveEnd::kFault : axis::MoveEnd::kStopped, why_.text});
+                          {by_fault ? why_.end : axis::MoveEnd::kStopped, why_.text});
   if (end == axis::MoveEnd::kCompanion) why = endedWith(*order.axis);
   return resultWith(context_, *order.axis, order.goal, end, why);
 }

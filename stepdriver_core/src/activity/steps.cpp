@@ -135,6 +135,29 @@ Steps wakeSteps(Context& context, axis::AxisModel& axis) {
   return braked(context, axis, std::move(steps));
 }
 
+// ---- the motor power ----
+
+void PowerStep::begin() {
+  if (context_.stops_asked != context_.stops_cleared) {
+    axis_.refuse("an emergency stop has come meanwhile");
+  }
+  axis_.refuseUnlessOpen();
+  context_.motor_power.switchOn();
+}
+
+bool PowerStep::look() {
+  const MotorPower& power = context_.motor_power;
+  if (power.isWanted()) return power.isThere();
+  if (power.failure().empty()) axis_.refuse("an emergency stop has come meanwhile");
+  throw GpioError(axis_.name() + ": " + power.failure());
+}
+
+Steps powerSteps(Context& context, axis::AxisModel& axis) {
+  Steps steps;
+  if (context.motor_power.isWired()) steps.push_back(std::make_unique<PowerStep>(context, axis));
+  return steps;
+}
+
 // ---- the brake ----
 
 void EngageBrakeStep::begin() {

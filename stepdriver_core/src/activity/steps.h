@@ -115,6 +115,20 @@ class ReleaseBrakeStep : public BrakeStep {
   pulse::Nanoseconds due() const override;
 };
 
+/// Switches the motor power on, if it isn't, and waits until it is there.
+class PowerStep : public Step {
+ public:
+  PowerStep(Context& context, axis::AxisModel& axis) : context_(context), axis_(axis) {}
+  /// @throw Refused if there was an emergency stop, or if the machine was closed.
+  void begin() override;
+  /// @throw GpioError if it can't be switched on. @throw Refused as above, meanwhile.
+  bool look() override;
+
+ private:
+  Context& context_;
+  axis::AxisModel& axis_;
+};
+
 /// Follows a motion to its end.
 class FollowStep : public Step {
  public:
@@ -155,6 +169,8 @@ std::unique_ptr<Step> pinsStep(Context& context, axis::AxisModel& axis,
 /// times of the chip are over. Every such sequence passes here. Without a brake the steps stay as
 /// they are.
 Steps braked(Context& context, axis::AxisModel& axis, Steps steps);
+/// Brings the motor power; does nothing if nothing switches it.
+Steps powerSteps(Context& context, axis::AxisModel& axis);
 /// Engages the brake, if there is one.
 Steps engageSteps(Context& context, axis::AxisModel& axis);
 /// Switches an idle motor's current on, and releases its brake; does nothing if neither is needed.

@@ -323,7 +323,7 @@ void AxisModel::distrust() {
 
 bool AxisModel::motorHolds() const {
   const motor::Power& power = motor.power();
-  return power.isEnabled() && !power.isAsleep() && !fault && mode.closed.empty();
+  return power.isEnabled() && mode.powered && !power.isAsleep() && !fault && mode.closed.empty();
 }
 
 bool AxisModel::mustWake() const {

@@ -133,8 +133,8 @@ class AxisModel {
   /// @name The driver chip
   /// @{ The motor was without current for a while.
   void noteUnpowered();
-  /// Whether the motor holds the load, and the brake may be released: it has current, there is no
-  /// fault, and the machine wasn't shut down.
+  /// Whether the motor holds the load, and the brake may be released: it has current and power,
+  /// there is no fault, and the machine wasn't shut down.
   bool motorHolds() const;
   /// Whether something must be done before a motion of an axis that is ready to move: it is idle,
   /// or its brake is engaged.

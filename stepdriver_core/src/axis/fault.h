@@ -22,13 +22,13 @@ class Fault {
     what_ = std::move(what);
     remedy_ = std::move(remedy);
   }
-  /// The emergency stop that ends a hang of the pulse thread doesn't hide the reason.
-  void latchHang(std::string what, std::string remedy) {
+  /// A fault of the whole machine, which makes an emergency stop: that doesn't hide the reason.
+  void latchOfMachine(std::string what, std::string remedy) {
     latch(std::move(what), std::move(remedy));
-    hangs_ = true;
+    of_machine_ = true;
   }
   void latchEmergencyStop(bool by_input) {
-    if (what_ == kEmergencyStopInput || (hangs_ && !by_input)) return;
+    if (what_ == kEmergencyStopInput || (of_machine_ && !by_input)) return;
     if (by_input) {
       latch(kEmergencyStopInput, "release the button, then call recover");
     } else {
@@ -38,13 +38,13 @@ class Fault {
   void clear() {
     what_.clear();
     remedy_.clear();
-    hangs_ = false;
+    of_machine_ = false;
   }
 
  private:
   std::string what_;
   std::string remedy_;
-  bool hangs_ = false;
+  bool of_machine_ = false;
 };
 
 }  // namespace stepdriver::axis

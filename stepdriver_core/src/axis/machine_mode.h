@@ -8,7 +8,9 @@ namespace stepdriver::axis {
 struct MachineMode {
   bool held = false;            ///< by a feed hold, moving or not, until resume or stop
   double speed_override = 1.0;  ///< of all velocities
-  std::string closed;           ///< why every command is refused; empty: the machine is open
+  /// The motors' power is there, or nothing switches it. Only activity::MotorPower changes this.
+  bool powered = true;
+  std::string closed;  ///< why every command is refused; empty: the machine is open
 };
 
 }  // namespace stepdriver::axis

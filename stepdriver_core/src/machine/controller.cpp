@@ -35,6 +35,8 @@ constexpr const char* kChipRemedy =
 constexpr const char* kPositionRemedy =
     "check what blocks the motor, and its encoder, then call recover, and home it or set its "
     "position";
+constexpr const char* kPowerRemedy =
+    "check the relay, its supply and fuse, and the wiring of the feedback, then call recover";
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
     "call "
@@ -71,13 +73,15 @@ void refuseBadNumber(const axis::AxisModel& axis, const char* what, double value
 Controller::Controller(const std::vector<config::AxisConfig>& axes,
                        const std::vector<motor::MotorLines>& lines, axis::LineNames names,
                        const std::optional<pulse::Signal>& emergency_stop,
-                       EmergencyDisable emergency_disable)
+                       EmergencyDisable emergency_disable, activity::MotorPower motor_power)
     : context_(names.inputs.size()),
       activities_(context_),
       emergency_stop_(emergency_stop),
       emergency_disable_(emergency_disable) {
   context_.out = &last_;
   context_.lines = std::move(names);
+  context_.motor_power = std::move(motor_power);
+  context_.mode.powered = context_.motor_power.isThere();
   for (std::size_t i = 0; i < axes.size(); ++i) {
     context_.axes.push_back(std::make_unique<axis::AxisModel>(
         axes[i], lines[i], static_cast<int>(i), context_.mode, context_.levels, context_.lines));
@@ -111,6 +115,8 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   std::visit([this](const auto& what) { on(what); }, input.what);
   activities_.look();
   supervise();
+  while (supervisePower()) {
+  }
   context_.pin_done.reset();
   for (const auto& axis : context_.axes) axis->rememberRest();
   if (!awaiting_rest_.empty()) {
@@ -123,7 +129,7 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
 }
 
 pulse::Nanoseconds Controller::due() const {
-  pulse::Nanoseconds due = activities_.due();
+  pulse::Nanoseconds due = std::min(activities_.due(), context_.motor_power.due());
   for (const auto& axis : context_.axes) due = std::min(due, idleDue(*axis));
   return due;
 }
@@ -137,14 +143,22 @@ void Controller::on(const EngineNews& news) {
 
 void Controller::takeStops(const EngineNews& news) {
   const bool by_input = news.input_stops != input_stops_seen_;
+  const auto latch = [&] {
+    for (const auto& axis : context_.axes) {
+      if (!axis->fault) axis->noteStop();
+      axis->fault.latchEmergencyStop(by_input);
+    }
+  };
+  if (news.stops_ramping != context_.stops_ramping) {
+    context_.stops_ramping = news.stops_ramping;
+    latch();
+  }
   if (news.stops_served == context_.stops_handled) return;
   context_.stops_handled = news.stops_served;
   input_stops_seen_ = news.input_stops;
-  disables_all_ = emergency_disable_ == EmergencyDisable::kOff;
-  for (const auto& axis : context_.axes) {
-    if (!axis->fault) axis->noteStop();
-    axis->fault.latchEmergencyStop(by_input);
-  }
+  disables_all_ = emergency_disable_ != EmergencyDisable::kHold;
+  context_.motor_power.stopped(context_);
+  latch();
 }
 
 void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
@@ -156,7 +170,8 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     axis.distrust();
     axis.motor.doubtPins();
   }
-  if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep()) {
+  if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep() &&
+      context_.mode.powered) {
     const driver::DriverChip& chip = axis.config.driver;
     axis.fault.latch(fmt::format("{} reports a fault on {}, such as over-current or "
                                  "over-temperature",
@@ -192,7 +207,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
 void Controller::on(const EngineHangs& hang) {
   const std::string text = textOf(hang.line);
   for (const auto& axis : context_.axes) {
-    axis->fault.latchHang(text, "then call recover");
+    axis->fault.latchOfMachine(text, "then call recover");
     axis->position.distrust();
     axis->noteStop();
   }
@@ -241,6 +256,35 @@ void Controller::supervise() {
   }
   disables_all_ = false;
   activities_.look();
+}
+
+// @return whether it has got on: the activities have looked at it.
+bool Controller::supervisePower() {
+  activity::MotorPower& power = context_.motor_power;
+  if (!power.look(context_, motorsMayLosePower())) return false;
+  if (const std::string failure = power.takeFailure(); !failure.empty()) {
+    context_.out->stops = true;
+    for (const auto& axis : context_.axes) {
+      axis->fault.latchOfMachine(failure, kPowerRemedy);
+      axis->noteStop();
+    }
+  }
+  activities_.look();
+  supervise();
+  return true;
+}
+
+// Each brake that can be engaged holds by now, and each motor that must be disabled is.
+bool Controller::motorsMayLosePower() const {
+  return std::all_of(context_.axes.begin(), context_.axes.end(), [this](const auto& axis) {
+    const motor::Brake& brake = axis->motor.brake();
+    if (axis->moving() || brake.isReleased() || context_.now < brake.settles()) return false;
+    if (!context_.mode.closed.empty()) return activities_.isFree(*axis);
+    for (const Activity* busy : {activities_.owner(*axis), activities_.heir(*axis)}) {
+      if (busy != nullptr && busy->work() == Activity::Work::kDisables) return false;
+    }
+    return true;
+  });
 }
 
 pulse::Nanoseconds Controller::idleDue(const axis::AxisModel& axis) const {
@@ -929,6 +973,7 @@ void Controller::serve(const PowerDown& /*wanted*/, const Ack& call) {
       activities_.begin(std::make_unique<activity::EngageBrake>(context_, *axis, call), why);
     }
   }
+  context_.motor_power.switchOff(context_.now, call);
 }
 
 // ---- what readers see ----
@@ -938,7 +983,9 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   const Activity* owner = activities_.owner(axis);
   AxisSnapshot shown;
   axis::AxisState& state = shown.state;
-  state.enabled = power.isEnabled();
+  state.enabled = power.isEnabled() && context_.mode.powered;
+  state.powered = context_.mode.powered;
+  state.brake_engaged = axis.motor.brake().isWired() && !axis.motor.brake().isReleased();
   state.asleep = power.isAsleep();
   state.idle = power.isIdle();
   state.moving = axis.moving();

@@ -21,8 +21,8 @@ class Controller {
  public:
   Controller(const std::vector<config::AxisConfig>& axes,
              const std::vector<motor::MotorLines>& lines, axis::LineNames names,
-             const std::optional<pulse::Signal>& emergency_stop,
-             EmergencyDisable emergency_disable);
+             const std::optional<pulse::Signal>& emergency_stop, EmergencyDisable emergency_disable,
+             activity::MotorPower motor_power = {});
   ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
@@ -33,7 +33,9 @@ class Controller {
   /// Clock time by which it needs a TimerDue.
   pulse::Nanoseconds due() const;
   /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
-  bool watchesInputs() const { return activities_.watchInputs(); }
+  bool watchesInputs() const {
+    return activities_.watchInputs() || context_.motor_power.watchesInputs();
+  }
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
 
@@ -117,6 +119,8 @@ class Controller {
   void take(axis::AxisModel& axis, const pulse::ChannelState& state);
   void takeStops(const EngineNews& news);
   void supervise();
+  bool supervisePower();
+  bool motorsMayLosePower() const;
   void superviseIdle(axis::AxisModel& axis);
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
   AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;

@@ -90,6 +90,9 @@ std::vector<Recording::Pin> pinsOf(const std::vector<config::AxisConfig>& axes,
       pins.push_back({axis.name, "brake", lines.brake, !axis.brake->release_level});
     }
   }
+  if (wiring.motor_power) {
+    pins.push_back({"machine", "motor_power", wiring.motor_power->output, true});
+  }
   if (wiring.heartbeat) pins.push_back({"machine", "heartbeat", wiring.heartbeat->output, true});
   return pins;
 }

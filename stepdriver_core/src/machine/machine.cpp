@@ -58,8 +58,12 @@ class Machine::Impl {
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness),
                                                    wiring.emergency_stop, wiring.shared);
-    controller_ = std::make_unique<Controller>(configs, wiring.motor_lines, names_,
-                                               wiring.emergency_stop, options.emergency_disable);
+    controller_ =
+        std::make_unique<Controller>(configs, wiring.motor_lines, names_, wiring.emergency_stop,
+                                     options.emergency_disable, wiring.motorPower(options));
+    if (options.emergency_disable == EmergencyDisable::kRamp) {
+      engine_->rampStops(longestRamp(configs));
+    }
     if (wiring.heartbeat) engine_->beat(*wiring.heartbeat);
     if (options.record_seconds > 0.0) {
       recorder_ = std::make_unique<FlightRecorder>(

@@ -163,6 +163,7 @@ struct Requested {
 /// The state of the pulse engine: its emergency stops, and then all its channels.
 struct EngineNews {
   std::uint64_t stops_served = 0;
+  std::uint64_t stops_ramping = 0;  ///< PulseEngine::stopsRamping()
   std::uint64_t input_stops = 0;
   std::vector<pulse::ChannelState> channels;
 };

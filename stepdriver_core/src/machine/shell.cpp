@@ -349,7 +349,7 @@ void Shell::watchPulses() {
   if (!pulse_thread_->isBlocked()) looks_in_vain_ = 0;
   if (++looks_in_vain_ != most_looks_in_vain_) return;
   // When the chip answers again, the motions don't continue.
-  engine_.emergencyStop();
+  engine_.stopAtOnce();
   const pulse::LineFailure line = engine_.lineAtWork();
   const std::string why = controller_.textOf(line);
   {
@@ -368,30 +368,34 @@ pulse::Nanoseconds Shell::alarm() const {
 
 // Without threads.
 void Shell::settle() {
+  bool fed = false;
   do {
     while (turn()) {
     }
     engine_due_ = engine_.serve();
-    if (controller_.watchesInputs()) feedInputs();
-  } while (news_.load(std::memory_order_acquire) || !reads_.empty());
+    fed = controller_.watchesInputs() && feedInputs();
+  } while (fed || news_.load(std::memory_order_acquire) || !reads_.empty());
 }
 
-void Shell::feedInputs() {
-  if (inputs_ == 0) return;
+// @return whether the controller was told anything.
+bool Shell::feedInputs() {
+  if (inputs_ == 0) return false;
+  bool fed = false;
   std::array<gpio::EdgeEvent, 16> events{};
   for (int count = 1; count > 0;) {
     count = lines_->waitForEdges(0, events.data(), events.size());
     for (int i = 0; i < count; ++i) handle(InputEdge{events.at(static_cast<std::size_t>(i))});
+    fed = fed || count > 0;
   }
   const InputReading reading = readInputs();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     queue(reading);
   }
-  feedWhatIsWatched();
+  return feedWhatIsWatched() || fed;
 }
 
-void Shell::feedWhatIsWatched() {
+bool Shell::feedWhatIsWatched() {
   std::vector<InputRead> reads;
   std::vector<gpio::EdgeEvent> edges;
   {
@@ -401,6 +405,7 @@ void Shell::feedWhatIsWatched() {
   }
   for (const gpio::EdgeEvent& edge : edges) handle(InputEdge{edge});
   for (const InputRead& read : reads) handle(read);
+  return !edges.empty() || !reads.empty();
 }
 
 // @return whether there was anything to do.
@@ -434,6 +439,7 @@ bool Shell::turn() {
 bool Shell::takeNews() {
   if (!news_.exchange(false, std::memory_order_acq_rel)) return false;
   EngineNews news;
+  news.stops_ramping = engine_.stopsRamping();
   news.stops_served = engine_.stopsServed();
   news.input_stops = engine_.inputStops();
   for (std::size_t i = 0; i < posted_.size(); ++i) {
@@ -471,6 +477,7 @@ void Shell::carryOut(const Input& input, activity::Outputs& out) {
     ++turns_;
   }
   answered_.notify_all();
+  if (out.stops) engine_.stopAtOnce();
   if (out.clear_stops != 0) {
     engine_.clearEmergencyStop(out.clear_stops);
     engine_.inputsChanged();

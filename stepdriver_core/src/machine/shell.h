@@ -98,8 +98,8 @@ class Shell : public pulse::NewsListener {
   /// Queues what the controller must be told of it. Call it with the mutex. @return whether that is
   /// anything.
   bool queue(const InputReading& reading);
-  void feedInputs();
-  void feedWhatIsWatched();
+  bool feedInputs();
+  bool feedWhatIsWatched();
   bool turn();
   bool takeNews();
   void handle(decltype(Input::what) what);

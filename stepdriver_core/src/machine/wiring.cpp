@@ -54,6 +54,28 @@ Wiring::Wiring(const std::vector<config::AxisConfig>& axes, const MachineOptions
                                      nanoseconds(0.5 / options.heartbeat->rate)};
     outputs.push_back({options.heartbeat->line, false, false});
   }
+  if (const auto& power = options.motor_power) {
+    motor_power.emplace();
+    motor_power->output = static_cast<int>(outputs.size());
+    outputs.push_back({power->line, !power->active_level, false});
+    if (power->feedback) {
+      motor_power->feedback = static_cast<int>(inputs.size());
+      inputs.push_back({power->feedback->line, power->feedback->bias, true});
+    }
+  }
+}
+
+pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes) {
+  double longest = 0.0;
+  for (const config::AxisConfig& axis : axes) {
+    const double deceleration = axis.stop_deceleration.value_or(axis.deceleration);
+    double time = axis.max_speed / deceleration;
+    if (axis.jerk > 0.0) {
+      time += (deceleration + std::max(axis.acceleration, axis.deceleration)) / axis.jerk;
+    }
+    longest = std::max(longest, time);
+  }
+  return nanoseconds(1.1 * longest + 0.1);
 }
 
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,

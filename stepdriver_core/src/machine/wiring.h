@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "activity/motor_power.h"
 #include "motor/motor_lines.h"
 #include "pulse/heartbeat.h"
 #include "pulse/pulse_engine.h"
@@ -25,6 +26,17 @@ struct Wiring {
   std::vector<pulse::SharedAxes> shared;
   std::optional<pulse::Signal> emergency_stop;
   std::optional<pulse::HeartbeatLine> heartbeat;
+  std::optional<activity::MotorPowerLines> motor_power;
+
+  /// @param options those that it was made of.
+  activity::MotorPower motorPower(const MachineOptions& options) const {
+    if (!motor_power) return {};
+    return {*options.motor_power, *motor_power};
+  }
 };
+
+/// How long the ramp of an emergency stop may take: the longest deceleration from the top speed of
+/// any axis, with a margin for the way to a whole microstep and for pulses that are late.
+pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes);
 
 }  // namespace stepdriver::machine

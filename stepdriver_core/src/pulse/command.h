@@ -31,6 +31,8 @@ struct Follow {
   /// ChannelState::faults() as it was known when this was planned. If a fault has come since, this
   /// one is refused.
   std::uint64_t faults = 0;
+  /// It brings the channel to rest: it is followed also in the ramp of an emergency stop.
+  bool slows = false;
   /// At its end it waits for the in-position outputs, if the channel has any.
   bool settles = false;
   /// @name Of an order from rest, for an axis with several motors; profiles that continue it keep

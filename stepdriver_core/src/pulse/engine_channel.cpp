@@ -57,6 +57,7 @@ void EngineChannel::adopt(const Successors::Entry& followed) {
 void EngineChannel::follow(const Follow& order) {
   restart_interval = order.restart_interval;
   group = order.group;
+  slows = order.slows;
   if (profile == nullptr) {
     state.still = order.still;
     squares = order.squares;

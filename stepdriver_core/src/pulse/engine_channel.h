@@ -92,6 +92,7 @@ struct EngineChannel {
   MotorSet toggled = 0;  // both edges are steps, and these motors' lines are at their active level
   bool squares = false;  // the current motion does
   bool running = false;  // the current motion has made a step
+  bool slows = false;    // the last order brings it to rest
   bool changed = false;  // it must be scheduled
   MotorSet faulty = 0;   // by the last readings of the fault lines
   bool unchecked = false;  // its fault line must be read before the next step

@@ -103,7 +103,8 @@ Nanoseconds PulseEngine::serve() {
   scheduleChanged();
   serveStops();
   tell();
-  return heartbeat_ ? std::min(dues_.earliest(), heartbeat_->due()) : dues_.earliest();
+  const Nanoseconds due = std::min(dues_.earliest(), rampDue());
+  return heartbeat_ ? std::min(due, heartbeat_->due()) : due;
 }
 
 void PulseEngine::tell() {
@@ -173,7 +174,7 @@ bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const bool late = start < now - state_.slipped || start < channel.madeUntil();
   return !late && !channel.isReserved() && order.continues == channel.latest() &&
          channel.successors.hasRoom(start) && order.faults == channel.state.faults() &&
-         order.stops == stopsAsked() && !emergencyStopped();
+         (emergencyStopped() ? order.slows && isRamping() : order.stops == stopsAsked());
 }
 
 // ---- inputs and emergency stops ----
@@ -184,8 +185,15 @@ std::uint64_t PulseEngine::emergencyStop() {
   return asked;
 }
 
+std::uint64_t PulseEngine::stopAtOnce() {
+  const std::uint64_t asked = stops_.ask();
+  at_once_.store(asked, std::memory_order_release);
+  clock_.wake();
+  return asked;
+}
+
 // Every motion has ended by now if its stop was requested before this pass; the pulses of that time
-// may still be high.
+// may still be high. Or a ramp was to be made, and has ended.
 void PulseEngine::serveStops() {
   const std::uint64_t asked = stopsAsked();
   if (asked == stopsServed()) return;
@@ -207,16 +215,49 @@ void PulseEngine::readEmergencyStop() {
   const bool active = level < 0 || (level != 0) == emergency_input_->active;
   // If it is still active after a clear, that is another stop.
   if (active && !(emergency_input_active_ && emergencyStopped())) {
+    const bool ramps = isRamping();
     input_stops_.fetch_add(1, std::memory_order_release);
     stops_.ask();
+    if (ramps) ++ramps_until_stop_;
   }
   emergency_input_active_ = active;
 }
 
 void PulseEngine::stopAll(Nanoseconds now) {
+  if (mayRamp(now)) return;
   for (Channel& channel : channels_) {
     if (channel.profile != nullptr) end(channel, EndReason::kEmergencyStop, now);
   }
+}
+
+bool PulseEngine::isRamping() const {
+  return stopsRamping() > stopsServed() && ramps_until_stop_ == stopsAsked() &&
+         at_once_.load(std::memory_order_acquire) <= stopsServed();
+}
+
+bool PulseEngine::allSlow() const {
+  return std::all_of(channels_.begin(), channels_.end(), [](const Channel& channel) {
+    return channel.profile == nullptr || channel.slows;
+  });
+}
+
+// Begins the ramp of a new stop. Returns whether the motions may decelerate.
+bool PulseEngine::mayRamp(Nanoseconds now) {
+  if (longest_ramp_ == 0 || stopsAsked() == stopsServed()) return false;
+  if (stopsRamping() <= stopsServed()) {
+    ramps_until_stop_ = stopsAsked();
+    ramp_began_ = now;
+    ramping_.store(ramps_until_stop_, std::memory_order_release);
+    news_ = true;
+  }
+  return isRamping() && now < ramp_began_ + longest_ramp_ &&
+         (now < ramp_began_ + kRampBegins || allSlow());
+}
+
+// When the ramp must be looked at again.
+Nanoseconds PulseEngine::rampDue() const {
+  if (longest_ramp_ == 0 || !isRamping()) return kNever;
+  return ramp_began_ + (allSlow() ? longest_ramp_ : std::min(kRampBegins, longest_ramp_));
 }
 
 void PulseEngine::readInputs(Nanoseconds now) {

@@ -74,6 +74,8 @@ class PulseEngine {
 
   /// The shortest interval after a late step, as a part of the planned one.
   static constexpr double kClosest = 0.75;
+  /// From an emergency stop with a ramp until each channel must have an order to decelerate.
+  static constexpr Nanoseconds kRampBegins = 100'000'000;
 
   /// Does what is due. @return the clock time at which it must be called again, which may be in the
   /// past.
@@ -94,6 +96,15 @@ class PulseEngine {
   ///
   /// @return the count of requested stops, including this one.
   std::uint64_t emergencyStop();
+  /// The same, and ends a ramp. @return as above
+  std::uint64_t stopAtOnce();
+  /// Emergency stops let the axes decelerate first, but not for longer than this. The listener must
+  /// order that: a channel that has no order for it (Follow::slows) by kRampBegins is stopped
+  /// at once, like each channel after this time or at another call of emergencyStop(). The input
+  /// ends no ramp, because its contacts bounce. Set before the first serve().
+  void rampStops(Nanoseconds longest) { longest_ramp_ = longest; }
+  /// The count of requested stops when the last ramp began.
+  std::uint64_t stopsRamping() const { return ramping_.load(std::memory_order_acquire); }
   std::uint64_t stopsAsked() const { return stops_.asked(); }
   std::uint64_t stopsServed() const { return stops_.served(); }
   /// @param served a count that stopsServed() has returned: all stops up to it are cleared.
@@ -144,6 +155,10 @@ class PulseEngine {
   // Inputs and emergency stops.
   void serveStops();
   void stopAll(Nanoseconds now);
+  bool mayRamp(Nanoseconds now);
+  bool isRamping() const;
+  bool allSlow() const;
+  Nanoseconds rampDue() const;
   void readInputs(Nanoseconds now);
   void readEmergencyStop();
   void readFault(Channel& channel, Nanoseconds now);
@@ -206,6 +221,11 @@ class PulseEngine {
 
   StopCounts stops_;
   std::atomic<std::uint64_t> input_stops_{0};
+  std::atomic<std::uint64_t> at_once_{0};  // stops up to this count have no ramp
+  std::atomic<std::uint64_t> ramping_{0};  // count of stops at the beginning of the last ramp
+  std::uint64_t ramps_until_stop_ = 0;     // the ramp ends at a stop with a higher count
+  Nanoseconds longest_ramp_ = 0;           // 0: no ramp
+  Nanoseconds ramp_began_ = 0;
   NewsListener* listener_ = nullptr;
   PinRing* ring_ = nullptr;
   std::optional<Heartbeat> heartbeat_;

@@ -8,7 +8,8 @@ namespace {
 
 std::unique_ptr<Simulation> makeSimulation(const MachineConfig& config, const std::string& name) {
   try {
-    return std::make_unique<Simulation>(config.axes, config.emergency_stop, config.simulation);
+    return std::make_unique<Simulation>(config.axes, config.emergency_stop, config.motor_power,
+                                        config.simulation);
   } catch (const Error& error) {
     const std::string key = "simulation/trace";
     throw ConfigError(

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <optional>
 #include <utility>
 
 #include "config/read_axes.h"
@@ -23,7 +25,9 @@ constexpr double kLongestTimeoutMs = 60'000.0;
 constexpr Range kRecordedSeconds{0.0, 600.0};
 constexpr Range kRecorderMemory{1.0, 1000.0};
 constexpr Range kHeartbeatRates{1.0, 1000.0};  // Hz
-constexpr int kMostProcessors = 1024;          // CPU_SETSIZE of the C library
+constexpr Range kPowerTimesMs{0.0, 60'000.0};
+constexpr Range kFeedbackTimeoutsMs{1.0, 60'000.0};
+constexpr int kMostProcessors = 1024;  // CPU_SETSIZE of the C library
 constexpr int kMostRecordings = 1000;
 
 const std::vector<std::string> kPolicies = {"warn", "enforce"};
@@ -85,14 +89,40 @@ std::optional<machine::HeartbeatConfig> readHeartbeat(ConfigReader& machine,
   return heartbeat;
 }
 
+std::optional<config::MotorPowerConfig> readMotorPower(ConfigReader& machine,
+                                                       config::UsedLines& used) {
+  ConfigReader reader = machine.map("motor_power");
+  if (!machine.has("motor_power")) return {};
+  const auto nanoseconds = [&reader](const char* key, Range range,
+                                     std::optional<double> otherwise) {
+    const double milliseconds =
+        otherwise ? reader.number(key, range, *otherwise) : reader.number(key, range);
+    return std::llround(milliseconds * 1e6);
+  };
+  config::MotorPowerConfig power;
+  power.line = config::readRequiredLine(reader, "pin", used);
+  power.active_level = reader.oneOf("active_level", {"low", "high"}, "high") == "high";
+  power.on_ns = nanoseconds("on_ms", kPowerTimesMs, std::nullopt);
+  power.off_delay_ns = nanoseconds("off_delay_ms", kPowerTimesMs, 0.0);
+  ConfigReader contact = reader.map("feedback");
+  if (reader.has("feedback")) {
+    power.feedback = config::readInputSwitch(contact, used);
+    contact.rejectUnknown();
+    power.feedback_timeout_ns = nanoseconds("feedback_timeout_ms", kFeedbackTimeoutsMs,
+                                            static_cast<double>(power.feedback_timeout_ns) / 1e6);
+  }
+  reader.rejectUnknown();
+  return power;
+}
+
 machine::EmergencyDisable readDisable(ConfigReader& reader) {
   // YAML 1.1 takes off for a boolean.
   const bool* flag = reader.value("disable").as<bool>();
   const bool is_off = flag != nullptr && !*flag;
   if (is_off) reader.allow("disable");
-  return is_off || reader.oneOf("disable", {"hold", "off"}, "hold") == "off"
-             ? machine::EmergencyDisable::kOff
-             : machine::EmergencyDisable::kHold;
+  const std::string how = is_off ? "off" : reader.oneOf("disable", {"hold", "ramp", "off"}, "hold");
+  if (how == "off") return machine::EmergencyDisable::kOff;
+  return how == "ramp" ? machine::EmergencyDisable::kRamp : machine::EmergencyDisable::kHold;
 }
 
 void readEmergencyStop(ConfigReader& machine, bool axes_are_right, MachineConfig& config,
@@ -104,13 +134,15 @@ void readEmergencyStop(ConfigReader& machine, bool axes_are_right, MachineConfig
                           reader.has("active_level") || reader.has("bias");
   if (has_button) config.emergency_stop = config::readInputSwitch(reader, used);
   reader.rejectUnknown();
-  if (!axes_are_right || config.emergency_disable != machine::EmergencyDisable::kOff) return;
+  if (!axes_are_right || config.emergency_disable == machine::EmergencyDisable::kHold) return;
+  if (config.motor_power) return;
   for (const config::AxisConfig& axis : config.axes) {
     if (axis.pins.enable.wired()) continue;
     reader.contradiction(
         "disable",
-        fmt::format("is off, but axes/{}/pins/enable is missing: nothing could switch the "
-                    "current of this motor off",
+        fmt::format("is {}, but axes/{}/pins/enable is missing, and there is no motor_power: "
+                    "nothing could switch the current of this motor off",
+                    config.emergency_disable == machine::EmergencyDisable::kOff ? "off" : "ramp",
                     axis.name));
   }
 }
@@ -126,6 +158,7 @@ machine::MachineOptions MachineConfig::options() const {
   options.emergency_stop = emergency_stop;
   options.emergency_disable = emergency_disable;
   options.heartbeat = heartbeat;
+  options.motor_power = motor_power;
   options.state_file = state_file;
   options.record_seconds = recorder.seconds;
   options.record_bytes = static_cast<std::size_t>(recorder.memory_mb * 1e6);
@@ -156,6 +189,7 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   if (reader.has("kinematics")) {
     config::readKinematics(std::move(kinematics), axes_are_right, config.axes);
   }
+  config.motor_power = readMotorPower(reader, used);
   readEmergencyStop(reader, axes_are_right, config, used);
   config.heartbeat = readHeartbeat(reader, used);
   ConfigReader simulation = reader.map("simulation");

@@ -139,6 +139,16 @@ std::vector<sim::RigCoupling> couplingsOf(const std::vector<AxisConfig>& axes) {
   return couplings;
 }
 
+std::optional<sim::MotorPowerSpec> relayOf(const std::optional<config::MotorPowerConfig>& config) {
+  if (!config) return {};
+  sim::MotorPowerSpec spec{config->line, config->active_level, config->on_ns, "", false};
+  if (config->feedback) {
+    spec.feedback_line = config->feedback->line;
+    spec.feedback_active = config->feedback->active_level;
+  }
+  return spec;
+}
+
 std::shared_ptr<sim::PinTrace> traceOf(const SimulationConfig& config) {
   if (config.trace.empty()) return nullptr;
   using Replaces = sim::VcdTrace::Replaces;
@@ -169,11 +179,12 @@ void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig
 
 Simulation::Simulation(const std::vector<AxisConfig>& axes,
                        std::optional<config::InputSwitch> emergency_stop,
+                       const std::optional<config::MotorPowerConfig>& motor_power,
                        const SimulationConfig& config)
     : axes_(axes),
       emergency_stop_(std::move(emergency_stop)),
       clock_(config.speed),
-      rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes)),
+      rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes), relayOf(motor_power)),
       backend_(rig_, [this] { return clock_.now(); }) {
   for (const AxisConfig& axis : axes) {
     for (std::size_t i = 0; i < axis.motors(); ++i) {

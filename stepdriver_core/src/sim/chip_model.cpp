@@ -235,7 +235,10 @@ bool ChipModel::isHeldAtHome() const {
 }
 
 void ChipModel::goHomeIfHeld() {
-  if (!isHeldAtHome()) return;
+  if (isHeldAtHome()) powerUp();
+}
+
+void ChipModel::powerUp() {
   translator_ = cycle() * floorDivide(translator_ + cycle() / 2, cycle());
 }
 

@@ -48,6 +48,8 @@ class ChipModel {
     if (chip_.fault_end == driver::FaultEnd::kReset) return inReset();
     return chip_.fault_end == driver::FaultEnd::kEnable && !enabled();
   }
+  /// Its power was off, and is there again.
+  void powerUp();
   bool inReset() const { return chip_.reset_held && at(Pin::kReset).level == *chip_.reset_held; }
   std::int64_t translator() const { return translator_; }
   int microsteps() const { return microsteps_; }

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "power_relay.h"
 #include "rig_axis.h"
 #include "trace_feed.h"
 
@@ -16,16 +17,9 @@ namespace stepdriver::sim {
 namespace {
 
 struct PinOnLine {
-  RigAxis* axis;
+  RigAxis* axis;           ///< nullptr: the relay of the motor power
   std::optional<Pin> pin;  ///< of the chip; empty: the brake
   int trace_pin;
-
-  void request(bool level, std::int64_t time_ns) const {
-    pin ? axis->request(*pin, level, time_ns) : axis->setBrake(level, time_ns);
-  }
-  void edge(bool level, std::int64_t time_ns) const {
-    pin ? axis->edge(*pin, level, time_ns) : axis->setBrake(level, time_ns);
-  }
 };
 
 struct WriteFault {
@@ -61,7 +55,7 @@ struct Line {
 class Rig::Impl {
  public:
   Impl(const std::vector<RigAxisSpec>& specs, std::shared_ptr<PinTrace> trace,
-       const std::vector<RigCoupling>& couplings)
+       const std::vector<RigCoupling>& couplings, const std::optional<MotorPowerSpec>& motor_power)
       : feed(std::move(trace)) {
     axes.reserve(specs.size());
     for (const RigAxisSpec& spec : specs) {
@@ -73,6 +67,7 @@ class Rig::Impl {
       wire(*axes.back());
     }
     for (const RigCoupling& coupling : couplings) couple(coupling);
+    if (motor_power) wire(*motor_power);
   }
 
   ~Impl() { feed.finish(); }
@@ -111,6 +106,25 @@ class Rig::Impl {
     }
   }
 
+  /// A line drives one of its pins with this level: by its request, or by an edge after that.
+  void drive(const PinOnLine& on_line, bool is_request, bool level, std::int64_t time_ns) {
+    if (on_line.axis == nullptr) {
+      relay->set(level, time_ns);
+      switchPower(time_ns);
+    } else if (!on_line.pin) {
+      on_line.axis->setBrake(level, time_ns);
+    } else if (is_request) {
+      on_line.axis->request(*on_line.pin, level, time_ns);
+    } else {
+      on_line.axis->edge(*on_line.pin, level, time_ns);
+    }
+  }
+
+  /// Gives the axes the power that the relay of the motors switches.
+  void switchPower(std::int64_t time_ns) {
+    for (const auto& axis : axes) axis->setPower(relay->thereFrom(), time_ns);
+  }
+
   void failWrites(const std::string& name, const std::optional<WriteFault>& fault) {
     Line& line = lineOf(name);
     failing_lines += (fault ? 1 : 0) - (line.write_fault ? 1 : 0);
@@ -119,6 +133,7 @@ class Rig::Impl {
 
   std::mutex mutex;
   std::vector<std::unique_ptr<RigAxis>> axes;
+  std::optional<PowerRelay> relay;
   TraceFeed feed;
   std::vector<Line> lines;
   std::vector<int> watched;           // those of them with a listener
@@ -136,6 +151,17 @@ class Rig::Impl {
       }
       coupled[i]->couple(std::move(drives));
     }
+  }
+
+  void wire(const MotorPowerSpec& motor_power) {
+    relay.emplace(motor_power);
+    const int index = feed.addPin({"machine", "motor_power"}, !motor_power.active_level);
+    lineOf(motor_power.line).pins.push_back({nullptr, std::nullopt, index});
+    if (SwitchModel* feedback = relay->feedback()) {
+      lineOf(motor_power.feedback_line).contacts.push_back(feedback);
+      feed.addSwitch({"machine", "motor_power_feedback"}, feedback);
+    }
+    switchPower(latest_ns);
   }
 
   void wire(RigAxis& axis) {
@@ -169,8 +195,9 @@ class Rig::Impl {
 };
 
 Rig::Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace,
-         const std::vector<RigCoupling>& couplings)
-    : impl_(std::make_unique<Impl>(axes, std::move(trace), couplings)) {}
+         const std::vector<RigCoupling>& couplings,
+         const std::optional<MotorPowerSpec>& motor_power)
+    : impl_(std::make_unique<Impl>(axes, std::move(trace), couplings, motor_power)) {}
 
 Rig::~Rig() = default;
 
@@ -189,6 +216,15 @@ void Rig::setFaults(const std::string& axis, const RigFaults& faults) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   impl_->axisOf(axis).setFaults(faults, impl_->latest_ns);
   impl_->switchesMoved(impl_->latest_ns);
+}
+
+void Rig::stickMotorPower(std::optional<bool> on, std::int64_t time_ns) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  if (!impl_->relay) throw std::logic_error("The rig has no relay of the motor power.");
+  const std::int64_t now_ns = impl_->advance(time_ns);
+  impl_->relay->stick(on, now_ns);
+  impl_->switchPower(now_ns);
+  impl_->switchesMoved(now_ns);
 }
 
 void Rig::failWrites(const std::string& line, std::int64_t writes, int error) {
@@ -232,7 +268,7 @@ void Rig::onRequest(int line, bool level, std::int64_t time_ns) {
   if (pins.empty()) return;
   for (const PinOnLine& pin : pins) {
     impl_->feed.settle(pin.trace_pin, level, now_ns);
-    pin.request(level, now_ns);
+    impl_->drive(pin, true, level, now_ns);
   }
   impl_->switchesMoved(now_ns);
 }
@@ -244,7 +280,7 @@ void Rig::onEdge(int line, bool level, std::int64_t time_ns) {
   if (pins.empty()) return;
   for (const PinOnLine& pin : pins) {
     impl_->feed.edge(pin.trace_pin, level, now_ns);
-    pin.edge(level, now_ns);
+    impl_->drive(pin, false, level, now_ns);
   }
   impl_->switchesMoved(now_ns);
 }

@@ -82,23 +82,46 @@ void RigAxis::setBrake(bool line_level, std::int64_t time_ns) {
 
 double RigAxis::fallUntil(std::int64_t time_ns) const {
   if (spec_.load_falls <= 0.0 || energized_ || fell_to_ns_ == kForEver) return 0.0;
-  const std::int64_t end = brake_ ? std::min(time_ns, brake_->holdsFrom()) : time_ns;
+  std::int64_t end = brake_ ? std::min(time_ns, brake_->holdsFrom()) : time_ns;
+  if (isEnergizedAt(time_ns)) end = std::min(end, power_from_ns_);
   return spec_.load_falls * static_cast<double>(std::max<std::int64_t>(end - fell_to_ns_, 0)) / 1e9;
 }
 
 void RigAxis::fall(std::int64_t time_ns) {
   const double way = fallUntil(time_ns);
   fell_to_ns_ = time_ns;
-  if (way == 0.0) return;
   fell_ += way;
   rotor_ -= way * chip_.finest() / spec_.full_step_travel;
+  if (way != 0.0) moveSwitches(time_ns);
+  meetPower(time_ns);
+}
+
+void RigAxis::setPower(std::int64_t from_ns, std::int64_t time_ns) {
+  fall(time_ns);
+  power_from_ns_ = from_ns;
+  if (from_ns > time_ns) {
+    powers_up_ = true;
+    energized_ = false;
+    settle(time_ns);
+  }
+  meetPower(time_ns);
+}
+
+void RigAxis::meetPower(std::int64_t time_ns) {
+  if (!powers_up_ || time_ns < power_from_ns_) return;
+  powers_up_ = false;
+  chip_.powerUp();
+  if (spec_.chip.fault_end != driver::FaultEnd::kItself) mendChip();
+  energized_ = isEnergizedAt(time_ns);
+  if (energized_) snapRotor();
+  settle(time_ns);
   moveSwitches(time_ns);
 }
 
 void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns) {
   if (chip_.endsFault() || time_ns >= chip_fault_ends_ns_) mendChip();
   const bool was_energized = energized_;
-  energized_ = chip_.energized() && !chip_fault_;
+  energized_ = isEnergizedAt(time_ns);
   if (pulse) takePulse(*pulse, time_ns);
   if (energized_ && !was_energized) snapRotor();
   if (in_position_ && (pulse || energized_ != was_energized)) settle(time_ns);
@@ -114,6 +137,7 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
       chip_.count(Violation::kStepIntoSwitch);
     }
   }
+  if (time_ns < power_from_ns_) chip_.count(Violation::kStepWithoutPower);
   const bool braked = brake_ && brake_->drags(time_ns);
   if (braked) chip_.count(Violation::kStepAgainstBrake);
 
@@ -236,7 +260,7 @@ RigAxisReport RigAxis::report(std::int64_t time_ns) const {
   report.fell = fell_ + falling;
   report.carriage = carriage() - falling;
   report.microsteps = chip_.microsteps();
-  report.energized = energized_;
+  report.energized = energized_ || (powers_up_ && isEnergizedAt(time_ns));
   report.min_pressed = min_switch_ && min_switch_->active(time_ns);
   report.max_pressed = max_switch_ && max_switch_->active(time_ns);
   report.violations = chip_.violations();

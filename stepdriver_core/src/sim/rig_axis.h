@@ -40,6 +40,9 @@ class RigAxis {
   const BrakeModel* brake() const { return brake_ ? &*brake_ : nullptr; }
   /// The line of the brake has this level from now on. @pre There is a brake.
   void setBrake(bool line_level, std::int64_t time_ns);
+  /// The power of the motor is there from this time on: kForEver if nothing switches it, kNever
+  /// while it is off.
+  void setPower(std::int64_t from_ns, std::int64_t time_ns);
   /// The contact that pulls the fault line low; nullptr if that isn't wired.
   SwitchModel* faultContact() { return fault_ ? &*fault_ : nullptr; }
   /// The contact of the in-position output; nullptr if that isn't wired.
@@ -64,6 +67,10 @@ class RigAxis {
   void snapRotor();
   /// [mm|deg] How far the load sinks from the last event to a time.
   double fallUntil(std::int64_t time_ns) const;
+  bool isEnergizedAt(std::int64_t time_ns) const {
+    return chip_.energized() && !chip_fault_ && time_ns >= power_from_ns_;
+  }
+  void meetPower(std::int64_t time_ns);
   void fall(std::int64_t time_ns);
   void moveSwitches(std::int64_t time_ns);
 
@@ -87,6 +94,8 @@ class RigAxis {
   std::vector<Drive> drives_;  // empty: its own motor alone
   // [mm|deg] Of a coupled axis: how far outwards it may get, by side.
   std::array<double, 2> farthest_{};
+  std::int64_t power_from_ns_ = kForEver;
+  bool powers_up_ = false;  // as soon as the power is there
 };
 
 }  // namespace stepdriver::sim

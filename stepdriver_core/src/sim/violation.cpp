@@ -34,6 +34,8 @@ const char* nameOf(Violation violation) {
       return "step into an active switch";
     case Violation::kStepAgainstBrake:
       return "step against the brake";
+    case Violation::kStepWithoutPower:
+      return "step while the motor power is off";
   }
   return "unknown violation";
 }

@@ -98,6 +98,10 @@ std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
     if (axis.brake) lines.push_back({axis.name + "/brake", axis.brake->line});
   }
   if (machine.emergency_stop) lines.push_back({"emergency_stop", machine.emergency_stop->line});
+  if (const auto& power = machine.motor_power) {
+    lines.push_back({"motor_power", power->line});
+    if (power->feedback) lines.push_back({"motor_power/feedback", power->feedback->line});
+  }
   if (machine.heartbeat) lines.push_back({"heartbeat", machine.heartbeat->line});
   return lines;
 }

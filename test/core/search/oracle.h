@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,10 +116,26 @@ class Oracle {
            });
   }
 
-  /// An emergency stop was requested: from now on no pulse may begin.
-  void emergencyStopped(pulse::Nanoseconds now) {
+  /// An emergency stop was requested: from now on no pulse may begin, or none beyond its ramp.
+  /// @param ramp_begins how long it may take until the axes decelerate; empty: there is no ramp
+  void emergencyStopped(pulse::Nanoseconds now, std::optional<pulse::Nanoseconds> ramp_begins) {
+    const bool ramps = ramp_begins.has_value();
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const pulse::Nanoseconds since =
+          ramps ? now + *ramp_begins + slowingOf(axis) - slipped_() : now;
+      quiets_[axis].push_back(
+          {moment(), Meaning::Quiet::kEmergency, "emergency stop", since, ramps});
+    }
+  }
+
+  /// Every emergency stop so far was answered: their ramps are over too.
+  void emergencyStopAnswered(pulse::Nanoseconds now) {
     for (auto& quiets : quiets_) {
-      quiets.push_back({moment(), Meaning::Quiet::kEmergency, "emergency stop", now, false});
+      for (Quiet& quiet : quiets) {
+        if (quiet.kind != Meaning::Quiet::kEmergency || !quiet.slows) continue;
+        quiet.since = std::min(quiet.since + slipped_(), now);
+        quiet.slows = false;
+      }
     }
   }
 

@@ -90,12 +90,19 @@ std::vector<config::AxisConfig> configsOf(int variant) {
 }
 
 machine::EmergencyDisable emergencyDisableOf(int variant) {
-  return variant == 1 ? machine::EmergencyDisable::kOff : machine::EmergencyDisable::kHold;
+  return variant == 1 ? machine::EmergencyDisable::kRamp : machine::EmergencyDisable::kHold;
 }
 
-machine::MachineOptions withButton() {
+machine::MachineOptions optionsOf(int variant) {
   machine::MachineOptions options;
   options.emergency_stop = config::InputSwitch{kEmergencyStop, true};
+  options.emergency_disable = emergencyDisableOf(variant);
+  if (variant == 1) {
+    options.motor_power = config::MotorPowerConfig{};
+    options.motor_power->line = "power";
+    options.motor_power->on_ns = 15 * kMillisecond;
+    options.motor_power->off_delay_ns = 10 * kMillisecond;
+  }
   return options;
 }
 
@@ -157,9 +164,10 @@ Participants::Participants(const Schedule& schedule)
       oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
       clock_(0.0),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
-      rig_(rigOf(configs_), trace_, test::Bench::couplings(configs_)),
+      rig_(rigOf(configs_), trace_, test::Bench::couplings(configs_),
+           test::Bench::motorPowerOf(optionsOf(schedule.variant))),
       backend_(rig_, [this] { return clock_.now(); }),
-      wiring_(configs_, withButton()),
+      wiring_(configs_, optionsOf(schedule.variant)),
       lines_(std::make_shared<FailingReads>(backend_.request(wiring_.outputs, wiring_.inputs))) {
   axis::LineNames names;
   for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
@@ -167,9 +175,10 @@ Participants::Participants(const Schedule& schedule)
   engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
                                                  wiring_.emergency_stop, wiring_.shared);
   if (schedule.variant == kSharing) oracle_.share({0, 1});
-  controller_ = std::make_unique<machine::Controller>(configs_, wiring_.motor_lines,
-                                                      std::move(names), wiring_.emergency_stop,
-                                                      emergencyDisableOf(schedule.variant));
+  controller_ = std::make_unique<machine::Controller>(
+      configs_, wiring_.motor_lines, std::move(names), wiring_.emergency_stop,
+      emergencyDisableOf(schedule.variant), wiring_.motorPower(optionsOf(schedule.variant)));
+  if (ramps()) engine_->rampStops(machine::longestRamp(configs_));
   engine_->listen(news_);
   told_levels_ = machine::ToldLevels(wiring_.inputs.size());
   const machine::InputReading first = readInputs();
@@ -193,6 +202,10 @@ void Participants::handle(decltype(machine::Input::what) what) {
 
 void Participants::carryOut(activity::Outputs& out) {
   for (auto& [call, reply] : out.answers) answer(call, std::move(reply));
+  if (out.stops) {
+    engine_->stopAtOnce();
+    engine_called_ = true;
+  }
   if (out.clear_stops != 0) {
     engine_->clearEmergencyStop(out.clear_stops);
     engine_->inputsChanged();
@@ -371,6 +384,7 @@ void Participants::go(Who who) {
     case Who::kNews: {
       news_.any = false;
       machine::EngineNews news;
+      news.stops_ramping = engine_->stopsRamping();
       news.stops_served = engine_->stopsServed();
       news.input_stops = engine_->inputStops();
       for (std::size_t i = 0; i < kAxes; ++i) {
@@ -382,6 +396,9 @@ void Participants::go(Who who) {
         if (!client.waits_for_stops) continue;
         if (controller_->snapshot()->stops_handled < *client.waits_for_stops) continue;
         client.waits_for_stops.reset();
+        if (engine_->stopsAsked() == engine_->stopsServed()) {
+          oracle_.emergencyStopAnswered(clock_.now());
+        }
         note("answer of emergency stop");
       }
       return;
@@ -439,7 +456,7 @@ void Participants::serveEngine() {
   engine_due_ = engine_->serve();
   if (std::exchange(input_stops_, engine_->inputStops()) != input_stops_) {
     note("the emergency stop input is active");
-    oracle_.emergencyStopped(clock_.now());
+    oracle_.emergencyStopped(clock_.now(), rampBegins());
   }
   if (reads && lines_->read(wiring_.emergency_stop->line) != 0 && !engine_->emergencyStopped()) {
     oracle_.complain("the emergency stop input is active, and the engine is not stopped");
@@ -817,7 +834,17 @@ void Participants::emergencyStop(int client) {
   who.waits_for_stops = engine_->emergencyStop();
   who.since = clock_.now();
   engine_called_ = true;
-  oracle_.emergencyStopped(clock_.now());
+  oracle_.emergencyStopped(clock_.now(), rampBegins());
+}
+
+// A controller that is late decelerates late.
+std::optional<pulse::Nanoseconds> Participants::rampBegins() const {
+  if (!ramps()) return std::nullopt;
+  return schedule_.deviations.empty() ? 0 : pulse::PulseEngine::kRampBegins;
+}
+
+bool Participants::ramps() const {
+  return emergencyDisableOf(schedule_.variant) == machine::EmergencyDisable::kRamp;
 }
 
 void Participants::shutDown(int client) {
@@ -978,8 +1005,10 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
     const std::string of_twin = test::violationsOf(twin);
     if (!of_twin.empty()) oracle_.complain(who + ", another motor: " + of_twin);
   }
-  // Nothing holds the load while the brake takes hold after a fault of the chip.
-  if (report.fell > 0.0 && !chip_broke_[axis]) {
+  // Nothing holds the load while the brake takes hold after a fault of the chip; and an emergency
+  // stop takes the motor power also if the brake's line could not be written.
+  const bool brake_failed = pins_failed_ && wiring_.motor_power;
+  if (report.fell > 0.0 && !chip_broke_[axis] && !brake_failed) {
     oracle_.complain(who + ": the load has fallen by " + std::to_string(report.fell) + " mm");
   }
 }
@@ -1010,7 +1039,7 @@ void Participants::checkRest() {
 
 // An emergency stop that nothing has ended leaves no motor with current, if it is configured so.
 void Participants::checkPower() {
-  const bool off = emergencyDisableOf(schedule_.variant) == machine::EmergencyDisable::kOff;
+  const bool off = emergencyDisableOf(schedule_.variant) != machine::EmergencyDisable::kHold;
   if (!off || !engine_->emergencyStopped() || pins_failed_) return;
   const auto has_current = [this](const config::AxisConfig& config) {
     return rig_.report(config.name).energized;

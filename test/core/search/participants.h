@@ -214,6 +214,8 @@ class Participants {
   void checkCount(std::size_t axis, const std::string& when);
   void checkRest();
   void checkPower();
+  bool ramps() const;
+  std::optional<pulse::Nanoseconds> rampBegins() const;
   void checkOutcomes();
   void checkInPosition();
   void probe();

@@ -100,10 +100,22 @@ class Bench {
         bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
-        rig(rig_axes, trace, couplings(axes)),
+        rig(rig_axes, trace, couplings(axes), motorPowerOf(options)),
         backend(rig, [this] { return clock.now(); }) {
     options.threaded = threaded;
     machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
+  }
+
+  /// The relay of the motor power, as it is configured.
+  static std::optional<sim::MotorPowerSpec> motorPowerOf(const machine::MachineOptions& options) {
+    const auto& config = options.motor_power;
+    if (!config) return std::nullopt;
+    sim::MotorPowerSpec spec{config->line, config->active_level, config->on_ns, "", false};
+    if (config->feedback) {
+      spec.feedback_line = config->feedback->line;
+      spec.feedback_active = config->feedback->active_level;
+    }
+    return spec;
   }
 
   static std::vector<sim::RigAxisSpec> rigAxes(const std::vector<config::AxisConfig>& axes) {

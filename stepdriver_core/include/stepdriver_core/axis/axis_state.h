@@ -71,8 +71,14 @@ struct HomingResult {
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
 struct AxisState {
-  bool enabled = false;  ///< by its own commands; a shared ENABLE line may energize it all the same
+  /// By its own commands, and with power; a shared ENABLE line may energize it all the same.
+  bool enabled = false;
   bool asleep = false;
+  /// The power of all motors is there, or nothing switches it: see MachineOptions::motor_power.
+  bool powered = true;
+  /// The line of its brake has the level that engages it, or could not be given that level. False
+  /// while it is released, and if the axis has no brake.
+  bool brake_engaged = false;
   bool idle = false;  ///< disabled or asleep by its idle timeout; the next motion ends that
   bool moving = false;
   bool held = false;  ///< the machine is on hold: this axis too, moving or not

@@ -11,6 +11,7 @@
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/motor_power_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/machine/recording.h"
@@ -28,11 +29,16 @@ struct HeartbeatConfig {
   double rate = 100.0;  ///< [Hz] of whole periods, of two edges each
 };
 
-/// What an emergency stop does to the motors, once the last pulse has ended.
+/// What an emergency stop does to the motors.
 enum class EmergencyDisable {
-  kHold,  ///< they stay energized
-  /// They are disabled, as by Axis::enable(false), until Axis::enable(true): each brake takes hold
-  /// first. A motor without ENABLE stays energized.
+  kHold,  ///< once the last pulse has ended, they stay energized
+  /// They decelerate first, as for Machine::stop(), and are then disabled as with kOff. Their
+  /// positions stay valid. Machine::emergencyStop() returns when all are at rest; another call, a
+  /// lost motor power, or more than the time that the slowest deceleration takes ends the pulses at
+  /// once.
+  kRamp,
+  /// Once the last pulse has ended, they are disabled, as by Axis::enable(false), until
+  /// Axis::enable(true): each brake takes hold first. A motor without ENABLE stays energized.
   kOff,
 };
 
@@ -55,6 +61,10 @@ struct MachineOptions {
   EmergencyDisable emergency_disable = EmergencyDisable::kHold;
   /// If it can't be written, all axes have a fault.
   std::optional<HeartbeatConfig> heartbeat{};
+  /// Switched on before the first motor is energized, at the start and by Axis::enable() and
+  /// recover(); off at an emergency stop and at the end. If it doesn't come in time or is lost,
+  /// that is an emergency stop, and all axes have a fault that says so.
+  std::optional<config::MotorPowerConfig> motor_power{};
   /// Absolute path of the file that keeps positions across a restart; empty: no file. A position
   /// in it that Axis::setPosition() would refuse isn't restored.
   std::string state_file{};
@@ -207,8 +217,9 @@ class Machine {
   /// @param factor 0.01 to 2.0. @throw Refused if it is outside of that; then nothing changes.
   void setSpeedOverride(double factor);
 
-  /// Completes the current pulse, sends no more, and then returns. Every axis is at fault until
-  /// recover(). MachineOptions::emergency_disable may disable the motors then; this doesn't wait
+  /// Completes the current pulse, or the ramp of MachineOptions::emergency_disable, sends no more,
+  /// and then returns. Every axis is at fault until recover(), from the beginning of the ramp on.
+  /// MachineOptions::emergency_disable may disable the motors then; this doesn't wait
   /// until they are disabled. MachineOptions::emergency_stop does the same; if it is active at the
   /// start, no motor is energized.
   ///

@@ -41,8 +41,9 @@ struct MachineConfig {
   std::optional<int> cpu;                ///< see pulse::RealtimeRequest
   std::optional<config::InputSwitch> emergency_stop;  ///< see machine::MachineOptions
   machine::EmergencyDisable emergency_disable{};
-  std::optional<machine::HeartbeatConfig> heartbeat;  ///< see machine::MachineOptions
-  std::string state_file;                             ///< see machine::MachineOptions
+  std::optional<machine::HeartbeatConfig> heartbeat;    ///< see machine::MachineOptions
+  std::optional<config::MotorPowerConfig> motor_power;  ///< see machine::MachineOptions
+  std::string state_file;                               ///< see machine::MachineOptions
   RecorderConfig recorder;
 
   /// What a machine::Machine of this configuration takes, in addition to the axes.
@@ -62,10 +63,17 @@ struct MachineConfig {
 ///   keep_cpus_awake: true        # with libgpiod; false: they may sleep, and wake late
 ///   cpu: 3                       # the processor of the pulse thread; left out: any
 /// emergency_stop:
-///   disable: hold                # what it does to the motors: hold, or off (also false: YAML 1.1)
+///   disable: hold                # what it does to the motors: hold, ramp or off (also false)
 ///   pin: "gpiochip0:25"          # optional: a button
 ///   active_level: high
 ///   bias: pull_up                # optional: as_is, pull_up, pull_down or disabled
+/// motor_power:                   # optional: a relay that switches the power of all motors
+///   pin: "gpiochip0:23"
+///   active_level: high           # optional
+///   on_ms: 200.0                 # until the power is there and the drivers have started
+///   off_delay_ms: 0.0            # after an emergency stop
+///   feedback: {pin: "gpiochip0:22", active_level: low, bias: pull_up}  # optional: a contact
+///   feedback_timeout_ms: 1000.0
 /// heartbeat:                     # optional: an output for an external monostable or safety relay
 ///   {pin: "gpiochip0:24", rate_hz: 100.0}
 /// state_file: ""                 # absolute path of the file that keeps positions; empty: no file

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/motor_power_config.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/setup/simulation_config.h"
@@ -20,9 +21,12 @@ namespace stepdriver::setup {
 class Simulation {
  public:
   /// @param emergency_stop the machine's input, to which the rig connects a button.
+  /// @param motor_power the machine's, for which the rig has a relay.
   /// @throw Error if the trace can't be written.
   Simulation(const std::vector<config::AxisConfig>& axes,
-             std::optional<config::InputSwitch> emergency_stop, const SimulationConfig& config);
+             std::optional<config::InputSwitch> emergency_stop,
+             const std::optional<config::MotorPowerConfig>& motor_power,
+             const SimulationConfig& config);
 
   gpio::Backend& backend() { return backend_; }
   pulse::Clock& clock() { return clock_; }

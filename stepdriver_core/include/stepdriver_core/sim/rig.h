@@ -44,6 +44,15 @@ struct BrakeSpec {
   std::int64_t engage_ns = 0;   ///< from the other level until it holds the load
 };
 
+/// A relay that switches the power of all motors.
+struct MotorPowerSpec {
+  std::string line;
+  bool active_level = true;      ///< level of the line that switches the power on
+  std::int64_t on_ns = 0;        ///< from that level until the power is there
+  std::string feedback_line;     ///< of a contact that closes with the power; empty: not wired
+  bool feedback_active = false;  ///< its level while the power is there
+};
+
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
@@ -95,6 +104,7 @@ enum class Violation {
   /// their steps one after the other.
   kStepIntoSwitch,
   kStepAgainstBrake,  ///< before the brake is released and its release time is over
+  kStepWithoutPower,  ///< while the motor power is off, or before it is there
 };
 
 /// In words, as in reports: `short step high`.
@@ -110,7 +120,7 @@ struct RigAxisReport {
   double carriage = 0.0;        ///< [mm|deg]
   int microsteps = 1;           ///< the mode at the last STEP edge
   double fell = 0.0;            ///< [mm|deg] how far the load has sunk, in total
-  bool energized = false;       ///< current flows: enabled, awake and not in RESET
+  bool energized = false;       ///< current flows: enabled, awake, not in RESET, and with power
   bool min_pressed = false;     ///< the reading of its line at the rig's latest time
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
@@ -142,7 +152,8 @@ struct RigFaults {
 /// high at the chip is forward: the carriage's position grows. On a chip with CW and CCW inputs,
 /// pulses on CW are forward, and those on CCW backward. While a brake is engaged the rotor doesn't
 /// turn; when it is released, the rotor snaps as above. A load turns the rotor back while neither
-/// current nor the brake holds it.
+/// current nor the brake holds it. Without motor power no current flows in any axis; when the power
+/// comes, each chip begins with its translator at the nearest Home.
 ///
 /// Lines. Before its first request a line has the level of a pull resistor towards the safe side:
 /// disabled, asleep, in RESET, everything else inactive or low. The first request makes no edge:
@@ -162,8 +173,10 @@ class Rig : public gpio::Board {
   /// @param couplings the motors of all other axes move only their own carriages.
   /// @throw std::invalid_argument if an axis is named twice, doesn't travel, or has microsteps that
   ///   its chip doesn't have.
+  /// @param motor_power empty: the power is always there.
   explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr,
-               const std::vector<RigCoupling>& couplings = {});
+               const std::vector<RigCoupling>& couplings = {},
+               const std::optional<MotorPowerSpec>& motor_power = {});
   ~Rig() override;
 
   /// @throw std::out_of_range if there is no such axis; so do all functions that take an axis.
@@ -173,6 +186,12 @@ class Rig : public gpio::Board {
 
   /// Takes effect at the rig's latest time.
   void setFaults(const std::string& axis, const RigFaults& faults);
+
+  /// The relay of the motor power doesn't follow its line from now on: the power is there (true:
+  /// its contacts are welded), or it isn't (false: a fuse, or a safety relay). Empty: it follows.
+  ///
+  /// @throw std::logic_error if there is no such relay.
+  void stickMotorPower(std::optional<bool> on, std::int64_t time_ns);
 
   /// The write that comes after `writes` more successful ones on this line fails with `error` (an
   /// errno), and so do all after it until clearWriteFault(). A write that fails because of another

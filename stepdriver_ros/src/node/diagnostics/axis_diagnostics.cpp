@@ -58,6 +58,8 @@ void addValues(const config::AxisConfig& config, const AxisReading& reading,
   status.add("homed", state.homed);
   status.add("position valid", state.position_valid);
   status.add("microsteps", state.microsteps);
+  status.add("motor power", state.powered ? "there" : "off");
+  if (config.brake) status.add("brake", state.brake_engaged ? "engaged" : "released");
   add_switch("min endstop", reading.endstops.min);
   add_switch("max endstop", reading.endstops.max);
   status.add("max_speed [" + unit + "/s]", limits.max_speed);

@@ -30,6 +30,7 @@ Time nextTime(Time last, Duration period, Time now) {
 /// Whether anything except the progress of a motion differs.
 bool differ(const axis::AxisState& one, const axis::AxisState& other) {
   return one.enabled != other.enabled || one.asleep != other.asleep || one.idle != other.idle ||
+         one.powered != other.powered || one.brake_engaged != other.brake_engaged ||
          one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
          one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
          one.target != other.target || one.speed_override != other.speed_override ||
@@ -185,6 +186,8 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
     message.name.push_back(machine_.axes()[i]->config().name);
     message.enabled.push_back(state.enabled);
     message.asleep.push_back(state.asleep);
+    message.powered.push_back(state.powered);
+    message.brake_engaged.push_back(state.brake_engaged);
     message.idle.push_back(state.idle);
     message.moving.push_back(state.moving);
     message.held.push_back(state.held);
@@ -210,6 +213,8 @@ void StatePublisher::publishStateOfEachAxis(bool due) {
     message.header.stamp = states_read_;
     message.enabled = state.enabled;
     message.asleep = state.asleep;
+    message.powered = state.powered;
+    message.brake_engaged = state.brake_engaged;
     message.idle = state.idle;
     message.moving = state.moving;
     message.held = state.held;
