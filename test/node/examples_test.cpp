@@ -165,9 +165,10 @@ TEST(Examples, PsocSketchDrawsAndThenSleeps) {
   const TemporaryFile points(".txt");
   const TemporaryFile picture(".png");
   std::ofstream(points.path()) << "0 0\n30 10\n10 30\n0 0\n";
-  const auto end = runProgram("draw", {points.path(), "--node", node, "-o", picture.path()});
+  const auto end =
+      runProgram("draw", {points.path(), "--node", node, "-o", picture.path(), "--tolerance", "0"});
   EXPECT_EQ(end.code, 0);
-  expectSays(end.output, "line 3 of 3");
+  expectSays(end.output, "92 of 92 mm, 100 %");
   EXPECT_TRUE(picture.exists());
   const auto report = rigOf(node);
   EXPECT_EQ(report.pulses_forward, (Counts{600, 600}));
