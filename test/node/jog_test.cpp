@@ -105,6 +105,22 @@ TEST_F(JogTest, OfAStreamThatGoesOnIsRefusedAfterAStopUntilItPauses) {
   })) << "it has sent 0";
 }
 
+TEST_F(JogTest, OfAStreamIsRefusedAfterAStopForAsLongAsItGoesOn) {
+  node.set("simulation/speed", 1.0);
+  node.set("jog_timeout", 0.5);
+  start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  ASSERT_TRUE(jogUntil(0.005, [&] { return node.pulses() > 80; }));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
+  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
+  const std::int64_t pulses = node.pulses();
+  ASSERT_TRUE(jogUntil(0.005, [&] {
+    return node.process().output().find("no jog for 0.5 s") != std::string::npos;
+  })) << "the last accepted message is old";
+  for (int i = 0; i < 20; ++i) jog({"x"}, {0.005});
+  EXPECT_EQ(node.pulses(), pulses) << "the stream has not paused";
+}
+
 TEST_F(JogTest, MovesNothingByAMessageThatItCannotUnderstand) {
   start();
   const double nan = std::numeric_limits<double>::quiet_NaN();

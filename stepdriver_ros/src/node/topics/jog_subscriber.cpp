@@ -35,7 +35,11 @@ JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, Ca
 void JogSubscriber::take(const boost::shared_ptr<const Bounded<Jog>>& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    jog(axesOf(*message), message->velocity);
+    const std::vector<std::size_t> axes = axesOf(*message);
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      if (message->velocity[i] == 0.0) streams_[axes[i]].end();
+    }
+    jog(axes, message->velocity);
   } catch (const Refused& refused) {
     ROS_WARN_THROTTLE_NAMED(1.0, "jog", "jog: %s", refused.what());
   }
@@ -76,7 +80,6 @@ void JogSubscriber::jog(const std::vector<std::size_t>& axes,
     if (velocities[i] != 0.0) {
       message.unless_stopped_since = streams_[axes[i]].stopsAtBegin(wanted, timeout_);
     } else {
-      streams_[axes[i]].end();
       heard_[axes[i]] = ros::SteadyTime();
     }
   }
@@ -107,6 +110,7 @@ bool JogSubscriber::endWhatIsOver() {
     ROS_INFO_NAMED("jog", "%s: no jog for %g s, so it comes to rest",
                    machine_.axes()[axis]->config().name.c_str(), timeout_.toSec());
   }
+  // Refused messages may still come: their streams don't end with this.
   if (!silent.empty()) jog(silent, std::vector<double>(silent.size()));
   return std::any_of(heard_.begin(), heard_.end(),
                      [](const ros::SteadyTime& heard) { return !heard.isZero(); });
