@@ -172,7 +172,7 @@ const std::vector<BadBringUp> kBadBringUps = {
     {"DisableThatIsTrue",
      setting("emergency_stop/disable", true),
      "emergency_stop/disable",
-     {"true", "hold or off"}},
+     {"true", "hold, ramp or off"}},
     {"MotorThatAnEmergencyStopCannotSwitchOff",
      [](NodeUnderTest& node) {
        node.set("emergency_stop/disable", "off");
