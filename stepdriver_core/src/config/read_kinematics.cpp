@@ -29,11 +29,11 @@ constexpr std::array<NamedMatrix, 3> kNamed{{{"corexy", {{{1.0, 1.0}, {1.0, -1.0
                                              {"differential", {{{1.0, 1.0}, {1.0, -1.0}}}}}};
 
 /// The pins that either all chips of axes that share motors have, or none.
-struct OptionalPin {
+struct SwitchedPin {
   const char* key;
   Pin Pins::*pin;
 };
-constexpr std::array<OptionalPin, 3> kOptionalPins{
+constexpr std::array<SwitchedPin, 3> kSwitchedPins{
     {{"enable", &Pins::enable}, {"sleep", &Pins::sleep}, {"reset", &Pins::reset}}};
 
 std::optional<double> numberOf(const ConfigValue& value) {
@@ -190,7 +190,7 @@ class KinematicsReader {
       if (axis.holds_position_unpowered != first.holds_position_unpowered) {
         refuse(", whose holds_position_unpowered must be that of " + first.name);
       }
-      for (const OptionalPin& pin : kOptionalPins) {
+      for (const SwitchedPin& pin : kSwitchedPins) {
         if ((axis.pins.*pin.pin).wired() == (first.pins.*pin.pin).wired()) continue;
         refuse(
             fmt::format(", whose pins/{} must be wired or not like that of {}: the motors are "
