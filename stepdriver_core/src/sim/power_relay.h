@@ -39,7 +39,7 @@ class PowerRelay {
   }
 
   /// The time from which the power is there; kNever while it is off.
-  std::int64_t thereFrom() const { return there_from_ns_; }
+  std::int64_t comesAt() const { return there_from_ns_; }
   /// The contact of the feedback; nullptr if it isn't wired.
   SwitchModel* feedback() { return feedback_ ? &*feedback_ : nullptr; }
 

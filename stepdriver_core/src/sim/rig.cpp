@@ -122,7 +122,7 @@ class Rig::Impl {
 
   /// Gives the axes the power that the relay of the motors switches.
   void switchPower(std::int64_t time_ns) {
-    for (const auto& axis : axes) axis->setPower(relay->thereFrom(), time_ns);
+    for (const auto& axis : axes) axis->setPower(relay->comesAt(), time_ns);
   }
 
   void failWrites(const std::string& name, const std::optional<WriteFault>& fault) {
