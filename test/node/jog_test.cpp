@@ -45,6 +45,25 @@ class JogTest : public testing::Test {
     });
   }
 
+  /// Stops the axis in a stream of messages. It makes no pulse although the stream continues until
+  /// the node has said these words, and it is refused again after that.
+  void expectRestInAStreamThatGoesOn(const std::string& words) {
+    node.set("simulation/speed", 1.0);
+    start();
+    const Recorder<AxisStates> states(node.full("axis_states"));
+    ASSERT_TRUE(jogUntil(0.005, [&] { return node.pulses() > 80; }));
+    EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
+    ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
+    const std::int64_t pulses = node.pulses();
+    ASSERT_TRUE(
+        jogUntil(0.005, [&] { return node.process().output().find(words) != std::string::npos; }));
+    const std::size_t said = node.process().output().size();
+    EXPECT_TRUE(jogUntil(0.005, [&] {
+      return node.process().output().find("the jog was stopped", said) != std::string::npos;
+    })) << "it is no longer refused";
+    EXPECT_EQ(node.pulses(), pulses) << "the stream has not paused";
+  }
+
   NodeUnderTest node;
   ros::Publisher publisher;
 };
@@ -85,19 +104,9 @@ TEST_F(JogTest, TakesOverFromAMove) {
 }
 
 TEST_F(JogTest, OfAStreamThatGoesOnIsRefusedAfterAStopUntilItPauses) {
-  node.set("simulation/speed", 1.0);
   node.set("jog_timeout", 2.0);
-  start();
-  const Recorder<AxisStates> states(node.full("axis_states"));
-  ASSERT_TRUE(jogUntil(0.005, [&] { return node.pulses() > 80; }));
-  EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
-  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
+  ASSERT_NO_FATAL_FAILURE(expectRestInAStreamThatGoesOn("the jog was stopped"));
   const std::int64_t pulses = node.pulses();
-  ASSERT_TRUE(jogUntil(0.005, [&] {
-    return node.process().output().find("the jog was stopped") != std::string::npos;
-  }));
-  for (int i = 0; i < 20; ++i) jog({"x"}, {0.005});
-  EXPECT_EQ(node.pulses(), pulses) << "the stream has not paused";
   ASSERT_TRUE(waitUntil([&] {
     jog({"x"}, {0.0});
     jog({"x"}, {0.005});
@@ -106,19 +115,9 @@ TEST_F(JogTest, OfAStreamThatGoesOnIsRefusedAfterAStopUntilItPauses) {
 }
 
 TEST_F(JogTest, OfAStreamIsRefusedAfterAStopForAsLongAsItGoesOn) {
-  node.set("simulation/speed", 1.0);
   node.set("jog_timeout", 0.5);
-  start();
-  const Recorder<AxisStates> states(node.full("axis_states"));
-  ASSERT_TRUE(jogUntil(0.005, [&] { return node.pulses() > 80; }));
-  EXPECT_TRUE(node.call<std_srvs::Trigger>("x/stop").success);
-  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
-  const std::int64_t pulses = node.pulses();
-  ASSERT_TRUE(jogUntil(0.005, [&] {
-    return node.process().output().find("no jog for 0.5 s") != std::string::npos;
-  })) << "the last accepted message is old";
-  for (int i = 0; i < 20; ++i) jog({"x"}, {0.005});
-  EXPECT_EQ(node.pulses(), pulses) << "the stream has not paused";
+  // The last accepted message is old by then.
+  ASSERT_NO_FATAL_FAILURE(expectRestInAStreamThatGoesOn("no jog for 0.5 s"));
 }
 
 TEST_F(JogTest, MovesNothingByAMessageThatItCannotUnderstand) {
