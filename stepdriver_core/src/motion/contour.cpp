@@ -14,6 +14,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmooth = 1e-6;                   // rad: no corner
 constexpr double kSharpest = 170.0 / 180.0 * kPi;  // rad: beyond that, it is a stop
 constexpr double kMidRounding = 3.0 / 8.0;         // m(0)/d
+constexpr double kMostBend = 0.0108;               // of |n(w) - w|w||/(4 d^2)
+constexpr double kEven = 1e-6;                     // of the curvature: no jump
 constexpr double kLeastBlend = 0.01;               // of the resolution
 constexpr double kLeastRate = 1e-4;                // of a Bezier, of the sum of its handles
 constexpr double kInLine = 1e-9;                   // sine of the angle of three points
@@ -50,16 +52,48 @@ double leastRate(const std::vector<double>& powers, std::size_t axes) {
   return rate_at(best);
 }
 
+// The jump of p'' between two segments, for parameters with |p'| = 1.
+std::vector<double> jumpOf(const ContourPoint& in, double rate_in, const ContourPoint& out,
+                           double rate_out) {
+  std::vector<double> jump;
+  jump.reserve(in.second.size());
+  for (std::size_t i = 0; i < in.second.size(); ++i) {
+    jump.push_back(out.second[i] / (rate_out * rate_out) - in.second[i] / (rate_in * rate_in));
+  }
+  return jump;
+}
+
+// The size of the part of a jump that changes the curvature: the one across the mean direction.
+double acrossOf(const std::vector<double>& jump, const ContourPoint& in, double rate_in,
+                const ContourPoint& out, double rate_out) {
+  double along = 0.0;
+  double square = 0.0;
+  for (std::size_t i = 0; i < jump.size(); ++i) {
+    const double mean = out.first[i] / rate_out + in.first[i] / rate_in;
+    along += jump[i] * mean;
+    square += mean * mean;
+  }
+  double across = 0.0;
+  for (std::size_t i = 0; i < jump.size(); ++i) {
+    const double mean = out.first[i] / rate_out + in.first[i] / rate_in;
+    const double x = jump[i] - mean * along / square;
+    across += x * x;
+  }
+  return std::sqrt(across);
+}
+
 }  // namespace
 
 Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& segments,
-                 double resolution)
+                 double resolution, Continuity continuity)
     : start_(std::move(start)), resolution_(resolution) {
   segments_.reserve(segments.size());
   for (std::size_t i = 0; i < segments.size(); ++i) {
     segments_.push_back(placed(i == 0 ? start_ : segments[i - 1].end, segments[i], i));
   }
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) round(i, segments[i].tolerance);
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
+    round(i, segments[i].tolerance, continuity);
+  }
 }
 
 Contour::Segment Contour::placed(const std::vector<double>& from, const ContourSegment& given,
@@ -131,7 +165,7 @@ double Contour::sharpest(const Segment& segment, double rate) const {
   return 0.0;
 }
 
-void Contour::round(std::size_t corner, double tolerance) {
+void Contour::round(std::size_t corner, double tolerance, Continuity continuity) {
   Segment& before = segments_[corner];
   Segment& after = segments_[corner + 1];
   ContourPoint in;
@@ -146,21 +180,34 @@ void Contour::round(std::size_t corner, double tolerance) {
   }
   const double half_chord = norm(shift);  // sin(turn/2)
   before.stops = false;
-  if (2.0 * half_chord < kSmooth) return;
-  double blend = 0.0;
-  if (half_chord <= std::sin(kSharpest / 2.0)) {
-    blend = std::min(
-        {tolerance / (kMidRounding * half_chord), before.end.rate / 2.0, after.begin.rate / 2.0});
-    const double bend =
-        std::max(sharpest(before, before.end.rate), sharpest(after, after.begin.rate));
-    if (bend > 0.0) blend = std::min(blend, 1.0 / (2.0 * bend));
+  const double sharpness =
+      std::max(sharpest(before, before.end.rate), sharpest(after, after.begin.rate));
+  const bool turns_back = half_chord > std::sin(kSharpest / 2.0);
+  std::vector<double> jump;
+  if (continuity == Continuity::kCurvature && !turns_back) {
+    jump = jumpOf(in, before.end.rate, out, after.begin.rate);
+    const double across = acrossOf(jump, in, before.end.rate, out, after.begin.rate);
+    if (!(across > kEven * sharpness)) jump.clear();
   }
-  if (blend < kLeastBlend * resolution_) {
+  if (2.0 * half_chord < kSmooth && jump.empty()) return;
+  double distance = 0.0;
+  if (!turns_back) {
+    const double turning = kMidRounding * half_chord;
+    // turning d + bending d^2 = tolerance
+    const double bending = kMostBend * norm(jump);
+    const double root = std::sqrt(turning * turning + 4.0 * bending * tolerance);
+    distance = jump.empty() ? tolerance / turning : 2.0 * tolerance / (turning + root);
+    distance = std::min({distance, before.end.rate / 2.0, after.begin.rate / 2.0});
+    if (sharpness > 0.0)
+      distance = std::min(distance, 1.0 / ((jump.empty() ? 2.0 : 4.0) * sharpness));
+  }
+  if (distance < kLeastBlend * resolution_) {
     before.stops = true;
     return;
   }
-  before.end.blend = after.begin.blend = blend;
+  before.end.blend = after.begin.blend = distance;
   before.end.shift = after.begin.shift = std::move(shift);
+  before.end.jump = after.begin.jump = std::move(jump);
 }
 
 double Contour::roundedUntil(std::size_t segment) const {
@@ -213,12 +260,13 @@ void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) co
 void Contour::evaluate(std::size_t index, double u, ContourPoint& point) const {
   evaluateGiven(index, u, point);
   const Segment& segment = segments_[index];
-  bend(segment.begin, u * segment.begin.rate, 1.0, point);
-  bend(segment.end, (1.0 - u) * segment.end.rate, -1.0, point);
+  blend(segment.begin, u * segment.begin.rate, 1.0, point);
+  blend(segment.end, (1.0 - u) * segment.end.rate, -1.0, point);
 }
 
-// Adds shift (m(w) - |w|), at a distance |w| from the corner, which is on the side of w's sign.
-void Contour::bend(const End& end, double distance, double sign, ContourPoint& point) const {
+// Adds shift (m(w) - |w|) + jump/4 (n(w) - w|w|), at a distance |w| from the corner, which is on
+// the side of w's sign.
+void Contour::blend(const End& end, double distance, double sign, ContourPoint& point) const {
   if (!(distance < end.blend)) return;
   const double y = distance / end.blend;
   const double position = end.blend * (kMidRounding + y * y * (0.75 - 0.125 * y * y)) - distance;
@@ -228,6 +276,17 @@ void Contour::bend(const End& end, double distance, double sign, ContourPoint& p
     point.position[i] += end.shift[i] * position;
     point.first[i] += end.shift[i] * first;
     point.second[i] += end.shift[i] * second;
+  }
+  if (end.jump.empty()) return;
+  const double d = end.blend;
+  const double square = end.rate * end.rate;
+  const double bent = sign * d * d * y * (0.375 - y + y * y * (0.75 - 0.125 * y * y));
+  const double bent_first = end.rate * d * (0.375 - 2.0 * y + y * y * (2.25 - 0.625 * y * y));
+  const double bent_second = sign * square * (y * (4.5 - 2.5 * y * y) - 2.0);
+  for (std::size_t i = 0; i < axes(); ++i) {
+    point.position[i] += end.jump[i] / 4.0 * bent;
+    point.first[i] += end.jump[i] / 4.0 * bent_first;
+    point.second[i] += end.jump[i] / 4.0 * bent_second;
   }
 }
 

@@ -43,6 +43,12 @@ struct ContourPoint {
   std::vector<double> second;
 };
 
+/// What is continuous along a contour wherever there is no stop.
+enum class Continuity {
+  kDirection,
+  kCurvature,  ///< and the direction: the acceleration of a motion along it needn't jump
+};
+
 /// A curve of segments whose corners are rounded. Distances are the root of the sum of the squares
 /// over all axes, each in its own unit. Immutable.
 ///
@@ -66,14 +72,26 @@ struct ContourPoint {
 ///
 /// There is a stop at a corner instead if its tolerance is 0, if it turns by more than 170 degrees,
 /// or if d is less than a hundredth of the resolution.
+///
+/// If the curvature has to be continuous, a place where it jumps is rounded too, even if the
+/// direction doesn't change there. Let c be the jump of p''. It makes a jump of the curvature
+/// unless it is along t1 + t2. The path is then a curve without a corner and a jump plus (t2 - t1)
+/// |w|/2 + c w|w|/4, and instead of w|w| the contour has, for |w| < d,
+///
+///     n(w) = 2 d^2 (3/16 (w/d) + 3/8 (w/d)^3 - 1/16 (w/d)^5)
+///
+/// which continues w|w| with the first and second derivative. It adds 0.0108 |c| d^2 or less to the
+/// distance from the path. d is at most 1/(4 max|p''|) there: n changes the derivative by
+/// 3/8 d |c|/4 or less, which is 3/64, and |c| is at most 2 max|p''|; so |p'| is above 0.04 for
+/// turns of up to 170 degrees.
 class Contour {
  public:
   /// @param start one number for each axis. @param segments each one of a length above 0; at least
   ///   one. @param resolution [unit] what makes no difference: a microstep of the finest axis.
   /// @throw std::invalid_argument if a Bezier's derivative is (almost) 0 at a point, which no axis
   ///   can pass without a stop; it names the segment (the first is 0).
-  Contour(std::vector<double> start, const std::vector<ContourSegment>& segments,
-          double resolution);
+  Contour(std::vector<double> start, const std::vector<ContourSegment>& segments, double resolution,
+          Continuity continuity = Continuity::kDirection);
 
   std::size_t axes() const { return start_.size(); }
   std::size_t size() const { return segments_.size(); }
@@ -107,6 +125,7 @@ class Contour {
     double rate = 0.0;          // |p'|
     double blend = 0.0;         // d; 0: not at all
     std::vector<double> shift;  // (t2 - t1)/2
+    std::vector<double> jump;   // c; empty: 0
   };
   struct Segment {
     ContourSegment::Shape shape;
@@ -127,9 +146,9 @@ class Contour {
 
   Segment placed(const std::vector<double>& from, const ContourSegment& given,
                  std::size_t index) const;
-  void round(std::size_t corner, double tolerance);
+  void round(std::size_t corner, double tolerance, Continuity continuity);
   double sharpest(const Segment& segment, double rate) const;
-  void bend(const End& end, double distance, double sign, ContourPoint& point) const;
+  void blend(const End& end, double distance, double sign, ContourPoint& point) const;
 
   std::vector<double> start_;
   double resolution_;

@@ -16,6 +16,7 @@
 namespace stepdriver {
 namespace {
 
+using motion::Continuity;
 using motion::Contour;
 using motion::ContourPoint;
 using motion::ContourSegment;
@@ -110,6 +111,26 @@ TEST(Contour, PassesATangentArcUnchanged) {
   EXPECT_NEAR(point.first[1], 5.0 * kPi / 2.0, 1e-12);
 }
 
+TEST(Contour, RoundsAJumpOfTheCurvatureIfItHasToBeContinuous) {
+  ContourSegment arc;
+  arc.shape = ContourSegment::Shape::kArc;
+  arc.plane = {0, 1};
+  arc.centre = {10.0, 5.0};
+  arc.angle = kPi / 2.0;
+  arc.end = {15.0, 5.0};
+  const auto contour = [&](double tolerance) {
+    return Contour({0.0, 0.0}, {lineTo({10.0, 0.0}, tolerance), arc}, 1.0, Continuity::kCurvature);
+  };
+  // 0.0108 d^2/5 = tolerance
+  EXPECT_NEAR(contour(1e-3).roundedFrom(0), 1.0 - std::sqrt(1e-3 * 5.0 / 0.0108) / 10.0, 1e-9);
+  EXPECT_NEAR(contour(1.0).roundedFrom(0), 1.0 - 1.25 / 10.0, 1e-12) << "a quarter of the radius";
+  EXPECT_FALSE(contour(1e-3).stopsAfter(0));
+  EXPECT_TRUE(contour(0.0).stopsAfter(0));
+  const Contour straight({0.0, 0.0}, {lineTo({10.0, 0.0}, 0.0), lineTo({20.0, 0.0}, 0.0)}, 1.0,
+                         Continuity::kCurvature);
+  EXPECT_FALSE(straight.stopsAfter(0));
+}
+
 TEST(Contour, FindsTheCircleOfAnArc) {
   const motion::Arc arc = motion::arcThrough({1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0});
   EXPECT_NEAR(arc.centre[0], 0.0, 1e-12);
@@ -162,13 +183,14 @@ TEST(Contour, KnowsTheRangeOfEachAxis) {
 }
 
 // Corners of every two shapes: within the tolerance, tangential, with a curvature that is
-// continuous where the rounding begins and ends, and never without a direction.
-TEST(Contour, StaysWithinTheToleranceOnRandomPaths) {
+// continuous where the rounding begins and ends (and, if it has to be, in its middle), and never
+// without a direction.
+void expectRounded(Continuity continuity) {
   std::mt19937 random(20);
   int corners = 0;
   for (int i = 0; i < 400; ++i) {
     const test::RandomContour path = test::randomContour(random);
-    const Contour contour = path.contour();
+    const Contour contour = path.contour(continuity);
     ContourPoint point;
     ContourPoint given;
     const auto shape_at = [&](std::size_t segment, double parameter) {
@@ -193,23 +215,36 @@ TEST(Contour, StaysWithinTheToleranceOnRandomPaths) {
       ASSERT_LT(distance(shape_at(segment, 1.0).direction, shape_at(segment + 1, 0.0).direction),
                 1.1e-6)
           << "path " << i << " segment " << segment;
+      if (continuity == Continuity::kCurvature) {
+        const std::vector<double> in = shape_at(segment, 1.0).curvature;
+        const std::vector<double> out = shape_at(segment + 1, 0.0).curvature;
+        const double zero = distance(in, std::vector<double>(contour.axes()));
+        ASSERT_LT(distance(in, out), 1e-5 * zero + 1e-12) << "path " << i << " segment " << segment;
+      }
       if (last == 1.0) continue;
       ++corners;
-      constexpr double kBeside = 1e-7;
       const double scale = distance(point.first, std::vector<double>(contour.axes()));
       for (const double edge : {first, last}) {
         if (edge == 0.0) continue;
-        const Shape in = shape_at(segment, edge - kBeside);
-        const Shape out = shape_at(segment, edge + kBeside);
-        ASSERT_LT(distance(in.direction, out.direction), 1e-4);
-        // The curvature grows linearly from there, the faster the shorter the rounding is.
-        const double blend = edge == first ? first : 1.0 - last;
-        ASSERT_LT(distance(in.curvature, out.curvature) * scale, 1e-3 + 1e-6 / (blend * blend))
+        const auto change = [&](double beside) {
+          const Shape in = shape_at(segment, edge - beside);
+          const Shape out = shape_at(segment, edge + beside);
+          EXPECT_LT(distance(in.direction, out.direction), 1e-4);
+          return distance(in.curvature, out.curvature) * scale;
+        };
+        // It doesn't jump if it changes the less, the nearer both places are.
+        ASSERT_LT(change(1e-8), 0.2 * change(1e-7) + 1e-3)
             << "path " << i << " segment " << segment;
       }
     }
   }
   EXPECT_GT(corners, 500);
+}
+
+TEST(Contour, StaysWithinTheToleranceOnRandomPaths) { expectRounded(Continuity::kDirection); }
+
+TEST(Contour, StaysWithinTheToleranceWithAContinuousCurvature) {
+  expectRounded(Continuity::kCurvature);
 }
 
 }  // namespace

@@ -18,7 +18,9 @@ struct RandomContour {
   std::vector<motion::ContourSegment> segments;
   std::vector<motion::ContourLimits> limits;
 
-  motion::Contour contour() const { return {start, segments, 1.0}; }
+  motion::Contour contour(motion::Continuity continuity = motion::Continuity::kDirection) const {
+    return {start, segments, 1.0, continuity};
+  }
 };
 
 /// Of 1 to 4 axes and 1 to 10 segments of every shape, with ends on whole microsteps. Tolerances
