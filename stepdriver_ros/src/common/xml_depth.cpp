@@ -1,11 +1,11 @@
 #include "xml_depth.h"
 
-#include <dlfcn.h>
 #include <xmlrpcpp/XmlRpcValue.h>
 
-#include <cstring>
 #include <stdexcept>
 #include <string>
+
+#include "library_function.h"
 
 namespace {
 
@@ -17,13 +17,7 @@ constexpr char kFromXml[] =
 
 /// The library's own function.
 FromXml libraryFromXml() {
-  static const FromXml function = [] {
-    void* const symbol = dlsym(RTLD_NEXT, kFromXml);
-    FromXml found = nullptr;
-    static_assert(sizeof(found) == sizeof(symbol));
-    std::memcpy(&found, &symbol, sizeof(found));
-    return found;
-  }();
+  static const auto function = stepdriver::ros_node::libraryFunction<FromXml>(kFromXml);
   return function;
 }
 
@@ -32,8 +26,7 @@ thread_local int depth = 0;
 
 }  // namespace
 
-/// Takes the place of the library's function of the same name, also for calls in the library: the
-/// loader finds the program's functions first.
+/// Takes the place of the library's function, also for calls in the library.
 bool XmlRpc::XmlRpcValue::fromXml(const std::string& valueXml, int* offset) {
   const FromXml read = libraryFromXml();
   if (read == nullptr || depth >= stepdriver::ros_node::kMostXmlDepth) {

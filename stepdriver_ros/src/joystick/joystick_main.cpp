@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-#include <ros/callback_queue.h>
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/names.h>
@@ -7,16 +5,13 @@
 #include <ros/param.h>
 #include <ros/this_node.h>
 
-#include <chrono>
 #include <cmath>
-#include <exception>
-#include <optional>
+#include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "common/client_node.h"
 #include "common/end_requests.h"
-#include "common/loopback_only.h"
 #include "common/node_start.h"
 #include "common/xml_depth.h"
 #include "common/xmlrpc_value.h"
@@ -27,11 +22,6 @@
 namespace stepdriver::joystick {
 namespace {
 
-using ros_node::EndRequests;
-
-constexpr double kPoll = 0.02;  // [s]
-// Time for the last message, which roscpp sends in a thread of its own.
-constexpr std::chrono::milliseconds kLastWords{50};
 // How many messages should arrive in the driver's jog_timeout, so that a late one ends no jog.
 constexpr double kMessagesInTimeout = 3.0;
 constexpr double kRounding = 1e-9;
@@ -48,25 +38,27 @@ Exit codes: 0 ended as asked, 1 wrong configuration, 64 wrong usage.
 Start it with: roslaunch stepdriver joystick.launch
 )";
 
-/// @param driver receives the driver's full name.
+struct Parameters {
+  std::string driver;  // full name
+  JoystickConfig config;
+};
+
 /// @throw ConfigError
-JoystickConfig readParameters(std::string& driver) {
+Parameters readParameters() {
   std::vector<ConfigIssue> issues;
   const std::string& name = ros::this_node::getName();
-  JoystickConfig config = readJoystickConfig(ros_node::privateParameters(name), name, issues);
-  std::string why;
-  if (config.driver.empty() || !ros::names::validate(config.driver, why)) {
-    issues.push_back({name + "/driver", fmt::format("is \"{}\", but must be the name of a node{}",
-                                                    config.driver, why.empty() ? "" : ": " + why)});
-  }
+  Parameters parameters;
+  parameters.config = readJoystickConfig(ros_node::privateParameters(name), name, issues);
+  ros_node::checkDriverName(parameters.config.driver, name, issues);
   if (!issues.empty()) throw ConfigError(issues);
-  driver = ros::names::resolve(config.driver);
+  parameters.driver = ros::names::resolve(parameters.config.driver);
   XmlRpc::XmlRpcValue axes;
-  if (ros::param::get(driver + "/axes", axes)) {
-    checkDriverAxes(config, name, ros_node::configValue(axes), driver, issues);
+  if (ros::param::get(parameters.driver + "/axes", axes)) {
+    checkDriverAxes(parameters.config, name, ros_node::configValue(axes), parameters.driver,
+                    issues);
   }
   if (!issues.empty()) throw ConfigError(issues);
-  return config;
+  return parameters;
 }
 
 void warnOfTooLowRate(const std::string& driver, double rate) {
@@ -80,35 +72,13 @@ void warnOfTooLowRate(const std::string& driver, double rate) {
       rate, driver.c_str(), timeout, std::ceil(kMessagesInTimeout / timeout - kRounding));
 }
 
-int run(EndRequests& end_requests) {
-  std::optional<ros::NodeHandle> node;  // with it roscpp and its console end
-  try {
-    // Before the handle registers this node, which ends a running node with the same name.
-    std::string driver;
-    const JoystickConfig config = readParameters(driver);
-    node.emplace();
-    ros_node::closeToOtherComputers();
-    end_requests.takeOverShutdownCall();
-    warnOfTooLowRate(driver, config.rate);
-    Joystick joystick(*node, driver, config);
-    ROS_INFO_NAMED("joystick", "Ready: %s jogs %zu %s of %s", node->resolveName("joy").c_str(),
-                   config.axes.size(), config.axes.size() == 1 ? "axis" : "axes", driver.c_str());
-    std::string who;
-    while (who.empty()) {
-      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kPoll));
-      who = end_requests.waitFor(std::chrono::milliseconds(0));
-    }
-    ROS_INFO_NAMED("joystick", "Ending on %s", who.c_str());
-    joystick.rest();
-    std::this_thread::sleep_for(kLastWords);
-    ros::shutdown();  // also ends unanswered calls
-    return ros_node::kExitOk;
-  } catch (const ConfigError& error) {
-    ros_node::explain(error, ros::this_node::getName(), "Not started");
-  } catch (const std::exception& error) {
-    ROS_FATAL_NAMED("joystick", "Not started: %s", error.what());
-  }
-  return ros_node::kExitConfig;
+std::unique_ptr<Joystick> start(ros::NodeHandle& node, const Parameters& parameters) {
+  const auto& [driver, config] = parameters;
+  warnOfTooLowRate(driver, config.rate);
+  auto joystick = std::make_unique<Joystick>(node, driver, config);
+  ROS_INFO_NAMED("joystick", "Ready: %s jogs %zu %s of %s", node.resolveName("joy").c_str(),
+                 config.axes.size(), config.axes.size() == 1 ? "axis" : "axes", driver.c_str());
+  return joystick;
 }
 
 }  // namespace
@@ -122,5 +92,5 @@ int main(int argc, char** argv) {
   if (const auto code = ros_node::handleArguments(argc, argv, joystick::kUsage)) return *code;
   ros::init(argc, argv, "joystick", ros::init_options::NoSigintHandler);
   if (!ros_node::waitForMaster(end_requests)) return ros_node::kExitOk;
-  return joystick::run(end_requests);
+  return ros_node::runClientNode(end_requests, joystick::readParameters, joystick::start);
 }

@@ -1,15 +1,15 @@
 #include "frame_memory.h"
 
-#include <dlfcn.h>
 #include <ros/connection.h>
 #include <ros/console.h>
 
 #include <atomic>
 #include <boost/shared_array.hpp>
-#include <cstring>
 #include <memory>
 #include <stdexcept>
 #include <string>
+
+#include "common/library_function.h"
 
 namespace {
 
@@ -25,13 +25,7 @@ constexpr char kRead[] =
 
 /// The library's own function.
 Read libraryRead() {
-  static const Read function = [] {
-    void* const symbol = dlsym(RTLD_NEXT, kRead);
-    Read found = nullptr;
-    static_assert(sizeof(found) == sizeof(symbol));
-    std::memcpy(&found, &symbol, sizeof(found));
-    return found;
-  }();
+  static const auto function = stepdriver::ros_node::libraryFunction<Read>(kRead);
   return function;
 }
 
@@ -63,8 +57,7 @@ boost::shared_array<std::uint8_t> withClaim(const boost::shared_array<std::uint8
 
 }  // namespace
 
-/// Takes the place of the library's function of the same name, also for calls in the library: the
-/// loader finds the program's functions first.
+/// Takes the place of the library's function, also for calls in the library.
 void ros::Connection::read(std::uint32_t size, const ReadFinishedFunc& finished_callback) {
   const Read read_on = libraryRead();
   if (size <= kSmallFrame) return read_on(this, size, finished_callback);
