@@ -115,7 +115,9 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   EXPECT_EQ(pins, "y/cw=S y/ccw=D y/enable=N y/m0=M y/endstops/min=E y/fault=F y/in_position=P ");
   config::MotorConfig twin;
   twin.motor = "right";
+  twin.driver = driver::driverChip("tmc2209");
   twin.pins.step.line = "R";
+  twin.pins.ms1.line = "O";
   twin.pins.enable.line = "N";
   config.twins.push_back(twin);
   config.motor = "left";
@@ -123,7 +125,7 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   for (const NamedLine& line : linesOf({config})) pins += line.pin + "=" + line.line + " ";
   EXPECT_EQ(pins,
             "x/left/step=S x/left/enable, x/right/enable=N x/left/m0=M x/left/endstops/min=E "
-            "x/left/fault=F x/right/step=R ");
+            "x/left/fault=F x/right/step=R x/right/ms1=O ");
   machine::MachineOptions options;
   options.emergency_stop = config::InputSwitch{"T", true, Bias::kAsIs};
   options.heartbeat = machine::HeartbeatConfig{"H"};

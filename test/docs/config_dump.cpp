@@ -59,7 +59,7 @@ class Dump {
     all(pins.step, pins.dir, pins.enable, pins.ms1, pins.ms2, pins.ms3, pins.sleep, pins.reset);
   }
   void add(const config::MotorConfig& motor) {
-    all(motor.motor, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,
+    all(motor.motor, motor.driver, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,
         motor.in_position, motor.offset);
   }
   void add(const config::Kinematics& kinematics) {
@@ -69,8 +69,8 @@ class Dump {
     }
   }
   void add(const config::AxisConfig& axis) {
-    all(axis.name, axis.joint, static_cast<int>(axis.kind), axis.driver, axis.microsteps,
-        axis.steps_per_unit, axis.steps_per_round, axis.max_skew);
+    all(axis.name, axis.joint, static_cast<int>(axis.kind), axis.microsteps, axis.steps_per_unit,
+        axis.steps_per_round, axis.max_skew);
     for (std::size_t i = 0; i < axis.motors(); ++i) add(axis.motorAt(i));
     if (axis.kinematics) add(*axis.kinematics);
     all(axis.max_speed, axis.start_speed, axis.acceleration, axis.deceleration,

@@ -16,10 +16,7 @@ using driver::FaultEnd;
 constexpr pulse::Nanoseconds kLevelIsTold = 250'000'000;
 
 std::unique_ptr<Step> resetStep(Context& context, axis::AxisModel& axis) {
-  return pinsStep(context, axis, axis.motor.pins().reset(), [&axis] {
-    axis.noteUnpowered();
-    axis.noteHome();
-  });
+  return pinsStep(context, axis, axis.motor.pins().reset(), [&axis] { axis.noteReset(); });
 }
 
 /// Energizes the motor, or switches its current off, until the next such command.
@@ -146,74 +143,79 @@ Steps Recover::plan() {
     }
     add(steps, std::make_unique<RunStep>([&axis] { axis.motor.pinsRestored(); }));
   }
-  add(steps, std::make_unique<RunStep>([this] { insert(endFaultOfDriver()); }));
+  add(steps, std::make_unique<RunStep>([this] { insert(endFaultsOfDrivers()); }));
   add(steps, std::make_unique<RunStep>([this] { clearFault(); }));
   return braked(context(), axis, std::move(steps));
 }
 
-bool Recover::isFaulty() {
-  axis::AxisModel& axis = *axes().front();
-  if (!axis.config.fault || axis.motor.power().isAsleep() || !context().mode.powered) return false;
+std::optional<std::size_t> Recover::faultyFrom(std::size_t motor) const {
+  const axis::AxisModel& axis = *axes().front();
+  if (axis.motor.power().isAsleep() || !context().mode.powered) return {};
   const motor::MotorLines& lines = axis.motor.lines();
-  for (std::size_t i = 0; i < lines.motors(); ++i) {
-    if (lines.motorAt(i).fault < 0) continue;
-    const bool level = axis.readInput(lines.motorAt(i).fault) != 0;
-    if (level == axis.config.driver.fault_active.value_or(false)) return true;
+  for (; motor < lines.motors(); ++motor) {
+    const int line = lines.motorAt(motor).fault;
+    if (line < 0) continue;
+    const bool level = axis.readInput(line) != 0;
+    if (level == axis.config.motorAt(motor).driver.fault_active.value_or(false)) return motor;
   }
-  return false;
+  return {};
 }
 
-Steps Recover::endFaultOfDriver() {
+Steps Recover::endFaultsOfDrivers() {
   axis::AxisModel& axis = *axes().front();
-  Steps steps;
-  // A sleeping chip doesn't report a fault that it may have kept.
-  const bool unknown = axis.config.fault && axis.motor.power().isAsleep();
-  if (!(isFaulty() || unknown)) return steps;
-  const FaultEnd by = axis.config.driver.fault_end;
-  if (by == FaultEnd::kReset && axis.motor.pins().hasReset()) {
-    add(steps, resetStep(context(), axis));
-  } else if (by == FaultEnd::kEnable && axis.motor.pins().hasEnable()) {
-    append(steps, switchOffAndOn());
-  } else {
-    return steps;
+  const bool is_asleep = axis.motor.power().isAsleep();
+  bool resets = false;
+  std::optional<std::size_t> ended_by_enable;
+  for (std::size_t i = 0; i < axis.config.motors(); ++i) {
+    const config::MotorConfig& motor = axis.config.motorAt(i);
+    // A sleeping chip doesn't report a fault that it may have kept.
+    if (is_asleep ? !motor.fault : faultyFrom(i) != i) continue;
+    const FaultEnd by = motor.driver.fault_end;
+    resets = resets || (by == FaultEnd::kReset && motor.pins.reset.wired());
+    if (by == FaultEnd::kEnable && motor.pins.enable.wired()) ended_by_enable = i;
   }
+  Steps steps;
+  if (!resets && !ended_by_enable) return steps;
+  if (resets) add(steps, resetStep(context(), axis));
+  if (ended_by_enable) append(steps, switchOffAndOn(*ended_by_enable));
   add(steps, std::make_unique<WaitStep>(context(), [&axis] { return axis.motor.state().ready; }));
   // The line has another level by then, which may be reported a little later.
   add(steps, std::make_unique<WaitStep>(
                  context(), [&axis] { return axis.motor.state().ready + kLevelIsTold; },
-                 [this] { return !isFaulty(); }));
+                 [this] { return !faultyFrom(0); }));
   return steps;
 }
 
 // A motor without current stays so; its driver has nothing more to be switched off.
-Steps Recover::switchOffAndOn() {
+Steps Recover::switchOffAndOn(std::size_t faulty) {
   axis::AxisModel& axis = *axes().front();
   Steps steps;
   if (!axis.motor.power().isEnabled()) return steps;
   if (axis.motor.enableIsHeldByOthers()) {
-    axis.refuse("the " + axis.config.driver.title + " still reports a fault on " +
-                axis.config.driver.fault_name +
+    axis.refuse(axis.chipText(faulty) + " still reports a fault on " +
+                axis.chipAt(faulty).fault_name +
                 "; ENABLE ends it, but keeps another axis enabled: disable that one first");
   }
-  const auto wait = axis.config.driver.timing.reset_low_ns;
+  const auto wait = axis.config.timing().reset_low_ns;
   add(steps, enableStep(context(), axis, false, {}));
   add(steps, std::make_unique<WaitStep>(context(), [this, wait] { return context().now + wait; }));
   add(steps, enableStep(context(), axis, true, {}));
   return steps;
 }
 
-std::string Recover::whyItStays() const {
-  const axis::AxisModel& axis = *axes().front();
-  const motor::DriverPins& pins = axis.motor.pins();
-  switch (axis.config.driver.fault_end) {
+std::string Recover::whyItStays(std::size_t faulty) const {
+  const config::MotorConfig& motor = axes().front()->config.motorAt(faulty);
+  switch (motor.driver.fault_end) {
     case FaultEnd::kItself:
       return "; it ends by itself when its cause is gone";
     case FaultEnd::kReset:
-      return pins.hasReset() ? ""
-                             : "; RESET isn't wired, so only switching its power off clears it";
+      return motor.pins.reset.wired()
+                 ? ""
+                 : "; RESET isn't wired, so only switching its power off clears it";
     case FaultEnd::kEnable:
-      return pins.hasEnable() ? ""
-                              : "; ENABLE isn't wired, so only switching its power off clears it";
+      return motor.pins.enable.wired()
+                 ? ""
+                 : "; ENABLE isn't wired, so only switching its power off clears it";
     case FaultEnd::kPower:
       break;
   }
@@ -222,10 +224,9 @@ std::string Recover::whyItStays() const {
 
 void Recover::clearFault() {
   axis::AxisModel& axis = *axes().front();
-  if (isFaulty()) {
-    const driver::DriverChip& chip = axis.config.driver;
-    axis.refuse("the " + chip.title + " still reports a fault on " + chip.fault_name +
-                whyItStays());
+  if (const auto faulty = faultyFrom(0)) {
+    axis.refuse(axis.chipText(*faulty) + " still reports a fault on " +
+                axis.chipAt(*faulty).fault_name + whyItStays(*faulty));
   }
   if (context().stops_asked != context().stops_cleared) {
     axis.refuse("an emergency stop has come meanwhile");

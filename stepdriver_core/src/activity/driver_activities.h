@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 
@@ -114,10 +115,11 @@ class Recover : public PinScript {
   Steps plan() override;
 
  private:
-  Steps endFaultOfDriver();
-  Steps switchOffAndOn();
-  std::string whyItStays() const;
-  bool isFaulty();
+  Steps endFaultsOfDrivers();
+  Steps switchOffAndOn(std::size_t faulty);
+  std::string whyItStays(std::size_t faulty) const;
+  /// The first motor from one on whose driver reports a fault; empty: none, or none can.
+  std::optional<std::size_t> faultyFrom(std::size_t motor) const;
   void clearFault();
 };
 

@@ -190,7 +190,7 @@ void MotorPower::lose(Context& context) {
     const motor::Power& power = axis->motor.power();
     if (axis->moving()) axis->position.distrust();
     if (power.isEnabled() && !power.isAsleep()) axis->noteUnpowered();
-    axis->noteHome();
+    axis->noteSupplyLost();
   }
 }
 

@@ -66,8 +66,7 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
     return std::max(now + lead, before->profile->startNs());
   }
   // DIR is set when the profile is accepted, and the chip may still be waking up.
-  const pulse::Nanoseconds dir =
-      axis.config.driver.timing.dir_hold_ns + axis.config.driver.timing.dir_setup_ns;
+  const pulse::Nanoseconds dir = axis.turnTime();
   return std::max(now + lead + dir, now + (axis.motor.state().ready - context.now) + dir);
 }
 

@@ -42,7 +42,7 @@ bool PinsStep::look() {
   if (phase_ == Phase::kReserving) {
     if (state.taken < serial_) return false;
     if (state.accepted != serial_) axis_.refuse("it moves");
-    const driver::Timing& timing = axis_.config.driver.timing;
+    const driver::Timing timing = axis_.config.timing();
     const pulse::Nanoseconds held = state.rose + std::max(timing.mode_hold_ns, timing.step_high_ns);
     due_ = state.pulses != 0 ? std::max(context_.now, held) : context_.now;
     phase_ = Phase::kWaiting;

@@ -73,7 +73,7 @@ PathStart AxisModel::pathStart(std::int64_t at) const {
 double AxisModel::maxSpeed() const { return std::min(limits_now_.max_speed, chipsMaxSpeed()); }
 
 double AxisModel::chipsMaxSpeed() const {
-  const double period = static_cast<double>(driver::shortestStepNs(config.driver)) * 1e-9;
+  const double period = static_cast<double>(config.shortestStepNs()) * 1e-9;
   return 1.0 / (period * stepsPerUnit());
 }
 
@@ -205,7 +205,6 @@ void AxisModel::refuseIntoEndstop(std::int64_t steps) const {
 }
 
 void AxisModel::refuseMicrosteps(int wanted) const {
-  const driver::DriverChip& chip = config.driver;
   if (config.kinematics) {
     refuse(
         fmt::format("it shares its motors, and keeps its microsteps, 1/{}: its place may be "
@@ -218,6 +217,7 @@ void AxisModel::refuseMicrosteps(int wanted) const {
                     "motors may be at different microsteps, which another mode doesn't have",
                     config.motors(), motor.microsteps()));
   }
+  const driver::DriverChip& chip = config.driver;  // that of the only motor
   const std::vector<int> known = driver::selectableMicrosteps(chip);
   if (chip.modes.empty()) {
     refuse(
@@ -255,12 +255,17 @@ bool AxisModel::anyEndstopActive(bool at_max) const {
 }
 
 std::string AxisModel::chipText(std::size_t motor_index) const {
+  const std::string title = "the " + chipAt(motor_index).title;
   if (!sharers_.empty()) {
-    const AxisModel& owner = motor_index == 0 ? *this : *sharers_.at(motor_index - 1);
-    return "the " + owner.config.driver.title + " of " + owner.name();
+    return title + " of " + (motor_index == 0 ? *this : *sharers_.at(motor_index - 1)).name();
   }
   const std::string& name = config.motorAt(motor_index).motor;
-  return "the " + config.driver.title + (name.empty() ? "" : " of motor " + name);
+  return title + (name.empty() ? "" : " of motor " + name);
+}
+
+const driver::DriverChip& AxisModel::chipAt(std::size_t motor_index) const {
+  if (sharers_.empty()) return config.motorAt(motor_index).driver;
+  return (motor_index == 0 ? *this : *sharers_.at(motor_index - 1)).config.driver;
 }
 
 int AxisModel::readInput(int line) const {
@@ -294,6 +299,16 @@ void AxisModel::shareMotors(const std::vector<AxisModel*>& axes) {
     reach_ += 0.5 * std::abs(config.kinematics->inverse[own][i]) * config.steps_per_unit /
               axes[i]->config.steps_per_unit;
   }
+}
+
+pulse::Nanoseconds AxisModel::turnTime() const {
+  const auto time = [](const AxisModel& axis) {
+    const driver::Timing timing = axis.config.timing();
+    return timing.dir_hold_ns + timing.dir_setup_ns;
+  };
+  pulse::Nanoseconds longest = time(*this);
+  for (const AxisModel* sharer : sharers_) longest = std::max(longest, time(*sharer));
+  return longest;
 }
 
 const AxisModel* AxisModel::sharerAtFault() const {
@@ -335,19 +350,31 @@ void AxisModel::noteUnpowered() {
   if (!config.holds_position_unpowered) distrust();
 }
 
-void AxisModel::noteHome() {
-  if (!motor.areAtHome()) distrust();
-  motor.wentHome();
+void AxisModel::noteHome(std::size_t motor_index) {
+  if (!motor.isAtHome(motor_index)) distrust();
+  motor.wentHome(motor_index);
 }
 
-void AxisModel::noteAsleep() {
+void AxisModel::noteReset() {
   noteUnpowered();
-  if (config.driver.asleep == driver::TranslatorState::kHome) noteHome();
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    if (config.motorAt(i).pins.reset.wired()) noteHome(i);
+  }
 }
 
-void AxisModel::noteDisabled() {
+void AxisModel::noteSupplyLost() {
+  for (std::size_t i = 0; i < config.motors(); ++i) noteHome(i);
+}
+
+void AxisModel::noteAsleep() { noteOff(&driver::DriverChip::asleep); }
+
+void AxisModel::noteDisabled() { noteOff(&driver::DriverChip::disabled); }
+
+void AxisModel::noteOff(driver::TranslatorState driver::DriverChip::*meanwhile) {
   noteUnpowered();
-  if (config.driver.disabled == driver::TranslatorState::kHome) noteHome();
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    if (config.motorAt(i).driver.*meanwhile == driver::TranslatorState::kHome) noteHome(i);
+  }
 }
 
 // ---- over a restart ----
@@ -383,6 +410,13 @@ std::string AxisModel::whyImpossible(const AxisMemory& kept, const std::string& 
   return pathAxis().whyBeyondLimits(kept.position, "in " + source + ", the position");
 }
 
+bool AxisModel::countsWhileDisabled() const {
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    if (config.motorAt(i).driver.disabled == driver::TranslatorState::kCounts) return true;
+  }
+  return false;
+}
+
 std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean,
                                      const std::string& source) const {
   // It may have been kept in another microstep mode, whose backlash is rounded differently.
@@ -402,7 +436,7 @@ std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean,
   if (!config.holds_position_unpowered) {
     return "the motor had no current in between, and holds_position_unpowered isn't set";
   }
-  if (config.driver.both_edges && config.driver.disabled == driver::TranslatorState::kCounts) {
+  if (config.stepsOnBothEdges() && countsWhileDisabled()) {
     return "each edge of STEP is a step, and the start may have made one without current";
   }
   if (!kept.at_home) {

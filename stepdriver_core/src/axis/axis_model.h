@@ -89,6 +89,8 @@ class AxisModel {
   /// [microsteps] The configured limits, of every stop, regardless of setLimits(). Their speed and
   /// acceleration are for the way to the next whole microstep, from a crawl.
   motion::MotionLimits stopLimits() const;
+  /// How long DIR must stand still, in total, around a turn of any of its motors.
+  pulse::Nanoseconds turnTime() const;
   /// Steps closer than this are at a speed that the motor can't start from without a ramp.
   pulse::Nanoseconds restartInterval() const;
   const AxisLimits& limitsOfNextMotion() const { return limits_next_; }
@@ -125,8 +127,12 @@ class AxisModel {
   bool anyEndstopActive(bool at_max) const;
   /// @throw GpioError
   int readInput(int line) const;
+  /// @name The driver of a motor of the axis, or of those that it shares: its own is the first one
+  /// @{
+  const driver::DriverChip& chipAt(std::size_t motor_index) const;
   /// "the A4988", and of which motor if there are several.
   std::string chipText(std::size_t motor_index) const;
+  /// @}
   /// A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const;
 
@@ -139,11 +145,12 @@ class AxisModel {
   /// Whether something must be done before a motion of an axis that is ready to move: it is idle,
   /// or its brake is engaged.
   bool mustWake() const;
-  /// The translator has gone Home: from another phase the motor turns when it has current again.
-  void noteHome();
-  /// What sleep and disabling do to the motor and the translator.
+  /// What RESET, sleep and disabling do to the motors and their translators.
+  void noteReset();
   void noteAsleep();
   void noteDisabled();
+  /// The chips have lost their supply, and with it their phases.
+  void noteSupplyLost();
   /// @}
 
   /// @name Axes that share motors
@@ -192,6 +199,11 @@ class AxisModel {
                       config::LimitSource source = config::LimitSource::kConfiguration) const;
 
   const AxisModel* sharerAtFault() const;
+  /// A translator has gone Home: from another phase the motor turns when it has current again.
+  void noteHome(std::size_t motor_index);
+  void noteOff(driver::TranslatorState driver::DriverChip::*meanwhile);
+  /// A chip's translator follows STEP without current.
+  bool countsWhileDisabled() const;
 
   std::vector<AxisModel*> sharers_;
   double reach_ = 0.0;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include "message_text.h"
 
 namespace stepdriver::config {
 namespace {
@@ -50,6 +53,21 @@ const char* sourceText(LimitSource source) {
       break;
   }
   return "the configuration";
+}
+
+driver::Timing AxisConfig::timing() const {
+  driver::Timing longest = driver.timing;
+  for (const MotorConfig& twin : twins) longest = longestOf(longest, twin.driver.timing);
+  return longest;
+}
+
+std::string AxisConfig::driverTitles() const {
+  std::vector<std::string> titles;
+  for (std::size_t i = 0; i < motors(); ++i) {
+    const std::string& title = motorAt(i).driver.title;
+    if (std::find(titles.begin(), titles.end(), title) == titles.end()) titles.push_back(title);
+  }
+  return listText(titles, "and");
 }
 
 double highestMotorSpeed(const Kinematics& kinematics, std::size_t motor,

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
@@ -30,25 +32,50 @@ bool isAxisName(const std::string& name) {
   return true;
 }
 
-std::optional<int> readMicrosteps(ConfigReader& axis,
-                                  const std::optional<driver::DriverChip>& chip) {
-  if (chip && !chip->microsteps.empty()) {
-    return axis.findOneOf("microsteps", chip->microsteps, Presence::kRequired);
+/// All motors have the same mode: one that each driver has.
+std::optional<int> readMicrosteps(ConfigReader& axis, const std::vector<MotorChip>& chips) {
+  std::optional<std::vector<int>> modes;
+  for (const auto& [chip, key] : chips) {
+    if (!chip || chip->microsteps.empty()) continue;
+    if (!modes) modes = chip->microsteps;
+    const auto is_missing = [&own = chip->microsteps](int mode) {
+      return std::find(own.begin(), own.end(), mode) == own.end();
+    };
+    modes->erase(std::remove_if(modes->begin(), modes->end(), is_missing), modes->end());
   }
+  if (modes && modes->empty()) {
+    axis.allow("microsteps");
+    axis.contradiction("motors", "have drivers with no number of microsteps in common");
+    return {};
+  }
+  if (modes) return axis.findOneOf("microsteps", *modes, Presence::kRequired);
   return axis.findInteger("microsteps", 1, kFinestMicrosteps, Presence::kRequired);
 }
 
 /// A mode that the chip has only with a strapped pin can't be selected by lines.
-void checkSelectable(ConfigReader& axis, const AxisConfig& config) {
-  if (!config.pins.ms1.wired() || driver::codeOf(config.driver, config.microsteps)) return;
+void checkSelectable(ConfigReader& axis, const AxisConfig& config, const MotorConfig& motor) {
+  if (!motor.pins.ms1.wired() || driver::codeOf(motor.driver, config.microsteps)) return;
   std::vector<std::string> modes;
-  for (const int mode : driver::selectableMicrosteps(config.driver)) {
+  for (const int mode : driver::selectableMicrosteps(motor.driver)) {
     modes.push_back(std::to_string(mode));
   }
   axis.contradiction("microsteps",
                      fmt::format("is {}, but with the microstep pins wired it must be {}: lines "
                                  "that are high or low select no other mode of the {}",
-                                 axis.shown("microsteps"), listText(modes), config.driver.title));
+                                 axis.shown("microsteps"), listText(modes), motor.driver.title));
+}
+
+/// Where the time is given that bounds the steps' interval: that of the driver whose DIR must be
+/// held longest.
+std::string dirHoldKey(const AxisConfig& config, const std::vector<MotorChip>& chips) {
+  std::size_t longest = 0;
+  for (std::size_t i = 1; i < config.motors(); ++i) {
+    const auto hold = [&config](std::size_t motor) {
+      return config.motorAt(motor).driver.timing.dir_hold_ns;
+    };
+    if (hold(i) > hold(longest)) longest = i;
+  }
+  return chips.at(longest).key + "timing/dir_hold_us";
 }
 
 class AxesReader {
@@ -61,21 +88,24 @@ class AxesReader {
     config.name = name;
     checkAxisName(name, axis);
     const std::size_t issues_of_chip = issues_.size();
-    const std::optional<driver::DriverChip> chip = readChip(axis);
+    const std::vector<MotorChip> chips = readMotorChips(axis);
+    const bool chips_are_right = issues_.size() == issues_of_chip;
     MotionContext context;
-    if (chip && issues_.size() == issues_of_chip) context.timing = chip->timing;
-    context.microsteps = readMicrosteps(axis, chip);
-    if (chip) {
-      config.driver = *chip;
-      context.chip_title = chip->title;
-      context.both_edges = chip->both_edges;
-    }
+    context.microsteps = readMicrosteps(axis, chips);
     config.microsteps = context.microsteps.value_or(1);
     config.joint = readJoint(name, axis);
     const std::size_t issues_before = issues_.size();
-    readMotors(axis, chip ? &*chip : nullptr, config, used_);
-    if (chip && context.microsteps) checkSelectable(axis, config);
+    readMotors(axis, chips, config, used_);
+    for (std::size_t i = 0; i < config.motors(); ++i) {
+      if (chips[i].chip && context.microsteps) checkSelectable(axis, config, config.motorAt(i));
+    }
     const bool pins_are_right = issues_.size() == issues_before;
+    if (chips_are_right) context.timing = config.timing();
+    context.both_edges = config.stepsOnBothEdges();
+    const std::string titles = config.driverTitles();
+    context.drivers_take =
+        "the " + titles + (titles == config.driver.title ? " takes" : " together take");
+    context.dir_hold_key = dirHoldKey(config, chips);
     readPower(axis, pins_are_right, config);
     readBrake(axis, pins_are_right, config, used_);
     const std::optional<Kind> kind = readMotion(axis, context, config);

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -126,8 +127,8 @@ void checkPaths(const DriverChip& chip) {
 
 class ChipReader {
  public:
-  ChipReader(ConfigReader& axis, DriverChip& chip)
-      : axis_(axis), chip_(chip), reader_(axis.map("chip")) {}
+  ChipReader(ConfigReader& owner, const std::set<std::string>& pins, DriverChip& chip)
+      : owner_(owner), pins_(pins), chip_(chip), reader_(owner.map("chip")) {}
 
   void read() {
     const bool wires_enable = isWired("enable");
@@ -175,10 +176,7 @@ class ChipReader {
  private:
   bool isDescribed() const { return chip_.name == kDescribed; }
 
-  bool isWired(const std::string& pin) const {
-    const auto* pins = axis_.value("pins").as<ConfigValue::Map>();
-    return pins != nullptr && pins->count(pin) > 0;
-  }
+  bool isWired(const std::string& pin) const { return pins_.count(pin) > 0; }
 
   bool level(const std::string& key, bool of_chip) {
     return reader_.oneOf(key, kLevels, of_chip ? "high" : "low") == "high";
@@ -259,7 +257,7 @@ class ChipReader {
   }
 
   void readTiming(bool wires_enable) {
-    ConfigReader reader = axis_.map("timing");
+    ConfigReader reader = owner_.map("timing");
     for (const TimingKey& key : kTimingKeys) {
       const auto presence =
           mustState(key.of, wires_enable) ? Presence::kRequired : Presence::kOptional;
@@ -269,16 +267,17 @@ class ChipReader {
     reader.rejectUnknown();
   }
 
-  ConfigReader& axis_;
+  ConfigReader& owner_;
+  const std::set<std::string>& pins_;
   DriverChip& chip_;
   ConfigReader reader_;
 };
 
 }  // namespace
 
-std::optional<DriverChip> readChip(ConfigReader& axis) {
-  axis.allow("driver");
-  const auto* name = axis.value("driver").as<std::string>();
+std::optional<DriverChip> readChip(ConfigReader& reader, const std::set<std::string>& pins) {
+  reader.allow("driver");
+  const auto* name = reader.value("driver").as<std::string>();
   std::optional<DriverChip> chip;
   if (name != nullptr && *name == kDescribed) {
     chip = describedChip();
@@ -286,15 +285,15 @@ std::optional<DriverChip> readChip(ConfigReader& axis) {
     if (const DriverChip* known = driver::findDriverChip(*name)) chip = *known;
   }
   if (chip) {
-    ChipReader(axis, *chip).read();
+    ChipReader(reader, pins, *chip).read();
     return chip;
   }
   std::vector<std::string> names = driver::driverChipNames();
   names.emplace_back(kDescribed);
-  axis.findOneOf("driver", names, Presence::kRequired);
+  reader.findOneOf("driver", names, Presence::kRequired);
   // Errors in the maps are reported all the same.
   DriverChip unknown;
-  ChipReader(axis, unknown).read();
+  ChipReader(reader, pins, unknown).read();
   return {};
 }
 

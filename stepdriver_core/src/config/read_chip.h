@@ -1,6 +1,8 @@
 #pragma once
 
 #include <optional>
+#include <set>
+#include <string>
 
 #include "stepdriver_core/config/config_reader.h"
 
@@ -11,7 +13,9 @@ constexpr int kFinestMicrosteps = 256;
 /// Reads `driver`, `chip` and `timing`: a named chip with the overrides of the configuration, or,
 /// for `driver: step_dir`, a chip that is described by the configuration alone.
 ///
+/// @param reader of an axis, or of one of its motors.
+/// @param pins the keys of the pins that are given for the chip.
 /// @return empty if there is no such driver; then nothing that depends on it is checked.
-std::optional<driver::DriverChip> readChip(ConfigReader& axis);
+std::optional<driver::DriverChip> readChip(ConfigReader& reader, const std::set<std::string>& pins);
 
 }  // namespace stepdriver::config

@@ -231,7 +231,7 @@ class KinematicsReader {
     for (std::size_t i = 0; i < kinematics.axes.size(); ++i) {
       const AxisConfig& axis = *axisOf(kinematics.axes[i]);
       const double rate = highestMotorSpeed(kinematics, i, axes_) * axis.steps_per_unit;
-      const double highest = 1e9 / static_cast<double>(driver::shortestStepNs(axis.driver));
+      const double highest = 1e9 / static_cast<double>(axis.shortestStepNs());
       if (rate <= highest * kSlack) continue;
       issue("axes", fmt::format("need {} steps/s of the motor with the pins of {} when all move at "
                                 "their top speeds, but the {} allows {}; lower their top speeds or "

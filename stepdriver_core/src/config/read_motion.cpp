@@ -113,10 +113,10 @@ class MotionReader {
     const double highest = 1e6 / step_us;
     if (rate <= highest * kSlack) return checkHold(rate);
     mustBe(keys_.max_speed,
-           fmt::format("at most {}: it is {} steps/s (at {} steps per {}), and the {} takes at "
+           fmt::format("at most {}: it is {} steps/s (at {} steps per {}), and {} at "
                        "most {} steps/s ({} us high, {} us low{})",
                        upperBoundText(highest / *steps_per_unit_), roughText(rate),
-                       roughText(*steps_per_unit_), keys_.unit, context_.chip_title,
+                       roughText(*steps_per_unit_), keys_.unit, context_.drivers_take,
                        upperBoundText(highest), numberText(high_us), numberText(low_us),
                        context_.both_edges ? ", each edge a step" : ""));
   }
@@ -127,7 +127,7 @@ class MotionReader {
     const double hold_us = static_cast<double>(context_.timing->dir_hold_ns) / 1e3;
     if (hold_us <= interval_us * kSlack) return;
     axis_.contradiction(
-        "timing/dir_hold_us",
+        context_.dir_hold_key,
         fmt::format("is {}, but must be at most {}: at {}, which is {}, a step "
                     "follows every {} us",
                     numberText(hold_us), upperBoundText(interval_us), keys_.max_speed,

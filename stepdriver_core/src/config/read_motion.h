@@ -15,9 +15,12 @@ constexpr double kSlack = 1.0 + 1e-9;
 /// unknown; nothing that depends on it is then reported.
 struct MotionContext {
   std::optional<int> microsteps;
-  std::optional<driver::Timing> timing;  ///< with the configuration's overrides
-  bool both_edges = false;               ///< each edge of STEP is a step
-  std::string chip_title;
+  /// The longest of its motors' drivers, with the configuration's overrides.
+  std::optional<driver::Timing> timing;
+  bool both_edges = false;   ///< each edge of STEP is a step
+  std::string drivers_take;  ///< "the A4988 takes", for messages
+  /// Of the driver whose DIR must be held longest, below the axis.
+  std::string dir_hold_key;
 };
 
 /// Reads the kind of the axis, its scale, speeds, accelerations and soft limits.

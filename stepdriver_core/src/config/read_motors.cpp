@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "message_text.h"
 #include "motion_keys.h"
+#include "read_chip.h"
 #include "read_motion.h"
 #include "read_pins.h"
 
@@ -24,26 +26,34 @@ constexpr std::array<const char*, 8> kMotorKeys = {
 
 const char* offsetKey(Kind kind) { return kind == Kind::kLinear ? "offset_mm" : "offset_deg"; }
 
-/// The pins that either all motors of an axis have, or no motor.
-struct OptionalPin {
+/// The keys of a driver: of the axis's, or of a motor's own.
+constexpr std::array<const char*, 3> kChipKeys = {"driver", "chip", "timing"};
+
+std::set<std::string> pinsGiven(const ConfigReader& motor) {
+  std::set<std::string> pins;
+  const ConfigValue value = motor.value("pins");
+  if (const auto* map = value.as<ConfigValue::Map>()) {
+    for (const auto& entry : *map) pins.insert(entry.first);
+  }
+  return pins;
+}
+
+/// The pins that switch the current of all motors: either all have them, or no motor.
+struct CurrentPin {
   const char* key;
-  bool (*is_wired)(const MotorConfig& motor);
+  Pin Pins::*pin;
 };
-constexpr std::array<OptionalPin, 8> kOptionalPins{
-    {{"enable", [](const MotorConfig& motor) { return motor.pins.enable.wired(); }},
-     {"ms1", [](const MotorConfig& motor) { return motor.pins.ms1.wired(); }},
-     {"ms2", [](const MotorConfig& motor) { return motor.pins.ms2.wired(); }},
-     {"ms3", [](const MotorConfig& motor) { return motor.pins.ms3.wired(); }},
-     {"sleep", [](const MotorConfig& motor) { return motor.pins.sleep.wired(); }},
-     {"reset", [](const MotorConfig& motor) { return motor.pins.reset.wired(); }},
-     {"fault", [](const MotorConfig& motor) { return motor.fault.has_value(); }},
-     {"in_position", [](const MotorConfig& motor) { return motor.in_position.has_value(); }}}};
+constexpr std::array<CurrentPin, 2> kCurrentPins{
+    {{"enable", &Pins::enable}, {"sleep", &Pins::sleep}}};
 
 void checkSamePins(ConfigReader& motors, const AxisConfig& config) {
   for (const MotorConfig& twin : config.twins) {
-    for (const OptionalPin& pin : kOptionalPins) {
-      if (pin.is_wired(config) == pin.is_wired(twin)) continue;
-      const bool twin_lacks = pin.is_wired(config);
+    for (const CurrentPin& pin : kCurrentPins) {
+      const auto is_wired = [&pin](const MotorConfig& motor) {
+        return (motor.pins.*pin.pin).wired();
+      };
+      if (is_wired(config) == is_wired(twin)) continue;
+      const bool twin_lacks = is_wired(config);
       const std::string& with = twin_lacks ? config.motor : twin.motor;
       const std::string& without = twin_lacks ? twin.motor : config.motor;
       motors.contradiction(
@@ -52,6 +62,25 @@ void checkSamePins(ConfigReader& motors, const AxisConfig& config) {
                       "an axis are switched together",
                       pin.key, motors.fullName(with)));
     }
+  }
+}
+
+/// Their steps are the same edges.
+void checkSameEdges(ConfigReader& motors, const AxisConfig& config) {
+  const auto edges = [](const driver::DriverChip& chip) {
+    return chip.both_edges                                  ? "steps on both edges of STEP"
+           : chip.step_inputs == driver::StepInputs::kCwCcw ? "has CW and CCW inputs"
+                                                            : "steps on one edge of STEP";
+  };
+  for (const MotorConfig& twin : config.twins) {
+    const std::string own = edges(twin.driver);
+    const std::string first = edges(config.driver);
+    if (own == first) continue;
+    motors.contradiction(
+        twin.motor, fmt::format("has a driver, {}, that {}, but must have one like that of {}, {}, "
+                                "that {}: the motors of an axis get the same edges",
+                                twin.driver.title, own, motors.fullName(config.motor),
+                                config.driver.title, first));
   }
 }
 
@@ -132,14 +161,57 @@ class SquaringReader {
 
 }  // namespace
 
-void readMotors(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
-                UsedLines& used) {
+std::vector<MotorChip> readMotorChips(ConfigReader& axis) {
   axis.allow("motors");
-  if (!axis.has("motors")) {
-    readPins(axis, chip, config, used);
-    readEndstops(axis, config, used);
-    return;
+  const ConfigValue value = axis.value("motors");
+  const auto* const map = value.as<ConfigValue::Map>();
+  if (map == nullptr || map->empty()) return {{readChip(axis, pinsGiven(axis)), ""}};
+  ConfigReader motors = axis.map("motors");
+  std::vector<MotorChip> chips;
+  std::set<std::string> pins_without_own;
+  bool all_have_own = true;
+  for (const std::string& name : motors.keys()) {
+    ConfigReader motor = motors.map(name);
+    if (!motor.has("driver")) {
+      all_have_own = false;
+      pins_without_own.merge(pinsGiven(motor));
+      for (const char* key : kChipKeys) {
+        if (motor.has(key)) {
+          motor.contradiction(key, fmt::format("is given, but needs {}: without a driver of its "
+                                               "own, the motor has {}",
+                                               motor.fullName("driver"), axis.fullName(key)));
+        }
+      }
+    }
   }
+  std::optional<driver::DriverChip> common;
+  if (!all_have_own) common = readChip(axis, pins_without_own);
+  for (const char* key : kChipKeys) {
+    axis.allow(key);
+    if (all_have_own && axis.has(key)) {
+      axis.contradiction(key, "is given, but each of motors has a driver of its own");
+    }
+  }
+  for (const std::string& name : motors.keys()) {
+    ConfigReader motor = motors.map(name);
+    if (motor.has("driver")) {
+      chips.push_back({readChip(motor, pinsGiven(motor)), "motors/" + name + "/"});
+    } else {
+      chips.push_back({common, ""});
+    }
+  }
+  return chips;
+}
+
+void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisConfig& config,
+                UsedLines& used) {
+  const auto read = [&](ConfigReader& reader, std::size_t number, MotorConfig& motor) {
+    const auto& chip = chips.at(number).chip;
+    if (chip) motor.driver = *chip;
+    readPins(reader, chip ? &*chip : nullptr, motor, used);
+    readEndstops(reader, motor, used);
+  };
+  if (!axis.has("motors")) return read(axis, 0, config);
   for (const char* key : kMotorKeys) {
     axis.allow(key);
     if (!axis.has(key)) continue;
@@ -154,22 +226,26 @@ void readMotors(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& 
                                  "without motors",
                                  names.size(), kMostMotors));
   }
-  for (const std::string& name : names) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string& name = names[i];
     ConfigReader reader = motors.map(name);
     checkAxisName(name, reader);
     MotorConfig motor;
     motor.motor = name;
-    readPins(reader, chip, motor, used);
-    readEndstops(reader, motor, used);
+    for (const char* key : kChipKeys) reader.allow(key);
+    read(reader, i, motor);
     for (const Kind kind : {Kind::kLinear, Kind::kRotary}) reader.allow(offsetKey(kind));
     reader.rejectUnknown();
-    if (name == names.front()) {
+    if (i == 0) {
       static_cast<MotorConfig&>(config) = std::move(motor);
     } else {
       config.twins.push_back(std::move(motor));
     }
   }
   checkSamePins(motors, config);
+  const bool all_known = std::all_of(chips.begin(), chips.end(),
+                                     [](const MotorChip& chip) { return chip.chip.has_value(); });
+  if (all_known) checkSameEdges(motors, config);
 }
 
 void readSquaring(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {

@@ -1,16 +1,32 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "config/used_lines.h"
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 
+/// The driver of a motor.
+struct MotorChip {
+  /// Empty if it isn't known, which has been reported; then nothing that depends on it is checked.
+  std::optional<driver::DriverChip> chip;
+  /// Where its `driver`, `chip` and `timing` are, below the axis: "motors/left/", or empty if they
+  /// are the axis's.
+  std::string key;
+};
+
+/// Reads the drivers of the motors of an axis: of each its own, or that of the axis.
+///
+/// @return one for each of `motors`, in their order; one if there is no such map.
+std::vector<MotorChip> readMotorChips(ConfigReader& axis);
+
 /// Reads `motors`, or the pins and endstops of the only motor.
 ///
-/// @param chip nullptr if it isn't known; then nothing that depends on it is checked.
-void readMotors(ConfigReader& axis, const driver::DriverChip* chip, AxisConfig& config,
+/// @param chips of readMotorChips().
+void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisConfig& config,
                 UsedLines& used);
 
 /// Reads what a homing needs to square several motors: `max_skew` and each motor's `offset`.

@@ -53,10 +53,20 @@ std::vector<int> selectableMicrosteps(const DriverChip& chip) {
   return selectable;
 }
 
-std::int64_t shortestStepNs(const DriverChip& chip) {
-  const Timing& timing = chip.timing;
-  return chip.both_edges ? std::max(timing.step_high_ns, timing.step_low_ns)
-                         : timing.step_high_ns + timing.step_low_ns;
+Timing longestOf(const Timing& one, const Timing& other) {
+  Timing longest;
+  for (std::int64_t Timing::*const time :
+       {&Timing::step_high_ns, &Timing::step_low_ns, &Timing::dir_setup_ns, &Timing::dir_hold_ns,
+        &Timing::mode_setup_ns, &Timing::mode_hold_ns, &Timing::enable_ns, &Timing::wake_ns,
+        &Timing::reset_low_ns, &Timing::reset_wait_ns}) {
+    longest.*time = std::max(one.*time, other.*time);
+  }
+  return longest;
+}
+
+std::int64_t shortestStepNs(const Timing& timing, bool both_edges) {
+  return both_edges ? std::max(timing.step_high_ns, timing.step_low_ns)
+                    : timing.step_high_ns + timing.step_low_ns;
 }
 
 bool keepsPosition(std::int64_t index, int from_microsteps, int to_microsteps) {

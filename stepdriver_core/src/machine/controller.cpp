@@ -68,6 +68,17 @@ void refuseBadNumber(const axis::AxisModel& axis, const char* what, double value
                   what, numberText(value)));
 }
 
+/// Why the drivers of an axis can't be switched by a pin that isn't wired.
+std::string whyNoPin(const config::AxisConfig& axis,
+                     std::optional<bool> driver::DriverChip::*active_level, const char* pin,
+                     const char* name) {
+  for (std::size_t i = 0; i < axis.motors(); ++i) {
+    const driver::DriverChip& chip = axis.motorAt(i).driver;
+    if (!(chip.*active_level)) return fmt::format("a {} has no {} pin", chip.title, name);
+  }
+  return fmt::format("pins/{} isn't configured", pin);
+}
+
 }  // namespace
 
 Controller::Controller(const std::vector<config::AxisConfig>& axes,
@@ -172,11 +183,11 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
   }
   if (state.chip_faults != before.chip_faults && !axis.motor.power().isAsleep() &&
       context_.mode.powered) {
-    const driver::DriverChip& chip = axis.config.driver;
-    axis.fault.latch(fmt::format("{} reports a fault on {}, such as over-current or "
-                                 "over-temperature",
-                                 axis.chipText(state.chip_at_fault), chip.fault_name),
-                     kChipRemedy);
+    axis.fault.latch(
+        fmt::format("{} reports a fault on {}, such as over-current or over-temperature",
+                    axis.chipText(state.chip_at_fault),
+                    axis.chipAt(state.chip_at_fault).fault_name),
+        kChipRemedy);
     axis.distrust();
   }
   if (state.ended != before.ended) {
@@ -190,12 +201,12 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
       axis.distrust();
     }
     if (state.end == pulse::EndReason::kNotInPosition) {
-      const driver::DriverChip& chip = axis.config.driver;
-      axis.fault.latch(fmt::format("{} isn't in position: {} was still inactive {} after the "
-                                   "end of the motion",
-                                   axis.chipText(state.unsettled), chip.in_position_name,
-                                   millisecondsText(state.waited)),
-                       kPositionRemedy);
+      axis.fault.latch(
+          fmt::format("{} isn't in position: {} was still inactive {} after the "
+                      "end of the motion",
+                      axis.chipText(state.unsettled), axis.chipAt(state.unsettled).in_position_name,
+                      millisecondsText(state.waited)),
+          kPositionRemedy);
       axis.distrust();
     }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.distrust();
@@ -866,10 +877,9 @@ void Controller::serve(const Sleep& wanted, const Ack& call) {
   const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
   for (const axis::AxisModel* changed : all) {
     refuseUnlessFree(*changed, wanted.asleep ? "it is put to sleep" : "it is woken");
-    const driver::DriverChip& chip = changed->config.driver;
     if (!changed->motor.pins().hasSleep()) {
-      changed->refuse(chip.sleep_asleep ? "pins/sleep isn't configured"
-                                        : "a " + chip.title + " has no SLEEP pin");
+      changed->refuse(
+          whyNoPin(changed->config, &driver::DriverChip::sleep_asleep, "sleep", "SLEEP"));
     }
   }
   for (axis::AxisModel* changed : all) {
@@ -883,10 +893,8 @@ void Controller::serve(const Reset& wanted, const Ack& call) {
   const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
   for (const axis::AxisModel* changed : all) {
     refuseUnlessFree(*changed, "it is reset");
-    const driver::DriverChip& chip = changed->config.driver;
     if (!changed->motor.pins().hasReset()) {
-      changed->refuse(chip.reset_held ? "pins/reset isn't configured"
-                                      : "a " + chip.title + " has no RESET pin");
+      changed->refuse(whyNoPin(changed->config, &driver::DriverChip::reset_held, "reset", "RESET"));
     }
   }
   for (axis::AxisModel* changed : all) {

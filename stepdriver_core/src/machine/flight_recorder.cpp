@@ -26,7 +26,7 @@ constexpr double kBytesPerEdge = 8.0;
 double edgesPerSecond(const std::vector<config::AxisConfig>& axes, const Wiring& wiring) {
   double rate = wiring.heartbeat ? 1e9 / static_cast<double>(wiring.heartbeat->interval) : 0.0;
   for (const config::AxisConfig& axis : axes) {
-    const double edges_of_a_step = axis.driver.both_edges ? 1.0 : 2.0;
+    const double edges_of_a_step = axis.stepsOnBothEdges() ? 1.0 : 2.0;
     rate +=
         edges_of_a_step * axis.max_speed * axis.steps_per_unit * static_cast<double>(axis.motors());
   }
@@ -55,7 +55,7 @@ std::vector<bool> levelsOf(const Wiring& wiring) {
 
 void addPins(const config::AxisConfig& axis, std::size_t motor, const motor::MotorLines& all_lines,
              std::vector<Recording::Pin>& pins) {
-  const driver::DriverChip& chip = axis.driver;
+  const driver::DriverChip& chip = axis.motorAt(motor).driver;
   const config::Pins& own = axis.motorAt(motor).pins;
   const motor::ChipLines& lines = all_lines.motorAt(motor);
   const std::string scope = axis.traceName(motor);

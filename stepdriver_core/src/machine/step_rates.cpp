@@ -32,13 +32,13 @@ Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
   const auto write = static_cast<double>(cost.write.p99);
   const auto read = static_cast<double>(cost.read.p99);
   // If each edge is a step, there is one write for each, and no time between the two of a pulse.
-  const bool both = axis.driver.both_edges;
-  const auto high = both ? 0.0 : static_cast<double>(axis.driver.timing.step_high_ns);
+  const bool both = axis.stepsOnBothEdges();
+  const auto high = both ? 0.0 : static_cast<double>(axis.timing().step_high_ns);
   const auto guard = static_cast<double>(capability.guard);
   Load load{};
   load.rise = read + write;
   load.calls = read + (both ? 1.0 : 2.0) * write;
-  load.chip = static_cast<double>(driver::shortestStepNs(axis.driver));
+  load.chip = static_cast<double>(axis.shortestStepNs());
   load.spinning = guard + std::min(guard, high);
   // A sleep ends late, and shortens the spinning; but there must be room for one.
   const double after_sleep =

@@ -11,7 +11,7 @@ namespace {
 class ChipPins {
  public:
   ChipPins(const config::AxisConfig& config, const MotorLines& lines, std::size_t motor)
-      : chip_(config.driver),
+      : chip_(config.motorAt(motor).driver),
         pins_(config.motorAt(motor).pins),
         lines_(lines.motorAt(motor)),
         cw_ccw_(lines.cw_ccw) {}
@@ -44,6 +44,7 @@ class ChipPins {
 
   PinSequence reset() const {
     PinSequence sequence;
+    if (!hasReset()) return sequence;
     sequence.add(lines_.reset, resetLevel(true), chip_.timing.reset_low_ns);
     sequence.add(lines_.reset, resetLevel(false), chip_.timing.reset_wait_ns);
     return sequence;
@@ -93,27 +94,32 @@ class ChipPins {
   const bool cw_ccw_;
 };
 
-/// The sequences of all chips of an axis, write by write. They have the same length and waits,
-/// because the chips are the same and have the same pins wired. Each line is written once at a
-/// time: the motors may share that of ENABLE.
+/// The sequences of all chips of an axis, write by write: after those that are made together, the
+/// longest of their waits passes. Each line is written once at a time: the motors may share that of
+/// ENABLE.
 template <typename SequenceOf>
 PinSequence together(const config::AxisConfig& config, const MotorLines& lines,
                      const SequenceOf& sequence_of) {
   std::vector<PinSequence> parts;
+  std::size_t longest = 0;
   for (std::size_t i = 0; i < config.motors(); ++i) {
     parts.push_back(sequence_of(ChipPins(config, lines, i), lines.motorAt(i)));
+    longest = std::max(longest, parts.back().size);
   }
   PinSequence all;
-  for (std::size_t k = 0; k < parts.front().size; ++k) {
+  for (std::size_t k = 0; k < longest; ++k) {
     const std::size_t first = all.size;
+    pulse::Nanoseconds wait = 0;
     for (const PinSequence& part : parts) {
+      if (k >= part.size) continue;
       const PinSequence::Write& write = part.writes.at(k);
+      wait = std::max(wait, write.then_wait);
       const bool is_written =
           std::any_of(all.writes.begin() + first, all.writes.begin() + all.size,
                       [&](const PinSequence::Write& other) { return other.line == write.line; });
       if (!is_written) all.add(write.line, write.level, 0);
     }
-    all.writes.at(all.size - 1).then_wait = parts.front().writes.at(k).then_wait;
+    all.writes.at(all.size - 1).then_wait = wait;
   }
   return all;
 }
@@ -122,6 +128,13 @@ PinSequence together(const config::AxisConfig& config, const MotorLines& lines,
 
 DriverPins::DriverPins(const config::AxisConfig& config, const MotorLines& lines)
     : config_(config), lines_(lines) {}
+
+bool DriverPins::hasReset() const {
+  for (std::size_t i = 0; i < lines_.motors(); ++i) {
+    if (lines_.motorAt(i).reset >= 0) return true;
+  }
+  return false;
+}
 
 PinSequence DriverPins::bringUp() const {
   return together(config_, lines_,

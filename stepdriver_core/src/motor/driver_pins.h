@@ -24,9 +24,11 @@ class DriverPins {
   /// @{
   bool hasEnable() const { return lines_.enable >= 0; }
   bool hasSleep() const { return lines_.sleep >= 0; }
-  bool hasReset() const { return lines_.reset >= 0; }
-  bool hasMode() const { return lines_.mode[0] >= 0; }
   /// @}
+  /// Whether any of the chips has it wired.
+  bool hasReset() const;
+  /// Of an axis with one motor: only such a one changes its mode.
+  bool hasMode() const { return lines_.mode[0] >= 0; }
 
   /// Wakes the chips and releases them from reset, starting at the safe levels. Empty if neither
   /// pin is wired.

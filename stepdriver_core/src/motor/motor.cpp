@@ -42,13 +42,9 @@ motion::MotionState Motor::stateAt(std::int64_t at) const {
 
 bool Motor::areAtHome() const {
   for (std::size_t i = 0; i < translators_.size(); ++i) {
-    if (!translators_[i].isAtHome(countOf(i))) return false;
+    if (!isAtHome(i)) return false;
   }
   return true;
-}
-
-void Motor::wentHome() {
-  for (std::size_t i = 0; i < translators_.size(); ++i) translators_[i].wentHome(countOf(i));
 }
 
 pulse::MotorSet Motor::allMotors() const {

@@ -53,10 +53,11 @@ class Motor {
   Translator& translator() { return translators_.front(); }
   const Translator& translator() const { return translators_.front(); }
   int microsteps() const { return translators_.front().microsteps(); }
+  bool isAtHome(std::size_t motor) const { return translators_.at(motor).isAtHome(countOf(motor)); }
   /// Whether each translator is at Home.
   bool areAtHome() const;
-  /// Each has gone Home.
-  void wentHome();
+  /// That of a motor has gone Home.
+  void wentHome(std::size_t motor) { translators_.at(motor).wentHome(countOf(motor)); }
   /// @}
 
   /// @name Motors that step together

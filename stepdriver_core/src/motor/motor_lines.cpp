@@ -17,7 +17,6 @@ class LineRequests {
   LineRequests(const config::AxisConfig& config, const std::vector<MotorLines>& others,
                std::vector<gpio::OutputRequest>& outputs, std::vector<gpio::InputRequest>& inputs)
       : config_(config),
-        chip_(config.driver),
         keep_(!config.disable_on_shutdown),
         others_(others),
         outputs_(outputs),
@@ -26,20 +25,19 @@ class LineRequests {
   MotorLines add() {
     static_cast<ChipLines&>(lines_) = addMotor(config_);
     for (const config::MotorConfig& twin : config_.twins) lines_.twins.push_back(addMotor(twin));
-    lines_.cw_ccw = isCwCcw();
+    lines_.cw_ccw = config_.hasCwCcwInputs();
     return lines_;
   }
 
  private:
-  bool isCwCcw() const { return chip_.step_inputs == driver::StepInputs::kCwCcw; }
-
   ChipLines addMotor(const config::MotorConfig& motor) {
     const config::Pins& pins = motor.pins;
+    const driver::DriverChip& chip = motor.driver;
     ChipLines lines;
-    addEnable(pins.enable, lines);
-    lines.sleep = output(pins.sleep, chip_.sleep_asleep.value_or(false), keep_);
-    lines.reset = output(pins.reset, chip_.reset_held.value_or(false), keep_);
-    const auto code = driver::codeOf(chip_, config_.microsteps);
+    addEnable(motor, lines);
+    lines.sleep = output(pins.sleep, chip.sleep_asleep.value_or(false), keep_);
+    lines.reset = output(pins.reset, chip.reset_held.value_or(false), keep_);
+    const auto code = driver::codeOf(chip, config_.microsteps);
     const std::array<const config::Pin*, 3> mode_pins = {&pins.ms1, &pins.ms2, &pins.ms3};
     for (std::size_t i = 0; i < mode_pins.size(); ++i) {
       lines.mode[i] = output(*mode_pins[i], code && (*code)[i], keep_);
@@ -47,9 +45,9 @@ class LineRequests {
     if (config_.brake && lines_.brake < 0) {
       lines_.brake = output({config_.brake->line, false}, !config_.brake->release_level, false);
     }
-    lines.dir = output(pins.dir, isCwCcw() && !chip_.step_active, false);
+    lines.dir = output(pins.dir, config_.hasCwCcwInputs() && !chip.step_active, false);
     // If each edge is a step, going back to the inactive level at the end could be one.
-    lines.step = output(pins.step, !chip_.step_active, chip_.both_edges);
+    lines.step = output(pins.step, !chip.step_active, chip.both_edges);
     lines.endstop_min = input(motor.endstop_min);
     lines.endstop_max = input(motor.endstop_max);
     lines.fault = input(motor.fault);
@@ -70,7 +68,8 @@ class LineRequests {
     return static_cast<int>(inputs_.size()) - 1;
   }
 
-  void addEnable(const config::Pin& enable, ChipLines& lines) {
+  void addEnable(const config::MotorConfig& motor, ChipLines& lines) {
+    const config::Pin& enable = motor.pins.enable;
     if (!enable.wired()) return;
     if (const ChipLines* sharer = sharerOf(enable)) {
       lines.enable = sharer->enable;
@@ -79,7 +78,7 @@ class LineRequests {
       kept = kept || keep_;
       return;
     }
-    lines.enable = output(enable, !chip_.enable_on, keep_);
+    lines.enable = output(enable, !motor.driver.enable_on, keep_);
     lines.enable_line = std::make_shared<EnableLine>();
   }
 
@@ -101,7 +100,6 @@ class LineRequests {
   }
 
   const config::AxisConfig& config_;
-  const driver::DriverChip& chip_;
   const bool keep_;
   const std::vector<MotorLines>& others_;
   std::vector<gpio::OutputRequest>& outputs_;
@@ -109,8 +107,9 @@ class LineRequests {
   MotorLines lines_;
 };
 
-pulse::MotorSignals signalsOf(const driver::DriverChip& chip, const config::MotorConfig& motor,
-                              const ChipLines& lines, bool cw_ccw) {
+pulse::MotorSignals signalsOf(const config::MotorConfig& motor, const ChipLines& lines,
+                              bool cw_ccw) {
+  const driver::DriverChip& chip = motor.driver;
   pulse::MotorSignals signals;
   signals.step = {lines.step, chip.step_active != motor.pins.step.inverted};
   signals.dir = {lines.dir, (chip.step_active || !cw_ccw) != motor.pins.dir.inverted};
@@ -136,11 +135,10 @@ MotorLines requestLines(const config::AxisConfig& config, const std::vector<Moto
 }
 
 pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const MotorLines& lines) {
-  const driver::DriverChip& chip = config.driver;
   pulse::ChannelConfig channel;
   for (std::size_t i = 0; i < config.motors(); ++i) {
     const config::MotorConfig& motor = config.motorAt(i);
-    const pulse::MotorSignals signals = signalsOf(chip, motor, lines.motorAt(i), lines.cw_ccw);
+    const pulse::MotorSignals signals = signalsOf(motor, lines.motorAt(i), lines.cw_ccw);
     if (i == 0) {
       static_cast<pulse::MotorSignals&>(channel) = signals;
     } else {
@@ -152,12 +150,13 @@ pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const Motor
           std::max(channel.in_position_timeout, nanoseconds(motor.in_position->timeout));
     }
   }
-  channel.both_edges = chip.both_edges;
+  const driver::Timing timing = config.timing();
+  channel.both_edges = config.stepsOnBothEdges();
   channel.dir_steps = lines.cw_ccw;
-  channel.step_high = chip.timing.step_high_ns;
-  channel.step_low = chip.timing.step_low_ns;
-  channel.dir_setup = chip.timing.dir_setup_ns;
-  channel.dir_hold = chip.timing.dir_hold_ns;
+  channel.step_high = timing.step_high_ns;
+  channel.step_low = timing.step_low_ns;
+  channel.dir_setup = timing.dir_setup_ns;
+  channel.dir_hold = timing.dir_hold_ns;
   channel.backlash = std::llround(config.backlash * config.steps_per_unit);
   channel.max_skew = std::llround(config.max_skew * config.steps_per_unit);
   return channel;

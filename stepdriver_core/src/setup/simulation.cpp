@@ -59,7 +59,7 @@ std::optional<sim::SwitchSpec> switchOf(const std::optional<config::Endstop>& en
 
 /// The axis as it is really wired.
 AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
-  const bool cw_ccw = axis.driver.step_inputs == driver::StepInputs::kCwCcw;
+  const bool cw_ccw = axis.hasCwCcwInputs();
   if (wiring.dir_inverted && !cw_ccw) axis.pins.dir.inverted = *wiring.dir_inverted;
   if (wiring.dir_inverted.value_or(false) && cw_ccw) std::swap(axis.pins.step, axis.pins.dir);
   if (wiring.steps_per_unit) {

@@ -41,7 +41,7 @@ std::string configurationText(const ros_node::NodeConfig& config) {
   std::vector<std::vector<std::string>> rows = {
       {"axis", "driver", "kind", "microsteps", "top speed", "steps/s", "endstops"}};
   for (const config::AxisConfig& axis : config.axes) {
-    rows.push_back({axis.name, axis.driver.title,
+    rows.push_back({axis.name, axis.driverTitles(),
                     axis.kind == config::Kind::kLinear ? "linear" : "rotary",
                     std::to_string(axis.microsteps), speedText(axis),
                     roundedText(axis.max_speed * axis.steps_per_unit), endstopsText(axis)});

@@ -63,7 +63,7 @@ void addLines(const config::AxisConfig& axis, const config::MotorConfig& motor,
     if (!line.empty()) lines.push_back({name + pin, line});
   };
   const config::Pins& pins = motor.pins;
-  const bool cw_ccw = axis.driver.step_inputs == driver::StepInputs::kCwCcw;
+  const bool cw_ccw = axis.hasCwCcwInputs();
   add(cw_ccw ? "cw" : "step", pins.step.line);
   add(cw_ccw ? "ccw" : "dir", pins.dir.line);
   const auto shared = std::find_if(enables.begin(), enables.end(), [&](std::size_t i) {
@@ -75,7 +75,7 @@ void addLines(const config::AxisConfig& axis, const config::MotorConfig& motor,
     enables.push_back(lines.size());
     add("enable", pins.enable.line);
   }
-  const bool numbered_from_0 = axis.driver.mode_pins_from_0;
+  const bool numbered_from_0 = motor.driver.mode_pins_from_0;
   add(numbered_from_0 ? "m0" : "ms1", pins.ms1.line);
   add(numbered_from_0 ? "m1" : "ms2", pins.ms2.line);
   add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);

@@ -88,10 +88,12 @@ TEST_F(Gantry, StopsBothMotorsAtAnEndstopOfEither) {
 TEST_F(Gantry, StopsBothMotorsAtAFaultOfEitherAndSaysWhose) {
   for (const std::string side : {"left", "right"}) {
     config::AxisConfig config = gantryAxis();
-    config.driver.title = "box";
-    config.driver.fault_active = false;
-    config.driver.fault_name = "ALM";
-    config.driver.fault_end = driver::FaultEnd::kReset;
+    driver::DriverChip box = config.driver;
+    box.title = "box";
+    box.fault_active = false;
+    box.fault_name = "ALM";
+    box.fault_end = driver::FaultEnd::kReset;
+    test::giveDrivers(config, box);
     config.fault = config::FaultPin{"left.fault"};
     config.twins[0].fault = config::FaultPin{"right.fault"};
     bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config},
@@ -152,7 +154,7 @@ TEST_F(Gantry, EnablesAndDisablesBothMotors) {
 TEST_F(Gantry, WakesBothMotorsBeforeTheChipsTimesAreOver) {
   config::AxisConfig config = gantryAxis();
   config.driver.timing.wake_ns = 5'000'000;
-  config.driver.timing.enable_ns = 3'000'000;
+  config.twins[0].driver.timing.enable_ns = 3'000'000;
   build(config);
   y().sleep(true);
   y().enable(false);
@@ -200,13 +202,9 @@ TEST_F(Gantry, KeepsItsMicrosteps) {
 
 TEST_F(Gantry, WaitsUntilBothMotorsAreInPosition) {
   config::AxisConfig config = gantryAxis();
-  config.driver = driver::driverChip("cl57t");
-  for (config::MotorConfig* motor :
-       std::initializer_list<config::MotorConfig*>{&config, &config.twins[0]}) {
-    config::Pins& pins = motor->pins;
-    pins.ms1 = pins.ms2 = pins.ms3 = pins.sleep = pins.reset = {};
-    motor->in_position = config::InPositionPin{motor->motor + ".in_position"};
-  }
+  test::giveDrivers(config, driver::driverChip("cl57t"));
+  config.in_position = config::InPositionPin{"left.in_position"};
+  config.twins[0].in_position = config::InPositionPin{"right.in_position"};
   build(config);
   y().setPosition(0.0);
   EXPECT_EQ(move(0.01).end, MoveEnd::kReached);
@@ -219,15 +217,129 @@ TEST_F(Gantry, WaitsUntilBothMotorsAreInPosition) {
       << result.message;
 }
 
+// A TMC2209 on the left, whose pulses may be as short as 200 ns, and on the right a box that needs
+// 2.5 us, and 5 us around each turn.
+config::AxisConfig withTwoDrivers() {
+  config::AxisConfig config = gantryAxis();
+  test::giveDriver(config, driver::driverChip("tmc2209"));
+  driver::DriverChip box = driver::driverChip("dm542");
+  box.title = "box";
+  box.fault_active = false;
+  box.fault_name = "ALM";
+  test::giveDriver(config.twins[0], box);
+  config.fault = config::FaultPin{"left.fault"};
+  config.twins[0].fault = config::FaultPin{"right.fault"};
+  return config;
+}
+
+TEST_F(Gantry, KeepsTheTimesOfTwoDifferentDrivers) {
+  config::AxisConfig config = withTwoDrivers();
+  config.max_speed = 2.4;  // 192,000 steps/s: at most 5.2 us for a step of 5 us
+  config.acceleration = config.deceleration = 200.0;
+  for (const bool slower_is_left : {false, true}) {
+    if (slower_is_left) {
+      std::swap(static_cast<config::MotorConfig&>(config), config.twins[0]);
+      std::swap(config.motor, config.twins[0].motor);
+    }
+    build(config);
+    y().setPosition(0.0);
+    for (const double target : {0.09, -0.05, 0.0}) {
+      const MoveResult result = move(target);
+      EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    }
+    EXPECT_EQ(bench->pulses("y"), 0);
+    EXPECT_EQ(bench->pulses("y.right"), 0);
+    EXPECT_EQ(left().translator, right().translator);
+    EXPECT_GT(left().pulses_forward, 10'000);
+    expectNoViolations();
+  }
+}
+
+TEST_F(Gantry, IsNoFasterThanItsSlowestDriver) {
+  config::AxisConfig config = withTwoDrivers();
+  config.max_speed = 4.0;  // 320,000 steps/s
+  config.acceleration = config.deceleration = 200.0;
+  build(config);
+  y().setPosition(0.0);
+  EXPECT_REFUSED(y().moveTo(0.09, false, 2.6), "is above the maximum 2.5 m/s");
+  EXPECT_EQ(move(0.09).end, MoveEnd::kReached);
+  expectNoViolations();
+}
+
+// In real time: a thread reports the edge of a fault.
+TEST_F(Gantry, StopsBothMotorsAtAFaultOfEitherDriver) {
+  for (const std::string side : {"left", "right"}) {
+    for (const driver::FaultEnd end : {driver::FaultEnd::kEnable, driver::FaultEnd::kPower}) {
+      config::AxisConfig config = withTwoDrivers();
+      config.driver.fault_end = config.twins[0].driver.fault_end = driver::FaultEnd::kPower;
+      (side == "left" ? config.driver : config.twins[0].driver).fault_end = end;
+      bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config},
+                                      test::rigMotors(config), true, 1.0);
+      y().setPosition(0.0);
+      sim::RigFaults faults;
+      faults.chip_fault_after = 500;
+      bench->rig.setFaults(side == "left" ? "y" : "y.right", faults);
+      const MoveResult result = move(0.05);
+      EXPECT_EQ(result.end, MoveEnd::kFault);
+      const std::string chip =
+          side == "left" ? "the TMC2209 of motor left" : "the box of motor right";
+      const std::string pin = side == "left" ? "DIAG" : "ALM";
+      EXPECT_NE(result.message.find(chip + " reports a fault on " + pin), std::string::npos)
+          << result.message;
+      EXPECT_EQ(bench->pulses("y"), bench->pulses("y.right"));
+      EXPECT_LT(bench->pulses("y"), 4000);
+      if (end == driver::FaultEnd::kPower) {
+        EXPECT_REFUSED(bench->machine->recover(), chip + " still reports a fault on " + pin +
+                                                      "; only switching its power off clears it");
+      } else {
+        bench->machine->recover();
+        EXPECT_EQ(y().state().fault, "");
+        EXPECT_TRUE(left().energized && right().energized);
+      }
+      expectNoViolations();
+    }
+  }
+}
+
+TEST_F(Gantry, LosesItsPositionIfAnyDriverGoesHome) {
+  for (const bool goes_home : {false, true}) {
+    config::AxisConfig config = withTwoDrivers();
+    config.holds_position_unpowered = true;
+    if (goes_home) config.twins[0].driver.disabled = driver::TranslatorState::kHome;
+    build(config);
+    y().setPosition(0.0);
+    move(7 * kStep);
+    y().enable(false);
+    EXPECT_EQ(y().state().position_valid, !goes_home);
+  }
+}
+
+TEST_F(Gantry, ResetsTheDriversThatHaveReset) {
+  config::AxisConfig config = gantryAxis();
+  test::giveDriver(config, driver::driverChip("tmc2209"));
+  config.pins.sleep = config.twins[0].pins.sleep = {};
+  build(config);
+  y().setPosition(0.0);
+  move(7 * kStep);
+  y().reset();
+  EXPECT_EQ(left().translator, 7 * 256 / 16 / 4) << "in microsteps of 1/64";
+  EXPECT_EQ(right().translator, 0);
+  EXPECT_FALSE(y().state().position_valid);
+  y().setPosition(0.0);
+  EXPECT_EQ(move(0.001).end, MoveEnd::kReached);
+  expectNoViolations();
+  test::giveDriver(config.twins[0], driver::driverChip("tmc2209"));
+  build(config);
+  EXPECT_REFUSED(y().reset(), "a TMC2209 has no RESET pin");
+  EXPECT_REFUSED(y().sleep(true), "a TMC2209 has no SLEEP pin");
+}
+
 TEST_F(Gantry, StepsBothMotorsOnBothEdges) {
   config::AxisConfig config = gantryAxis();
-  config.driver = driver::driverChip("drv8434");
-  config.driver.both_edges = true;
-  for (config::MotorConfig* motor :
-       std::initializer_list<config::MotorConfig*>{&config, &config.twins[0]}) {
-    motor->pins.ms1 = motor->pins.ms2 = motor->pins.ms3 = motor->pins.sleep =
-        motor->pins.reset = {};
-  }
+  driver::DriverChip chip = driver::driverChip("drv8434");
+  chip.both_edges = true;
+  chip.sleep_asleep.reset();
+  test::giveDrivers(config, chip);
   build(config, [](auto&, auto& right) { right.start = 1.003; });
   const axis::HomingResult homed = y().home();
   EXPECT_EQ(homed.end, axis::HomingEnd::kHomed) << homed.message;

@@ -74,6 +74,130 @@ TEST(ReadMotors, HaveTheSamePinsWired) {
               "motors of an axis are switched together"));
 }
 
+ConfigValue withDrivers(const char* left, const char* right) {
+  ConfigValue axis = gantry();
+  drop(axis, "driver");
+  put(axis, "motors/left/driver", left);
+  put(axis, "motors/right/driver", right);
+  return axis;
+}
+
+TEST(ReadMotors, HaveTheDriverOfTheAxisOrTheirOwn) {
+  ConfigValue axis = gantry();
+  put(axis, "motors/right/driver", "tmc2209");
+  put(axis, "timing/step_high_us", 3.0);
+  put(axis, "motors/right/timing/dir_setup_us", 7.0);
+  const AxisConfig config = readX(axis);
+  EXPECT_EQ(config.driver.name, "a4988");
+  EXPECT_EQ(config.twins[0].driver.name, "tmc2209");
+  EXPECT_EQ(config.driver.timing.step_high_ns, 3'000);
+  EXPECT_EQ(config.twins[0].driver.timing.step_high_ns, 200);
+  EXPECT_EQ(config.driverTitles(), "A4988 and TMC2209");
+  const driver::Timing longest = config.timing();
+  EXPECT_EQ(longest.step_high_ns, 3'000);
+  EXPECT_EQ(longest.step_low_ns, 1'000);
+  EXPECT_EQ(longest.dir_setup_ns, 7'000);
+  EXPECT_EQ(longest.dir_hold_ns, 200);
+  EXPECT_EQ(longest.enable_ns, 1'000'000);
+  EXPECT_EQ(config.shortestStepNs(), 4'000);
+  const AxisConfig own = readX(withDrivers("drv8825", "drv8825"));
+  EXPECT_EQ(own.driverTitles(), "DRV8825");
+}
+
+TEST(ReadMotors, HaveTheDriverOfTheAxisIfTheyDescribeNone) {
+  ConfigValue axis = gantry();
+  put(axis, "motors/right/timing/step_high_us", 3.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("motors/right/timing",
+                    "is given, but needs /axes/x/motors/right/driver: without a driver of its "
+                    "own, the motor has /axes/x/timing"));
+  axis = withDrivers("a4988", "tmc2209");
+  put(axis, "timing/step_high_us", 3.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("timing", "is given, but each of motors has a driver of its own"));
+  axis = gantry();
+  drop(axis, "driver");
+  put(axis, "motors/right/driver", "a4988");
+  ASSERT_EQ(issuesOfX(axis).size(), 1U);
+  EXPECT_EQ(issuesOfX(axis)[0].rfind("/axes/x/driver: is missing", 0), 0U) << issuesOfX(axis)[0];
+  axis = withDrivers("a4988", "a4989");
+  ASSERT_EQ(issuesOfX(axis).size(), 1U);
+  EXPECT_EQ(issuesOfX(axis)[0].rfind("/axes/x/motors/right/driver: is \"a4989\"", 0), 0U)
+      << issuesOfX(axis)[0];
+}
+
+TEST(ReadMotors, HaveMicrostepsThatEachDriverHas) {
+  ConfigValue axis = withDrivers("a4988", "tmc2209");
+  EXPECT_EQ(issuesOfX(axis), Lines{});
+  put(axis, "microsteps", 4);
+  EXPECT_EQ(issuesOfX(axis), lineOfX("microsteps", "is 4, but must be 8 or 16"));
+  axis = withDrivers("a4988", "step_dir");
+  put(axis, "motors/right/chip/microstep_codes", "5 L, 10 H");
+  put(axis, "motors/right/chip/enable_active", "low");
+  put(axis, "motors/right/timing",
+      mapOf({{"step_high_us", 1.0},
+             {"step_low_us", 1.0},
+             {"dir_setup_us", 1.0},
+             {"dir_hold_us", 1.0},
+             {"mode_setup_us", 1.0},
+             {"mode_hold_us", 1.0},
+             {"enable_ms", 1.0}}));
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("motors", "have drivers with no number of microsteps in common"));
+}
+
+TEST(ReadMotors, HaveMicrostepPinsThatSelectTheMode) {
+  ConfigValue axis = withDrivers("a4988", "drv8434");
+  put(axis, "motors/right/pins/m0", "r:8");
+  put(axis, "motors/right/pins/m1", "r:9");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("microsteps",
+                    "is 16, but with the microstep pins wired it must be 1, 2, 4 or 8: lines that "
+                    "are high or low select no other mode of the DRV8434"));
+}
+
+TEST(ReadMotors, StepOnTheSameEdges) {
+  ConfigValue axis = withDrivers("a4988", "tmc2209");
+  put(axis, "motors/right/chip/step_edges", "both");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("motors/right",
+                    "has a driver, TMC2209, that steps on both edges of STEP, but must have one "
+                    "like that of /axes/x/motors/left, A4988, that steps on one edge of STEP: the "
+                    "motors of an axis get the same edges"));
+  put(axis, "motors/left/chip/step_edges", "both");
+  EXPECT_EQ(issuesOfX(axis), Lines{});
+}
+
+TEST(ReadMotors, AreAsFastAsTheSlowestDriver) {
+  ConfigValue axis = withDrivers("tmc2209", "dm542");
+  put(axis, "max_speed_mm_s", 2500.0);
+  EXPECT_EQ(issuesOfX(axis), Lines{});
+  put(axis, "max_speed_mm_s", 2501.0);
+  EXPECT_EQ(
+      issuesOfX(axis),
+      lineOfX(
+          "max_speed_mm_s",
+          "is 2501.0, but must be at most 2500: it is 200080 steps/s (at 80 steps per "
+          "mm), and the TMC2209 and DM542 together take at most 200000 steps/s (2.5 us high, 2.5 "
+          "us low)"));
+  put(axis, "max_speed_mm_s", 2000.0);
+  put(axis, "motors/right/timing/dir_hold_us", 8.0);
+  ASSERT_EQ(issuesOfX(axis).size(), 1U);
+  EXPECT_EQ(issuesOfX(axis)[0].rfind("/axes/x/motors/right/timing/dir_hold_us: is 8, but", 0), 0U)
+      << issuesOfX(axis)[0];
+}
+
+TEST(ReadMotors, MayHaveAFaultPinOnOneDriverOnly) {
+  ConfigValue axis = withDrivers("a4988", "tmc2209");
+  put(axis, "motors/right/pins/fault", "r:7");
+  const AxisConfig config = readX(axis);
+  EXPECT_FALSE(config.fault);
+  EXPECT_EQ(config.twins[0].fault->line, "r:7");
+  put(axis, "motors/left/pins/fault", "l:7");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("motors/left/pins/fault", "is \"l:7\", but the A4988 has no fault pin"));
+}
+
 TEST(ReadMotors, AreNotGivenBesideTheAxissOwnPins) {
   ConfigValue axis = gantry();
   put(axis, "pins", mapOf({{"step", "a:1"}, {"dir", "a:2"}}));

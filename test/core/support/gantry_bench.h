@@ -19,6 +19,21 @@ inline config::MotorConfig motorNamed(const std::string& name) {
   return motor;
 }
 
+/// Gives a motor another driver, with the pins that it has; microstep pins are strapped.
+inline void giveDriver(config::MotorConfig& motor, const driver::DriverChip& chip) {
+  motor.driver = chip;
+  config::Pins& pins = motor.pins;
+  pins.ms1 = pins.ms2 = pins.ms3 = {};
+  if (!chip.sleep_asleep) pins.sleep = {};
+  if (!chip.reset_held) pins.reset = {};
+}
+
+/// The same driver for all motors of an axis.
+inline void giveDrivers(config::AxisConfig& axis, const driver::DriverChip& chip) {
+  giveDriver(axis, chip);
+  for (config::MotorConfig& twin : axis.twins) giveDriver(twin, chip);
+}
+
 /// The axis y with the motors left and right, each with both switches, 80 microsteps/mm. Its homing
 /// is homingAxis()'s; the motors may get 6 mm apart.
 inline config::AxisConfig gantryAxis() {

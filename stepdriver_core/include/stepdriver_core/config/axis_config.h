@@ -122,9 +122,10 @@ const char* sourceText(LimitSource source);
 /// The most motors that an axis can have.
 constexpr std::size_t kMostMotors = 4;
 
-/// A motor of an axis: its driver's pins, and the switches at its side.
+/// A motor of an axis: its driver and that one's pins, and the switches at its side.
 struct MotorConfig {
-  std::string motor;  ///< its name; empty: it is the only one
+  std::string motor;          ///< its name; empty: it is the only one
+  driver::DriverChip driver;  ///< with the overrides of the configuration
   Pins pins;
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
@@ -139,12 +140,12 @@ struct MotorConfig {
 /// on a rotary one; a step is a microstep of the configured mode.
 ///
 /// An axis with several motors, such as a gantry, has those of the first one here and all others in
-/// `twins`. They have the same driver chip and the same pins wired, and step together.
+/// `twins`. They step together: what kind of edges makes a step is the same for all their drivers,
+/// each has the configured microsteps, and ENABLE and SLEEP are wired for all or for none.
 struct AxisConfig : MotorConfig {
   std::string name;
   std::string joint;  ///< its name in joint_states and in the URDF
   Kind kind = Kind::kLinear;
-  driver::DriverChip driver;  ///< with the overrides of the configuration
   std::vector<MotorConfig> twins;
   /// Of an axis that shares motors, the same for all of them; null: its motors are its own.
   std::shared_ptr<const Kinematics> kinematics;
@@ -197,6 +198,22 @@ struct AxisConfig : MotorConfig {
     }
     return false;
   }
+
+  /// @name The drivers of its motors, which get the same edges at the same time
+  /// @{
+  /// Each edge of STEP is a step.
+  bool stepsOnBothEdges() const { return driver.both_edges; }
+  bool hasCwCcwInputs() const { return driver.step_inputs == driver::StepInputs::kCwCcw; }
+  /// The times that suit all of them: of each time the longest.
+  driver::Timing timing() const;
+  /// [ns] The shortest time from one step to the next one.
+  std::int64_t shortestStepNs() const {
+    return driver::shortestStepNs(timing(), stepsOnBothEdges());
+  }
+  /// "DM542", or of several, "A4988 and DM542". Each is named once.
+  std::string driverTitles() const;
+  /// @}
+
   /// The name of a motor on the simulated rig and in traces of pins: "y", the axis's, for the first
   /// one, and "y.right" for another.
   std::string traceName(std::size_t index) const {

@@ -163,7 +163,8 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///       min: {pin: "gpiochip0:20", active_level: low}   # low or high
 ///       max: {pin: "gpiochip0:21", active_level: low}
 ///     motors:                   # 2 to 4 that step together, in place of pins and endstops above:
-///       left: {pins: ..., endstops: ..., offset_mm: 0.0}  # and all keys about them
+///       left: {pins: ..., endstops: ..., offset_mm: 0.0}  # and all keys about them; and driver,
+///                               # chip and timing, if they aren't those of the axis
 ///     max_skew_mm: 5.0          # how far they may get apart while a homing squares them
 ///     brake:                    # default: no brake; needs pins/enable or pins/sleep
 ///       {pin: "gpiochip0:12", release_level: high, release_ms: 60.0, engage_ms: 30.0}

@@ -120,8 +120,12 @@ std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int 
 /// Whether there is such a path. @throw std::invalid_argument if a mode has no code on this chip.
 bool hasModePath(const DriverChip& chip, int from_microsteps, int to_microsteps);
 
+/// The times that suit two chips that get the same edges: of each time the longer one.
+Timing longestOf(const Timing& one, const Timing& other);
+
 /// [ns] The shortest time from one step to the next one.
-std::int64_t shortestStepNs(const DriverChip& chip);
+/// @param both_edges each edge of STEP is a step.
+std::int64_t shortestStepNs(const Timing& timing, bool both_edges);
 
 /// Full steps in an electrical cycle; after one, the coil currents are the same again. After
 /// power-up, RESET and SLEEP the translator stands at Home, a full-step position (45 degrees).

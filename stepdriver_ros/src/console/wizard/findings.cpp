@@ -99,7 +99,7 @@ std::vector<std::string> changesText(const Findings& findings, const config::Axi
   std::vector<std::string> changes;
   const std::string& axis = findings.axis;
   if (findings.wrong_way) {
-    const bool cw_ccw = config.driver.step_inputs == driver::StepInputs::kCwCcw;
+    const bool cw_ccw = config.hasCwCcwInputs();
     changes.push_back(axis +
                       (cw_ccw ? ": pins/cw and pins/ccw are swapped" : ": invert/dir is changed") +
                       ", because its plus was your minus");

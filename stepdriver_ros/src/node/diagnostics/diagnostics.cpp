@@ -142,7 +142,7 @@ std::string hardwareId(const std::vector<config::AxisConfig>& axes, const std::s
   gethostname(host.data(), host.size() - 1);
   std::string text = std::string(host.data()) + ": ";
   for (const config::AxisConfig& axis : axes) {
-    text += fmt::format("{} {}, ", axis.name, axis.driver.title);
+    text += fmt::format("{} {}, ", axis.name, axis.driverTitles());
   }
   return text + "on " + on;
 }
