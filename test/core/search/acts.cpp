@@ -156,6 +156,7 @@ std::vector<Act> makeActs() {
          all.pressSwitch(kX, true);
        }},
       {"chip fault of x", [](Participants& all, int) { all.breakChip(kX); }},
+      {"the motor power is lost", [](Participants& all, int) { all.loseMotorPower(); }},
       {"z is never in position", [](Participants& all, int) { all.neverInPosition(); }},
       {"steps of x fail", [](Participants& all, int) { all.failSteps(kX); }},
       {"turns of y fail", [](Participants& all, int) { all.failTurns(kY); }},

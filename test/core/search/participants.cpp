@@ -28,6 +28,8 @@ constexpr const char* kEmergencyStop = "emergency_stop";
 constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
 constexpr int kJogs = 12;
 constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
+/// From the loss of the motor power to the last step, if an edge is lost and the engine is late.
+constexpr pulse::Nanoseconds kLossIsSeen = kInputPeriod + 2 * kLatestPass;
 constexpr pulse::Nanoseconds kQuietIsWatched = 250 * kMillisecond;
 constexpr std::size_t kMostSteps = 200'000;
 /// Of an axis with a brake. [mm/s]
@@ -90,7 +92,14 @@ std::vector<config::AxisConfig> configsOf(int variant) {
 }
 
 machine::EmergencyDisable emergencyDisableOf(int variant) {
-  return variant == 1 ? machine::EmergencyDisable::kRamp : machine::EmergencyDisable::kHold;
+  switch (variant) {
+    case 1:
+      return machine::EmergencyDisable::kRamp;
+    case 2:
+      return machine::EmergencyDisable::kOff;
+    default:
+      return machine::EmergencyDisable::kHold;
+  }
 }
 
 machine::MachineOptions optionsOf(int variant) {
@@ -102,6 +111,8 @@ machine::MachineOptions optionsOf(int variant) {
     options.motor_power->line = "power";
     options.motor_power->on_ns = 15 * kMillisecond;
     options.motor_power->off_delay_ns = 10 * kMillisecond;
+    options.motor_power->feedback = config::InputSwitch{"power.feedback", true};
+    options.motor_power->feedback_timeout_ns = 50 * kMillisecond;
   }
   return options;
 }
@@ -184,7 +195,10 @@ Participants::Participants(const Schedule& schedule)
   const machine::InputReading first = readInputs();
   watched_ = first.levels;
   queue(first);
-  trace_->rose = [this](std::size_t axis, std::int64_t time) { oracle_.rose(axis, time); };
+  trace_->rose = [this](std::size_t axis, std::int64_t time) {
+    oracle_.rose(axis, time);
+    checkPowered(axis, time);
+  };
 }
 
 // ---- the shell ----
@@ -891,6 +905,13 @@ void Participants::breakChip(std::size_t axis) {
   rig_.setFaults(configs_[axis].name, faults);
 }
 
+// Participants that wait for their turn may see the loss much later.
+void Participants::checkPowered(std::size_t axis, pulse::Nanoseconds now) {
+  if (!power_lost_since_ || now <= *power_lost_since_ + kLossIsSeen) return;
+  if (!schedule_.deviations.empty()) return;
+  oracle_.complain(configs_[axis].name + " steps long after the motor power was lost");
+}
+
 void Participants::neverInPosition() {
   sim::RigFaults faults;
   faults.never_in_position = true;
@@ -917,7 +938,20 @@ void Participants::failSwitch(std::size_t axis) {
 
 void Participants::failEmergencyStop() { lines_->fail(wiring_.emergency_stop->line, EIO); }
 
+void Participants::loseMotorPower() {
+  if (!wiring_.motor_power) return;
+  rig_.stickMotorPower(false, clock_.now());
+  if (!power_lost_since_) power_lost_since_ = clock_.now();
+  power_was_lost_ = true;
+}
+
 void Participants::mendLines() {
+  if (power_lost_since_) {
+    rig_.stickMotorPower({}, clock_.now());
+    power_lost_since_.reset();
+    // It may be back before anything has noticed.
+    position_changed_ = true;
+  }
   lines_->fail(-1, 0);
   for (const config::AxisConfig& config : configs_) {
     rig_.clearWriteFault(config.pins.step.line);
@@ -973,10 +1007,17 @@ void Participants::checkCounts(const std::string& when) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) checkCount(axis, when);
 }
 
+// Until the loss of the power is known, axes may step without it.
+sim::RigAxisReport Participants::reportOf(const std::string& rig_axis) const {
+  sim::RigAxisReport report = rig_.report(rig_axis);
+  if (power_was_lost_) report.violations.erase(sim::Violation::kStepWithoutPower);
+  return report;
+}
+
 void Participants::checkCount(std::size_t axis, const std::string& when) {
   const std::string who = configs_[axis].name + " " + when;
   const pulse::ChannelState state = engine_->channel(static_cast<int>(axis));
-  const sim::RigAxisReport report = rig_.report(configs_[axis].name);
+  const sim::RigAxisReport report = reportOf(configs_[axis].name);
   const std::int64_t pulses = report.pulses_forward + report.pulses_backward;
   // If a falling edge could not be written, the next rising edge is left out.
   // A motor that has reached its switch before the others leaves some out.
@@ -995,7 +1036,7 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
   const std::string violations = test::violationsOf(report);
   if (!violations.empty()) oracle_.complain(who + ": " + violations);
   for (std::size_t motor = 1; motor < configs_[axis].motors(); ++motor) {
-    const sim::RigAxisReport twin = rig_.report(configs_[axis].traceName(motor));
+    const sim::RigAxisReport twin = reportOf(configs_[axis].traceName(motor));
     const std::int64_t expected = state.count + state.lags.at(motor);
     const std::int64_t seen = twin.pulses_forward - twin.pulses_backward;
     if (!steps_failed_[axis] && seen != expected) {
@@ -1005,10 +1046,10 @@ void Participants::checkCount(std::size_t axis, const std::string& when) {
     const std::string of_twin = test::violationsOf(twin);
     if (!of_twin.empty()) oracle_.complain(who + ", another motor: " + of_twin);
   }
-  // Nothing holds the load while the brake takes hold after a fault of the chip; and an emergency
-  // stop takes the motor power also if the brake's line could not be written.
+  // Nothing holds the load while the brake takes hold after a fault of the chip or of the power;
+  // and an emergency stop takes the motor power also if the brake's line could not be written.
   const bool brake_failed = pins_failed_ && wiring_.motor_power;
-  if (report.fell > 0.0 && !chip_broke_[axis] && !brake_failed) {
+  if (report.fell > 0.0 && !chip_broke_[axis] && !brake_failed && !power_was_lost_) {
     oracle_.complain(who + ": the load has fallen by " + std::to_string(report.fell) + " mm");
   }
 }

@@ -121,6 +121,8 @@ class Participants {
   void breakChip(std::size_t axis);
   /// From now on z's driver isn't in position, whatever it does.
   void neverInPosition();
+  /// The relay of the motor power opens, whatever its line says; lines that work again close it.
+  void loseMotorPower();
   void failSteps(std::size_t axis);
   void failTurns(std::size_t axis);
   void failSwitch(std::size_t axis);
@@ -212,6 +214,8 @@ class Participants {
   bool atRest();
   void checkCounts(const std::string& when);
   void checkCount(std::size_t axis, const std::string& when);
+  void checkPowered(std::size_t axis, pulse::Nanoseconds now);
+  sim::RigAxisReport reportOf(const std::string& rig_axis) const;
   void checkRest();
   void checkPower();
   bool ramps() const;
@@ -270,6 +274,8 @@ class Participants {
   std::array<bool, kAxes> had_setpoints_{};
   std::array<bool, kAxes> steps_failed_{};
   std::array<bool, kAxes> chip_broke_{};
+  std::optional<pulse::Nanoseconds> power_lost_since_;
+  bool power_was_lost_ = false;
   std::uint64_t input_stops_ = 0;
   bool engine_reads_inputs_ = false;
   std::vector<activity::AcceptedHoming> homings_;
