@@ -154,9 +154,11 @@ Steps FollowLine::followLine() {
     path->requireStart(startsOf(axes(), at));
     return {path};
   };
+  std::vector<Order> orders = orders_;
+  for (Order& order : orders) order.goal.path_limits = order.axis->pathAxis().limits;
   Steps steps;
   add(steps, std::make_unique<FollowStep>(
-                 context(), orders_, join, [] { return std::vector<Predecessor>(); },
+                 context(), std::move(orders), join, [] { return std::vector<Predecessor>(); },
                  [this] { return takeCall(); }));
   return steps;
 }

@@ -11,6 +11,7 @@
 #include "axis/axis_model.h"
 #include "axis/shared_path.h"
 #include "call.h"
+#include "motion/limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -49,6 +50,7 @@ struct Goal {
   Setpoint setpoint;      ///< of a kSetpoint
   bool of_motor = false;  ///< true: the target is the motor's; false: the joint's
   MotorsTogether motors;
+  motion::MotionLimits path_limits;  ///< [microsteps] of a kTogether: its path keeps them
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
   pulse::Nanoseconds slipped_ns = 0;  ///< how far the timeline had slid by then

@@ -162,22 +162,24 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
       plans.path = planPath(plans.at);
       for (std::size_t i = 0; i < orders_.size(); ++i) {
         plans.planned.push_back(
-            {std::make_shared<const motion::Profile>(shared_path_->profileOf(i, *plans.path)),
-             0.0});
+            {std::make_shared<const motion::Profile>(shared_path_->profileOf(i, *plans.path)), 0.0,
+             orders_[i].goal.path_limits, plans.at});
       }
       return plans;
     }
     if (!slowsDown()) {
       const Order& order = orders_.front();
-      motion::Plan own = planGoal(*order.axis, order.goal, plans.at);
-      plans.planned.push_back(
-          {std::make_shared<const motion::Profile>(std::move(own.profile)), own.overshoot});
+      GoalPlan own = planGoal(*order.axis, order.goal, plans.at);
+      plans.planned.push_back({std::make_shared<const motion::Profile>(std::move(own.plan.profile)),
+                               own.plan.overshoot, own.limits, own.slows_ns});
       return plans;
     }
     for (const Order& order : orders_) {
       Planned& planned = plans.planned.emplace_back();
       if (!order.axis->moving()) continue;
       planned.profile = std::make_shared<const motion::Profile>(planStop(*order.axis, plans.at));
+      planned.limits = order.axis->motor.motions().latest()->limits;
+      planned.slows_ns = plans.at;
     }
   } catch (const std::range_error& error) {
     orders_.front().axis->refuse(error.what());
@@ -234,6 +236,8 @@ void Manoeuvre::order(Plans plans) {
     if (!started_ && !slowsDown()) order.goal.began_ns = plans.at;
     motor::Motion motion;
     motion.serial = open.serials[i];
+    motion.limits = plans.planned[i].limits;
+    motion.slows_ns = plans.planned[i].slows_ns;
     motion.overshoot = plans.planned[i].overshoot;
     motion.profile = plans.planned[i].profile;
     motion.order = open.follows;

@@ -74,6 +74,8 @@ class Manoeuvre {
     // null if the axis is at rest while others stop
     std::shared_ptr<const motion::Profile> profile;
     double overshoot = 0.0;
+    motion::MotionLimits limits;  // see motor::Motion
+    std::int64_t slows_ns = motor::Motion::kNeverSlows;
   };
   struct Plans {
     std::int64_t at = 0;

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
+#include "motion/extent.h"
+#include "motion/level_off.h"
 #include "setpoint_motion.h"
 
 namespace stepdriver::activity {
@@ -31,20 +34,78 @@ std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goa
   return stand_at;
 }
 
-motion::Plan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at) {
+namespace {
+
+motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
+                      const motion::MotionState& from, std::int64_t at,
+                      const motion::MotionLimits& within) {
+  if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
+  if (goal.kind == Goal::Kind::kJog) {
+    return motion::planVelocity(at, from, std::copysign(within.max_speed, goal.velocity), within,
+                                standAt(axis, goal));
+  }
+  return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
+}
+
+// How far a motion goes beyond its target or a soft limit [microsteps].
+double excessOf(const axis::AxisModel& axis, const Goal& goal, const motion::Plan& plan) {
+  // To follow a stream of setpoints, an axis may have to pass the last one.
+  double excess = goal.kind == Goal::Kind::kSetpoint ? 0.0 : plan.overshoot;
+  if (goal.of_motor) return excess;  // no soft limit applies
+  const motion::Extent extent = motion::extentOf(plan.profile);
+  if (const auto& lowest = axis.config.min_position) {
+    excess = std::max(excess, axis.countOf(*lowest) - extent.lowest);
+  }
+  if (const auto& highest = axis.config.max_position) {
+    const double most = axis.countOf(*highest) + static_cast<double>(axis.backlash());
+    excess = std::max(excess, extent.highest - most);
+  }
+  return excess;
+}
+
+// The limits of the motion under way, at a motion time of it.
+motion::MotionLimits limitsAt(const axis::AxisModel& axis, const motor::Motion& motion,
+                              std::int64_t at) {
+  motion::MotionLimits limits = motion.limits;
+  if (at >= motion.slows_ns) limits.jerk = axis.stopLimits().jerk;
+  return limits;
+}
+
+bool areTheSame(const motion::MotionLimits& one, const motion::MotionLimits& other) {
+  return one.acceleration == other.acceleration && one.deceleration == other.deceleration &&
+         one.jerk == other.jerk;
+}
+
+}  // namespace
+
+GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at) {
+  constexpr double kNoStep = 0.5;  // microsteps
   const motion::MotionState from = axis.motor.stateAt(at);
   const bool slows_down = goal.runs() && goal.velocity == 0.0;
   const double velocity =
       slows_down ? axis.maxSpeed()
                  : std::min(std::abs(goal.velocity) * axis.mode.speed_override, axis.maxSpeed());
   const motion::MotionLimits within = axis.limits(velocity);
-  if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
-  if (goal.kind == Goal::Kind::kJog) {
-    return motion::planVelocity(at, from,
-                                std::copysign(velocity * axis.stepsPerUnit(), goal.velocity),
-                                within, standAt(axis, goal));
+  const std::int64_t slows_ns =
+      goal.kind == Goal::Kind::kSetpoint ? goal.setpoint.until_ns : motor::Motion::kNeverSlows;
+  const motor::Motion* under_way = axis.motor.motions().latest();
+  motion::MotionLimits before = under_way != nullptr ? limitsAt(axis, *under_way, at) : within;
+  before.max_speed = within.max_speed;
+  if (goal.kind == Goal::Kind::kSetpoint && at >= slows_ns) {
+    if (axis.moving()) return {{planStop(axis, at)}, before, at};
+    throw std::range_error("no other setpoint came before the timeout");
   }
-  return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
+  if (areTheSame(before, within)) {
+    return {planFrom(axis, goal, from, at, within), within, slows_ns};
+  }
+  const motion::LevelOff level_off(at, from, within, before.jerk);
+  GoalPlan changed{
+      level_off.followedBy(planFrom(axis, goal, level_off.end(), level_off.endNs(), within)),
+      level_off.isNeeded() ? before : within, slows_ns};
+  const double excess = excessOf(axis, goal, changed.plan);
+  if (excess <= kNoStep) return changed;
+  GoalPlan kept{planFrom(axis, goal, from, at, before), before, slows_ns};
+  return excessOf(axis, goal, kept.plan) < excess ? kept : changed;
 }
 
 motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {

@@ -12,10 +12,21 @@ namespace stepdriver::activity {
 /// How far in the future a profile begins at first: time to plan it and to hand it over.
 constexpr pulse::Nanoseconds kLead = 1'000'000;
 
+/// The plan for a goal of one axis, and the limits that it keeps, see motor::Motion.
+struct GoalPlan {
+  motion::Plan plan;
+  motion::MotionLimits limits;
+  std::int64_t slows_ns = motor::Motion::kNeverSlows;
+};
+
 /// The plan for a goal of one axis, from the state of the axis at a motion time.
 ///
-/// @throw std::range_error if the motion takes too long.
-motion::Plan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at);
+/// If the limits have changed since the motion under way was planned, the new ones apply, unless
+/// the axis would pass its target or a soft limit farther with them: then it keeps the old ones.
+///
+/// @throw std::range_error if the motion takes too long, or if the timeout of a setpoint is over
+///   before the axis moves.
+GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at);
 
 /// The count at which the motor has to stop for a goal of the joint: a backlash is taken up or open
 /// there. @param within the limits of the motion from this state.

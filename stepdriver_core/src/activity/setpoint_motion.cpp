@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "motion/extent.h"
 #include "motion/pursuit.h"
 #include "point_motion.h"
 
@@ -20,39 +20,6 @@ constexpr double kNoStep = 0.5;  // microsteps: nothing closer than this makes a
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-/// The highest and the lowest position of a motion.
-struct Extent {
-  double lowest = 0.0;
-  double highest = 0.0;
-};
-
-Extent extentOf(const motion::Profile& profile) {
-  const double end = profile.endPosition().value();
-  Extent extent{end, end};
-  const auto consider = [&extent](motion::DoubleDouble position) {
-    extent.lowest = std::min(extent.lowest, position.value());
-    extent.highest = std::max(extent.highest, position.value());
-  };
-  for (const motion::Piece& piece : profile.pieces()) {
-    consider(piece.p0);
-    for (double t = piece.firstTurn(0.0); t < piece.duration.hi; t = piece.firstTurn(t)) {
-      consider(piece.positionAt(t));
-    }
-  }
-  return extent;
-}
-
-/// How far a motion passes its own end before it comes back [microsteps].
-double overshootOf(const motion::Profile& profile, const motion::MotionState& from) {
-  const Extent extent = extentOf(profile);
-  const double end = profile.endPosition().value();
-  const double way = end - from.position.value();
-  const double above = extent.highest - end;
-  const double below = end - extent.lowest;
-  const double beyond = way > 0.0 ? above : way < 0.0 ? below : std::max(above, below);
-  return beyond > kNoStep ? beyond : 0.0;
-}
-
 motion::Profile profileOf(std::int64_t at, const motion::MotionState& from,
                           std::vector<motion::Piece> pieces) {
   if (pieces.empty()) return {at, from.position};
@@ -64,7 +31,7 @@ void append(std::vector<motion::Piece>& pieces, const motion::Profile& more) {
 }
 
 bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& profile) {
-  const Extent extent = extentOf(profile);
+  const motion::Extent extent = motion::extentOf(profile);
   const auto& lowest = axis.config.min_position;
   const auto& highest = axis.config.max_position;
   const auto backlash = static_cast<double>(axis.backlash());
@@ -142,7 +109,7 @@ motion::Profile untilTimeout(const axis::AxisModel& axis, const Goal& goal,
   append(pieces, profile);
   pieces = motion::firstPart(std::move(pieces), seconds(until - profile.startNs()));
   std::optional<std::int64_t> not_beyond;
-  if (goal.target && overshootOf(profile, from) == 0.0) {
+  if (goal.target && motion::overshootOf(profile) == 0.0) {
     not_beyond = std::llround(profile.endPosition().value());
   }
   append(pieces,
@@ -156,15 +123,12 @@ motion::Plan planSetpoint(const axis::AxisModel& axis, const Goal& goal,
                           const motion::MotionState& from, std::int64_t at,
                           const motion::MotionLimits& within) {
   const Setpoint& wanted = goal.setpoint;
-  if (at >= wanted.until_ns) {
-    if (axis.moving()) return {planStop(axis, at)};
-    throw std::range_error("no other setpoint came before the timeout");
-  }
+  if (at >= wanted.until_ns) return {motion::planStop(at, from, axis.stopLimits())};
   const motion::Profile profile = wanted.of_position
                                       ? positionProfile(axis, goal, from, at, within)
                                       : velocityProfile(axis, goal, from, at, within);
   motion::Plan plan{untilTimeout(axis, goal, from, profile)};
-  plan.overshoot = overshootOf(plan.profile, from);
+  plan.overshoot = motion::overshootOf(plan.profile);
   return plan;
 }
 

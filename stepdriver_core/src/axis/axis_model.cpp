@@ -22,8 +22,7 @@ AxisModel::AxisModel(config::AxisConfig axis_config, const motor::MotorLines& mo
       mode(machine_mode),
       inputs(input_levels),
       lines(line_names),
-      limits_now_{config.max_speed, config.acceleration, config.deceleration, config.jerk},
-      limits_next_(limits_now_) {}
+      limits_{config.max_speed, config.acceleration, config.deceleration, config.jerk} {}
 
 // ---- scales ----
 
@@ -70,7 +69,7 @@ PathStart AxisModel::pathStart(std::int64_t at) const {
 
 // ---- limits ----
 
-double AxisModel::maxSpeed() const { return std::min(limits_now_.max_speed, chipsMaxSpeed()); }
+double AxisModel::maxSpeed() const { return std::min(limits_.max_speed, chipsMaxSpeed()); }
 
 double AxisModel::chipsMaxSpeed() const {
   const double period = static_cast<double>(config.shortestStepNs()) * 1e-9;
@@ -78,15 +77,15 @@ double AxisModel::chipsMaxSpeed() const {
 }
 
 config::LimitSource AxisModel::maxSpeedSource() const {
-  if (maxSpeed() < limits_now_.max_speed) return config::LimitSource::kChip;
-  if (limits_now_.max_speed < config.max_speed) return config::LimitSource::kSetLimits;
+  if (maxSpeed() < limits_.max_speed) return config::LimitSource::kChip;
+  if (limits_.max_speed < config.max_speed) return config::LimitSource::kSetLimits;
   return config.max_speed_source;
 }
 
 motion::MotionLimits AxisModel::limits(double velocity) const {
   const double scale = stepsPerUnit();
-  return {config.start_speed * scale, velocity * scale, limits_now_.acceleration * scale,
-          limits_now_.deceleration * scale, limits_now_.jerk * scale};
+  return {config.start_speed * scale, velocity * scale, limits_.acceleration * scale,
+          limits_.deceleration * scale, limits_.jerk * scale};
 }
 
 motion::MotionLimits AxisModel::stopLimits() const {
@@ -132,12 +131,6 @@ AxisLimits AxisModel::checkedLimits(const AxisLimits& wanted) const {
                                    config::kLowestAcceleration, "/s^2");
   next.jerk = checkedLimit("jerk", wanted.jerk, config.jerk, config::kLowestJerk, "/s^3");
   return next;
-}
-
-void AxisModel::changeLimits(const AxisLimits& wanted) {
-  limits_next_ = wanted;
-  limits_now_.max_speed = wanted.max_speed;
-  if (!moving()) limits_now_ = limits_next_;
 }
 
 // ---- refusals ----

@@ -93,10 +93,8 @@ class AxisModel {
   pulse::Nanoseconds turnTime() const;
   /// Steps closer than this are at a speed that the motor can't start from without a ramp.
   pulse::Nanoseconds restartInterval() const;
-  const AxisLimits& limitsOfNextMotion() const { return limits_next_; }
-  void changeLimits(const AxisLimits& wanted);
-  /// A motion has ended: the limits of the next one apply.
-  void atRest() { limits_now_ = limits_next_; }
+  const AxisLimits& limitsOfNextPlan() const { return limits_; }
+  void changeLimits(const AxisLimits& wanted) { limits_ = wanted; }
   /// @}
 
   /// @name Refusals
@@ -207,9 +205,8 @@ class AxisModel {
 
   std::vector<AxisModel*> sharers_;
   double reach_ = 0.0;
-  AxisMemory rest_;         // when it was last at rest
-  AxisLimits limits_now_;   // of the current motion
-  AxisLimits limits_next_;  // of motions that begin at rest; the speed also applies now
+  AxisMemory rest_;  // when it was last at rest
+  AxisLimits limits_;
 };
 
 }  // namespace stepdriver::axis

@@ -11,6 +11,7 @@
 
 #include "message_text.h"
 #include "motion/compose.h"
+#include "motion/level_off.h"
 #include "motion/planner.h"
 #include "motion/root.h"
 
@@ -148,7 +149,10 @@ motion::Profile LinePath::plan(std::int64_t at, const motion::MotionState& from,
                                double speed_override) const {
   motion::MotionLimits limits = limits_;
   limits.max_speed = std::min(speed_ * speed_override, limits_.max_speed);
-  return motion::planMove(at, from, length_, limits).profile;
+  // The jerk of a hold may be higher.
+  const motion::LevelOff level_off(at, from, limits_, stop_limits_.jerk);
+  return level_off.followedBy(motion::planMove(level_off.endNs(), level_off.end(), length_, limits))
+      .profile;
 }
 
 motion::Profile LinePath::planStop(std::int64_t at, const motion::MotionState& from) const {

@@ -211,7 +211,6 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
     }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.distrust();
   }
-  if (!axis.moving()) axis.atRest();
   if (!was_faulty && axis.fault) axis.noteStop();
 }
 
@@ -451,7 +450,7 @@ void Controller::serve(const PlanMove& wanted, const Ack& call) {
   const Goal goal = goalOf(wanted.move);
   const motion::Plan planned = [&] {
     try {
-      return activity::planGoal(moved, goal, activity::earliestStart(context_, moved, 0));
+      return activity::planGoal(moved, goal, activity::earliestStart(context_, moved, 0)).plan;
     } catch (const std::range_error& error) {
       moved.refuse(error.what());
     }
@@ -683,6 +682,7 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
     const double target = wanted.path ? wanted.path->targets[i] : wanted.prepared->target(i);
     goal.target = motion::restingCount(target);
     goal.remainder = target - static_cast<double>(*goal.target);
+    goal.path_limits = wanted.prepared->axes()[i].limits;
     orders.push_back({&moved, goalWithOutcome(goal)});
   }
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -1012,7 +1012,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   shown.backlash = axis.backlash();
   shown.motors = axis.motor.lines().motors();
   shown.square_lags = axis.motor.squareLags();
-  shown.limits = axis.limitsOfNextMotion();
+  shown.limits = axis.limitsOfNextPlan();
   for (const motor::Motion& motion : axis.motor.motions().all()) {
     AxisSnapshot::Motion view;
     view.serial = motion.serial;

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "motion/limits.h"
 #include "motion/profile.h"
 #include "pulse/channel.h"
 
@@ -13,11 +15,18 @@ namespace stepdriver::motor {
 
 /// A profile that was ordered from the pulse engine.
 struct Motion {
+  static constexpr std::int64_t kNeverSlows = std::numeric_limits<std::int64_t>::max();
+
   std::uint64_t serial = 0;
   /// [microsteps of the joint] Of a move; empty: it has no end.
   std::optional<std::int64_t> target;
   bool slows_down = false;  ///< it only comes to rest, at any position
-  double overshoot = 0.0;   ///< [microsteps] how far it overshoots its end before it comes back
+  /// Those that it was planned with, or that the motion was planned with that it slows down. Their
+  /// max_speed doesn't count.
+  motion::MotionLimits limits;
+  /// Motion time from which its jerk may be that of stops.
+  std::int64_t slows_ns = kNeverSlows;
+  double overshoot = 0.0;  ///< [microsteps] how far it overshoots its end before it comes back
   std::shared_ptr<const motion::Profile> profile;
   /// The data that the engine reads until it has handled the order.
   std::shared_ptr<const void> order;

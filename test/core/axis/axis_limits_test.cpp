@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -25,15 +26,17 @@ using test::violationsOf;
 
 class AxisLimitsTest : public testing::Test {
  protected:
-  void build(double jerk = 0.0) {
+  void build(double jerk = 0.0, bool has_soft_limits = true) {
     config::AxisConfig config = linearAxis("x");
     config.steps_per_unit = 1000.0;
     config.max_speed = 1.0;
     config.acceleration = 2.0;
     config.deceleration = 2.0;
     config.jerk = jerk;
-    config.min_position = -50.0;
-    config.max_position = 50.0;
+    if (has_soft_limits) {
+      config.min_position = -50.0;
+      config.max_position = 50.0;
+    }
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
     specs[0].min_switch->position = -100'000.0;
     specs[0].max_switch->position = 100'000.0;
@@ -45,6 +48,10 @@ class AxisLimitsTest : public testing::Test {
   axis::Axis& x() { return bench->axis(); }
   void advance(double seconds) { bench->machine->advance(seconds); }
   double velocity() { return x().state().velocity; }
+  void send(machine::SetpointMode mode, double timeout, double value) {
+    EXPECT_EQ(bench->machine->followSetpoints(mode, timeout, {{"x", value, {}}}),
+              std::vector<std::string>{""});
+  }
 
   std::unique_ptr<Bench> bench;
 };
@@ -83,17 +90,17 @@ TEST_F(AxisLimitsTest, RefusesCommandsBeyondTheLowerSpeed) {
   EXPECT_REFUSED(x().jog(-0.6), "above the maximum");
 }
 
-TEST_F(AxisLimitsTest, SlowsDownAMotionUnderWayAtItsDeceleration) {
+TEST_F(AxisLimitsTest, SlowsDownAMotionUnderWay) {
   const axis::Move move = x().moveTo(10.0);
   advance(2.0);
   EXPECT_NEAR(velocity(), 1.0, 1e-9);
   x().setLimits({0.4, 0.0, 0.5, 0.0});
   advance(0.201);
-  EXPECT_NEAR(velocity(), 0.6, 1e-6) << "by 2 m/s^2, which it began with";
-  advance(0.2);
+  EXPECT_NEAR(velocity(), 0.9, 1e-6) << "by 0.5 m/s^2";
+  advance(1.1);
   EXPECT_NEAR(velocity(), 0.4, 1e-9);
   const double before = x().state().time_left;
-  EXPECT_NEAR(before, (10.0 - x().state().position) / 0.4 + 0.1, 0.005);
+  EXPECT_NEAR(before, (10.0 - x().state().position) / 0.4 + 0.4, 0.005);
   EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses(), 10'000);
 }
@@ -142,6 +149,156 @@ TEST_F(AxisLimitsTest, ComesToRestInTimeWhateverIsSetMeanwhile) {
   EXPECT_LE(farthest, 50.0);
   const axis::Move slow = x().moveTo(49.0);
   EXPECT_GT(slow.duration, 6.0) << "from rest on they hold: 2 sqrt(0.99 / 0.1)";
+}
+
+TEST_F(AxisLimitsTest, HoldForAMotionUnderWayIfItStillStopsInTime) {
+  const axis::Move move = x().moveTo(10.0);
+  advance(2.0);
+  x().setLimits({0.0, 0.0, 0.25, 0.0});  // it needs 2 m to come to rest
+  advance(0.002);
+  EXPECT_NEAR(x().state().time_left, 10.0 - x().state().position + 2.0, 0.005);
+  EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses(), 10'000);
+  x().setLimits({});
+  const axis::Move back = x().moveTo(0.0);
+  advance(9.05);  // 1.2 m are left
+  x().setLimits({0.0, 0.0, 0.25, 0.0});
+  advance(0.002);
+  EXPECT_NEAR(x().state().time_left, x().state().position + 0.25, 0.005)
+      << "it keeps the deceleration that it began with";
+  EXPECT_EQ(x().wait(back).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->report().pulses_backward, 10'000);
+  const axis::Move next = x().moveTo(10.0);
+  EXPECT_NEAR(next.duration, 10.0 + 0.25 + 2.0, 1e-3) << "the next motion has the new one";
+}
+
+// Planned with the lower deceleration it would pass the soft limit before it turns.
+TEST_F(AxisLimitsTest, LetNoMotionPassASoftLimit) {
+  const std::vector<std::function<void()>> turns = {
+      [this] { x().jog(-1.0); },
+      [this] { x().moveTo(0.0); },
+      [this] { bench->machine->setSpeedOverride(0.9); },
+      [this] { send(machine::SetpointMode::kPosition, 5.0, 49.0); },
+      [this] { send(machine::SetpointMode::kVelocity, 5.0, -1.0); },
+  };
+  for (const bool line : {false, true}) {
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+      SCOPED_TRACE(testing::Message() << "turn " << i << (line ? " of a line" : " of a move"));
+      build();
+      if (line) {
+        bench->machine->moveLine({{"x"}, {50.0}});
+      } else {
+        x().moveTo(50.0);
+      }
+      advance(50.0);  // 0.4 m before it comes to rest, for which 0.25 m suffice
+      x().setLimits({0.0, 0.0, 0.1, 0.0});
+      turns[i]();
+      double farthest = 0.0;
+      for (int k = 0; k < 3000; ++k) {
+        advance(0.001);
+        farthest = std::max(farthest, x().state().position);
+      }
+      EXPECT_GT(farthest, 49.5);
+      EXPECT_LE(farthest, 50.0);
+    }
+  }
+}
+
+/// A lower jerk takes an acceleration back more slowly: from 2 m/s^2 at 0.01 m/s^3 in 200 s, while
+/// the speed changes by 200 m/s.
+class LowerJerk : public AxisLimitsTest {
+ protected:
+  void expectNoTurnAndNoHigherSpeed(double seconds) {
+    double place = x().state().planned;
+    for (int i = 0; i < static_cast<int>(seconds / 0.005); ++i) {
+      advance(0.005);
+      const axis::AxisState state = x().state();
+      ASSERT_GE(state.planned, place - 1e-9) << "it turned";
+      ASSERT_LE(state.velocity, 1.0 + 1e-6);
+      place = state.planned;
+    }
+  }
+};
+
+TEST_F(LowerJerk, OfAMotionUnderWayNeitherTurnsItNorMakesItTooFast) {
+  for (const double jerk : {0.0, 4.0}) {
+    for (int after = 0; after < 32; ++after) {
+      SCOPED_TRACE(testing::Message() << jerk << " m/s^3, after " << after);
+      build(jerk);
+      const axis::Move move = x().moveTo(2.0);
+      advance(0.001 + 0.1 * after);
+      if (!x().state().moving) break;
+      x().setLimits({0.0, 0.0, 0.0, 0.01});
+      bench->machine->setSpeedOverride(0.8);
+      expectNoTurnAndNoHigherSpeed(3.0);
+      bench->machine->setSpeedOverride(1.0);
+      EXPECT_EQ(x().wait(move).end, MoveEnd::kReached);
+      EXPECT_EQ(bench->report().pulses_backward, 0);
+    }
+  }
+}
+
+TEST_F(LowerJerk, OfAJogWithoutALimitDoesNotMakeItTooFast) {
+  for (const double jerk : {0.0, 4.0}) {
+    for (int after = 0; after < 10; ++after) {
+      SCOPED_TRACE(testing::Message() << jerk << " m/s^3, after " << after);
+      build(jerk, false);
+      x().jog(1.0);
+      advance(0.001 + 0.1 * after);
+      x().setLimits({0.0, 0.0, 0.0, 0.01});
+      expectNoTurnAndNoHigherSpeed(3.0);
+      x().jog(0.5);
+      expectNoTurnAndNoHigherSpeed(3.0);
+    }
+  }
+}
+
+TEST_F(LowerJerk, ThanThatOfAStopNeitherTurnsNorSpeedsUpWhatFollowsIt) {
+  const std::vector<std::function<void()>> followers = {
+      [this] { x().moveTo(40.0); },
+      [this] { x().jog(1.0); },
+      [this] { send(machine::SetpointMode::kVelocity, 0.1, 0.9); },
+  };
+  for (const double jerk : {0.0, 4.0}) {
+    for (std::size_t i = 0; i < followers.size(); ++i) {
+      for (int after = 1; after < 10; ++after) {
+        SCOPED_TRACE(testing::Message() << jerk << " m/s^3, " << i << ", after " << after);
+        build(jerk);
+        x().setLimits({0.0, 0.0, 0.0, 0.01});
+        for (int k = 0; k < 300; ++k) {
+          send(machine::SetpointMode::kVelocity, 0.1, 0.9);
+          advance(0.05);
+        }
+        ASSERT_GT(velocity(), 0.5);
+        if (after % 2 == 0) {
+          x().stop();
+        } else {
+          advance(0.101);  // a stream that pauses comes to rest likewise
+        }
+        advance(0.05 * after);
+        followers[i]();
+        expectNoTurnAndNoHigherSpeed(1.0);
+        EXPECT_EQ(bench->report().pulses_backward, 0);
+      }
+    }
+  }
+}
+
+TEST_F(LowerJerk, ThanThatOfAHoldNeitherTurnsNorSpeedsUpALine) {
+  for (int after = 1; after < 10; ++after) {
+    SCOPED_TRACE(after);
+    build(4.0);
+    x().setLimits({0.0, 0.0, 0.0, 0.01});
+    const machine::CoordinatedMove move = bench->machine->moveLine({{"x"}, {20.0}});
+    advance(12.0);
+    ASSERT_GT(velocity(), 0.5);
+    bench->machine->hold();
+    advance(0.05 * after);
+    bench->machine->resume();
+    expectNoTurnAndNoHigherSpeed(3.0);
+    EXPECT_EQ(bench->machine->wait(move).end, MoveEnd::kReached);
+    EXPECT_EQ(bench->report().pulses_backward, 0);
+  }
 }
 
 TEST_F(AxisLimitsTest, AStopKeepsItsDeceleration) {

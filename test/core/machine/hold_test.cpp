@@ -90,8 +90,10 @@ TEST_F(Hold, OfOneMovingAxisHoldsAllAndKeepsTheGoal) {
 // first. Whenever a stop or a hold comes, it brings the axis to rest in the time that it needs.
 TEST_F(Hold, AndStopEndAMoveThatIsAboutToTurn) {
   for (const bool hold : {true, false}) {
-    for (int after = 1; after < 30; ++after) {
-      SCOPED_TRACE(after);
+    for (int i = 2; i < 60; ++i) {
+      const int after = i / 2;
+      const double target = i % 2 == 0 ? 0.1 : 0.0;
+      SCOPED_TRACE(testing::Message() << "to " << target << " m, after " << after);
       config::AxisConfig config = linearAxis("x", 20'000.0, 0.06, 0.3);
       config.jerk = 3.0;
       Bench one({config});
@@ -102,7 +104,7 @@ TEST_F(Hold, AndStopEndAMoveThatIsAboutToTurn) {
       one.machine->advance(0.5);
       x.stop();
       one.machine->advance(0.01 * after);
-      const axis::Move move = x.moveTo(0.1);
+      const axis::Move move = x.moveTo(target);
       one.machine->advance(0.007);
       hold ? one.machine->hold() : x.stop();
       one.machine->advance(0.45);  // 0.06/0.3 s, and 2.5 times 0.3/3 s

@@ -33,8 +33,8 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
   return {name, [=](Participants& all, int client) { all.post(client, name, wanted, meaning); }};
 }
 
-/// While z still decelerates at the configured jerk it gets a target, for which it may have to turn
-/// at a lower jerk, and is stopped again. The pauses differ with the steps before.
+/// While z still decelerates at the configured jerk it gets a target within a lower one, and is
+/// stopped again. The pauses differ with the steps before.
 std::deque<Turn> turns(std::size_t steps) {
   constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
   const auto pause = static_cast<pulse::Nanoseconds>(20 + steps % 7 * 5) * kMillisecond;
@@ -48,6 +48,24 @@ std::deque<Turn> turns(std::size_t steps) {
           {230 * kMillisecond, "stop z", machine::StopAxis{kZ}, slows_down},
           {pause, "move z to 12 mm", move, moving({kZ})},
           {short_pause, "stop z", machine::StopAxis{kZ}, slows_down}};
+}
+
+/// The limits of z are lowered while it speeds up, moves or slows down to a target, and it is
+/// stopped. The pauses differ with the steps before.
+std::deque<Turn> lowers(std::size_t steps) {
+  constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
+  const auto pause = static_cast<pulse::Nanoseconds>(3 + steps % 11 * 15) * kMillisecond;
+  const auto short_pause = static_cast<pulse::Nanoseconds>(1 + steps % 5 * 9) * kMillisecond;
+  axis::AxisLimits slow;
+  slow.acceleration = slow.deceleration = 0.3;
+  axis::AxisLimits smooth;
+  smooth.jerk = 0.5;
+  return {{0, "move z by 4 mm", machine::MoveTo{kZ, 0.004, true, 0.0}, moving({kZ})},
+          {pause, "low jerk of z", machine::SetLimits{kZ, smooth}, {}},
+          {short_pause, "override 0.7", machine::SetSpeedOverride{0.7}, {}},
+          {short_pause, "low accelerations of z", machine::SetLimits{kZ, slow}, {}},
+          {short_pause, "stop z", machine::StopAxis{kZ}, quiet(Meaning::Quiet::kSlowsDown, {kZ})},
+          {short_pause, "all limits of z", machine::SetLimits{kZ, {}}, {}}};
 }
 
 machine::FollowSetpoints positions(const std::vector<machine::Setpoint>& setpoints) {
@@ -84,6 +102,8 @@ std::vector<Act> makeActs() {
               moving({kY, kZ})),
       {"stop z, move it at a lower jerk, and stop it",
        [=](Participants& all, int client) { all.postInTurn(client, turns(all.steps())); }},
+      {"lower the limits of z while it moves, and stop it",
+       [=](Participants& all, int client) { all.postInTurn(client, lowers(all.steps())); }},
       {"trajectory of x and y",
        [](Participants& all, int client) {
          all.postTrajectory(client, {kX, kY}, 0.008);

@@ -65,18 +65,20 @@ class Axis {
   ///   since.
   virtual void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since = {}) = 0;
 
-  /// Changes the limits of motions, within what is configured. A lower max_speed slows down a move
-  /// or a jog under way at once; axes that move together keep the limits that they began with. A
-  /// new acceleration, deceleration or jerk applies to motions that begin at rest: a motion under
-  /// way was planned to stop with the old ones, and might not stop in time with the new ones. Stops
-  /// always use the configured deceleration and jerk.
+  /// Changes the limits of motions, within what is configured. They apply to the next plan: a move,
+  /// a jog or a setpoint under way is planned again at once. If it would pass its target or a soft
+  /// limit farther with the new limits than with the old ones, it keeps the old acceleration,
+  /// deceleration and jerk to its end. An acceleration that a lower jerk can't take back before
+  /// standstill or the highest speed is taken back with the jerk that this needs. Axes that move
+  /// together keep the limits that they began with. Stops always use the configured deceleration
+  /// and jerk.
   ///
   /// @param wanted 0: as configured.
   /// @throw Refused if a number isn't 0 or between the lowest limit and the configured one. A jerk
   ///   has no upper bound if no jerk limit is configured.
   virtual void setLimits(const AxisLimits& wanted) = 0;
 
-  /// The limits of motions that begin at rest.
+  /// The limits of the next plan.
   virtual AxisLimits limits() const = 0;
 
   /// Decelerates to rest, and returns when the pulse thread has the deceleration. The axes that

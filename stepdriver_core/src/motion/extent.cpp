@@ -1,0 +1,34 @@
+#include "extent.h"
+
+#include <algorithm>
+
+namespace stepdriver::motion {
+
+Extent extentOf(const Profile& profile) {
+  const double end = profile.endPosition().value();
+  Extent extent{end, end};
+  const auto consider = [&extent](DoubleDouble position) {
+    extent.lowest = std::min(extent.lowest, position.value());
+    extent.highest = std::max(extent.highest, position.value());
+  };
+  for (const Piece& piece : profile.pieces()) {
+    consider(piece.p0);
+    for (double t = piece.firstTurn(0.0); t < piece.duration.hi; t = piece.firstTurn(t)) {
+      consider(piece.positionAt(t));
+    }
+  }
+  return extent;
+}
+
+double overshootOf(const Profile& profile) {
+  constexpr double kNoStep = 0.5;
+  const Extent extent = extentOf(profile);
+  const double end = profile.endPosition().value();
+  const double way = (profile.endPosition() - profile.startPosition()).value();
+  const double above = extent.highest - end;
+  const double below = end - extent.lowest;
+  const double beyond = way > 0.0 ? above : way < 0.0 ? below : std::max(above, below);
+  return beyond > kNoStep ? beyond : 0.0;
+}
+
+}  // namespace stepdriver::motion

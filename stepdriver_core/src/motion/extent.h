@@ -1,0 +1,20 @@
+#pragma once
+
+#include "profile.h"
+
+namespace stepdriver::motion {
+
+/// The lowest and the highest position of a motion [microsteps].
+struct Extent {
+  double lowest = 0.0;
+  double highest = 0.0;
+};
+
+/// Takes time in proportion to the number of pieces.
+Extent extentOf(const Profile& profile);
+
+/// How far a motion passes its own end before it comes back [microsteps]; 0 if it makes no step
+/// beyond it.
+double overshootOf(const Profile& profile);
+
+}  // namespace stepdriver::motion
