@@ -14,6 +14,7 @@
 #include "message_text.h"
 #include "motion/contour.h"
 #include "motion/contour_motion.h"
+#include "motion/smooth_contour_motion.h"
 #include "motion/spline.h"
 #include "stepdriver_core/error.h"
 
@@ -208,7 +209,7 @@ class SegmentReader {
   std::size_t index_ = 0;
 };
 
-void requireRequest(const PathRequest& request, const std::vector<PathAxis>& axes) {
+void requireRequest(const PathRequest& request) {
   const std::size_t size = request.segments.size();
   if (size == 0 || size > kMostPathSegments) {
     throw Refused(
@@ -221,21 +222,21 @@ void requireRequest(const PathRequest& request, const std::vector<PathAxis>& axe
   };
   require("velocity", request.velocity);
   require("tolerance", request.tolerance);
-  for (const PathAxis& axis : axes) {
-    if (axis.limits.jerk == 0.0) continue;
-    axis.refuse(
-        fmt::format("it has a jerk limit of {}, but the acceleration jumps on a path: only "
-                    "axes without a jerk limit can follow one",
-                    axis.show(axis.limits.jerk / axis.steps_per_unit, "/s^3")));
-  }
+}
+
+bool isSmooth(const std::vector<PathAxis>& axes) {
+  return std::any_of(axes.begin(), axes.end(),
+                     [](const PathAxis& axis) { return axis.limits.jerk > 0.0; });
 }
 
 // [unit]
 motion::ContourLimits limitsOf(const PathAxis& axis) {
   const double share = axis.backlash > 0 ? kShareWithBacklash : 1.0;
   const double unit = share / axis.steps_per_unit;
-  return {axis.limits.max_speed * unit, axis.limits.acceleration * unit,
-          axis.limits.deceleration * unit};
+  motion::ContourLimits limits{axis.limits.max_speed * unit, axis.limits.acceleration * unit,
+                               axis.limits.deceleration * unit};
+  if (axis.limits.jerk > 0.0) limits.jerk = axis.limits.jerk * unit;
+  return limits;
 }
 
 void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& axes) {
@@ -248,6 +249,17 @@ void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& a
   }
 }
 
+// [s] How long an axis takes to move by a part of a microstep from rest to rest: on a quintic,
+// which has a speed of 1.875 way/T, an acceleration of 5.77 way/T^2 and a jerk of 60 way/T^3, or on
+// a cubic, which has a speed of 1.5 way/T and an acceleration of 6 way/T^2.
+double restTime(double way, const motion::MotionLimits& limits, bool smooth) {
+  const double acceleration = std::min(limits.acceleration, limits.deceleration);
+  if (!smooth) return std::max(1.5 * way / limits.max_speed, std::sqrt(6.0 * way / acceleration));
+  const double time =
+      std::max(1.875 * way / limits.max_speed, std::sqrt(5.78 * way / acceleration));
+  return limits.jerk > 0.0 ? std::max(time, std::cbrt(60.0 * way / limits.jerk)) : time;
+}
+
 // From the end of the path to the microsteps at which the axes come to rest. That is half a
 // microstep or less: no step.
 void appendRest(std::vector<TrajectoryPoint>& points, const std::vector<PathAxis>& axes) {
@@ -256,12 +268,8 @@ void appendRest(std::vector<TrajectoryPoint>& points, const std::vector<PathAxis
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const double count = axes[k].countOf(rest.positions[k]);
     const auto whole = static_cast<double>(motion::restingCount(count));
-    const double way = std::abs(whole - count);
-    const motion::MotionLimits& limits = axes[k].limits;
-    // The cubic has an acceleration of 6 way/T^2 at its ends, and a speed of 1.5 way/T between.
-    duration =
-        std::max({duration, 1.5 * way / limits.max_speed,
-                  std::sqrt(6.0 * way / std::min(limits.acceleration, limits.deceleration))});
+    duration = std::max(
+        duration, restTime(std::abs(whole - count), axes[k].limits, !rest.accelerations.empty()));
     rest.positions[k] = axes[k].positionOf(whole);
   }
   constexpr double kRounding = 1e-6;  // s
@@ -279,10 +287,8 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
       axes[k].refuseBeyondLimits(knot.positions[k],
                                  nameOf(knot.segment) + ", rounded at its corners, leads to");
     }
-    points.push_back({static_cast<double>(knot.time_ns) * 1e-9,
-                      std::move(knot.positions),
-                      std::move(knot.velocities),
-                      {}});
+    points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),
+                      std::move(knot.velocities), std::move(knot.accelerations)});
   }
   appendRest(points, axes);
   return points;
@@ -292,7 +298,7 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
 
 PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
                   const std::vector<PathOrigin>& origins) {
-  requireRequest(request, axes);
+  requireRequest(request);
   SegmentReader reader(request, axes, origins);
   std::vector<ContourSegment> segments;
   segments.reserve(request.segments.size());
@@ -304,10 +310,15 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
     limits.push_back(limitsOf(axis));
   }
   try {
-    const motion::Contour contour(reader.start(), segments, resolution);
+    const bool smooth = isSmooth(axes);
+    const motion::Contour contour(
+        reader.start(), segments, resolution,
+        smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection);
     requireRange(contour, axes);
     PathPlan plan;
-    plan.points = pointsOf(motion::planContour(contour, limits), axes);
+    plan.points = pointsOf(
+        smooth ? motion::planSmoothContour(contour, limits) : motion::planContour(contour, limits),
+        axes);
     for (std::size_t k = 0; k < axes.size(); ++k) {
       plan.targets.push_back(axes[k].countOf(segments.back().end[k]));
     }

@@ -210,6 +210,15 @@ void Contour::round(std::size_t corner, double tolerance, Continuity continuity)
   before.end.jump = after.begin.jump = std::move(jump);
 }
 
+Contour Contour::part(std::size_t first, std::size_t last) const {
+  ContourPoint begin;
+  evaluateGiven(first, 0.0, begin);
+  Contour made(std::move(begin.position), {}, resolution_);
+  made.segments_.assign(segments_.begin() + static_cast<std::ptrdiff_t>(first),
+                        segments_.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  return made;
+}
+
 double Contour::roundedUntil(std::size_t segment) const {
   const End& begin = segments_[segment].begin;
   return begin.blend > 0.0 ? begin.blend / begin.rate : 0.0;

@@ -103,6 +103,11 @@ class Contour {
   /// The same of the path as given, with all its corners.
   void evaluateGiven(std::size_t segment, double parameter, ContourPoint& point) const;
 
+  /// Some of its segments.
+  ///
+  /// @pre It stops before the first one and after the last one, or they are its ends.
+  Contour part(std::size_t first, std::size_t last) const;
+
   /// The lowest and the highest position of an axis on a segment as given.
   std::pair<double, double> range(std::size_t segment, std::size_t axis) const;
 

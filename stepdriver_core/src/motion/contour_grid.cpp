@@ -15,6 +15,7 @@ constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an i
 constexpr double kMostArcDeviation = 0.005;  // of the resolution
 constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
+constexpr double kNegligible = 1e-14;        // of the length of an interval
 constexpr int kPartsOfCorner = 5;            // at least, of each half
 constexpr int kPartsOfCurve = 4;             // at least
 
@@ -110,6 +111,78 @@ std::vector<std::size_t> ContourGrid::quarter(const std::vector<bool>& which) {
   return origins;
 }
 
+ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
+  ContourGrid made(*this);
+  made.intervals_.clear();
+  made.derivatives_.clear();
+  made.positions_.assign(position(0), position(0) + axes_);
+  made.stops_.assign(1, stopsAt(0));
+  const auto take = [&](std::size_t of, const Interval& interval, const double* end) {
+    made.intervals_.push_back(interval);
+    made.derivatives_.insert(made.derivatives_.end(), firstAtBegin(of),
+                             firstAtBegin(of) + 4 * axes_);
+    made.positions_.insert(made.positions_.end(), end, end + axes_);
+    made.stops_.push_back(false);
+  };
+  ContourPoint point;
+  double begin = 0.0;  // distance from the start
+  auto next = distances.begin();
+  for (std::size_t i = 0; i < size(); ++i) {
+    giveWayAt(i);
+    Interval rest = intervals_[i];
+    const double shortest = kLeastPart * rest.length;
+    double done = 0.0;
+    for (; next != distances.end() && *next < begin + intervals_[i].length - shortest; ++next) {
+      const double at = *next - begin;
+      if (!rest.straight || at < done + shortest) continue;
+      evaluateAt(i, at, point);
+      Interval part = rest;
+      part.length = at - done;
+      part.to = rest.from + (rest.to - rest.from) * part.length / rest.length;
+      take(i, part, point.position.data());
+      rest.from = part.to;
+      rest.length -= part.length;
+      done = at;
+    }
+    take(i, rest, position(i + 1));
+    made.stops_.back() = stopsAt(i + 1);
+    begin += intervals_[i].length;
+  }
+  return made;
+}
+
+void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint& point) const {
+  const Interval& of = intervals_[interval];
+  point.position.resize(axes_);
+  point.first.resize(axes_);
+  point.second.resize(axes_);
+  if (of.straight) {
+    for (std::size_t j = 0; j < axes_; ++j) {
+      point.first[j] = firstAtBegin(interval)[j];
+      point.position[j] = position(interval)[j] + distance * point.first[j];
+      point.second[j] = 0.0;
+    }
+    return;
+  }
+  Place begin;
+  Place middle;
+  Place end;
+  evaluate(of.segment, of.from, begin);
+  const double part = distance / of.length;
+  double parameter = of.from + part * (of.to - of.from);
+  constexpr int kCorrections = 4;
+  for (int i = 0; i < kCorrections; ++i) {
+    evaluate(of.segment, (of.from + parameter) / 2.0, middle);
+    evaluate(of.segment, parameter, end);
+    const double error = lengthOf(begin, middle, end) - distance;
+    if (std::abs(error) < kNegligible * of.length) break;
+    parameter -= error / end.rate;
+  }
+  evaluate(of.segment, parameter, end);
+  point.position = end.point.position;
+  withRespectToLength(end, point.first.data(), point.second.data());
+}
+
 bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {
   const auto [least, most] = std::minmax({begin.rate, middle.rate, end.rate});
   if (most > kMostRateRatio * least) return true;
@@ -151,14 +224,19 @@ void ContourGrid::append(std::size_t segment, const Place& begin, const Place& e
 }
 
 void ContourGrid::appendDerivatives(const Place& place) {
-  const std::vector<double>& first = place.point.first;
-  const std::vector<double>& second = place.point.second;
+  derivatives_.resize(derivatives_.size() + 2 * axes_);
+  double* first = &derivatives_[derivatives_.size() - 2 * axes_];
+  withRespectToLength(place, first, first + axes_);
+}
+
+void ContourGrid::withRespectToLength(const Place& place, double* first, double* second) const {
+  const ContourPoint& point = place.point;
   double along = 0.0;
-  for (std::size_t i = 0; i < axes_; ++i) along += first[i] * second[i];
+  for (std::size_t i = 0; i < axes_; ++i) along += point.first[i] * point.second[i];
   const double square = place.rate * place.rate;
-  for (const double x : first) derivatives_.push_back(x / place.rate);
   for (std::size_t i = 0; i < axes_; ++i) {
-    derivatives_.push_back((second[i] - first[i] * (along / square)) / square);
+    first[i] = point.first[i] / place.rate;
+    second[i] = (point.second[i] - point.first[i] * (along / square)) / square;
   }
 }
 

@@ -34,6 +34,11 @@ class ContourGrid {
   /// @return the former index of each interval.
   std::vector<std::size_t> quarter(const std::vector<bool>& which);
 
+  /// With straight intervals divided at some distances from the start.
+  ///
+  /// @param distances in increasing order.
+  ContourGrid divided(const std::vector<double>& distances) const;
+
   std::size_t axes() const { return axes_; }
   std::size_t size() const { return intervals_.size(); }
   const Interval& operator[](std::size_t index) const { return intervals_[index]; }
@@ -45,6 +50,9 @@ class ContourGrid {
     const Interval& of = intervals_[interval];
     contour_.evaluate(of.segment, (of.from + of.to) / 2.0, point);
   }
+
+  /// The point at a distance from the begin of an interval, with the derivatives with respect to s.
+  void evaluateAt(std::size_t interval, double distance, ContourPoint& point) const;
 
   /// @name The first two derivatives of the position with respect to s, at the ends of an interval.
   /// The second one jumps at a place if the curvature does; the first one only at a stop.
@@ -73,6 +81,7 @@ class ContourGrid {
   void append(std::size_t segment, const Place& begin, const Place& end, double length,
               bool straight);
   void appendDerivatives(const Place& place);
+  void withRespectToLength(const Place& place, double* first, double* second) const;
 
   const Contour& contour_;
   std::size_t axes_;

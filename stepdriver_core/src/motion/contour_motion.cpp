@@ -44,12 +44,7 @@ struct Trapezoid {
 };
 
 Trapezoid trapezoidOf(double length, double begin_square, double end_square,
-                      const ContourSpeed::Ramp& ramp, double highest_square) {
-  const double meeting =
-      (2.0 * length * ramp.up * ramp.down + begin_square * ramp.down + end_square * ramp.up) /
-      (ramp.up + ramp.down);
-  const double peak_square =
-      std::max({std::min(meeting, highest_square), begin_square, end_square});
+                      const ContourSpeed::Ramp& ramp, double peak_square) {
   Trapezoid made;
   made.peak = std::sqrt(peak_square);
   made.ramp_up = (made.peak - std::sqrt(begin_square)) / ramp.up;
@@ -102,7 +97,7 @@ class Knots {
   void appendStraight(std::size_t interval, const ContourSpeed& speed) {
     const Trapezoid made =
         trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
-                    speed.ramp(interval), speed.capAtBegin(interval));
+                    speed.ramp(interval), speed.peakSquare(interval));
     appendOnLine(interval, time_ + made.ramp_up, made.way_up, made.peak);
     appendOnLine(interval, time_ + made.ramp_up + made.cruise, made.way_up + made.way_cruise,
                  made.peak);

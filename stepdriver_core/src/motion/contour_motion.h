@@ -2,17 +2,19 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "motion/contour.h"
 
 namespace stepdriver::motion {
 
-/// The limits of one axis on a contour, all above 0 and finite [unit/s, unit/s^2].
+/// The limits of one axis on a contour, all above 0 and finite but for the jerk [unit/s, unit/s^2].
 struct ContourLimits {
   double speed = 0.0;
-  double acceleration = 0.0;  ///< while its speed rises
-  double deceleration = 0.0;  ///< while its speed falls
+  double acceleration = 0.0;                              ///< while its speed rises
+  double deceleration = 0.0;                              ///< while its speed falls
+  double jerk = std::numeric_limits<double>::infinity();  ///< [unit/s^3] infinity: no limit
 };
 
 /// A place of a contour, the time at which the motion is there, and its velocity.
@@ -21,10 +23,12 @@ struct ContourKnot {
   std::size_t segment = 0;
   std::vector<double> positions;   ///< [unit]
   std::vector<double> velocities;  ///< [unit/s]
+  /// [unit/s^2] Empty if accelerations may jump.
+  std::vector<double> accelerations;
 };
 
 /// The fastest motion along a contour, from rest to rest, within the limits of the axes and the
-/// speeds of the segments. There is no jerk limit: accelerations jump.
+/// speeds of the segments. Jerk limits are ignored: accelerations jump. See planSmoothContour().
 ///
 /// The axes move on the cubics that have the positions and velocities of the knots at both ends.
 /// Between knots they are within a tenth of the resolution of the contour. In the whole of each

@@ -39,6 +39,8 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
       limits_(limits),
       acceleration_shares_(grid.size(), 1.0),
       speed_shares_(grid.size(), 1.0),
+      most_squares_(grid.size(), kUnbounded),
+      most_accelerations_(grid.size(), kUnbounded),
       stale_(grid.size(), true),
       controllable_(grid.size() + 1, kUnbounded),
       squares_(grid.size() + 1, kUnbounded) {
@@ -49,6 +51,12 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
 void ContourSpeed::lower(std::size_t interval, double acceleration, double speed) {
   acceleration_shares_[interval] /= acceleration;
   speed_shares_[interval] /= speed;
+  stale_[interval] = true;
+}
+
+void ContourSpeed::restrict(std::size_t interval, double square, double acceleration) {
+  most_squares_[interval] = square;
+  most_accelerations_[interval] = acceleration;
   stale_[interval] = true;
 }
 
@@ -63,6 +71,8 @@ void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
   };
   spread(acceleration_shares_);
   spread(speed_shares_);
+  spread(most_squares_);
+  spread(most_accelerations_);
   spread(controllable_);
   spread(squares_);
   stale_.clear();
@@ -96,7 +106,7 @@ double ContourSpeed::capAt(std::size_t interval, const double* first) const {
   const std::size_t segment = grid_[interval].segment;
   const std::vector<bool>& measured = contour_.measured(segment);
   const double share = speed_shares_[interval];
-  double cap = kUnbounded;
+  double cap = most_squares_[interval];
   double sum = 0.0;
   for (std::size_t j = 0; j < limits_.size(); ++j) {
     const double square = first[j] * first[j];
@@ -125,7 +135,19 @@ ContourSpeed::Ramp ContourSpeed::ramp(std::size_t interval) const {
   }
   ramp.up *= acceleration_shares_[interval];
   ramp.down *= acceleration_shares_[interval];
+  ramp.up = std::min(ramp.up, most_accelerations_[interval]);
+  ramp.down = std::min(ramp.down, most_accelerations_[interval]);
   return ramp;
+}
+
+double ContourSpeed::peakSquare(std::size_t interval) const {
+  const double begin = squares_[interval];
+  const double end = squares_[interval + 1];
+  const Ramp along = ramp(interval);
+  const double meeting =
+      (2.0 * grid_[interval].length * along.up * along.down + begin * along.down + end * along.up) /
+      (along.up + along.down);
+  return std::max({std::min(meeting, capAtBegin(interval)), begin, end});
 }
 
 // What the accelerations of the axes at both ends of an interval allow, with x and u at its begin:
@@ -147,6 +169,10 @@ void ContourSpeed::collectBounds(std::size_t interval) {
     addBounds(first_begin[j], second_begin[j], least, most);
     addBounds(first_end[j] + twice * second_end[j], second_end[j], least, most);
   }
+  const double along = most_accelerations_[interval];
+  if (along == kUnbounded) return;
+  above_.push_back({along, 0.0});
+  below_.push_back({-along, 0.0});
 }
 
 // least <= u_factor u + x_factor x <= most

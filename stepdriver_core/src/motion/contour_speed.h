@@ -21,6 +21,9 @@ class ContourSpeed {
   /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
   /// these.
   void lower(std::size_t interval, double acceleration, double speed);
+  /// Limits the square of the speed in an interval [unit^2/s^2], and the acceleration along it
+  /// [unit/s^2], for the next plan().
+  void restrict(std::size_t interval, double square, double acceleration);
   /// After ContourGrid::quarter(): its result, and what was divided.
   void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided);
   /// Plans everything the first time, then only what has changed since.
@@ -42,6 +45,8 @@ class ContourSpeed {
     double down = 0.0;
   };
   Ramp ramp(std::size_t interval) const;
+  /// [unit^2/s^2] The highest square of the speed in a straight interval.
+  double peakSquare(std::size_t interval) const;
 
  private:
   // u = s'' is at least, or at most, offset + slope x.
@@ -64,6 +69,8 @@ class ContourSpeed {
   const std::vector<ContourLimits>& limits_;
   std::vector<double> acceleration_shares_;  // of each interval
   std::vector<double> speed_shares_;
+  std::vector<double> most_squares_;
+  std::vector<double> most_accelerations_;
   std::vector<bool> stale_;           // each interval that has changed since the last plan
   std::vector<double> controllable_;  // the largest x at each place from which it can slow down
   std::vector<double> squares_;       // x at each place

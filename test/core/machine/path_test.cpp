@@ -394,13 +394,162 @@ TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
   EXPECT_EQ(bench->pulses("y"), 0);
 }
 
-TEST_F(Path, IsRefusedWithAJerkLimit) {
-  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
-  axes[1].jerk = 20.0;
-  build(axes);
-  EXPECT_REFUSED(followPath(circle()), "y: it has a jerk limit of 20 m/s^3");
-  advance(1.0);
+// With a jerk limit: y has the lower one.
+class SmoothPath : public Path {
+ protected:
+  void SetUp() override { buildWith(20.0, 10.0); }
+
+  void buildWith(double jerk_x, double jerk_y, double backlash = 0.0) {
+    std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+    axes[0].jerk = jerk_x;
+    axes[1].jerk = jerk_y;
+    for (config::AxisConfig& axis : axes) axis.backlash = backlash;
+    build(axes);
+  }
+
+  void expectOnTheCircle() {
+    EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
+              kTolerance + kHalfMicrosteps + 0.1 * kMicrostep);
+  }
+
+  // The 8 parts of a difference that the cubics and half a microstep may add, over its cube.
+  void expectLimits(double jerk_x, double jerk_y) {
+    constexpr double kApart = 0.02;  // s
+    for (const std::string name : {"x", "y"}) {
+      const test::Differences seen = differences(name, kApart);
+      EXPECT_LE(seen.speed, 0.1 / kMicrostep * 1.001) << name;
+      EXPECT_LE(seen.acceleration, 1.0 / kMicrostep * 1.005) << name;
+      const double jerk = name == "x" ? jerk_x : jerk_y;
+      if (jerk == 0.0) continue;
+      EXPECT_LE(seen.jerk, jerk / kMicrostep + 8.0 * 0.03 / (kApart * kApart * kApart)) << name;
+    }
+  }
+};
+
+TEST_F(SmoothPath, KeepsTheLimitsOfBothAxes) {
+  const CoordinatedResult result = finish(mixed());
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_NEAR(result.positions[0], -0.010, kMicrostep / 2.0);
+  EXPECT_NEAR(result.positions[1], 0.010, kMicrostep / 2.0);
+  expectAtRest();
+  expectLimits(20.0, 10.0);
+  EXPECT_GE(differences("y", 0.02).jerk, 0.7 * 10.0 / kMicrostep) << "it isn't used";
+  RecordProperty("duration", std::to_string(result.duration));
+}
+
+TEST_F(SmoothPath, KeepsTheLimitIfOnlyOneAxisHasOne) {
+  buildWith(0.0, 10.0);
+  EXPECT_EQ(finish(mixed()).end, MoveEnd::kReached);
+  expectAtRest();
+  expectLimits(0.0, 10.0);
+}
+
+TEST_F(SmoothPath, FollowsACircleOfLinesWithoutStopping) {
+  const CoordinatedResult result = finish(circle());
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(bench->pulses("x"), 0);
   EXPECT_EQ(bench->pulses("y"), 0);
+  expectAtRest();
+  expectOnTheCircle();
+  expectLimits(20.0, 10.0);
+  RecordProperty("duration", std::to_string(result.duration));
+}
+
+TEST_F(SmoothPath, OfALineTakesTheSevenPhasesOfAMove) {
+  // 20 mm at 0.1 m/s, 1 m/s^2 and 20 m/s^3
+  EXPECT_NEAR(finish({{"x", "y"}, {lineTo({0.02, 0.0})}, false, 0.0, 0.0}).duration,
+              0.02 / 0.1 + 0.1 / 1.0 + 1.0 / 20.0, 1e-6);
+}
+
+TEST_F(SmoothPath, IsHeldOnThePathAndResumed) {
+  const CoordinatedMove move = followPath(circle());
+  advance(0.5);
+  machine().hold();
+  awaitRest();
+  EXPECT_TRUE(state("x").held);
+  advance(1.0);
+  machine().resume();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectAtRest();
+  expectOnTheCircle();
+}
+
+TEST_F(SmoothPath, StopsOnThePath) {
+  const CoordinatedMove move = followPath(circle());
+  advance(0.7);
+  bench->axis("y").stop();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
+  awaitRest();
+  expectAtRest();
+  expectOnTheCircle();
+  // The next path begins there.
+  EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 0);
+}
+
+TEST_F(SmoothPath, EndsOnThePathAtAnEmergencyStop) {
+  const CoordinatedMove move = followPath(circle());
+  advance(0.6);
+  machine().emergencyStop();
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kEmergencyStop);
+  expectOnTheCircle();
+  expectAtRest();
+}
+
+TEST_F(SmoothPath, RunsMoreSlowlyAtASpeedOverride) {
+  const double duration = followPath(circle()).duration;
+  advance(0.5);
+  machine().setSpeedOverride(0.5);
+  advance(duration);
+  EXPECT_TRUE(state("x").moving);
+  awaitRest();
+  expectAtRest();
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectOnTheCircle();
+  expectLimits(20.0, 10.0);
+}
+
+TEST_F(SmoothPath, TakesUpTheBacklashOnTheWay) {
+  buildWith(20.0, 20.0, 0.0001);
+  const CoordinatedResult result = finish(circle());
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_NEAR(result.positions[0], 0.0, 1e-12);
+  EXPECT_EQ(bench->pulses("x"), 8);
+  expectLimits(20.0, 20.0);
+}
+
+TEST_F(SmoothPath, StopsWhereTheCurvatureJumpsOnlyWithoutATolerance) {
+  PathRequest request{{"x", "y"}, {lineTo({0.010, 0.0})}, false, 0.0, 0.0};
+  request.segments.push_back(arcTo({0.010, 0.020}, {0.010, 0.010}));
+  const auto slowest = [&] {
+    const double duration = followPath(request).duration;
+    advance(0.1);
+    double speed = std::numeric_limits<double>::infinity();
+    for (double time = 0.1; time < duration - 0.1; time += 0.001) {
+      advance(0.001);
+      speed = std::min(speed, std::hypot(state("x").velocity, state("y").velocity));
+    }
+    awaitRest();
+    finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0});
+    return speed;
+  };
+  EXPECT_LT(slowest(), 0.002);
+  request.tolerance = kTolerance;
+  EXPECT_GT(slowest(), 0.02);
+  expectLimits(20.0, 10.0);
+}
+
+TEST_F(SmoothPath, UsesALimitThatWasSet) {
+  buildWith(0.0, 0.0);
+  const double jumping = finish(mixed()).duration;
+  finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0});
+  for (const char* name : {"x", "y"}) {
+    axis::AxisLimits limits;
+    limits.jerk = 10.0;
+    bench->axis(name).setLimits(limits);
+  }
+  EXPECT_GT(finish(mixed()).duration, 1.05 * jumping);
 }
 
 }  // namespace

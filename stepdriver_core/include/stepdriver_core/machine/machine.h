@@ -168,15 +168,16 @@ class Machine {
   /// Moves several axes along a path of lines, arcs and Beziers, from where they stand to rest at
   /// its end, as fast as their limits allow. Corners are rounded within the tolerance and passed
   /// without a stop; at a corner with a tolerance of 0, and at a turn by more than 170 degrees, the
-  /// axes stop. From then on it is a trajectory: for holds, stops, the speed override and backlash
-  /// see followTrajectory(). Axes with a backlash use four fifths of their speeds and
-  /// accelerations, so that it can be taken up meanwhile. It is planned in the calling thread and
-  /// delays no other call.
+  /// axes stop. If an axis has a jerk limit, the same holds for places where the curvature jumps,
+  /// such as the one between a line and an arc. From then on it is a trajectory: for holds, stops,
+  /// the speed override and backlash see followTrajectory(). Axes with a backlash use four fifths
+  /// of their speeds, accelerations and jerks, so that it can be taken up meanwhile. It is planned
+  /// in the calling thread and delays no other call.
   ///
-  /// @throw Refused as moveTo(), and if one of the axes moves or has a jerk limit, if the request
-  ///   is malformed, if a segment has a length of 0 or leads beyond a soft limit, if an arc has no
-  ///   circle, if a Bezier has a cusp, or if one of the axes was stopped while this was planned;
-  ///   the message names the segment (the first is 0). Then nothing moves.
+  /// @throw Refused as moveTo(), and if one of the axes moves, if the request is malformed, if a
+  ///   segment has a length of 0 or leads beyond a soft limit, if an arc has no circle, if a Bezier
+  ///   has a cusp, or if one of the axes was stopped while this was planned; the message names the
+  ///   segment (the first is 0). Then nothing moves.
   CoordinatedMove followPath(const PathRequest& request);
 
   /// How a motion of several axes ended; empty if it hasn't ended.

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace stepdriver::motion {
+
+/// A value that counts from one distance to another one [unit].
+struct CeilingSpan {
+  double from = 0.0;
+  double to = 0.0;
+  double value = 0.0;
+};
+
+/// The lowest of all values at each distance.
+class Ceiling {
+ public:
+  explicit Ceiling(std::vector<CeilingSpan> spans);
+
+  /// @return infinity if there is no span.
+  double lowest(double from, double to) const;
+  /// The distances at which the value changes, in increasing order.
+  const std::vector<double>& places() const { return places_; }
+
+ private:
+  std::vector<double> places_;
+  std::vector<double> values_;  // from each place on
+};
+
+/// A place of a motion. Up to the next one the square of the speed is linear in the distance: the
+/// acceleration is constant.
+struct SpeedPlace {
+  double distance = 0.0;  ///< [unit]
+  double square = 0.0;    ///< [unit^2/s^2] of the speed
+};
+
+/// Lowers the speed around each of its maxima that lasts less than `time` to the highest one that
+/// then lasts so long, or to the higher one of the two minima around it: then they become one
+/// maximum, which is lowered as well.
+///
+/// @param places from rest to rest.
+std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time);
+
+/// A part of a smoothed motion, with constant jerk.
+struct SmoothPart {
+  double time = 0.0;          ///< [s] of its begin, as all that follows
+  double distance = 0.0;      ///< [unit]
+  double speed = 0.0;         ///< [unit/s]
+  double acceleration = 0.0;  ///< [unit/s^2]
+  double jerk = 0.0;          ///< [unit/s^3]
+  /// The part of the given motion that is averaged is from `rear` to `front` [unit], and has these
+  /// accelerations there in this part of the smoothed motion.
+  double rear = 0.0;
+  double front = 0.0;
+  double rear_acceleration = 0.0;
+  double front_acceleration = 0.0;
+};
+
+/// The moving average of a motion, whose distance at the time t is s0(t):
+///
+///     s(t) = 1/T integral of s0 from t - T to t
+///
+/// So the speed and the acceleration are averages of those of s0, and the jerk is
+/// (s0''(t) - s0''(t - T))/T. If the speed of s0 is at most c within c T/2 of a place, s' is at
+/// most c at that place: let s0 be beyond c T/2 after it at the time t, as otherwise the average is
+/// one of speeds up to c. Going back in time from there, s0 falls by c or less per time, for T at
+/// least. Its average over T would then be after the place, which it is not.
+///
+/// @param places from rest to rest. @param time T, above 0 [s]
+/// @return the last one is at rest.
+std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time);
+
+}  // namespace stepdriver::motion

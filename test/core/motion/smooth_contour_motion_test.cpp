@@ -1,0 +1,233 @@
+#include "motion/smooth_contour_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/random_contour.h"
+
+// The motion along a path with jerk limits: within all limits, on the path, and how much longer it
+// takes than without them. A unit is a microstep.
+
+namespace stepdriver {
+namespace {
+
+using motion::Continuity;
+using motion::Contour;
+using motion::ContourKnot;
+using motion::ContourLimits;
+using motion::ContourPoint;
+using motion::ContourSegment;
+
+const double kPi = std::acos(-1.0);
+
+ContourSegment straightTo(std::vector<double> end, double tolerance) {
+  ContourSegment segment;
+  segment.end = std::move(end);
+  segment.tolerance = tolerance;
+  return segment;
+}
+
+double secondsOf(const std::vector<ContourKnot>& knots) {
+  return static_cast<double>(knots.back().time_ns) * 1e-9;
+}
+
+// A quintic between two knots, at a part u of its duration.
+struct QuinticState {
+  double position;
+  double velocity;
+  double acceleration;
+  double jerk;
+};
+
+QuinticState quinticAt(const ContourKnot& from, const ContourKnot& to, std::size_t axis, double u) {
+  const double h = static_cast<double>(to.time_ns - from.time_ns) * 1e-9;
+  const double way = to.positions[axis] - from.positions[axis];
+  const double v0 = h * from.velocities[axis];
+  const double v1 = h * to.velocities[axis];
+  const double a0 = h * h * from.accelerations[axis] / 2.0;
+  const double a1 = h * h * to.accelerations[axis] / 2.0;
+  const double c3 = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * a0 + a1;
+  const double c4 = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * a0 - 2.0 * a1;
+  const double c5 = 6.0 * way - 3.0 * v0 - 3.0 * v1 - a0 + a1;
+  return {from.positions[axis] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5)))),
+          (v0 + u * (2.0 * a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / h,
+          (2.0 * a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / (h * h),
+          (6.0 * c3 + u * (24.0 * c4 + u * 60.0 * c5)) / (h * h * h)};
+}
+
+// How far a point is from the contour near some of its segments.
+class NearContour {
+ public:
+  NearContour(const Contour& contour, std::size_t first, std::size_t last)
+      : contour_(contour), first_(first), last_(last) {
+    for (std::size_t near = first - std::min<std::size_t>(first, 1);
+         near < std::min(last + 2, contour.size()); ++near) {
+      for (int i = 0; i <= kParts; ++i) {
+        contour.evaluate(near, static_cast<double>(i) / kParts, point_);
+        places_.push_back({near, static_cast<double>(i) / kParts, point_.position});
+      }
+    }
+  }
+  bool isOf(std::size_t first, std::size_t last) const { return first == first_ && last == last_; }
+
+  double distance(const std::vector<double>& position) {
+    std::vector<double> squares;
+    for (const Place& place : places_) squares.push_back(squareTo(position, place.position));
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      const bool before = i % (kParts + 1) == 0 || squares[i] <= squares[i - 1];
+      const bool after = i % (kParts + 1) == kParts || squares[i] <= squares[i + 1];
+      if (before && after) least = std::min(least, leastAround(places_[i], position));
+    }
+    return std::sqrt(least);
+  }
+
+ private:
+  static constexpr int kParts = 400;
+  struct Place {
+    std::size_t segment;
+    double parameter;
+    std::vector<double> position;
+  };
+
+  static double squareTo(const std::vector<double>& a, const std::vector<double>& b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sum;
+  }
+
+  double leastAround(const Place& place, const std::vector<double>& position) {
+    const auto square_at = [&](double u) {
+      contour_.evaluate(place.segment, u, point_);
+      return squareTo(position, point_.position);
+    };
+    double low = std::max(0.0, place.parameter - 1.0 / kParts);
+    double high = std::min(1.0, place.parameter + 1.0 / kParts);
+    for (int i = 0; i < 60; ++i) {
+      const double third = (high - low) / 3.0;
+      if (square_at(low + third) < square_at(high - third)) {
+        high -= third;
+      } else {
+        low += third;
+      }
+    }
+    return square_at(low);
+  }
+
+  const Contour& contour_;
+  std::size_t first_;
+  std::size_t last_;
+  ContourPoint point_;
+  std::vector<Place> places_;
+};
+
+TEST(SmoothContourMotion, OfALineHasTheSevenPhasesOfTheFastest) {
+  const auto duration = [](double length, const ContourLimits& limits) {
+    const Contour contour({0.0}, {straightTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    return secondsOf(motion::planSmoothContour(contour, {limits}));
+  };
+  // 1000/1000 + 1000/5000 + 5000/50000
+  EXPECT_NEAR(duration(1000.0, {1000.0, 5000.0, 5000.0, 50'000.0}), 1.3, 1e-6);
+  // Without the highest speed: sqrt((a/j)^2 + 4 length/a) + a/j
+  EXPECT_NEAR(duration(1000.0, {1e6, 5000.0, 5000.0, 50'000.0}), std::sqrt(0.01 + 0.8) + 0.1, 1e-6);
+  // Without the highest acceleration 4 cbrt(length/(2 j)), apart from the choice of the time.
+  const double optimum = 4.0 * std::cbrt(1000.0 / (2.0 * 50'000.0));
+  EXPECT_LE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), 1.02 * optimum);
+  EXPECT_GE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), optimum - 1e-9);
+}
+
+TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
+  std::vector<ContourSegment> segments;
+  for (int i = 1; i <= 100; ++i) {
+    const double angle = 2.0 * kPi * i / 100.0;
+    segments.push_back(
+        straightTo({1600.0 * std::cos(angle) - 1600.0, 1600.0 * std::sin(angle)}, 1.6));
+  }
+  const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Contour contour({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  const double smooth = secondsOf(motion::planSmoothContour(contour, limits));
+  const double fastest = secondsOf(motion::planContour(contour, limits));
+  RecordProperty("smooth", std::to_string(smooth));
+  RecordProperty("fastest", std::to_string(fastest));
+  EXPECT_LE(smooth, 2.4 * fastest);
+}
+
+// On random paths: limits, rest at both ends, the distance from the path, and the duration against
+// that without a jerk limit, which no motion with one can go below.
+TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
+  std::mt19937 random(2027);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  constexpr int kPaths = 1000;
+  double worst_ratio = 0.0;
+  double ratios = 0.0;
+  double worst_jerk = 0.0;
+  double worst_distance = 0.0;
+  for (int i = 0; i < kPaths; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    // Accelerations that take 1 to 100 ms to build up; some axes have no jerk limit.
+    for (std::size_t axis = 0; axis < path.limits.size(); ++axis) {
+      if (axis > 0 && number(0.0, 1.0) < 0.3) continue;
+      path.limits[axis].jerk = path.limits[axis].acceleration * std::pow(10.0, number(1.0, 3.0));
+    }
+    const Contour contour = path.contour(Continuity::kCurvature);
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits);
+    ASSERT_EQ(knots.front().time_ns, 0);
+    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+      ASSERT_NEAR(knots.back().positions[axis], path.segments.back().end[axis], 1e-9);
+      for (const ContourKnot* end : {&knots.front(), &knots.back()}) {
+        ASSERT_EQ(end->velocities[axis], 0.0);
+        ASSERT_EQ(end->accelerations[axis], 0.0);
+      }
+    }
+    std::vector<NearContour> near;
+    for (std::size_t k = 1; k < knots.size(); ++k) {
+      const ContourKnot& from = knots[k - 1];
+      const ContourKnot& to = knots[k];
+      ASSERT_LT(from.time_ns, to.time_ns);
+      constexpr int kParts = 10;
+      std::vector<double> middle;
+      for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+        const ContourLimits& limits = path.limits[axis];
+        for (int part = 0; part <= kParts; ++part) {
+          const QuinticState state = quinticAt(from, to, axis, static_cast<double>(part) / kParts);
+          const double most = std::max(limits.acceleration, limits.deceleration);
+          ASSERT_LE(std::abs(state.velocity), limits.speed * (1.0 + 1e-6)) << "path " << i;
+          ASSERT_LE(std::abs(state.acceleration), most * (1.0 + 1e-3)) << "path " << i;
+          ASSERT_LE(std::abs(state.jerk), limits.jerk * (1.0 + 1e-3))
+              << "path " << i << " knot " << k << " axis " << axis;
+          worst_jerk = std::max(worst_jerk, std::abs(state.jerk) / limits.jerk);
+          if (2 * part == kParts) middle.push_back(state.position);
+        }
+      }
+      if (i % 10 != 0) continue;
+      if (near.empty() || !near.back().isOf(from.segment, to.segment)) {
+        near.emplace_back(contour, from.segment, to.segment);
+      }
+      const double distance = near.back().distance(middle);
+      worst_distance = std::max(worst_distance, distance);
+      ASSERT_LE(distance, 0.1) << "path " << i << " knot " << k << " of " << knots.size();
+    }
+    const double ratio = secondsOf(knots) / secondsOf(motion::planContour(contour, path.limits));
+    worst_ratio = std::max(worst_ratio, ratio);
+    ratios += ratio;
+    EXPECT_GE(ratio, 0.995) << "path " << i;
+  }
+  EXPECT_LE(ratios / kPaths, 1.15);
+  RecordProperty("mean_ratio", std::to_string(ratios / kPaths));
+  RecordProperty("worst_ratio", std::to_string(worst_ratio));
+  RecordProperty("worst_jerk", std::to_string(worst_jerk));
+  RecordProperty("worst_distance", std::to_string(worst_distance));
+}
+
+}  // namespace
+}  // namespace stepdriver
