@@ -79,7 +79,6 @@ bool areTheSame(const motion::MotionLimits& one, const motion::MotionLimits& oth
 }  // namespace
 
 GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at) {
-  constexpr double kNoStep = 0.5;  // microsteps
   const motion::MotionState from = axis.motor.stateAt(at);
   const bool slows_down = goal.runs() && goal.velocity == 0.0;
   const double velocity =
@@ -103,7 +102,7 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at
       level_off.followedBy(planFrom(axis, goal, level_off.end(), level_off.endNs(), within)),
       level_off.isNeeded() ? before : within, slows_ns};
   const double excess = excessOf(axis, goal, changed.plan);
-  if (excess <= kNoStep) return changed;
+  if (excess <= motion::kNoStep) return changed;
   GoalPlan kept{planFrom(axis, goal, from, at, before), before, slows_ns};
   return excessOf(axis, goal, kept.plan) < excess ? kept : changed;
 }

@@ -16,7 +16,6 @@ namespace {
 // A faster stream is followed as if it had this part of the highest speed: the rest is for catching
 // up with it.
 constexpr double kFastestPoint = 0.98;
-constexpr double kNoStep = 0.5;  // microsteps: nothing closer than this makes a step
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
@@ -35,8 +34,8 @@ bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& prof
   const auto& lowest = axis.config.min_position;
   const auto& highest = axis.config.max_position;
   const auto backlash = static_cast<double>(axis.backlash());
-  return (!lowest || extent.lowest >= axis.countOf(*lowest) - kNoStep) &&
-         (!highest || extent.highest <= axis.countOf(*highest) + backlash + kNoStep);
+  return (!lowest || extent.lowest >= axis.countOf(*lowest) - motion::kNoStep) &&
+         (!highest || extent.highest <= axis.countOf(*highest) + backlash + motion::kNoStep);
 }
 
 // The motor's target for coming to rest on the position after it was passed, or before it is

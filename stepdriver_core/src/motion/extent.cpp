@@ -21,7 +21,6 @@ Extent extentOf(const Profile& profile) {
 }
 
 double overshootOf(const Profile& profile) {
-  constexpr double kNoStep = 0.5;
   const Extent extent = extentOf(profile);
   const double end = profile.endPosition().value();
   const double way = (profile.endPosition() - profile.startPosition()).value();

@@ -4,6 +4,9 @@
 
 namespace stepdriver::motion {
 
+/// [microsteps] A motion that passes a position by no more than this makes no step beyond it.
+inline constexpr double kNoStep = 0.5;
+
 /// The lowest and the highest position of a motion [microsteps].
 struct Extent {
   double lowest = 0.0;

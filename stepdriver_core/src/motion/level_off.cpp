@@ -11,7 +11,7 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kRounding = 1e-9;
+constexpr double kJerkRounding = 1e-9;
 
 // The lowest jerk that takes the acceleration back before the speed falls to the start speed or
 // rises to its maximum: a speed changes by a^2/(2 j) meanwhile.
@@ -32,7 +32,7 @@ LevelOff::LevelOff(std::int64_t start_ns, const MotionState& from, const MotionL
   if (from.acceleration == 0.0 || limits.jerk == 0.0) return;
   const double most = most_jerk > 0.0 ? most_jerk : std::numeric_limits<double>::infinity();
   const double jerk = std::min(jerkToLevelOff(from, limits), most);
-  if (jerk <= limits.jerk * (1.0 + kRounding)) return;
+  if (jerk <= limits.jerk * (1.0 + kJerkRounding)) return;
   const double size = std::abs(from.acceleration);
   const std::int64_t duration_ns =
       std::max<std::int64_t>(1, static_cast<std::int64_t>(size / jerk * 1e9));
