@@ -26,7 +26,7 @@ mkdir -p "$build/bench"
 catkin=${STEPDRIVER_CATKIN:-$build/bench/catkin}
 build_node() {
   configure "$src" "$catkin" -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCMAKE_BUILD_TYPE=Release \
-    -DCATKIN_DEVEL_PREFIX="$catkin/devel" -DSTEPDRIVER_BENCH=ON &&
+    -DCATKIN_DEVEL_PREFIX="$catkin/devel" -DCATKIN_ENABLE_TESTING=OFF -DSTEPDRIVER_BENCH=ON &&
     cmake --build "$catkin" -j "$jobs" --target stepdriver_node node_bench listener
 }
 [[ -n ${STEPDRIVER_CATKIN:-} ]] || quietly node-bench-build build_node

@@ -30,7 +30,7 @@ while (($# > 0)); do
 done
 
 choose_build_folder
-install_packages core ros
+install_packages core ros ros-tests
 build_storm() {
   configure_catkin && cmake --build "$build/catkin" -j "$jobs" --target stepdriver_node storm_test
 }
