@@ -7,8 +7,8 @@ export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH"
 export LC_ALL=C.UTF-8 PYTHONNOUSERSITE=1 PYTHONDONTWRITEBYTECODE=1
 unset PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV PYENV_VERSION
 unset LD_LIBRARY_PATH PKG_CONFIG_PATH CMAKE_PREFIX_PATH CMAKE_GENERATOR DESTDIR CDPATH "${!ROS_@}"
-# Nothing here reads messages in Lisp.
-export ROS_LANG_DISABLE=genlisp
+# Nothing here reads messages in Lisp or JavaScript.
+export ROS_LANG_DISABLE=geneus:genlisp:gennodejs
 
 # The checkout, with every symbolic link on the way resolved.
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd -P)

@@ -7,6 +7,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 usage() {
   cat <<'END'
 usage: scripts/cross.sh [--build] arm64|armhf [ROOM...]
+       scripts/cross.sh --board arm64
 
 Builds the core and the tests of the named rooms (folders of test/core; all of them by default) with
 Debian's cross compiler, and runs them under qemu-user. Then makes a set of motions with that build and
@@ -18,14 +19,19 @@ That folder is kept in ~/.cache/stepdriver/cross (or $XDG_CACHE_HOME/stepdriver/
 with the reason, if something of this isn't available.
 
   --build  only builds
+  --board  boots Debian's kernel on a whole machine under QEMU instead, and moves the axis of
+           examples/move_axis with the GPIO lines of that machine, by libgpiod. QEMU's own record of the
+           lines must have each pulse of the move and no other, and the motor enabled for it
 END
 }
 
-only_build=
-if [[ ${1:-} == --build ]]; then
-  only_build=1
-  shift
-fi
+only=
+case ${1:-} in
+  --build | --board)
+    only=${1#--}
+    shift
+    ;;
+esac
 case ${1:-} in
   arm64) triplet=aarch64-linux-gnu processor=aarch64 emulator=qemu-aarch64-static ;;
   armhf) triplet=arm-linux-gnueabihf processor=arm emulator=qemu-arm-static ;;
@@ -33,6 +39,7 @@ case ${1:-} in
   *) usage >&2 && exit 2 ;;
 esac
 arch=$1
+[[ $only != board || ($arch == arm64 && $# == 1) ]] || { usage >&2 && exit 2; }
 rooms=("${@:2}")
 
 missing() {
@@ -42,23 +49,26 @@ missing() {
 
 choose_build_folder
 # In a process of its own, because it ends the shell if it fails.
-(install_packages core "cross-$arch") >&2 || missing "its packages can't be installed"
+(install_packages core "cross-$arch" ${only:+"$only-$arch"}) >&2 || missing "its packages can't be installed"
 cross=$build/cross-$arch
 
 # ---- the libraries of the other processor ----
 
-# Unpacks them into the folder $1, with lists of apt of its own.
+# Gives apt lists of its own in the folder $1, and sets own_lists, which are its options.
+use_own_lists() {
+  mkdir -p "$1"/{lists,cache/archives}/partial
+  : >"$1/status"
+  own_lists=(-o APT::Architecture="$arch" -o APT::Architectures::="$arch" -o Dir::State="$1"
+    -o Dir::State::lists="$1/lists" -o Dir::State::status="$1/status" -o Dir::Cache="$1/cache")
+  # apt's own user couldn't read the caller's folder.
+  (($(id -u) != 0)) || own_lists+=(-o APT::Sandbox::User=root)
+  # Some of the lists may be enough.
+  apt-get "${own_lists[@]}" -q update || true
+}
 unpack_libraries() {
   local sysroot=$1 work=$1/work file package
-  mkdir -p "$work"/{lists,cache/archives}/partial "$work/debs"
-  : >"$work/status"
-  local apt=(-o APT::Architecture="$arch" -o APT::Architectures::="$arch" -o Dir::State="$work"
-    -o Dir::State::lists="$work/lists" -o Dir::State::status="$work/status" -o Dir::Cache="$work/cache")
-  # apt's own user couldn't read the caller's folder.
-  (($(id -u) != 0)) || apt+=(-o APT::Sandbox::User=root)
-  # Some of the lists may be enough.
-  apt-get "${apt[@]}" -q update || true
-  apt-get "${apt[@]}" -q -y --no-install-recommends --download-only install \
+  use_own_lists "$work"
+  apt-get "${own_lists[@]}" -q -y --no-install-recommends --download-only install \
     libc6-dev libfmt-dev libgpiod-dev libgtest-dev libstdc++6 libyaml-cpp-dev || return
   for package in "$work"/cache/archives/*.deb; do dpkg-deb -x "$package" "$sysroot" || return; done
   # As in an installed system, /lib is /usr/lib, and no link leads out of the folder.
@@ -71,23 +81,39 @@ unpack_libraries() {
   done
   rm -rf "$work"
 }
+# The kernel without its modules, and a shell.
+unpack_board() {
+  local work=$1/work package
+  use_own_lists "$work"
+  package=$(apt-cache "${own_lists[@]}" depends "linux-image-$arch" | sed -n 's/^ *Depends: \(linux-image\)/\1/p') &&
+    (cd "$work" && apt-get "${own_lists[@]}" -q download "$package" busybox-static) &&
+    for package in "$work"/*.deb; do
+      dpkg-deb --fsys-tarfile "$package" | tar -C "$1" --wildcards -x './boot/vmlinuz*' ./bin/busybox 2>/dev/null || true
+    done
+  [[ -x $1/bin/busybox && -n $(find "$1/boot" -name 'vmlinuz*') ]] && rm -rf "$work"
+}
 
 cache=${XDG_CACHE_HOME:-${HOME:?}/.cache}/stepdriver/cross
 mkdir -p "$cache"
 cache=$(cd "$cache" && pwd -P)
 # shellcheck disable=SC1091
-sysroot=$cache/$(. /etc/os-release && printf '%s' "${VERSION_CODENAME:-$ID}")-$arch
-if [[ ! -d $sysroot ]]; then
-  say "Unpacking the libraries of $arch into $sysroot"
+release=$(. /etc/os-release && printf '%s' "${VERSION_CODENAME:-$ID}")
+# keep FOLDER FUNCTION: fills the folder by the function, unless it is there already.
+keep() {
+  local folder=$1
+  [[ ! -d $folder ]] || return 0
+  say "Unpacking packages of $arch into $folder"
   new=$(mktemp -d "$cache/.new.XXXXXX")
-  remove_new() { rm -rf "$new"; }
-  at_exit remove_new
-  run unpack_libraries "$new" >"$build/log/cross-libraries.log" 2>&1
-  ((run_status == 0)) || missing "its libraries can't be downloaded:" \
-    "$(grep -m 1 '^[EW]:' "$build/log/cross-libraries.log" || tail -n 1 "$build/log/cross-libraries.log")"
+  run "$2" "$new" >"$build/log/cross-unpack.log" 2>&1
+  ((run_status == 0)) || missing "packages can't be downloaded:" \
+    "$(grep -m 1 '^[EW]:' "$build/log/cross-unpack.log" || tail -n 1 "$build/log/cross-unpack.log")"
   # If another run was faster, its folder is kept.
-  mv -T "$new" "$sysroot" 2>/dev/null || true
-fi
+  mv -T "$new" "$folder" 2>/dev/null || rm -rf "$new"
+}
+remove_new() { [[ -z ${new:-} ]] || rm -rf "$new"; }
+at_exit remove_new
+sysroot=$cache/$release-$arch
+keep "$sysroot" unpack_libraries
 
 # ---- the builds ----
 
@@ -108,7 +134,8 @@ strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
 [[ $("$triplet-g++" -dumpversion) != 12* ]] || strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=ON
 targets=()
 for room in "${rooms[@]}"; do targets+=("${room}_tests"); done
-((${#targets[@]} > 0)) || targets=(all)
+((${#targets[@]} > 0)) && targets+=(check_waveform trace_tests) || targets=(all)
+[[ $only != board ]] || targets=(stepdriver_core_yaml)
 
 # Several files of the library are compiled as one, which takes half the time; gcc then warns of members
 # whose type is in an anonymous namespace.
@@ -116,16 +143,77 @@ configure_cross() {
   configure "$src/stepdriver_core" "$cross/core" "-DCMAKE_TOOLCHAIN_FILE=$cross/toolchain.cmake" "$strict" \
     -DCMAKE_UNITY_BUILD=ON -DCMAKE_CXX_FLAGS=-Wno-subobject-linkage
 }
-build_cross() { cmake --build "$cross/core" -j "$jobs" --target "${targets[@]}" check_waveform trace_tests; }
+build_cross() { cmake --build "$cross/core" -j "$jobs" --target "${targets[@]}"; }
 
 say "Building the core for $arch"
 quietly "cross-$arch-configure" configure_cross
 quietly "cross-$arch-build" build_cross
 
+# ---- a whole machine
+
+# The machine "virt" of QEMU has a PL061 with 8 lines, of which nobody uses these.
+step=0 dir=1 enable=2
+example=$root/examples/move_axis
+steps=4000  # 50 mm of 80 steps/mm
+
+# Its files are a shell, the example and the libraries that it loads.
+make_board() {
+  local board=$1 files=$1/files library
+  rm -rf "$board"
+  mkdir -p "$files"/{bin,dev,proc,sys,example}
+  "$triplet-g++" --sysroot="$sysroot" -std=c++17 -O2 "$example/move_axis.cpp" -o "$files/example/move_axis" \
+    -I "$root/stepdriver_core/include" "$cross"/core/libstepdriver_core{_yaml,}.a \
+    -lyaml-cpp -lfmt -lgpiod -pthread &&
+    sed -e 's/backend: simulated/backend: libgpiod/' -e "s/GPIO17/9030000.pl061:$step/" \
+      -e "s/GPIO27/9030000.pl061:$dir/" -e "s/GPIO22/9030000.pl061:$enable/" \
+      "$example/axis.yaml" >"$files/example/axis.yaml" || return
+  "/usr/bin/$emulator" -L "$sysroot" -E LD_TRACE_LOADED_OBJECTS=1 "$files/example/move_axis" |
+    sed -n 's|.*[ \t]\(/[^ ]*\) (0x.*|\1|p' | while IFS= read -r library; do
+    mkdir -p "$files${library%/*}" && cp -L "$sysroot$library" "$files$library" || return
+  done || return
+  cp "$kernel/bin/busybox" "$files/bin/" || return
+  cat >"$files/init" <<'END' || return
+#!/bin/busybox sh
+/bin/busybox mount -t devtmpfs dev /dev
+/bin/busybox mount -t proc proc /proc
+/bin/busybox mount -t sysfs sys /sys
+/bin/busybox uname -srm
+cd /example && ./move_axis
+/bin/busybox poweroff -f
+END
+  chmod +x "$files/init"
+  (cd "$files" && find . | cpio --quiet -o -H newc --owner=0:0 | gzip -1) >"$board/initrd.gz"
+}
+# Its time is the number of instructions that it carried out, at 8 ns each: a busy computer makes nothing late.
+boot_board() {
+  timeout 300 qemu-system-aarch64 -machine virt -cpu cortex-a72 -icount shift=3,sleep=off -m 512 -nic none -display none -no-reboot \
+    -serial stdio -kernel "$kernel"/boot/vmlinuz-* -initrd "$cross/board/initrd.gz" \
+    -append 'console=ttyAMA0 quiet panic=-1' -trace pl061_set_output -D "$cross/board/lines.log"
+}
+# QEMU records what its PL061 drives: "pl061_set_output ... setting output 0 to 1".
+count_pulses() {
+  awk -v step="$step" -v dir="$dir" -v enable="$enable" '
+    { level[$(NF - 2)] = $NF }
+    $(NF - 2) == step && $NF == 1 { pulses++; if (level[enable] != 0) print "a pulse with the motor disabled" }
+    $(NF - 2) == dir && level[step] == 1 { print "DIR changed during a pulse" }
+    END { print pulses + 0 " pulses" }' "$cross/board/lines.log"
+}
+if [[ $only == board ]]; then
+  kernel=$cache/$release-$arch-board
+  keep "$kernel" unpack_board
+  quietly "board-$arch-files" make_board "$cross/board"
+  boot_board | tee "$build/log/board-$arch.log"
+  grep -qF 'x is at 0.0500 m' "$build/log/board-$arch.log" || die "the move failed there"
+  counted=$(count_pulses)
+  [[ $counted == "$steps pulses" ]] || die "QEMU's record of the lines, which must have $steps pulses, has: $counted"
+  say "QEMU's record of its lines has all of the $steps pulses, and the motor was enabled."
+  exit
+fi
+
 # This computer's own build of the motions.
 [[ -f $build/core/CMakeCache.txt ]] || quietly cross-own-configure configure_core
 quietly cross-own-build cmake --build "$build/core" -j "$jobs" --target trace_tests
-[[ -z $only_build ]] || exit 0
+[[ $only != build ]] || exit 0
 
 # ---- the tests ----
 

@@ -457,8 +457,8 @@ check_arm64() {
 
 choose_build_folder
 rm -rf "$build/ros"
-install_packages core ccache "${parts[@]}" "$(wants ros && echo ros-tests trace)" \
-  "$(wants core && echo pictures bench)" "$(wants lint && echo ros ros-tests bench)" \
+install_packages core ccache "${parts[@]}" "$(wants ros && echo plots ros-tests trace)" \
+  "$(wants core && echo pictures bench)" "$(wants lint && echo ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
   "$(wants fuzz && echo ros)"
 # Compilers newer than Debian 12's may have more warnings. All builds have the same option, because ccache

@@ -1,6 +1,11 @@
 """The style of the pictures, and the graphs of motions and drawings."""
 
-import matplotlib
+import sys
+
+try:
+    import matplotlib
+except ImportError:
+    sys.exit("Pictures are drawn by matplotlib: apt install python3-matplotlib")
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
