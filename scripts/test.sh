@@ -9,7 +9,7 @@ usage() {
 usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize] [--bad-days]
                        [--soak] [--fuzz] [--arm64]
 
-Installs missing packages, builds, and runs the named parts; by default all but --soak and --arm64.
+Installs missing packages, builds, and runs the named parts; by default all but --soak.
 
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
           headers; the keys of package.xml; the links of the pages, and the files that they name; the tests
@@ -29,7 +29,8 @@ Installs missing packages, builds, and runs the named parts; by default all but 
   --soak  the same for a minute each
   --fuzz  random inputs for everything that reads files, messages and commands (scripts/fuzz.sh)
   --arm64  some tests of the core as a Raspberry Pi with 64 bits runs them, under an emulator, and the
-          times of its steps, which must be those of this computer (scripts/cross.sh)
+          times of its steps, which must be those of this computer; a whole emulated machine that moves an
+          axis by libgpiod (scripts/cross.sh)
 
 If a stage fails, the others still run. Exit code 0: every stage passed.
 END
@@ -44,7 +45,7 @@ for argument; do
     *) usage >&2 && exit 2 ;;
   esac
 done
-((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize bad-days fuzz)
+((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize bad-days fuzz arm64)
 wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 ! wants kernel || wants core || parts+=(core)
 
@@ -191,8 +192,8 @@ compiled_together_by() {
 tidy() {
   local name=$1
   shift
-  xargs -r -d '\n' -P "$jobs" -n 1 clang-tidy --quiet -p "$build/tidy/$name" "$@" \
-    --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/" 2>>"$build/log/tidy.log"
+  /usr/bin/python3 -B "$root/scripts/tidy.py" "$build/tidy/$name" "$@" \
+    --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/"
 }
 
 check_tidy() { await tidy_all; }
@@ -445,15 +446,20 @@ build_fuzz() { in_group=1 bash "$root/scripts/fuzz.sh" --build; }
 # The rooms that depend most on the processor. scripts/cross.sh tests all of them.
 rooms_for_arm64=(config driver motion pulse)
 build_arm64() { in_group=1 bash "$root/scripts/cross.sh" --build arm64 "${rooms_for_arm64[@]}"; }
-check_arm64() {
+# cross ARGUMENT...: if this computer can't have the compiler, the libraries or the emulator, it is skipped.
+cross() {
   local status=0
-  # It has built, or the next command says why it can't.
-  await build_arm64 >"$build/log/await-arm64.log" || true
-  bash "$root/scripts/cross.sh" arm64 "${rooms_for_arm64[@]}" 2>"$build/log/arm64.log" || status=$?
-  ((status != skip_status)) || skip "$(tail -n 1 "$build/log/arm64.log")"
-  cat "$build/log/arm64.log" >&2
+  bash "$root/scripts/cross.sh" "$@" 2>"$build/log/cross.log" || status=$?
+  ((status != skip_status)) || skip "$(tail -n 1 "$build/log/cross.log")"
+  cat "$build/log/cross.log" >&2
   return "$status"
 }
+check_arm64() {
+  # It has built, or the next command says why it can't.
+  await build_arm64 >"$build/log/await-arm64.log" || true
+  cross arm64 "${rooms_for_arm64[@]}"
+}
+check_board() { cross --board arm64; }
 
 choose_build_folder
 rm -rf "$build/ros"
@@ -461,6 +467,8 @@ install_packages core ccache "${parts[@]}" "$(wants ros && echo plots ros-tests 
   "$(wants core && echo pictures bench)" "$(wants lint && echo ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
   "$(wants fuzz && echo ros)"
+# If they can't be installed, its stages say so.
+! wants arm64 || (install_packages cross-arm64 board-arm64) || true
 # Compilers newer than Debian 12's may have more warnings. All builds have the same option, because ccache
 # shares only results of the same options.
 strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
@@ -523,7 +531,10 @@ if wants sanitize; then
 fi
 ! wants bad-days || stage bad-days test_bad_days
 ! wants fuzz || stage fuzz check_fuzz
-! wants arm64 || stage arm64 check_arm64
+if wants arm64; then
+  stage arm64 check_arm64
+  stage board check_board arm64
+fi
 
 say "" "$summary"
 say "$passed passed, $failed failed, $skipped skipped"
