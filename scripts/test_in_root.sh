@@ -47,7 +47,7 @@ while (($# > 0)); do
   shift
 done
 [[ -n $suite ]] || { usage >&2 && exit 2; }
-[[ -z $only || $only == demo.sh || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core and --demo can be tried"
+[[ -z $only || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core can be tried"
 (($(id -u) == 0)) || die "needs root, for debootstrap and chroot: sudo $0 $suite"
 command -v debootstrap >/dev/null || die "needs debootstrap: apt-get install debootstrap"
 
@@ -72,6 +72,7 @@ mkdir -p "$roots"
 roots=$(cd "$roots" && pwd -P)
 base=$roots/$suite
 commands=(demo.sh test.sh demo.sh)
+[[ -z $only ]] || commands=("$only")
 if [[ $suite == focal ]]; then
   components=main,universe
   mirror=$(mirror_of Ubuntu http://archive.ubuntu.com/ubuntu)
@@ -82,7 +83,6 @@ else
   mirror=$(mirror_of Debian http://deb.debian.org/debian)
   security_suite="$(mirror_of Debian-Security http://deb.debian.org/debian-security) $suite-security"
 fi
-[[ -z $only ]] || commands=("$only")
 
 if [[ ! -d $base ]]; then
   say "Making $base from $mirror"

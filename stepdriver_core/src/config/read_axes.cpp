@@ -65,8 +65,8 @@ void checkSelectable(ConfigReader& axis, const AxisConfig& config, const MotorCo
                                  axis.shown("microsteps"), listText(modes), motor.driver.title));
 }
 
-/// Where the time is given that bounds the steps' interval: that of the driver whose DIR must be
-/// held longest.
+/// The key of the time that bounds the steps' interval: that of the driver whose DIR must be held
+/// longest.
 std::string dirHoldKey(const AxisConfig& config, const std::vector<MotorChip>& chips) {
   std::size_t longest = 0;
   for (std::size_t i = 1; i < config.motors(); ++i) {
