@@ -13,8 +13,8 @@ namespace stepdriver::config {
 struct MotorChip {
   /// Empty if it isn't known, which has been reported; then nothing that depends on it is checked.
   std::optional<driver::DriverChip> chip;
-  /// The prefix of its `driver`, `chip` and `timing` in the keys of the axis: "motors/left/", or empty
-  /// if they are the axis's.
+  /// The prefix of its `driver`, `chip` and `timing` in the keys of the axis: "motors/left/", or
+  /// empty if they are the axis's.
   std::string key;
 };
 
