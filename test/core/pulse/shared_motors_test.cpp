@@ -57,6 +57,39 @@ TEST_F(SharedMotorsTest, AnAxisEndsWhileTheOtherContinues) {
   EXPECT_EQ(pulses(1), 20U);
 }
 
+// While x and y move against each other, the motor of their sum stands still. Then only y moves. A
+// motion of x that begins later finds the motor's next step from there on, not from its last step
+// on, when x wasn't yet at its end.
+TEST_F(SharedMotorsTest, AMotionThatBeginsLaterChangesNoStepBeforeIt) {
+  follow(cruise(1'000'000, 0, 1, 100.0), 0);
+  follow(cruise(1'000'000, 0, -3, 100.0), 1);
+  runUntil(12'000'000);
+  ASSERT_EQ(engine->channel(0).following, 0U);
+  ASSERT_NE(engine->channel(1).following, 0U);
+  EXPECT_EQ(pulses(0), 0U);
+  follow(cruise(40'000'000, 1, 2, 100.0), 0);
+  runOut();
+  // Its steps: at -0.5 and -1.5 for y alone, and back at -1.5 for x.
+  EXPECT_EQ(lines.rises(0), (std::vector<Nanoseconds>{16'000'000, 26'000'000, 45'000'000}));
+  EXPECT_EQ(engine->channel(0).count, 2);
+  EXPECT_EQ(engine->channel(1).count, -3);
+}
+
+TEST_F(SharedMotorsTest, AProfileThatTakesOverChangesNoStepBeforeIt) {
+  follow(cruise(1'000'000, 0, 3, 100.0), 0);
+  const std::uint64_t y = follow(cruise(1'000'000, 0, -3, 100.0), 1);
+  runUntil(10'000'000);
+  EXPECT_EQ(pulses(0), 0U);
+  // From 11 ms on y goes back, at the same speed.
+  follow(cruise(11'000'000, -1, 1, 100.0), 1, y);
+  runOut();
+  // x + y is 0 until 11 ms, and then rises by 200 steps/s to 4 at 31 ms.
+  EXPECT_EQ(lines.rises(0),
+            (std::vector<Nanoseconds>{13'500'000, 18'500'000, 23'500'000, 28'500'000}));
+  EXPECT_EQ(engine->channel(0).count, 3);
+  EXPECT_EQ(engine->channel(1).count, 1);
+}
+
 TEST_F(SharedMotorsTest, NoOrderIsFollowedWhileThePinsOfAChipAreWritten) {
   Command reserve;
   reserve.kind = Command::Kind::kReserve;
