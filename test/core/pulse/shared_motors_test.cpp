@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "support/pulse_engine_bench.h"
@@ -22,6 +23,17 @@ class SharedMotorsTest : public PulseEngineTest {
     engine = std::make_unique<PulseEngine>(
         lines, clock, std::vector<ChannelConfig>{config(0), config(1)}, 5'000'000, std::nullopt,
         std::vector<SharedAxes>{shared});
+  }
+  /// From position 0 on. @param legs [s] and [steps/s], one after the other.
+  static motion::Profile profileOf(Nanoseconds start,
+                                   const std::vector<std::pair<double, double>>& legs) {
+    std::vector<motion::Piece> pieces;
+    double position = 0.0;
+    for (const auto& [duration, speed] : legs) {
+      pieces.push_back({motion::DoubleDouble(duration), motion::DoubleDouble(position), speed});
+      position += duration * speed;
+    }
+    return motion::Profile(start, std::move(pieces));
   }
   std::size_t pulses(int motor) { return lines.rises(motor * kLinesPerChannel).size(); }
 };
@@ -57,37 +69,36 @@ TEST_F(SharedMotorsTest, AnAxisEndsWhileTheOtherContinues) {
   EXPECT_EQ(pulses(1), 20U);
 }
 
-// While x and y move against each other, the motor of their sum stands still. Then only y moves. A
-// motion of x that begins later finds the motor's next step from there on, not from its last step
-// on, when x wasn't yet at its end.
-TEST_F(SharedMotorsTest, AMotionThatBeginsLaterChangesNoStepBeforeIt) {
-  follow(cruise(1'000'000, 0, 1, 100.0), 0);
-  follow(cruise(1'000'000, 0, -3, 100.0), 1);
-  runUntil(12'000'000);
+// x and y move against each other, there and back, so that the motor of their sum stands still. The
+// motion of one alone would have turned it.
+TEST_F(SharedMotorsTest, AMotionThatBeginsLaterMakesNoStepBeforeIt) {
+  follow(profileOf(1'000'000, {{0.01, -100.0}, {0.01, 100.0}}), 0);
+  follow(profileOf(1'000'000, {{0.01, 100.0}, {0.01, -100.0}, {0.03, -100.0}}), 1);
+  runUntil(22'000'000);
   ASSERT_EQ(engine->channel(0).following, 0U);
   ASSERT_NE(engine->channel(1).following, 0U);
   EXPECT_EQ(pulses(0), 0U);
-  follow(cruise(40'000'000, 1, 2, 100.0), 0);
+  follow(cruise(60'000'000, 0, 1, 100.0), 0);
   runOut();
-  // Its steps: at -0.5 and -1.5 for y alone, and back at -1.5 for x.
-  EXPECT_EQ(lines.rises(0), (std::vector<Nanoseconds>{16'000'000, 26'000'000, 45'000'000}));
-  EXPECT_EQ(engine->channel(0).count, 2);
+  // y alone from 21 ms on, to -3, and then x.
+  EXPECT_EQ(lines.rises(0),
+            (std::vector<Nanoseconds>{26'000'000, 36'000'000, 46'000'000, 65'000'000}));
+  EXPECT_EQ(engine->channel(0).count, 1);
   EXPECT_EQ(engine->channel(1).count, -3);
 }
 
-TEST_F(SharedMotorsTest, AProfileThatTakesOverChangesNoStepBeforeIt) {
-  follow(cruise(1'000'000, 0, 3, 100.0), 0);
-  const std::uint64_t y = follow(cruise(1'000'000, 0, -3, 100.0), 1);
+TEST_F(SharedMotorsTest, AProfileThatTakesOverMakesNoStepBeforeIt) {
+  follow(profileOf(1'000'000, {{0.01, -100.0}, {0.01, 100.0}, {0.02, 100.0}}), 0);
+  const std::uint64_t y =
+      follow(profileOf(1'000'000, {{0.01, 100.0}, {0.01, -100.0}, {0.02, -100.0}}), 1);
   runUntil(10'000'000);
-  EXPECT_EQ(pulses(0), 0U);
-  // From 11 ms on y goes back, at the same speed.
-  follow(cruise(11'000'000, -1, 1, 100.0), 1, y);
+  // From 21 ms on both move forward.
+  follow(profileOf(21'000'000, {{0.02, 100.0}}), 1, y);
   runOut();
-  // x + y is 0 until 11 ms, and then rises by 200 steps/s to 4 at 31 ms.
   EXPECT_EQ(lines.rises(0),
-            (std::vector<Nanoseconds>{13'500'000, 18'500'000, 23'500'000, 28'500'000}));
-  EXPECT_EQ(engine->channel(0).count, 3);
-  EXPECT_EQ(engine->channel(1).count, 1);
+            (std::vector<Nanoseconds>{23'500'000, 28'500'000, 33'500'000, 38'500'000}));
+  EXPECT_EQ(engine->channel(0).count, 2);
+  EXPECT_EQ(engine->channel(1).count, 2);
 }
 
 TEST_F(SharedMotorsTest, NoOrderIsFollowedWhileThePinsOfAChipAreWritten) {
