@@ -83,8 +83,8 @@ bool SharedMotors::isFast(Nanoseconds motion_now) const {
 }
 
 Nanoseconds SharedMotors::madeUntil() const {
-  if (!moves()) return std::numeric_limits<Nanoseconds>::min();
-  Nanoseconds until = since_;
+  Nanoseconds until = std::numeric_limits<Nanoseconds>::min();
+  if (!moves()) return until;
   for (const EngineChannel* motor : motors_) until = std::max(until, motor->last_planned);
   return until;
 }

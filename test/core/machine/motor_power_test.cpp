@@ -289,6 +289,24 @@ TEST_F(MotorPower, ThatIsLostInAMotionIsAnEmergencyStopOfEveryAxisWithItsOwnReas
   EXPECT_EQ(moveX(0.001), axis::MoveEnd::kReached);
 }
 
+// y stays in its place without current, but its chip begins again at Home.
+TEST_F(MotorPower, ThatIsLostAtRestLeavesThePositionsThatNothingHasHeld) {
+  addFeedback();
+  axes[1].holds_position_unpowered = true;
+  begin();
+  for (const std::int64_t steps : {0, 7}) {
+    for (const char* name : {"x", "y"}) bench->axis(name).setPosition(0.0);
+    if (steps != 0) bench->move(static_cast<double>(steps) / 80'000.0, "y");
+    bench->rig.stickMotorPower(false, bench->clock.now());
+    bench->machine->advance(0.2);
+    EXPECT_FALSE(bench->axis("x").state().position_valid);
+    EXPECT_EQ(bench->axis("y").state().position_valid, steps == 0);
+    bench->rig.stickMotorPower({}, bench->clock.now());
+    bench->machine->recover();
+    EXPECT_EQ(fault(), "");
+  }
+}
+
 TEST_F(MotorPower, ThatStaysAfterItWasSwitchedOffIsAFaultAndIsNotSwitchedOnAgain) {
   addFeedback();
   options.motor_power->off_delay_ns = 0;
