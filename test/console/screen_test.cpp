@@ -48,6 +48,13 @@ TEST(Screen, ShowsEachAxisInMmWithItsSwitchesAndStates) {
   EXPECT_TRUE(shows(screen, "live"));
 }
 
+TEST(Screen, ShowsThatTheMotorPowerIsOff) {
+  AxisView x = axisView("x");
+  EXPECT_FALSE(shows(screenText(sessionWith({x}), 24, 80), "no power"));
+  x.powered = false;
+  EXPECT_TRUE(shows(screenText(sessionWith({x}), 24, 80), "no power"));
+}
+
 TEST(Screen, EverythingOfSixAxesFitsIntoTheSmallestUsualWindow) {
   Session session = sessionWith(sixAxes());
   const std::string screen = screenText(session, 24, 80);

@@ -27,6 +27,7 @@ std::string switchText(bool there, bool known, bool active) {
 }
 
 std::string motorText(const AxisView& axis) {
+  if (!axis.powered) return "no power";
   if (axis.enabled) return "on";
   if (axis.idle) return "idle";
   return axis.asleep ? "asleep" : "off";

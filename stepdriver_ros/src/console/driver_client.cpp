@@ -204,6 +204,7 @@ void DriverClient::take(const AxisStates& states) {
     AxisView& axis = axes.emplace_back();
     axis.name = states.name[i];
     axis.enabled = states.enabled[i] != 0;
+    axis.powered = states.powered[i] != 0;
     axis.asleep = states.asleep[i] != 0;
     axis.idle = states.idle[i] != 0;
     axis.moving = states.moving[i] != 0;

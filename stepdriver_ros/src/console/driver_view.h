@@ -12,6 +12,7 @@ namespace stepdriver::console {
 struct AxisView {
   std::string name;
   bool enabled = false;
+  bool powered = true;  ///< the power of the motors is there
   bool asleep = false;
   bool idle = false;
   bool moving = false;
