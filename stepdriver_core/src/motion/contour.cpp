@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "give_way.h"
+
 namespace stepdriver::motion {
 namespace {
 
@@ -16,6 +18,7 @@ constexpr double kSharpest = 170.0 / 180.0 * kPi;  // rad: beyond that, it is a 
 constexpr double kMidRounding = 3.0 / 8.0;         // m(0)/d
 constexpr double kMostBend = 0.0108;               // of |n(w) - w|w||/(4 d^2)
 constexpr double kEven = 1e-6;                     // of the curvature: no jump
+constexpr double kGentle = 30.0 / 180.0 * kPi;     // rad: roundings may overlap
 constexpr double kLeastBlend = 0.01;               // of the resolution
 constexpr double kLeastRate = 1e-4;                // of a Bezier, of the sum of its handles
 constexpr double kInLine = 1e-9;                   // sine of the angle of three points
@@ -25,6 +28,132 @@ double norm(const std::vector<double>& vector) {
   for (const double x : vector) sum += x * x;
   return std::sqrt(sum);
 }
+
+// Of the direction of a line, whose coefficients are two of each axis.
+double norm(const std::vector<double>& powers, std::size_t axes) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < axes; ++i) sum += powers[2 * i + 1] * powers[2 * i + 1];
+  return std::sqrt(sum);
+}
+
+// Corners of lines, one after the other, whose roundings may overlap, see Contour.
+class GentleCorners {
+ public:
+  /// @param begin [unit] of the first line, and `end` of the last one: no rounding is beyond them.
+  GentleCorners(double begin, double end) : begin_(begin), end_(end) {}
+
+  /// @param length of the line before it. @param turn sin(turn/2). @param distance of its rounding
+  ///   if it overlaps no other one.
+  void append(double length, double turn, double distance, double tolerance) {
+    const double before = corners_.empty() ? 0.0 : corners_.back().place;
+    corners_.push_back({before + length, turn, distance, distance, tolerance});
+  }
+
+  std::vector<double> widened() {
+    end_ += corners_.back().place;
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      giveWay(i);
+      widen(i);
+    }
+    bool fits = false;
+    for (int i = 0; i < kMostPasses && !fits; ++i) fits = narrow();
+    std::vector<double> distances;
+    for (const Corner& corner : corners_) {
+      distances.push_back(fits ? corner.distance : corner.least);
+    }
+    return distances;
+  }
+
+ private:
+  static constexpr int kMostPasses = 30;
+  static constexpr int kHalvings = 30;
+  static constexpr std::size_t kMostNeighbours = 32;  // at each side
+  static constexpr double kMostTurns = 0.5;
+  static constexpr double kInside = 1.0 - 1e-9;  // so that rounding passes no end
+
+  struct Corner {
+    double place;
+    double turn;
+    double least;
+    double distance;
+    double tolerance;
+  };
+
+  // (m(w) - |w|)/d for y = |w|/d
+  static double roundingAt(double y) {
+    return y < 1.0 ? kMidRounding + y * y * (0.75 - 0.125 * y * y) - y : 0.0;
+  }
+
+  std::size_t firstNear(std::size_t corner) const {
+    return corner - std::min(corner, kMostNeighbours);
+  }
+  std::size_t lastNear(std::size_t corner) const {
+    return std::min(corner + kMostNeighbours, corners_.size() - 1);
+  }
+
+  bool allows(std::size_t index, double distance) const {
+    const Corner& corner = corners_[index];
+    double turns = 0.0;
+    double deviation = 0.0;
+    for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
+      const double away = std::abs(corners_[i].place - corner.place);
+      if (away < 2.0 * distance) turns += corners_[i].turn;
+      deviation += corners_[i].turn * distance * roundingAt(away / distance);
+    }
+    return turns <= kMostTurns && deviation <= corner.tolerance;
+  }
+
+  void widen(std::size_t index) {
+    Corner& corner = corners_[index];
+    if (corner.turn == 0.0) return;
+    // Twice the distance is within the neighbours that are counted.
+    double high = kInside * std::min(corner.place - begin_, end_ - corner.place);
+    if (index >= kMostNeighbours) {
+      high = std::min(high, (corner.place - corners_[firstNear(index)].place) / 2.0);
+    }
+    if (index + kMostNeighbours < corners_.size()) {
+      high = std::min(high, (corners_[lastNear(index)].place - corner.place) / 2.0);
+    }
+    double low = corner.distance;
+    for (int i = 0; i < kHalvings && low < high; ++i) {
+      const double middle = (low + high) / 2.0;
+      (allows(index, middle) ? low : high) = middle;
+    }
+    corner.distance = low;
+  }
+
+  // Of the roundings where their sum exceeds a tolerance. @return whether none did.
+  bool narrow() {
+    bool fits = true;
+    std::vector<double> factors(corners_.size(), 1.0);
+    for (std::size_t k = 0; k < corners_.size(); ++k) {
+      if (corners_[k].turn == 0.0) continue;
+      double deviation = 0.0;
+      for (std::size_t i = firstNear(k); i <= lastNear(k); ++i) {
+        const double away = std::abs(corners_[i].place - corners_[k].place);
+        deviation +=
+            corners_[i].turn * corners_[i].distance * roundingAt(away / corners_[i].distance);
+      }
+      constexpr double kRounding = 1e-9;
+      if (deviation <= corners_[k].tolerance * (1.0 + kRounding)) continue;
+      fits = false;
+      const double factor = std::sqrt(corners_[k].tolerance / deviation);
+      for (std::size_t i = firstNear(k); i <= lastNear(k); ++i) {
+        if (std::abs(corners_[i].place - corners_[k].place) < corners_[i].distance) {
+          factors[i] = std::min(factors[i], factor);
+        }
+      }
+    }
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      corners_[i].distance = std::max(corners_[i].least, corners_[i].distance * factors[i]);
+    }
+    return fits;
+  }
+
+  double begin_;
+  double end_;
+  std::vector<Corner> corners_;
+};
 
 // The point of a Bezier's derivative, a parabola, that is nearest to 0: tried where its distance
 // from 0 is least among many places, and then more closely around the best.
@@ -94,6 +223,7 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
   for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
     round(i, segments[i].tolerance, continuity);
   }
+  if (continuity == Continuity::kCurvature) widen(segments);
 }
 
 Contour::Segment Contour::placed(const std::vector<double>& from, const ContourSegment& given,
@@ -219,15 +349,71 @@ Contour Contour::part(std::size_t first, std::size_t last) const {
   return made;
 }
 
-double Contour::roundedUntil(std::size_t segment) const {
-  const End& begin = segments_[segment].begin;
-  return begin.blend > 0.0 ? begin.blend / begin.rate : 0.0;
+bool Contour::isGentle(std::size_t corner) const {
+  const Segment& before = segments_[corner];
+  return isLine(corner) && isLine(corner + 1) && !before.stops &&
+         norm(before.end.shift) <= std::sin(kGentle / 2.0);
 }
 
-double Contour::roundedFrom(std::size_t segment) const {
-  const End& end = segments_[segment].end;
-  return end.blend > 0.0 ? 1.0 - end.blend / end.rate : 1.0;
+// Lets the roundings of neighbouring gentle corners overlap.
+void Contour::widen(const std::vector<ContourSegment>& given) {
+  for (std::size_t first = 0; first + 1 < size(); ++first) {
+    giveWay(first);
+    if (!isGentle(first)) continue;
+    std::size_t last = first;
+    while (last + 2 < size() && isGentle(last + 1)) ++last;
+    // A collinear end needs nothing: it is no rounding, and doesn't stop.
+    GentleCorners corners(segments_[first].begin.blend,
+                          segments_[last + 1].begin.rate - segments_[last + 1].end.blend);
+    for (std::size_t i = first; i <= last; ++i) {
+      const End& end = segments_[i].end;
+      corners.append(end.rate, norm(end.shift), end.blend, given[i].tolerance);
+    }
+    const std::vector<double> distances = corners.widened();
+    for (std::size_t i = first; i <= last; ++i) {
+      if (distances[i - first] > segments_[i].end.blend) overlap(i, distances[i - first]);
+    }
+    first = last;
+  }
 }
+
+// Makes the rounding of a corner reach as far as this.
+void Contour::overlap(std::size_t corner, double distance) {
+  segments_[corner].end.blend = segments_[corner + 1].begin.blend = distance;
+  const std::vector<double>& shift = segments_[corner].end.shift;
+  double place = segments_[corner + 1].begin.rate;  // the end of the line, from the corner
+  for (std::size_t i = corner + 2; i < size() && place < distance; ++i) {
+    const double rate = norm(segments_[i].powers, axes());
+    segments_[i].overlaps.push_back({-place, {rate, distance, shift, {}}});
+    place += rate;
+  }
+  place = segments_[corner].end.rate;
+  for (std::size_t i = corner; i-- > 0 && place < distance;) {
+    const double rate = norm(segments_[i].powers, axes());
+    place += rate;
+    segments_[i].overlaps.push_back({place, {rate, distance, shift, {}}});
+  }
+}
+
+// The parameters up to which, and from which on, a segment is rounded.
+std::pair<double, double> Contour::rounded(std::size_t index) const {
+  const Segment& segment = segments_[index];
+  double until = segment.begin.blend > 0.0 ? segment.begin.blend / segment.begin.rate : 0.0;
+  double from = segment.end.blend > 0.0 ? 1.0 - segment.end.blend / segment.end.rate : 1.0;
+  for (const Segment::Overlap& overlap : segment.overlaps) {
+    const double place = overlap.place / overlap.end.rate;
+    const double reach = overlap.end.blend / overlap.end.rate;
+    if (place < 0.5) until = std::max(until, place + reach);
+    if (place > 0.5) from = std::min(from, place - reach);
+  }
+  if (until <= from) return {until, from};
+  const double middle = (std::clamp(until, 0.0, 1.0) + std::clamp(from, 0.0, 1.0)) / 2.0;
+  return {middle, middle};
+}
+
+double Contour::roundedUntil(std::size_t segment) const { return rounded(segment).first; }
+
+double Contour::roundedFrom(std::size_t segment) const { return rounded(segment).second; }
 
 bool Contour::isLine(std::size_t segment) const {
   return segments_[segment].shape == ContourSegment::Shape::kLine;
@@ -271,6 +457,10 @@ void Contour::evaluate(std::size_t index, double u, ContourPoint& point) const {
   const Segment& segment = segments_[index];
   blend(segment.begin, u * segment.begin.rate, 1.0, point);
   blend(segment.end, (1.0 - u) * segment.end.rate, -1.0, point);
+  for (const Segment::Overlap& overlap : segment.overlaps) {
+    const double w = u * overlap.end.rate - overlap.place;
+    blend(overlap.end, std::abs(w), w < 0.0 ? -1.0 : 1.0, point);
+  }
 }
 
 // Adds shift (m(w) - |w|) + jump/4 (n(w) - w|w|), at a distance |w| from the corner, which is on

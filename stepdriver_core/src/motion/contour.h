@@ -82,8 +82,18 @@ enum class Continuity {
 ///
 /// which continues w|w| with the first and second derivative. It adds 0.0108 |c| d^2 or less to the
 /// distance from the path. d is at most 1/(4 max|p''|) there: n changes the derivative by
-/// 3/8 d |c|/4 or less, which is 3/64, and |c| is at most 2 max|p''|; so |p'| is above 0.04 for
+/// 3/8 d |c|/4 or less, which is 3/64, and |c| is at most 2 max|p''|. Then |p'| is above 0.04 for
 /// turns of up to 170 degrees.
+///
+/// Roundings of corners between lines may then also overlap, as curves of many short lines need: a
+/// corner that turns by 30 degrees or less has a d beyond its segments if
+/// - the sum of all roundings is within the tolerance at each corner; between two corners it is
+///   convex, so it is largest at one of them,
+/// - it ends before any other kind of segment, corner or stop, and
+/// - the sum of sin(turn/2) of all corners within 2 d is 1/2 or less: so is that of all roundings
+/// at
+///   any place, each of which changes the derivative by less than its sin(turn/2), so |p'| is 1/2
+///   or more.
 class Contour {
  public:
   /// @param start one number for each axis. @param segments each one of a length above 0; at least
@@ -144,6 +154,12 @@ class Contour {
     double angle = 0.0;
     End begin;
     End end;
+    // Of a line: corners of other segments whose rounding reaches it.
+    struct Overlap {
+      double place = 0.0;  // of the corner, from the begin of this line
+      End end;
+    };
+    std::vector<Overlap> overlaps;
     bool stops = true;
     double speed;
     std::vector<bool> measured;
@@ -152,6 +168,10 @@ class Contour {
   Segment placed(const std::vector<double>& from, const ContourSegment& given,
                  std::size_t index) const;
   void round(std::size_t corner, double tolerance, Continuity continuity);
+  bool isGentle(std::size_t corner) const;
+  void widen(const std::vector<ContourSegment>& given);
+  void overlap(std::size_t corner, double distance);
+  std::pair<double, double> rounded(std::size_t segment) const;
   double sharpest(const Segment& segment, double rate) const;
   void blend(const End& end, double distance, double sign, ContourPoint& point) const;
 

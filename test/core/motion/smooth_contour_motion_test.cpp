@@ -157,7 +157,7 @@ TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
   const double fastest = secondsOf(motion::planContour(contour, limits));
   RecordProperty("smooth", std::to_string(smooth));
   RecordProperty("fastest", std::to_string(fastest));
-  EXPECT_LE(smooth, 2.4 * fastest);
+  EXPECT_LE(smooth, 1.5 * fastest);
 }
 
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
