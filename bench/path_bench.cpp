@@ -83,11 +83,14 @@ PathRequest waves(std::size_t segments) {
   return request;
 }
 
-void plan(benchmark::State& state, PathRequest (*make)(std::size_t)) {
+void plan(benchmark::State& state, PathRequest (*make)(std::size_t), double jerk = 0.0) {
   constexpr std::size_t kSegments = 1000;
   const PathRequest request = make(kSegments);
   std::vector<axis::PathAxis> axes;
-  for (const std::string& name : request.names) axes.push_back(plotterAxis(name.c_str()));
+  for (const std::string& name : request.names) {
+    axes.push_back(plotterAxis(name.c_str()));
+    axes.back().limits.jerk = jerk;
+  }
   const std::vector<machine::PathOrigin> origins(axes.size());
   std::size_t points = 0;
   for (auto round : state) {
@@ -104,6 +107,10 @@ void plan(benchmark::State& state, PathRequest (*make)(std::size_t)) {
 BENCHMARK_CAPTURE(plan, circles, circles)->Name("Path/circles_of_lines");
 BENCHMARK_CAPTURE(plan, zigzag, zigzag)->Name("Path/random_lines");
 BENCHMARK_CAPTURE(plan, waves, waves)->Name("Path/beziers");
+constexpr double kJerk = 20.0 * 80'000.0;  // microsteps/s^3
+BENCHMARK_CAPTURE(plan, smooth_circles, circles, kJerk)->Name("Path/circles_of_lines_with_jerk");
+BENCHMARK_CAPTURE(plan, smooth_zigzag, zigzag, kJerk)->Name("Path/random_lines_with_jerk");
+BENCHMARK_CAPTURE(plan, smooth_waves, waves, kJerk)->Name("Path/beziers_with_jerk");
 
 }  // namespace
 }  // namespace stepdriver::bench
