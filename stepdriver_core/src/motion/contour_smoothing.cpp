@@ -11,7 +11,7 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-9;
 constexpr int kMostRounds = 40;  // each of which joins maxima in pairs at least
 
@@ -91,7 +91,7 @@ class MotionCursor {
   };
 
   /// [s] When the acceleration changes next.
-  double next() const { return next_ < times_.size() ? times_[next_] + delay_ : kUnbounded; }
+  double next() const { return next_ < times_.size() ? times_[next_] + delay_ : kInfinity; }
   State at(double time) {
     while (next() <= time) ++next_;
     if (next_ == 0) return {places_.front().distance, 0.0, 0.0};
@@ -120,7 +120,7 @@ Ceiling::Ceiling(std::vector<CeilingSpan> spans) {
   const auto higher = [](const CeilingSpan& a, const CeilingSpan& b) { return a.value > b.value; };
   std::priority_queue<CeilingSpan, std::vector<CeilingSpan>, decltype(higher)> open(higher);
   const auto change = [&](double place) {
-    const double value = open.empty() ? kUnbounded : open.top().value;
+    const double value = open.empty() ? kInfinity : open.top().value;
     if (!places_.empty() && places_.back() == place) {
       values_.back() = value;
     } else if (values_.empty() || values_.back() != value) {
@@ -140,12 +140,12 @@ Ceiling::Ceiling(std::vector<CeilingSpan> spans) {
     open.push(span);
     change(span.from);
   }
-  close(kUnbounded);
+  close(kInfinity);
 }
 
 double Ceiling::lowest(double from, double to) const {
   auto place = std::upper_bound(places_.begin(), places_.end(), from);
-  double lowest = kUnbounded;
+  double lowest = kInfinity;
   if (place != places_.begin()) {
     lowest = values_[static_cast<std::size_t>(place - places_.begin()) - 1];
   }
@@ -201,7 +201,7 @@ std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double t
   std::vector<SmoothPart> made;
   made.reserve(2 * places.size());
   double distance = places.front().distance;
-  for (double now = 0.0; now < kUnbounded;) {
+  for (double now = 0.0; now < kInfinity;) {
     giveWayAt(made.size());
     const MotionCursor::State ahead = front.at(now);
     const MotionCursor::State behind = rear.at(now);
