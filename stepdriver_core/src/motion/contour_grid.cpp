@@ -15,7 +15,7 @@ constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an i
 constexpr double kMostArcDeviation = 0.005;  // of the resolution
 constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
-constexpr double kNegligible = 1e-14;        // of the length of an interval
+constexpr double kNoLength = 1e-14;          // of the length of an interval
 constexpr int kPartsOfCorner = 5;            // at least, of each half
 constexpr int kPartsOfCurve = 4;             // at least
 
@@ -175,7 +175,7 @@ void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint
     evaluate(of.segment, (of.from + parameter) / 2.0, middle);
     evaluate(of.segment, parameter, end);
     const double error = lengthOf(begin, middle, end) - distance;
-    if (std::abs(error) < kNegligible * of.length) break;
+    if (std::abs(error) < kNoLength * of.length) break;
     parameter -= error / end.rate;
   }
   evaluate(of.segment, parameter, end);

@@ -16,9 +16,9 @@ constexpr double kRounding = 1e-9;
 constexpr int kMostRounds = 40;  // each of which joins maxima in pairs at least
 
 // A maximum that is being lowered: it lies between two places, and so does its end at each side.
-class Peak {
+class Maximum {
  public:
-  Peak(const std::vector<SpeedPlace>& places, std::size_t first, std::size_t last)
+  Maximum(const std::vector<SpeedPlace>& places, std::size_t first, std::size_t last)
       : places_(places), left_(first), right_(last), level_(places[first].square) {}
 
   void lower(double time) {
@@ -173,7 +173,7 @@ std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time
       const bool rises = i > 0 && places[i - 1].square < places[i].square;
       const bool falls = last + 1 < places.size() && places[last + 1].square < places[i].square;
       if (!rises || !falls) continue;
-      Peak peak(places, i, last);
+      Maximum peak(places, i, last);
       peak.lower(time);
       if (peak.level() >= places[i].square) continue;
       lowered = true;
