@@ -12,7 +12,7 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;
+constexpr double kWidthRounding = 1e-9;
 constexpr int kMostRounds = 40;  // each of which joins maxima in pairs at least
 
 // A maximum that is being lowered: it lies between two places, and so does its end at each side.
@@ -22,7 +22,7 @@ class Maximum {
       : places_(places), left_(first), right_(last), level_(places[first].square) {}
 
   void lower(double time) {
-    while (width(level_) < std::sqrt(level_) * time * (1.0 - kRounding)) {
+    while (width(level_) < std::sqrt(level_) * time * (1.0 - kWidthRounding)) {
       while (left_ > 0 && places_[left_ - 1].square == level_) --left_;
       while (right_ + 1 < places_.size() && places_[right_ + 1].square == level_) ++right_;
       if (width(level_) >= std::sqrt(level_) * time) return;

@@ -21,14 +21,14 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 // [s] Knots aren't closer than this, so that rounded times and positions don't change the jerk.
 constexpr double kClosestKnots = 100e-6;
 constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
-constexpr int kMostRounds = 12;
-constexpr double kSmallExcess = 1e-3;
-constexpr double kRounding = 1e-6;
-constexpr double kLowerBy = 1.002;
-constexpr double kShorterBy = 0.7;         // the time of the average
-constexpr double kShortestAverage = 1e-3;  // s
-constexpr double kMostDeviation = 0.05;    // of the resolution
-constexpr int kMostDivisions = 4;
+constexpr int kMostReplans = 12;
+constexpr double kNoExcess = 1e-3;
+constexpr double kNoDifference = 1e-6;
+constexpr double kLowerSmoothBy = 1.002;
+constexpr double kShorterBy = 0.7;             // the time of the average
+constexpr double kShortestAverage = 1e-3;      // s
+constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
+constexpr int kMostQuarterings = 4;
 
 // The knots of a motion between two stops, at any time.
 class SmoothKnots {
@@ -304,7 +304,7 @@ class SmoothSection {
     for (int i = 0;; ++i) {
       Plan best = bestOfTimes();
       std::vector<bool> deviates(grid_.size(), false);
-      if (i == kMostDivisions || !findDeviations(best.knots, deviates)) return best;
+      if (i == kMostQuarterings || !findDeviations(best.knots, deviates)) return best;
       grid_.quarter(deviates);
       findCaps();
     }
@@ -329,7 +329,7 @@ class SmoothSection {
 
   bool moves(std::size_t axis) const {
     for (std::size_t i = 0; i < grid_.size(); ++i) {
-      if (std::abs(grid_.firstAtBegin(i)[axis]) > kRounding) return true;
+      if (std::abs(grid_.firstAtBegin(i)[axis]) > kNoDifference) return true;
     }
     return false;
   }
@@ -369,7 +369,7 @@ class SmoothSection {
       const double middle = (knots[i - 1].distance + knots[i].distance) / 2.0;
       while (interval + 1 < grid_.size() && caps_[interval].to < middle) ++interval;
       if (grid_[interval].straight) continue;
-      if (deviationOf(knots, i, interval, middle) < kMostDeviation * contour_.resolution())
+      if (deviationOf(knots, i, interval, middle) < kMostSmoothDeviation * contour_.resolution())
         continue;
       deviates[interval] = found = true;
     }
@@ -407,9 +407,9 @@ class SmoothSection {
   Plan plan(double time) const {
     Lowered lowered;
     Plan best = planOnce(time, lowered);
-    for (int i = 1; i < kMostRounds && best.slowdown > 1.0 + kSmallExcess; ++i) {
+    for (int i = 1; i < kMostReplans && best.slowdown > 1.0 + kNoExcess; ++i) {
       Plan next = planOnce(time, lowered);
-      const bool done = next.slowdown <= 1.0 + kSmallExcess;
+      const bool done = next.slowdown <= 1.0 + kNoExcess;
       if (next.duration() < best.duration()) best = std::move(next);
       if (done) break;
     }
@@ -488,7 +488,7 @@ class SmoothSection {
       }
       worst.include(demand);
       const double slowdown = demand.slowdown();
-      if (slowdown < 1.0 + kRounding) continue;
+      if (slowdown < 1.0 + kNoDifference) continue;
       bool straight = true;
       for (std::size_t k = knots[i - 1].interval; k <= knots[i].interval; ++k) {
         straight = straight && grid[k].straight;
@@ -502,13 +502,13 @@ class SmoothSection {
       if (!straight || demand.speed > 1.0) {
         lowered.speeds.push_back({knots[i - 1].distance, knots[i].distance,
                                   std::max(knots[i - 1].speed, knots[i].speed) /
-                                      ((straight ? demand.speed : slowdown) * kLowerBy)});
+                                      ((straight ? demand.speed : slowdown) * kLowerSmoothBy)});
       }
       if (acceleration > 0.0) {
         const double by =
             straight ? std::max(demand.acceleration, demand.jerk) : slowdown * slowdown;
-        lowered.accelerations.push_back(
-            {parts[knots[i - 1].part].rear, parts[last].front, acceleration / (by * kLowerBy)});
+        lowered.accelerations.push_back({parts[knots[i - 1].part].rear, parts[last].front,
+                                         acceleration / (by * kLowerSmoothBy)});
       }
     }
     return worst;
