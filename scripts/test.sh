@@ -443,8 +443,8 @@ check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --seed 1; }
 # All of it stays in the group that an interrupt ends.
 build_fuzz() { in_group=1 bash "$root/scripts/fuzz.sh" --build; }
 
-# The rooms that depend most on the processor, besides that of the motions, whose tests take minutes there:
-# the comparison of step times stands for it. scripts/cross.sh tests all of them.
+# The rooms that depend most on the processor. The tests of the motions take minutes there: the comparison
+# of step times stands for them. scripts/cross.sh tests all rooms.
 rooms_for_arm64=(config driver pulse)
 build_arm64() { in_group=1 bash "$root/scripts/cross.sh" --build arm64 "${rooms_for_arm64[@]}"; }
 # cross ARGUMENT...: if this computer can't have the compiler, the libraries or the emulator, it is skipped.
