@@ -168,7 +168,7 @@ void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint
   Place middle;
   Place end;
   evaluate(of.segment, of.from, begin);
-  const double part = distance / of.length;
+  const double part = std::clamp(distance / of.length, 0.0, 1.0);
   double parameter = of.from + part * (of.to - of.from);
   constexpr int kCorrections = 4;
   for (int i = 0; i < kCorrections; ++i) {
@@ -176,7 +176,7 @@ void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint
     evaluate(of.segment, parameter, end);
     const double error = lengthOf(begin, middle, end) - distance;
     if (std::abs(error) < kNoLength * of.length) break;
-    parameter -= error / end.rate;
+    parameter = std::clamp(parameter - error / end.rate, of.from, of.to);
   }
   evaluate(of.segment, parameter, end);
   point.position = end.point.position;

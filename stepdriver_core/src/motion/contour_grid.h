@@ -51,7 +51,8 @@ class ContourGrid {
     contour_.evaluate(of.segment, (of.from + of.to) / 2.0, point);
   }
 
-  /// The point at a distance from the begin of an interval, with the derivatives with respect to s.
+  /// The point at a distance from the begin of an interval, with the derivatives with respect to s;
+  /// beyond an interval that isn't straight, its end.
   void evaluateAt(std::size_t interval, double distance, ContourPoint& point) const;
 
   /// @name The first two derivatives of the position with respect to s, at the ends of an interval.

@@ -18,8 +18,10 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
-// [s] Knots aren't closer than this, so that rounded times and positions don't change the jerk.
+// [s] Knots aren't closer than this, nor than a rounded position may change the jerk by a
+// thousandth of its limit: a quintic has 60/h^3 of that.
 constexpr double kClosestKnots = 100e-6;
+constexpr double kMostRounding = 1e-3 / 60.0;
 constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
 constexpr int kMostReplans = 12;
 constexpr double kNoExcess = 1e-3;
@@ -219,8 +221,13 @@ double timeTo(const SmoothPart& part, double distance, double duration) {
 class KnotMaker {
  public:
   KnotMaker(const ContourGrid& grid, const std::vector<ContourLimits>& limits,
-            const std::vector<SmoothPart>& parts, double time)
-      : grid_(grid), limits_(limits), parts_(parts), time_(time), knots_(grid.axes()) {}
+            const std::vector<SmoothPart>& parts, double time, double closest)
+      : grid_(grid),
+        limits_(limits),
+        parts_(parts),
+        time_(time),
+        closest_(closest),
+        knots_(grid.axes()) {}
 
   SmoothKnots make() {
     appendPlace(0, parts_.front(), 0.0, 0);
@@ -243,7 +250,7 @@ class KnotMaker {
         appendPlace(interval_, part, h, k);
       }
     }
-    if (knots_.size() > 1 && parts_.back().time - knots_.back().time < kClosestKnots) {
+    if (knots_.size() > 1 && parts_.back().time - knots_.back().time < closest_) {
       knots_.dropLast();
     }
     appendPlace(grid_.size(), parts_.back(), 0.0, parts_.size() - 1);
@@ -252,7 +259,7 @@ class KnotMaker {
 
  private:
   bool tooClose(double time) const {
-    return knots_.size() > 0 && time - knots_.back().time < kClosestKnots;
+    return knots_.size() > 0 && time - knots_.back().time < closest_;
   }
 
   void appendBegin(const SmoothPart& part, std::size_t index) {
@@ -277,7 +284,8 @@ class KnotMaker {
   const ContourGrid& grid_;
   const std::vector<ContourLimits>& limits_;
   const std::vector<SmoothPart>& parts_;
-  double time_;  // of the average
+  double time_;     // of the average
+  double closest_;  // [s] knots
   SmoothKnots knots_;
   ContourPoint point_;
   std::size_t interval_ = 0;  // that contains the motion
@@ -332,6 +340,19 @@ class SmoothSection {
       if (std::abs(grid_.firstAtBegin(i)[axis]) > kNoDifference) return true;
     }
     return false;
+  }
+
+  double closestKnots() const {
+    double closest = kClosestKnots;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      double farthest = 0.0;
+      for (std::size_t i = 0; i <= grid_.size(); ++i) {
+        farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
+      }
+      const double rounding = farthest * std::numeric_limits<double>::epsilon();
+      closest = std::max(closest, std::cbrt(rounding / (kMostRounding * limits_[j].jerk)));
+    }
+    return closest;
   }
 
   // How far the middle of the quintic that ends at a knot is from the contour, at a right angle.
@@ -446,7 +467,7 @@ class SmoothSection {
     }
     speed.plan();
     const std::vector<SmoothPart> parts = smoothed(flattenPeaks(placesOf(grid, speed), time), time);
-    Plan plan{KnotMaker(grid, limits_, parts, time).make(), {}, 1.0};
+    Plan plan{KnotMaker(grid, limits_, parts, time, closestKnots()).make(), {}, 1.0};
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
       plan.segments.push_back(grid[plan.knots[i].interval].segment);
     }

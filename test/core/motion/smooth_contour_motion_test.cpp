@@ -229,5 +229,47 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
   RecordProperty("worst_distance", std::to_string(worst_distance));
 }
 
+// Far from 0, with a tiny and a very long line at the end, and accelerations that take 10 us to 10
+// s to build up: rounding doesn't take the jerk beyond what a trajectory may have.
+TEST(SmoothContourMotion, KeepsTheJerkAtExtremes) {
+  std::mt19937 random(77);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  for (int i = 0; i < 100; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    const double offset = number(0.0, 1.0) < 0.5 ? 0.0 : 1e7;
+    const auto shift = [&](std::vector<double>& position) {
+      for (double& x : position) x += offset;
+    };
+    shift(path.start);
+    for (ContourSegment& segment : path.segments) {
+      shift(segment.end);
+      shift(segment.control1);
+      shift(segment.control2);
+      for (double& x : segment.centre) x += offset;
+    }
+    std::vector<double> end = path.segments.back().end;
+    for (const double length : {0.001, 1e6}) {
+      end[0] += length;
+      path.segments.push_back(straightTo(end, 0.1));
+    }
+    for (ContourLimits& limits : path.limits) {
+      limits.jerk = limits.acceleration * std::pow(10.0, number(-1.0, 5.0));
+    }
+    const Contour contour = path.contour(Continuity::kCurvature);
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits);
+    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+      for (std::size_t k = 1; k < knots.size(); ++k) {
+        for (const double u : {0.0, 0.5, 1.0}) {
+          const QuinticState state = quinticAt(knots[k - 1], knots[k], axis, u);
+          ASSERT_LE(std::abs(state.jerk), 1.01 * path.limits[axis].jerk)
+              << "path " << i << " knot " << k << " axis " << axis;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver
