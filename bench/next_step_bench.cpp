@@ -6,6 +6,9 @@
 #include <vector>
 
 #include "motion/compose.h"
+#include "motion/input_shaper.h"
+#include "motion/profile_sum.h"
+#include "motion/shaped_profile.h"
 #include "motion/spline.h"
 #include "motion/step_finder.h"
 #include "support/exact_steps.h"
@@ -100,6 +103,22 @@ void stepsOfJerkPhases(benchmark::State& state) {
             ExactMotion::sCurve(static_cast<long double>(steps), speed, a, kJerk));
 }
 BENCHMARK(stepsOfJerkPhases)->Name("NextStep/jerk_only");
+
+// ---- a shaped motion
+
+void stepsOfShaped(benchmark::State& state) {
+  const Profile plan = trapezoid();
+  const motion::InputShaper shaper = motion::InputShaper::ei(42.0, 0.1);
+  const motion::ShapedProfile shaped(plan, shaper, plan.startNs());
+  motion::ProfileSum sum;
+  for (auto round : state) {
+    sum.begin(shaped.startNs());
+    sum.add(1.0, shaped);
+    benchmark::DoNotOptimize(timesOf(StepFinder(sum, 0)));
+  }
+  state.SetItemsProcessed(state.iterations() * kSteps);
+}
+BENCHMARK(stepsOfShaped)->Name("NextStep/shaped");
 
 // ---- a trajectory
 

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Draws the pictures of docs/motion.md from recorded traces; motion_pictures.sh calls it."""
 
+import cmath
 import csv
 import pathlib
 import sys
@@ -102,6 +103,29 @@ def draw_path(folder, trace):
     save(figure, folder, "trajectory_path")
 
 
+def draw_shaper(folder, trace, frequency, until):
+    """The speeds of both axes, and how far a mass that each pulls by an undamped spring is ahead of it."""
+    figure, (speeds, masses) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 3.2))
+    for colour, axis, label in zip(COLOURS, "xy", ("as planned", "shaped")):
+        times, counts = trace.steps[axis]
+        speeds.plot(*trace.curve(axis).speed(), color=colour, label=label)
+        samples, values = [], []
+        ahead, time, step = 0j, 0.0, 0
+        for at, count in zip(times + [until], counts + [counts[-1]]):
+            fine = max(1, round((at - time) * 2000))
+            for i in range(1, fine + 1):
+                samples.append(time + (at - time) * i / fine)
+                values.append((ahead * cmath.rect(1.0, 2 * cmath.pi * frequency * (time - samples[-1]))).real)
+            ahead = ahead * cmath.rect(1.0, 2 * cmath.pi * frequency * (time - at)) - (count - step)
+            time, step = at, count
+        masses.plot(samples, values, color=colour)
+    speeds.set_ylabel("speed\n[steps/s]")
+    masses.set_ylabel("mass ahead\nof axis [steps]")
+    masses.set_xlabel("time [s]")
+    speeds.legend(loc="best", frameon=False)
+    save(figure, folder, "input_shaper")
+
+
 def save(figure, folder, picture):
     look.save(figure, folder / (picture + ".svg"))
 
@@ -134,6 +158,7 @@ def main(traces, pictures):
     held = trace("trajectory_hold")
     draw(pictures, "trajectory_hold", [(held, "x", "x"), (held, "y", "y")], ["position", "speed"])
     draw_path(pictures, held)
+    draw_shaper(pictures, trace("input_shaper"), 8.0, 1.0)
 
 
 if __name__ == "__main__":

@@ -75,14 +75,17 @@ class Dump {
     if (axis.kinematics) add(*axis.kinematics);
     all(axis.max_speed, axis.start_speed, axis.acceleration, axis.deceleration,
         axis.stop_deceleration, axis.jerk, axis.backlash, axis.min_position, axis.max_position);
+    for (const config::ShaperConfig& shaper : axis.input_shaper) {
+      all(static_cast<int>(shaper.type), shaper.frequency, shaper.damping);
+    }
     all(axis.brake, axis.homing, axis.require_homing, axis.enable_on_start,
         axis.disable_on_shutdown, axis.align_on_microstep_change, axis.idle_timeout,
         static_cast<int>(axis.idle_action), axis.holds_position_unpowered);
   }
   void add(const setup::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
-        rig.max_switch, rig.load_falls, rig.fail_step_write_after, rig.settling_ms,
-        rig.faults.never_in_position);
+        rig.max_switch, rig.load_falls, rig.spring_hz, rig.spring_damping,
+        rig.fail_step_write_after, rig.settling_ms, rig.faults.never_in_position);
     all(rig.wiring.dir_inverted, rig.wiring.steps_per_unit, rig.wiring.min_pin, rig.wiring.max_pin,
         rig.wiring.min_active_level, rig.wiring.max_active_level);
     all(rig.faults.min_stuck, rig.faults.max_stuck, rig.faults.lose_every,

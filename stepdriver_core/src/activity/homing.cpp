@@ -327,7 +327,7 @@ void Homing::keepLatch() {
   latched_ = axis_.motor.state();
   slipped_ = context().slipped;
   const motor::Motion* motion = axis_.motor.motions().find(latched_.ended);
-  latch_profile_ = motion != nullptr ? motion->profile : nullptr;
+  latch_ = motion != nullptr ? std::optional(motion->planned) : std::nullopt;
 }
 
 // The first edge of the burst that ended the latch: a contact that closes may bounce while the axis
@@ -352,8 +352,8 @@ double Homing::triggerCount() const {
   const double count = towards_ * (static_cast<double>(latched_.count) + latched_.between);
   const auto edge = squares_ ? std::nullopt : triggerEdge();
   // An edge may be lost. The switch has closed between the last step and the one that wasn't made.
-  if (!edge || !latch_profile_) return towards_ * count - slack;
-  double at = towards_ * latch_profile_->stateAt(*edge - slipped_).position.value();
+  if (!edge || !latch_) return towards_ * count - slack;
+  double at = towards_ * latch_->made().stateAt(*edge - slipped_).position.value();
   at = std::min(at, count + 0.5);
   // It isn't known when in the latch the timeline slid, but the number of steps bounds the effect.
   if (slipped_ != slipped_before_) at = std::max(at, count - 0.5);

@@ -8,7 +8,7 @@
 
 #include "activity.h"
 #include "manoeuvre.h"
-#include "motion/profile.h"
+#include "motion/shaped_profile.h"
 #include "script.h"
 #include "stepdriver_core/axis/axis_state.h"
 
@@ -105,8 +105,8 @@ class Homing : public Activity {
   pulse::Nanoseconds settle_began_ = 0;
   pulse::Nanoseconds steady_since_ = 0;
 
-  // The profile of the latch, and how it ended.
-  std::shared_ptr<const motion::Profile> latch_profile_;
+  // The motion of the latch, and how it ended.
+  std::optional<motion::PlannedMotion> latch_;
   pulse::ChannelState latched_;
   pulse::Nanoseconds slipped_before_ = 0;
   pulse::Nanoseconds slipped_ = 0;

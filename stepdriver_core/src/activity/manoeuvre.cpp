@@ -161,23 +161,23 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
     if (!alone) {
       plans.path = planPath(plans.at);
       for (std::size_t i = 0; i < orders_.size(); ++i) {
-        plans.planned.push_back(
-            {std::make_shared<const motion::Profile>(shared_path_->profileOf(i, *plans.path)), 0.0,
-             orders_[i].goal.path_limits, plans.at});
+        const motor::Motor& motor = orders_[i].axis->motor;
+        plans.planned.push_back({motor.shaped(shared_path_->profileOf(i, *plans.path)), 0.0,
+                                 orders_[i].goal.path_limits, plans.at});
       }
       return plans;
     }
     if (!slowsDown()) {
       const Order& order = orders_.front();
       GoalPlan own = planGoal(*order.axis, order.goal, plans.at);
-      plans.planned.push_back({std::make_shared<const motion::Profile>(std::move(own.plan.profile)),
+      plans.planned.push_back({order.axis->motor.shaped(std::move(own.plan.profile)),
                                own.plan.overshoot, own.limits, own.slows_ns});
       return plans;
     }
     for (const Order& order : orders_) {
       Planned& planned = plans.planned.emplace_back();
       if (!order.axis->moving()) continue;
-      planned.profile = std::make_shared<const motion::Profile>(planStop(*order.axis, plans.at));
+      planned.motion = order.axis->motor.shaped(planStop(*order.axis, plans.at));
       planned.limits = order.axis->motor.motions().latest()->limits;
       planned.slows_ns = plans.at;
     }
@@ -193,7 +193,7 @@ std::vector<axis::Move> Manoeuvre::prepare() {
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Planned& planned = prepared_->planned[i];
     const Goal& goal = orders_[i].goal;
-    axis::Move move = moveOf(*orders_[i].axis, goal, *planned.profile, planned.overshoot);
+    axis::Move move = moveOf(*orders_[i].axis, goal, planned.motion->made(), planned.overshoot);
     move.id = goal.move;
     move.outcome = goal.outcome;
     moves.push_back(std::move(move));
@@ -208,7 +208,7 @@ void Manoeuvre::order(Plans plans) {
   open.mode = mode_;
   open.follows = context_.newCommand(beginsTogether() ? start_->number : 0);
   for (std::size_t i = 0; i < orders_.size(); ++i) {
-    if (plans.planned[i].profile == nullptr) {
+    if (!plans.planned[i].motion) {
       open.serials.push_back(0);
       continue;
     }
@@ -218,7 +218,7 @@ void Manoeuvre::order(Plans plans) {
     pulse::Follow& follow = open.follows->emplace_back();
     follow.channel = axis.motor.channel();
     follow.serial = open.serials[i];
-    follow.profile = plans.planned[i].profile.get();
+    follow.profile = plans.planned[i].motion->made();
     follow.continues = before != nullptr ? before->serial : 0;
     follow.restart_interval = axis.restartInterval();
     follow.group = plans.path != nullptr ? group_ : 0;
@@ -232,14 +232,14 @@ void Manoeuvre::order(Plans plans) {
   }
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     Order& order = orders_[i];
-    if (plans.planned[i].profile == nullptr) continue;
+    if (!plans.planned[i].motion) continue;
     if (!started_ && !slowsDown()) order.goal.began_ns = plans.at;
     motor::Motion motion;
     motion.serial = open.serials[i];
     motion.limits = plans.planned[i].limits;
     motion.slows_ns = plans.planned[i].slows_ns;
     motion.overshoot = plans.planned[i].overshoot;
-    motion.profile = plans.planned[i].profile;
+    motion.planned = *plans.planned[i].motion;
     motion.order = open.follows;
     if (order.goal.kind != Goal::Kind::kSetpoint || order.goal.setpoint.of_position) {
       motion.target = order.goal.target;
@@ -386,8 +386,8 @@ void Manoeuvre::accept(const OpenOrder& order) {
   accepted_path_ = order.plans.path;
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     for (std::size_t i = 0; i < orders_.size(); ++i) {
-      if (orders_[i].axis != before.axis || order.plans.planned[i].profile == nullptr) continue;
-      tell(before.goal, replacedResult(before, orders_[i], *order.plans.planned[i].profile));
+      if (orders_[i].axis != before.axis || !order.plans.planned[i].motion) continue;
+      tell(before.goal, replacedResult(before, orders_[i], *order.plans.planned[i].motion->plan()));
     }
   }
   call_.reset();

@@ -71,8 +71,8 @@ class Manoeuvre {
   enum class Mode { kRun, kStop, kHold };
 
   struct Planned {
-    // null if the axis is at rest while others stop
-    std::shared_ptr<const motion::Profile> profile;
+    // empty if the axis is at rest while others stop
+    std::optional<motion::PlannedMotion> motion;
     double overshoot = 0.0;
     motion::MotionLimits limits;  // see motor::Motion
     std::int64_t slows_ns = motor::Motion::kNeverSlows;

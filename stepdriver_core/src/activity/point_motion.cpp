@@ -109,9 +109,9 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at
 
 motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   const motor::Motion& before = *axis.motor.motions().latest();
-  const motion::MotionState from = before.profile->stateAt(at);
+  const motion::MotionState from = before.planned.plan()->stateAt(at);
   const motion::MotionLimits stopping = axis.stopLimits();
-  const motion::DoubleDouble end = before.profile->endPosition();
+  const motion::DoubleDouble end = before.planned.plan()->endPosition();
   // A motion that hasn't begun has nothing ahead of it, but one may be passing its end.
   const double way = (end - from.position).value();
   const bool ends_ahead = way * from.velocity > 0.0 || std::abs(way) < 0.5;
@@ -123,7 +123,7 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
                            pulse::Nanoseconds lead) {
   const pulse::Nanoseconds now = context.motionNow();
   if (const motor::Motion* before = axis.motor.motions().latest()) {
-    return std::max(now + lead, before->profile->startNs());
+    return std::max(now + lead, before->planned.plan()->startNs());
   }
   // DIR is set when the profile is accepted, and the chip may still be waking up.
   const pulse::Nanoseconds dir = axis.turnTime();
@@ -135,18 +135,18 @@ std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
   return *goal.target - axis.jointCount();
 }
 
-axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::Profile& profile,
-                  double overshoot) {
+axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal,
+                  const motion::ShapedProfile& motion, double overshoot) {
   axis::Move move;
   // A motion may reverse, which takes up the backlash again: the motor's end doesn't determine the
   // joint's.
   const bool jogs = goal.runs();
-  const double rest = jogs || goal.of_motor ? axis.jointAt(profile.endPosition().value())
+  const double rest = jogs || goal.of_motor ? axis.jointAt(motion.endPosition().value())
                                             : static_cast<double>(*goal.target);
   move.rest = axis.positionOf(rest);
   move.target =
       jogs ? move.rest : axis.positionOf(static_cast<double>(*goal.target) + goal.remainder);
-  move.duration = static_cast<double>(profile.endNs() - profile.startNs()) / 1e9;
+  move.duration = static_cast<double>(motion.endNs() - motion.startNs()) / 1e9;
   move.overshoot = overshoot / axis.stepsPerUnit();
   return move;
 }

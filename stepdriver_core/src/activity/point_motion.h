@@ -6,6 +6,7 @@
 #include "context.h"
 #include "goal.h"
 #include "motion/planner.h"
+#include "motion/shaped_profile.h"
 
 namespace stepdriver::activity {
 
@@ -47,7 +48,7 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
 std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal);
 
 /// The answer for a caller about a planned goal, without an outcome. @param overshoot [microsteps]
-axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal, const motion::Profile& profile,
-                  double overshoot);
+axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal,
+                  const motion::ShapedProfile& motion, double overshoot);
 
 }  // namespace stepdriver::activity

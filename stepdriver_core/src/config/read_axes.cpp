@@ -16,6 +16,7 @@
 #include "read_motors.h"
 #include "read_pins.h"
 #include "read_power.h"
+#include "read_shaper.h"
 #include "stepdriver_core/config/config_reader.h"
 #include "stepdriver_core/printable.h"
 
@@ -109,6 +110,7 @@ class AxesReader {
     readPower(axis, pins_are_right, config);
     readBrake(axis, pins_are_right, config, used_);
     const std::optional<Kind> kind = readMotion(axis, context, config);
+    readShaper(axis, kind, config);
     readHoming(axis, kind, config);
     readSquaring(axis, kind, config);
     config.align_on_microstep_change =

@@ -392,7 +392,7 @@ double Controller::relativeOrigin(const axis::AxisModel& axis) const {
   const Goal* goal = motion->goalOf(axis);
   // A motion that slows down or takes up backlash ends at the end of its motor's motion.
   if (latest->slows_down || (goal != nullptr && goal->of_motor)) {
-    return axis.jointAt(latest->profile->endPosition().value());
+    return axis.jointAt(latest->planned.plan()->endPosition().value());
   }
   if (goal == nullptr || !goal->target) {
     axis.refuse("busy: it jogs without an end; give an absolute position");
@@ -448,20 +448,28 @@ void Controller::serve(const MoveRounds& wanted, const Ack& call) {
 void Controller::serve(const PlanMove& wanted, const Ack& call) {
   axis::AxisModel& moved = axis(wanted.move.axis);
   const Goal goal = goalOf(wanted.move);
-  const motion::Plan planned = [&] {
+  axis::MovePlan shown;
+  const motion::PlannedMotion planned = [&] {
     try {
-      return activity::planGoal(moved, goal, activity::earliestStart(context_, moved, 0)).plan;
+      motion::Plan plan =
+          activity::planGoal(moved, goal, activity::earliestStart(context_, moved, 0)).plan;
+      motion::PlannedMotion motion = moved.motor.shaped(std::move(plan.profile));
+      shown.move = activity::moveOf(moved, goal, motion.made(), plan.overshoot);
+      return motion;
     } catch (const std::range_error& error) {
       moved.refuse(error.what());
     }
   }();
-  axis::MovePlan shown;
   shown.steps_per_unit = moved.stepsPerUnit();
-  shown.move = activity::moveOf(moved, goal, planned.profile, planned.overshoot);
   const double unit = 1.0 / moved.stepsPerUnit();
-  for (const motion::Piece& piece : planned.profile.pieces()) {
+  for (const motion::Piece& piece : planned.plan()->pieces()) {
     shown.pieces.push_back({piece.duration.value(), moved.positionOf(piece.p0.value()),
                             piece.v0 * unit, piece.a * unit, piece.j * unit});
+  }
+  if (const motion::InputShaper* shaper = planned.made().shaper()) {
+    for (const motion::Impulse& impulse : shaper->impulses()) {
+      shown.parts.push_back({impulse.part, static_cast<double>(impulse.delay_ns) * 1e-9});
+    }
   }
   call->succeed(std::move(shown));
 }
@@ -1016,7 +1024,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   for (const motor::Motion& motion : axis.motor.motions().all()) {
     AxisSnapshot::Motion view;
     view.serial = motion.serial;
-    view.profile = motion.profile;
+    view.planned = motion.planned;
     view.slows_down = motion.slows_down;
     if (motion.target) view.target = axis.positionOf(static_cast<double>(*motion.target));
     shown.motions.push_back(std::move(view));

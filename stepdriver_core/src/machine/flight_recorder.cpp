@@ -216,7 +216,7 @@ void FlightRecorder::notePlans(const Input& input, const pulse::Command& command
     const pulse::Follow& follow = command.follows[i];
     const auto axis = static_cast<std::size_t>(follow.channel);
     const AxisSnapshot& seen = snapshot.axes.at(axis);
-    const motion::Profile& profile = *follow.profile;
+    const motion::ShapedProfile& profile = follow.profile;
     const double from = profile.stateAt(profile.startNs()).position.value();
     const double to = profile.endPosition().value();
     const auto place = [&](double count) {
@@ -224,12 +224,13 @@ void FlightRecorder::notePlans(const Input& input, const pulse::Command& command
                                seen.steps_per_unit);
     };
     const double start = static_cast<double>(profile.startNs() + input.slipped - input.now) * 1e-9;
+    const double duration = static_cast<double>(profile.endNs() - profile.startNs()) * 1e-9;
     note(input.now,
          fmt::format("{}: plan {}{}: motor from count {:.0f} ({}) to {:.0f} ({}) in {:.6f} s, "
                      "beginning in {:.6f} s",
                      axes_[axis].name, follow.serial,
                      follow.continues != 0 ? fmt::format(", after {}", follow.continues) : "", from,
-                     place(from), to, place(to), profile.duration().value(), start));
+                     place(from), to, place(to), duration, start));
   }
 }
 

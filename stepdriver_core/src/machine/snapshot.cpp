@@ -32,16 +32,17 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
   state.target = axis.held_target.value_or(state.position);
   const AxisSnapshot::Motion* motion = followed(axis, channel);
   if (motion == nullptr) return state;
-  const motion::MotionState now = motion->profile->stateAt(after);
+  const motion::ShapedProfile made = motion->planned.made();
+  const motion::MotionState now = made.stateAt(after);
   const auto [low, high] =
-      std::minmax({motion->profile->stateAt(before).position.value(), now.position.value()});
+      std::minmax({made.stateAt(before).position.value(), now.position.value()});
   const double planned = std::clamp(count, low, high);
   state.planned = position_of(planned - static_cast<double>(channel.slack));
   // While the backlash is taken up, the joint stands still.
   const bool joint_moves = channel.slack == (now.velocity > 0.0 ? axis.backlash : 0);
   state.velocity = joint_moves ? now.velocity / axis.steps_per_unit : 0.0;
   if (motion->slows_down) {
-    const double end = motion->profile->endPosition().value();
+    const double end = made.endPosition().value();
     const double slack =
         static_cast<double>(channel.slack) + end - static_cast<double>(channel.count);
     state.target = position_of(end - std::clamp(slack, 0.0, static_cast<double>(axis.backlash)));
@@ -49,7 +50,7 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
     state.target = *motion->target;
   }
   if (motion->target || motion->slows_down) {
-    const pulse::Nanoseconds left = motion->profile->endNs() - after;
+    const pulse::Nanoseconds left = made.endNs() - after;
     state.time_left = static_cast<double>(std::max<pulse::Nanoseconds>(left, 0)) / 1e9;
   }
   return state;
@@ -57,7 +58,7 @@ axis::AxisState stateOf(const AxisSnapshot& axis, const pulse::ChannelState& liv
 
 double peakRateOf(const AxisSnapshot& axis, const pulse::ChannelState& live) {
   const AxisSnapshot::Motion* motion = followed(axis, live);
-  return motion != nullptr ? motion->profile->peakSpeed() : 0.0;
+  return motion != nullptr ? motion->planned.made().peakSpeed() : 0.0;
 }
 
 }  // namespace stepdriver::machine

@@ -9,7 +9,7 @@
 
 #include "axis/axis_memory.h"
 #include "axis/path_axis.h"
-#include "motion/profile.h"
+#include "motion/shaped_profile.h"
 #include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -18,10 +18,10 @@ namespace stepdriver::machine {
 
 /// The controller's state of an axis, for readers in any thread. Immutable.
 struct AxisSnapshot {
-  /// A profile that the engine follows, or will follow.
+  /// A motion that the engine follows, or will follow.
   struct Motion {
     std::uint64_t serial = 0;
-    std::shared_ptr<const motion::Profile> profile;
+    motion::PlannedMotion planned;
     std::optional<double> target;  ///< [unit]
     bool slows_down = false;
   };

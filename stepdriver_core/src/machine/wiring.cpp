@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "motor/input_shaping.h"
 #include "nanoseconds.h"
 #include "pulse/measure.h"
 #include "stepdriver_core/machine/step_rates.h"
@@ -73,7 +74,7 @@ pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes) {
     if (axis.jerk > 0.0) {
       time += (deceleration + std::max(axis.acceleration, axis.deceleration)) / axis.jerk;
     }
-    longest = std::max(longest, time);
+    longest = std::max(longest, time + motor::shapingTimeOf(axis));
   }
   return nanoseconds(1.1 * longest + 0.1);
 }

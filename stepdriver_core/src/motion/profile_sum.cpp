@@ -5,56 +5,71 @@
 namespace stepdriver::motion {
 
 void ProfileSum::begin(std::int64_t start_ns) {
-  size_ = 0;
+  size_ = terms_ = 0;
   start_ns_ = start_ns;
   piece_start_ = piece_end_ = {};
 }
 
-void ProfileSum::add(double factor, const Profile& profile) {
-  Term& term = terms_[size_++];
-  term = {factor, &profile, profile.endPosition(), secondsOf(start_ns_ - profile.startNs()), 0};
+void ProfileSum::add(double factor, const ShapedProfile& motion) {
+  const Profile& profile = motion.profile();
+  if (motion.shaper() == nullptr) {
+    addPart(factor, profile, profile.startNs());
+  } else {
+    for (const Impulse& impulse : motion.shaper()->impulses()) {
+      addPart(exactProduct(factor, impulse.part), profile, profile.startNs() + impulse.delay_ns);
+    }
+  }
+  ++terms_;
+}
+
+void ProfileSum::addPart(DoubleDouble factor, const Profile& profile, std::int64_t start_ns) {
+  Part& part = parts_[size_++];
+  part = {terms_, factor, &profile, profile.endPosition(), secondsOf(start_ns_ - start_ns), 0};
   if (profile.pieceCount() == 0) {
-    term.profile = nullptr;
-  } else if (term.since.hi > 0.0) {
-    term.piece = profile.pieceAt(term.since);
+    part.profile = nullptr;
+  } else if (part.since.hi > 0.0) {
+    part.piece = profile.pieceAt(part.since);
   }
 }
 
 void ProfileSum::add(double factor, DoubleDouble position) {
-  terms_[size_++] = {factor, nullptr, position, {}, 0};
+  parts_[size_++] = {terms_++, factor, nullptr, position, {}, 0};
 }
 
-void ProfileSum::rest(std::size_t term) { terms_[term].profile = nullptr; }
+void ProfileSum::rest(std::size_t term) {
+  for (std::size_t i = 0; i < size_; ++i) {
+    if (parts_[i].term == term) parts_[i].profile = nullptr;
+  }
+}
 
-DoubleDouble ProfileSum::addPiece(Term& term, DoubleDouble from) {
-  const DoubleDouble factor = term.factor;
-  const auto rests = [&](DoubleDouble position) { piece_.p0 = piece_.p0 + factor * position; };
-  if (term.profile == nullptr) {
-    rests(term.position);
+DoubleDouble ProfileSum::addPiece(Part& part, DoubleDouble from) {
+  const auto rests = [&](DoubleDouble position) { piece_.p0 = piece_.p0 + part.factor * position; };
+  if (part.profile == nullptr) {
+    rests(part.position);
     return from;
   }
-  const Profile& profile = *term.profile;
-  const DoubleDouble at = from + term.since;
+  const Profile& profile = *part.profile;
+  const DoubleDouble at = from + part.since;
   if (at.hi < -kNoTime) {
     rests(profile.startPosition());
-    return -term.since;
+    return -part.since;
   }
   const std::size_t count = profile.pieceCount();
-  while (term.piece < count && !((profile.pieceStart(term.piece + 1) - at).hi > kNoTime)) {
-    ++term.piece;
+  while (part.piece < count && !((profile.pieceStart(part.piece + 1) - at).hi > kNoTime)) {
+    ++part.piece;
   }
-  if (term.piece == count) {
-    rests(term.position);
+  if (part.piece == count) {
+    rests(part.position);
     return from;
   }
-  const Piece piece = profile.piece(term.piece);
-  DoubleDouble t = at - profile.pieceStart(term.piece);
+  const Piece piece = profile.piece(part.piece);
+  DoubleDouble t = at - profile.pieceStart(part.piece);
   if (t.hi < 0.0) t = {};
-  piece_.p0 = piece_.p0 + factor * piece.positionAt(t);
-  velocity_ = velocity_ + factor * piece.velocityAt(t);
-  acceleration_ = acceleration_ + factor * piece.accelerationAt(t);
-  piece_.j += term.factor * piece.j;
-  return profile.pieceStart(term.piece + 1) - term.since;
+  piece_.p0 = piece_.p0 + part.factor * piece.positionAt(t);
+  velocity_ = velocity_ + part.factor * piece.velocityAt(t);
+  acceleration_ = acceleration_ + part.factor * piece.accelerationAt(t);
+  piece_.j += part.factor.value() * piece.j;
+  return profile.pieceStart(part.piece + 1) - part.since;
 }
 
 bool ProfileSum::next() {
@@ -63,7 +78,7 @@ bool ProfileSum::next() {
   velocity_ = acceleration_ = {};
   bool moves = false;
   for (std::size_t i = 0; i < size_; ++i) {
-    const DoubleDouble end = addPiece(terms_[i], piece_start_);
+    const DoubleDouble end = addPiece(parts_[i], piece_start_);
     if (!(piece_start_ < end)) continue;
     if (!moves || end < piece_end_) piece_end_ = end;
     moves = true;

@@ -4,16 +4,17 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "motion/profile.h"
+#include "motion/shaped_profile.h"
 
 namespace stepdriver::motion {
 
 /// The most axes that can share motors.
 constexpr std::size_t kMostTerms = 4;
 
-/// The motion of a motor that several axes share: the sum of their profiles, each times a factor,
-/// piece by piece. A sum of cubic pieces is a cubic piece, so it is exact, except that jerks are
-/// rounded to doubles. It takes the same memory however long the profiles are.
+/// The motion of a motor, piece by piece: the sum of the motions of the axes that share it, each
+/// times a factor, and each the sum of its shaper's parts. A sum of cubic pieces is a cubic piece,
+/// so it is exact, except that jerks are rounded to doubles. It takes the same memory however long
+/// the profiles are.
 ///
 /// Doesn't allocate or throw. Only one thread may use it at a time.
 class ProfileSum {
@@ -21,13 +22,12 @@ class ProfileSum {
   /// Begins a sum without terms. @param start_ns motion time at which its first piece begins.
   void begin(std::int64_t start_ns);
 
-  /// Adds an axis that follows a profile, or rests. @pre fewer than kMostTerms; next() has not been
-  /// called.
-  /// @param profile lives until the sum ends or the axis rests; it may begin and end at any time.
-  void add(double factor, const Profile& profile);
+  /// Adds an axis that moves, or rests. @pre fewer than kMostTerms; next() has not been called.
+  /// @param motion lives until the sum ends or the axis rests; it may begin and end at any time.
+  void add(double factor, const ShapedProfile& motion);
   void add(double factor, DoubleDouble position);
 
-  /// An axis has come to the end of its profile, and rests there: the profile isn't read any more.
+  /// An axis has come to the end of its motion, and rests there: its profile isn't read any more.
   /// @param term in the order of add().
   void rest(std::size_t term);
 
@@ -38,19 +38,23 @@ class ProfileSum {
   std::int64_t startNs() const { return start_ns_; }
 
  private:
-  struct Term {
-    double factor = 0.0;
+  // A term, or a part of one that is shaped.
+  struct Part {
+    std::size_t term = 0;
+    DoubleDouble factor;
     const Profile* profile = nullptr;  // null: it rests
     DoubleDouble position;             // at rest
-    DoubleDouble since;                // s from the profile's start to that of the sum
+    DoubleDouble since;                // s from the part's start to that of the sum
     std::size_t piece = 0;
   };
 
-  /// Adds what a term does from a time on. @return when that ends; the time itself: never.
-  DoubleDouble addPiece(Term& term, DoubleDouble from);
+  void addPart(DoubleDouble factor, const Profile& profile, std::int64_t start_ns);
+  /// Adds what a part does from a time on. @return when that ends; the time itself: never.
+  DoubleDouble addPiece(Part& part, DoubleDouble from);
 
-  std::array<Term, kMostTerms> terms_{};
-  std::size_t size_ = 0;
+  std::array<Part, kMostTerms * InputShaper::kMostImpulses> parts_{};
+  std::size_t size_ = 0;   // of them
+  std::size_t terms_ = 0;  // that were added
   std::int64_t start_ns_ = 0;
   DoubleDouble piece_start_;
   DoubleDouble piece_end_;

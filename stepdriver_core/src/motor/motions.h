@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "motion/limits.h"
-#include "motion/profile.h"
+#include "motion/shaped_profile.h"
 #include "pulse/channel.h"
 
 namespace stepdriver::motor {
@@ -27,7 +27,7 @@ struct Motion {
   /// Motion time from which its jerk may be that of stops.
   std::int64_t slows_ns = kNeverSlows;
   double overshoot = 0.0;  ///< [microsteps] how far it overshoots its end before it comes back
-  std::shared_ptr<const motion::Profile> profile;
+  motion::PlannedMotion planned;
   /// The data that the engine reads until it has handled the order.
   std::shared_ptr<const void> order;
 };

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "input_shaping.h"
 
 namespace stepdriver::motor {
 
@@ -10,6 +13,7 @@ Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int chan
       lines_(lines),
       is_shared_(config.kinematics != nullptr),
       pins_(config, lines),
+      shaper_(inputShaperOf(config)),
       power_(config.idle_action, !pins_.hasEnable()),
       brake_(config, lines),
       translators_(config.motors(), Translator(config.microsteps)) {
@@ -29,14 +33,21 @@ void Motor::take(const pulse::ChannelState& state) {
   motions_.take(state);
 }
 
+motion::PlannedMotion Motor::shaped(motion::Profile plan) const {
+  auto shared = std::make_shared<const motion::Profile>(std::move(plan));
+  const Motion* before = motions_.latest();
+  if (before == nullptr) return {std::move(shared), shaper_};
+  return before->planned.takenOverBy(std::move(shared));
+}
+
 motion::MotionState Motor::stateAt(std::int64_t at) const {
-  if (const Motion* motion = motions_.latest()) return motion->profile->stateAt(at);
+  if (const Motion* motion = motions_.latest()) return motion->planned.plan()->stateAt(at);
   if (is_shared_) return {state_.rests_at, 0.0, 0.0};
   const motion::DoubleDouble count = motion::fromInteger(state_.count);
   // A stop on a path ends between two microsteps: the next motion continues from there.
   const Motion* last = motions_.find(state_.ended);
   if (last == nullptr || state_.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
-  const motion::DoubleDouble rest = last->profile->endPosition();
+  const motion::DoubleDouble rest = last->planned.plan()->endPosition();
   return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
 }
 

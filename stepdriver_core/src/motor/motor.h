@@ -7,7 +7,8 @@
 
 #include "brake.h"
 #include "driver_pins.h"
-#include "motion/profile.h"
+#include "motion/input_shaper.h"
+#include "motion/shaped_profile.h"
 #include "motions.h"
 #include "motor_lines.h"
 #include "power.h"
@@ -40,7 +41,12 @@ class Motor {
   /// The serial of a new order to the engine.
   std::uint64_t nextSerial() { return ++serial_; }
 
-  /// [microsteps] The state of the motor at a motion time.
+  /// A plan with its shaper, to be ordered next: it takes over from the motion that was ordered
+  /// last, or begins at rest.
+  motion::PlannedMotion shaped(motion::Profile plan) const;
+
+  /// [microsteps] The planned state of the motor at a motion time: what a plan begins from. With a
+  /// shaper, the motor itself is still on its way there.
   motion::MotionState stateAt(std::int64_t at) const;
 
   Power& power() { return power_; }
@@ -111,6 +117,7 @@ class Motor {
   const MotorLines lines_;
   const bool is_shared_;
   const DriverPins pins_;
+  const std::shared_ptr<const motion::InputShaper> shaper_;
   pulse::ChannelState state_;
   Motions motions_;
   std::uint64_t serial_ = 0;

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "channel.h"
-#include "motion/profile.h"
+#include "motion/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
@@ -15,7 +15,7 @@ namespace stepdriver::pulse {
 struct Follow {
   int channel = 0;
   std::uint64_t serial = 0;
-  const motion::Profile* profile = nullptr;  ///< lives until the channel stops following it
+  motion::ShapedProfile profile;  ///< its data live until the channel stops following it
   /// Serial of the profile that this one was planned to continue, the last one that was ordered;
   /// 0: from rest. If the channel has ended that one, this one is refused.
   std::uint64_t continues = 0;

@@ -9,11 +9,11 @@ namespace stepdriver::pulse {
 
 Nanoseconds EngineChannel::madeUntil() const {
   if (shared != nullptr) return shared->madeUntil();
-  return profile != nullptr ? last_planned : std::numeric_limits<Nanoseconds>::min();
+  return follows() ? last_planned : std::numeric_limits<Nanoseconds>::min();
 }
 
 bool EngineChannel::isRunning() const {
-  return shared != nullptr ? shared->isRunning() : profile != nullptr && running;
+  return shared != nullptr ? shared->isRunning() : follows() && running;
 }
 
 bool EngineChannel::isReserved() const {
@@ -46,7 +46,13 @@ void EngineChannel::adopt(const Successors::Entry& followed) {
   state.following = followed.serial;
   settles = followed.settles && has(&MotorSignals::in_position);
   if (shared == nullptr) {
-    finder = motion::StepFinder(*followed.profile, state.count);
+    if (profile.shaper() == nullptr) {
+      finder = motion::StepFinder(profile.profile(), state.count);
+    } else {
+      parts.begin(profile.startNs());
+      parts.add(1.0, profile);
+      finder = motion::StepFinder(parts, state.count);
+    }
     pullNext();
   }
   // A plan without a step, as for another speed, doesn't begin the wait again.
@@ -58,13 +64,13 @@ void EngineChannel::follow(const Follow& order) {
   restart_interval = order.restart_interval;
   group = order.group;
   slows = order.slows;
-  if (profile == nullptr) {
+  if (!follows()) {
     state.still = order.still;
     squares = order.squares;
     if (order.is_square) square_lags = state.lags;
     const Successors::Entry first{order.profile, order.serial, order.settles};
     shared != nullptr ? shared->begin(*this, first) : adopt(first);
-    last_planned = order.profile->startNs();
+    last_planned = order.profile.startNs();
     late = 0;
     running = false;
   } else {
@@ -73,7 +79,7 @@ void EngineChannel::follow(const Follow& order) {
 }
 
 bool EngineChannel::reserve() {
-  if (profile != nullptr || reserved) return false;
+  if (follows() || reserved) return false;
   if (shared != nullptr && shared->moves()) return false;
   reserved = true;
   faulty = 0;  // it must be read again when the pins have been written
@@ -112,14 +118,14 @@ void EngineChannel::countStep() {
 
 void EngineChannel::endMotion(EndReason reason, Nanoseconds motion_now) {
   // A failure after the end of a motion doesn't change how that motion ended.
-  if (profile != nullptr) {
+  if (follows()) {
     state.end = reason;
     state.end_abrupt = shared != nullptr ? shared->ends_fast : isFast();
     state.ended = latest();
     state.end_time = motion_now;
   }
   state.following = 0;
-  profile = nullptr;
+  profile = {};
   squares = false;
   settling = false;
   successors.clear();

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "motion/profile_sum.h"
+#include "motion/shaped_profile.h"
 #include "motion/step_finder.h"
 #include "pulse/channel.h"
 #include "pulse/command.h"
@@ -22,8 +24,10 @@ struct EngineChannel {
   Action action() const {
     if (high) return Action::kFall;
     if (next) return next->direction == direction ? Action::kRise : Action::kTurn;
-    return profile != nullptr ? Action::kFinish : Action::kNothing;
+    return follows() ? Action::kFinish : Action::kNothing;
   }
+
+  bool follows() const { return static_cast<bool>(profile); }
 
   /// The planned interval between the last step and the next one. @pre There is a next one.
   Nanoseconds interval() const { return next->time_ns - last_planned; }
@@ -34,7 +38,7 @@ struct EngineChannel {
   /// The next step is obsolete: it would come after the first successor has begun.
   bool isSucceeded() const {
     return !successors.empty() && shared == nullptr &&
-           (!next || next->time_ns >= successors.first().profile->startNs());
+           (!next || next->time_ns >= successors.first().profile.startNs());
   }
 
   /// Serial of the profile that the next one must continue; 0: the channel is at rest.
@@ -115,8 +119,8 @@ struct EngineChannel {
   Nanoseconds settling_since = 0;
   Nanoseconds look_at = 0;
 
-  const motion::Profile* profile = nullptr;  // the one that is followed
-  std::uint64_t group = 0;                   // of the last order; 0: no group
+  motion::ShapedProfile profile;  // the one that is followed
+  std::uint64_t group = 0;        // of the last order; 0: no group
   Nanoseconds restart_interval = 0;
   MotorCounts square_lags{};  // ChannelState::lags when it was square
   ChannelState state;
@@ -124,6 +128,7 @@ struct EngineChannel {
   motion::StepFinder finder;
   ChannelConfig config;
   Successors successors;
+  motion::ProfileSum parts;  // of a profile that is shaped
 };
 
 }  // namespace stepdriver::pulse

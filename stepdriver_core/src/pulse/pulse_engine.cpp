@@ -170,7 +170,7 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
 
 bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const Channel& channel = channels_[static_cast<std::size_t>(order.channel)];
-  const Nanoseconds start = order.profile->startNs();
+  const Nanoseconds start = order.profile.startNs();
   const bool late = start < now - state_.slipped || start < channel.madeUntil();
   return !late && !channel.isReserved() && order.continues == channel.latest() &&
          channel.successors.hasRoom(start) && order.faults == channel.state.faults() &&
@@ -198,7 +198,7 @@ void PulseEngine::serveStops() {
   const std::uint64_t asked = stopsAsked();
   if (asked == stopsServed()) return;
   for (const Channel& channel : channels_) {
-    if (channel.high || channel.profile != nullptr) return;
+    if (channel.high || channel.follows()) return;
   }
   stops_.serve(asked);
   news_ = true;
@@ -226,7 +226,7 @@ void PulseEngine::readEmergencyStop() {
 void PulseEngine::stopAll(Nanoseconds now) {
   if (mayRamp(now)) return;
   for (Channel& channel : channels_) {
-    if (channel.profile != nullptr) end(channel, EndReason::kEmergencyStop, now);
+    if (channel.follows()) end(channel, EndReason::kEmergencyStop, now);
   }
 }
 
@@ -236,9 +236,8 @@ bool PulseEngine::isRamping() const {
 }
 
 bool PulseEngine::allSlow() const {
-  return std::all_of(channels_.begin(), channels_.end(), [](const Channel& channel) {
-    return channel.profile == nullptr || channel.slows;
-  });
+  return std::all_of(channels_.begin(), channels_.end(),
+                     [](const Channel& channel) { return !channel.follows() || channel.slows; });
 }
 
 // Begins the ramp of a new stop. Returns whether the motions may decelerate.
@@ -335,8 +334,8 @@ bool PulseEngine::mayStepShared(Channel& motor, Nanoseconds now) {
     }
     if (!motor.next) return false;
     const bool has_switch = axis->config.endstop_min || axis->config.endstop_max;
-    if (axis->profile == nullptr || !has_switch) continue;
-    const double velocity = axis->profile->stateAt(motor.next->time_ns).velocity;
+    if (!axis->follows() || !has_switch) continue;
+    const double velocity = axis->profile.stateAt(motor.next->time_ns).velocity;
     if (velocity != 0.0 && !mayStepTowards(*axis, 0, velocity > 0.0, now)) return false;
   }
   return true;
@@ -627,12 +626,11 @@ void PulseEngine::fail(Channel& channel, const LineFailure& failure, Nanoseconds
 
 void PulseEngine::end(Channel& channel, EndReason reason, Nanoseconds now) {
   if (channel.shared != nullptr) return endShared(channel, reason, now);
-  const bool together =
-      channel.group != 0 && channel.profile != nullptr && reason != EndReason::kDone;
+  const bool together = channel.group != 0 && channel.follows() && reason != EndReason::kDone;
   endOne(channel, reason, now);
   if (!together) return;
   for (Channel& other : channels_) {
-    if (other.profile != nullptr && other.group == channel.group) {
+    if (other.follows() && other.group == channel.group) {
       end(other, EndReason::kCompanion, now);
     }
   }
@@ -650,7 +648,7 @@ void PulseEngine::endShared(Channel& channel, EndReason reason, Nanoseconds now)
   shared.ends_fast = shared.isFast(now - state_.slipped);
   for (Channel* axis : shared.axes()) {
     if (channel.drives) axis->state.end_lateness = channel.state.end_lateness;
-    const bool moved = axis->profile != nullptr;
+    const bool moved = axis->follows();
     if (!moved && axis != &channel) {
       changed(*axis);
       continue;
@@ -658,7 +656,7 @@ void PulseEngine::endShared(Channel& channel, EndReason reason, Nanoseconds now)
     endOne(*axis, axis == &channel || isOfAllAxes(reason) ? reason : EndReason::kCompanion, now);
     if (!moved || axis->group == 0) continue;
     for (Channel& other : channels_) {
-      if (other.profile != nullptr && other.group == axis->group && other.shared != &shared) {
+      if (other.follows() && other.group == axis->group && other.shared != &shared) {
         end(other, EndReason::kCompanion, now);
       }
     }
@@ -746,7 +744,7 @@ bool PulseEngine::schedule(Channel& channel) {
       due = channel.state.pulses != 0 ? channel.rose + channel.config.dir_hold : 0;
       break;
     case Action::kFinish:
-      due = std::max(channel.profile->endNs() + state_.slipped, channel.look_at);
+      due = std::max(channel.profile.endNs() + state_.slipped, channel.look_at);
       break;
   }
   dues_.set(channel.index, due);

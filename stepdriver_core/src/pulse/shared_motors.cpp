@@ -52,13 +52,12 @@ SharedMotors::SharedMotors(const SharedAxes& shared, std::vector<EngineChannel*>
 
 bool SharedMotors::moves() const {
   return std::any_of(axes_.begin(), axes_.end(),
-                     [](const EngineChannel* axis) { return axis->profile != nullptr; });
+                     [](const EngineChannel* axis) { return axis->follows(); });
 }
 
 bool SharedMotors::isRunning() const {
-  return std::any_of(axes_.begin(), axes_.end(), [](const EngineChannel* axis) {
-    return axis->profile != nullptr && axis->running;
-  });
+  return std::any_of(axes_.begin(), axes_.end(),
+                     [](const EngineChannel* axis) { return axis->follows() && axis->running; });
 }
 
 bool SharedMotors::isReserved() const {
@@ -71,8 +70,8 @@ bool SharedMotors::isFast(Nanoseconds motion_now) const {
   Nanoseconds restart = 0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     restart = std::max(restart, axes_[i]->restart_interval);
-    if (axes_[i]->profile == nullptr) continue;
-    velocities.at(i) = axes_[i]->profile->stateAt(motion_now).velocity;
+    if (!axes_[i]->follows()) continue;
+    velocities.at(i) = axes_[i]->profile.stateAt(motion_now).velocity;
   }
   return std::any_of(matrix_.begin(), matrix_.end(), [&](const std::vector<double>& row) {
     double speed = 0.0;
@@ -103,8 +102,8 @@ void SharedMotors::seed() {
     sum.begin(std::max(motor.last_planned, since_));
     for (std::size_t k = 0; k < axes_.size(); ++k) {
       const EngineChannel& axis = *axes_[k];
-      if (axis.profile != nullptr) {
-        sum.add(matrix_[i][k], *axis.profile);
+      if (axis.follows()) {
+        sum.add(matrix_[i][k], axis.profile);
       } else {
         sum.add(matrix_[i][k], motion::DoubleDouble(axis.state.rests_at));
       }
@@ -118,7 +117,7 @@ void SharedMotors::begin(EngineChannel& axis, const Successors::Entry& followed)
   const bool moved = moves();
   axis.adopt(followed);
   if (!moved) {
-    since_ = followed.profile->startNs();
+    since_ = followed.profile.startNs();
     for (EngineChannel* motor : motors_) {
       motor->last_planned = since_;
       motor->late = 0;
@@ -131,7 +130,7 @@ std::optional<Nanoseconds> SharedMotors::nextTakeOver() const {
   std::optional<Nanoseconds> first;
   for (const EngineChannel* axis : axes_) {
     if (axis->successors.empty()) continue;
-    const Nanoseconds start = axis->successors.first().profile->startNs();
+    const Nanoseconds start = axis->successors.first().profile.startNs();
     first = std::min(first.value_or(start), start);
   }
   return first;
@@ -145,13 +144,13 @@ bool SharedMotors::isBefore(Nanoseconds time) const {
 }
 
 std::optional<Nanoseconds> SharedMotors::dueOf(const EngineChannel& axis) const {
-  if (axis.profile == nullptr) return std::nullopt;
+  if (!axis.follows()) return std::nullopt;
   if (!axis.successors.empty()) {
-    const Nanoseconds start = axis.successors.first().profile->startNs();
+    const Nanoseconds start = axis.successors.first().profile.startNs();
     return start == *nextTakeOver() && isBefore(start) ? std::optional<Nanoseconds>(start)
                                                        : std::nullopt;
   }
-  const Nanoseconds end = axis.profile->endNs();
+  const Nanoseconds end = axis.profile.endNs();
   if (nextTakeOver().value_or(end + 1) <= end) return std::nullopt;
   // A last step may be at the end itself; and the last pulses must be over.
   const bool pulses = std::any_of(motors_.begin(), motors_.end(),
@@ -160,14 +159,14 @@ std::optional<Nanoseconds> SharedMotors::dueOf(const EngineChannel& axis) const 
 }
 
 void SharedMotors::takeOver(EngineChannel& axis) {
-  since_ = std::max(since_, axis.successors.first().profile->startNs());
+  since_ = std::max(since_, axis.successors.first().profile.startNs());
   axis.adopt(axis.successors.takeFirst());
   seed();
 }
 
 void SharedMotors::finish(EngineChannel& axis) {
-  since_ = std::max(since_, axis.profile->endNs());
-  axis.state.rests_at = axis.profile->endPosition().value();
+  since_ = std::max(since_, axis.profile.endNs());
+  axis.state.rests_at = axis.profile.endPosition().value();
   for (motion::ProfileSum& sum : sums_) sum.rest(numberOf(axis));
 }
 
@@ -204,7 +203,7 @@ void SharedMotors::stepped(const EngineChannel& motor) {
     const double place = placeOf(i);
     state.count = std::llround(place);
     state.between = place - static_cast<double>(state.count);
-    axis.running = axis.profile != nullptr;
+    axis.running = axis.follows();
     if (motors_[i] == &motor) {
       state.own = motor.state.count;
       state.pulses = motor.state.pulses;

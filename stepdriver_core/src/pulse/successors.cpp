@@ -5,7 +5,7 @@
 namespace stepdriver::pulse {
 
 void Successors::add(const Entry& entry) {
-  while (size_ > 0 && last().profile->startNs() >= entry.profile->startNs()) --size_;
+  while (size_ > 0 && last().profile.startNs() >= entry.profile.startNs()) --size_;
   entries_[size_++] = entry;
 }
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "motion/profile.h"
+#include "motion/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
@@ -14,7 +14,7 @@ namespace stepdriver::pulse {
 class Successors {
  public:
   struct Entry {
-    const motion::Profile* profile = nullptr;
+    motion::ShapedProfile profile;
     std::uint64_t serial = 0;
     bool settles = false;
   };
@@ -26,7 +26,7 @@ class Successors {
   /// Whether there is room for a profile that begins at this time: those that would begin at or
   /// after it are dropped.
   bool hasRoom(Nanoseconds start) const {
-    return size_ < kCapacity || last().profile->startNs() >= start;
+    return size_ < kCapacity || last().profile.startNs() >= start;
   }
 
   /// @pre hasRoom() for it.

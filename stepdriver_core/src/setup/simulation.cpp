@@ -110,6 +110,9 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
                                 axis.brake->engage_ns};
   }
   spec.load_falls = simulated.load_falls;
+  if (simulated.spring_hz > 0.0) {
+    spec.spring = sim::SpringSpec{simulated.spring_hz, simulated.spring_damping};
+  }
   const SwitchPlaces places = switchPlaces(axis, simulated);
   spec.min_switch = switchOf(axis.endstop_min, simulated, places.min);
   spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);

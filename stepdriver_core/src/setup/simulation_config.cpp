@@ -16,6 +16,8 @@ constexpr int kMostBounces = 1000;
 constexpr double kLongestBounceMs = 1000.0;
 constexpr double kLongestSettlingMs = 60'000.0;
 constexpr double kLongestFaultMs = 3.6e6;
+constexpr double kHighestHz = 1000.0;
+constexpr double kMostDamping = 0.9;
 constexpr int kMostWrites = std::numeric_limits<int>::max();
 
 /// Reads the rig of one axis, or of one of its motors.
@@ -39,6 +41,9 @@ class SimulatedAxisReader {
         reader_.number("settling_ms", Range{0.0, kLongestSettlingMs}, axis.settling_ms);
     axis.faults.never_in_position = reader_.boolean("never_in_position", false);
     axis.load_falls = speed("load_falls").value_or(axis.load_falls);
+    axis.spring_hz = reader_.number("spring_hz", Range{0.0, kHighestHz}, axis.spring_hz);
+    axis.spring_damping =
+        reader_.number("spring_damping", Range{0.0, kMostDamping}, axis.spring_damping);
     readWiring(axis.wiring);
     axis.faults.min_stuck = stuck("min_stuck");
     axis.faults.max_stuck = stuck("max_stuck");

@@ -56,6 +56,7 @@ RigAxis::RigAxis(const RigAxisSpec& spec)
       in_position_(madeContact(spec_.in_position_line,
                                spec_.chip.in_position_active.value_or(false), true)) {
   if (spec_.brake) brake_.emplace(*spec_.brake);
+  if (spec_.spring) mass_.emplace(spec_.spring->frequency, spec_.spring->damping, spec_.start);
   settle(kForEver);
 }
 
@@ -183,8 +184,16 @@ double RigAxis::carriage() const {
 }
 
 void RigAxis::moveSwitches(std::int64_t time_ns) {
-  if (drives_.empty()) return moveOwnSwitches(time_ns);
+  if (drives_.empty()) {
+    pullMass(time_ns);
+    return moveOwnSwitches(time_ns);
+  }
+  for (const Drive& drive : drives_) drive.axis->pullMass(time_ns);
   for (const Drive& drive : drives_) drive.axis->moveOwnSwitches(time_ns);
+}
+
+void RigAxis::pullMass(std::int64_t time_ns) {
+  if (mass_) mass_->moveTo(carriage(), time_ns);
 }
 
 void RigAxis::moveOwnSwitches(std::int64_t time_ns) {
@@ -259,6 +268,7 @@ RigAxisReport RigAxis::report(std::int64_t time_ns) const {
   const double falling = fallUntil(time_ns);
   report.fell = fell_ + falling;
   report.carriage = carriage() - falling;
+  if (mass_) report.ringing = mass_->ringing(time_ns);
   report.microsteps = chip_.microsteps();
   report.energized = energized_ || (powers_up_ && isEnergizedAt(time_ns));
   report.min_pressed = min_switch_ && min_switch_->active(time_ns);

@@ -8,6 +8,7 @@
 
 #include "brake_model.h"
 #include "chip_model.h"
+#include "spring_mass.h"
 #include "stepdriver_core/sim/rig.h"
 #include "switch_model.h"
 
@@ -73,6 +74,7 @@ class RigAxis {
   void meetPower(std::int64_t time_ns);
   void fall(std::int64_t time_ns);
   void moveSwitches(std::int64_t time_ns);
+  void pullMass(std::int64_t time_ns);
 
   const RigAxisSpec spec_;
   ChipModel chip_;
@@ -91,6 +93,7 @@ class RigAxis {
   std::optional<SwitchModel> fault_;
   std::optional<SwitchModel> in_position_;
   std::optional<BrakeModel> brake_;
+  std::optional<SpringMass> mass_;
   std::vector<Drive> drives_;  // empty: its own motor alone
   // [mm|deg] Of a coupled axis: how far outwards it may get, by side.
   std::array<double, 2> farthest_{};

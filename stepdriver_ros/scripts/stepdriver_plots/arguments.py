@@ -51,3 +51,10 @@ def not_negative(text):
     if value < 0.0:
         raise argparse.ArgumentTypeError(f"{text}: must be 0 or more")
     return value
+
+
+def damping_ratio(text):
+    value = not_negative(text)
+    if value > 0.9:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 0 to 0.9")
+    return value

@@ -20,6 +20,7 @@ class DriverNode:
         self.name = rospy.resolve_name(name)
         self._proxies = {}
         self._path_action = None
+        self._trajectory_action = None
 
     def call(self, service, kind, **fields):
         """Calls a service below the node's name. Raises NodeError if the call fails or is refused."""
@@ -46,6 +47,18 @@ class DriverNode:
             self._path_action = PathAction(f"{self.name}/follow_path")
         return self._path_action.follow(tell, **fields)
 
+    @staticmethod
+    def join(name):
+        """Makes this program a node, which topics need."""
+        rospy.init_node(name, anonymous=True, disable_signals=True)
+
+    def follow_trajectory(self, joint, points):
+        """Moves a joint along points (time [s], position, velocity) until its end, from time 0 on. Raises
+        NodeError if the trajectory is refused, or if something else ends it."""
+        if self._trajectory_action is None:
+            self._trajectory_action = TrajectoryAction(f"{self.name}/follow_joint_trajectory")
+        self._trajectory_action.follow(joint, points)
+
     def param(self, key, default=None):
         return rospy.get_param(f"{self.name}/{key}", default)
 
@@ -64,17 +77,15 @@ class DriverNode:
                         "name of the node, and is it running?")
 
 
-class PathAction:
-    """A client of the action follow_path, through its topics."""
+class Action:
+    """A client of an action, through its topics."""
 
-    def __init__(self, name):
-        from stepdriver.msg import FollowPathActionFeedback, FollowPathActionGoal, FollowPathActionResult
-        self._name = name
-        self._id, self._result, self._progress = "", None, 0.0
-        self._goals = rospy.Publisher(f"{name}/goal", FollowPathActionGoal, queue_size=1)
-        self._subscribers = [
-            rospy.Subscriber(f"{name}/result", FollowPathActionResult, self._end),
-            rospy.Subscriber(f"{name}/feedback", FollowPathActionFeedback, self._see)]
+    def __init__(self, name, goal, result, feedback):
+        self._name, self._goal = name, goal
+        self._id, self._result, self._feedback = "", None, None
+        self._goals = rospy.Publisher(f"{name}/goal", goal, queue_size=1)
+        self._subscribers = [rospy.Subscriber(f"{name}/result", result, self._end),
+                             rospy.Subscriber(f"{name}/feedback", feedback, self._see)]
         peers = [self._goals.get_num_connections] + [
             subscriber.get_num_connections for subscriber in self._subscribers]
         latest = time.monotonic() + CONNECT
@@ -89,23 +100,96 @@ class PathAction:
 
     def _see(self, message):
         if message.status.goal_id.id == self._id:
-            self._progress = message.feedback.progress
+            self._feedback = message.feedback
 
-    def follow(self, tell, **fields):
-        from stepdriver.msg import FollowPathActionGoal, FollowPathResult
-        goal = FollowPathActionGoal()
+    def run(self, fields, look=lambda feedback: None):
+        """Sends a goal, and returns its result. look: is called with the last feedback from time to time."""
+        goal = self._goal()
         for name, value in fields.items():
             setattr(goal.goal, name, value)
         goal.header.stamp = rospy.Time.now()
-        self._result, self._progress = None, 0.0
+        self._result, self._feedback = None, None
         self._id = goal.goal_id.id = f"{rospy.get_name()}-{time.monotonic_ns()}"
         self._goals.publish(goal)
         while self._result is None:
             if rospy.is_shutdown() or not self._goals.get_num_connections():
                 raise NodeError(f"{self._name}: the node is gone")
             time.sleep(PAUSE)
-            tell(self._progress)
-        if self._result.end != FollowPathResult.REACHED:
-            raise NodeError(f"{self._name}: {self._result.message}")
+            if self._feedback is not None:
+                look(self._feedback)
+        return self._result
+
+
+class PathAction:
+    """A client of the action follow_path."""
+
+    def __init__(self, name):
+        from stepdriver.msg import FollowPathActionFeedback, FollowPathActionGoal, FollowPathActionResult
+        self._name = name
+        self._action = Action(name, FollowPathActionGoal, FollowPathActionResult,
+                              FollowPathActionFeedback)
+
+    def follow(self, tell, **fields):
+        from stepdriver.msg import FollowPathResult
+        result = self._action.run(fields, lambda feedback: tell(feedback.progress))
+        if result.end != FollowPathResult.REACHED:
+            raise NodeError(f"{self._name}: {result.message}")
         tell(1.0)
-        return self._result.position
+        return result.position
+
+
+class TrajectoryAction:
+    """A client of the action follow_joint_trajectory."""
+
+    def __init__(self, name):
+        try:
+            import control_msgs.msg as messages
+        except ImportError:  # the node has its own messages then, which are the same
+            import stepdriver.msg as messages
+        self._name = name
+        self._action = Action(name, messages.FollowJointTrajectoryActionGoal,
+                              messages.FollowJointTrajectoryActionResult,
+                              messages.FollowJointTrajectoryActionFeedback)
+
+    def follow(self, joint, points):
+        from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+        trajectory = JointTrajectory(joint_names=[joint])
+        for at, position, velocity in points:
+            point = JointTrajectoryPoint(positions=[position], velocities=[velocity])
+            point.time_from_start = rospy.Duration.from_sec(at)
+            trajectory.points.append(point)
+        result = self._action.run({"trajectory": trajectory})
+        if result.error_code != 0:
+            raise NodeError(f"{self._name}: {result.error_string}")
+
+
+class Accelerometer:
+    """The samples of a sensor_msgs/Imu in one direction."""
+
+    def __init__(self, topic, direction):
+        from sensor_msgs.msg import Imu
+        self.topic = rospy.resolve_name(topic)
+        self._direction = direction
+        self._samples = []
+        self._subscriber = rospy.Subscriber(topic, Imu, self._take, queue_size=1000)
+        latest = time.monotonic() + CONNECT
+        while not self._samples:
+            if time.monotonic() > latest:
+                raise NodeError(f"{self.topic}: no sensor_msgs/Imu has come in {CONNECT:g} s")
+            time.sleep(PAUSE)
+
+    def _take(self, message):
+        self._samples.append((message.header.stamp.to_sec(),
+                              getattr(message.linear_acceleration, self._direction)))
+
+    @staticmethod
+    def now():
+        """[s] in the time of the samples' stamps."""
+        return rospy.Time.now().to_sec()
+
+    def between(self, begin, end):
+        """Times and accelerations. Forgets them, and all before."""
+        samples = self._samples
+        self._samples = [sample for sample in samples if sample[0] > end]
+        wanted = [sample for sample in samples if begin <= sample[0] <= end]
+        return [time for time, _ in wanted], [value for _, value in wanted]

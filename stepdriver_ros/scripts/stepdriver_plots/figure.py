@@ -37,11 +37,16 @@ def save(figure, path):
     plt.close(figure)
 
 
-def draw_motion(curves, path, title=""):
+def draw_motion(curves, path, title="", deflections=()):
     """Draws one or more axes with the same unit: velocity and step period over position; position,
-    velocity, acceleration and jerk over time."""
+    velocity, acceleration and jerk over time. deflections: (label, times, values) of masses that they pull
+    along by springs."""
     unit = curves[0].unit
-    figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2))
+    if deflections:
+        figure, panels = plt.subplots(4, 2, figsize=(9.6, 9.6))
+        draw_deflections(figure, panels[3], deflections, unit)
+    else:
+        figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2))
     for curve, colour in zip(curves, COLOURS * len(curves)):
         coarse = curve.coarse(SAMPLES)
         for panel, (xs, ys) in (
@@ -70,6 +75,35 @@ def draw_motion(curves, path, title=""):
         panels[0, 0].legend(loc="best", frameon=False)
     figure.suptitle(title)
     save(figure, path)
+
+
+def draw_spectrum(frequencies, responses, shapers, path, axis):
+    """What an accelerometer shows of the oscillations of an axis. shapers: (name, frequency, the part that
+    it leaves at each of the frequencies)."""
+    figure, panel = plt.subplots(figsize=(6.4, 3.2))
+    panel.plot(frequencies, responses, ".-", color=COLOURS[0], label="measured")
+    for (name, frequency, left), colour in zip(shapers, COLOURS[1:]):
+        panel.plot(frequencies, [part * response for part, response in zip(left, responses)],
+                   color=colour, label=f"with {name} for {frequency:.1f} Hz")
+        panel.axvline(frequency, color=colour, linewidth=0.8, linestyle=":")
+    panel.set_ylim(bottom=0.0)
+    panel.set_xlabel("frequency [Hz]")
+    panel.set_ylabel(f"acceleration,\nover that of {axis}")
+    panel.legend(loc="best", frameon=False)
+    save(figure, path)
+
+
+def draw_deflections(figure, row, deflections, unit):
+    """In place of the panels of a row."""
+    grid = row[0].get_gridspec()
+    for panel in row:
+        panel.remove()
+    panel = figure.add_subplot(grid[3, :])
+    for (label, times, values), colour in zip(deflections, COLOURS * len(deflections)):
+        panel.plot(times, values, color=colour, label=label)
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel(f"deflection [{unit}]")
+    panel.legend(loc="best", frameon=False)
 
 
 def say_in(panel, text):

@@ -4,6 +4,7 @@ from collections import namedtuple
 
 Piece = namedtuple("Piece", "duration position velocity acceleration jerk")
 SAMPLES = 200  # for each piece
+SAME = 1e-12  # [s] a piece that isn't longer is only a rounding error
 
 
 class PlanCurve:
@@ -26,6 +27,32 @@ class PlanCurve:
                         piece.acceleration * factor, piece.jerk * factor) for piece in self.pieces]
         step = None if self.step is None else self.step * factor
         return PlanCurve(pieces, self.label, unit, step)
+
+    def shaped(self, parts, delays, label=""):
+        """The sum of parts of this move, each later by its delay [s], as an input shaper makes it."""
+        ends = sorted(start + delay for start in self.starts for delay in delays)
+        pieces = []
+        for begin, end in zip(ends, ends[1:]):
+            if end - begin < SAME:
+                continue
+            state = [0.0] * 4
+            for part, delay in zip(parts, delays):
+                value = self._from(begin - delay, (begin + end) / 2 - delay)
+                state = [total + part * own for total, own in zip(state, value)]
+            pieces.append(Piece(end - begin, *state))
+        return PlanCurve(pieces, label, self.unit, self.step)
+
+    def _from(self, time, within):
+        """Position, velocity, acceleration and jerk at a time, as they are in the piece of another time."""
+        if within < 0.0 or not self.pieces:
+            return (self.pieces[0].position if self.pieces else 0.0), 0.0, 0.0, 0.0
+        for start, piece in zip(self.starts, self.pieces):
+            if within < start + piece.duration:
+                t = time - start
+                return (place(piece, t), speed(piece, t), piece.acceleration + piece.jerk * t,
+                        piece.jerk)
+        last = self.pieces[-1]
+        return place(last, last.duration), 0.0, 0.0, 0.0
 
     @property
     def has_jerk_limit(self):

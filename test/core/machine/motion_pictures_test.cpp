@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/spring_mass.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
@@ -243,6 +244,31 @@ TEST_F(MotionPictures, TrajectoryWithHold) {
   EXPECT_EQ(bench->pulses("x"), 800);
   EXPECT_EQ(bench->pulses("y"), 0);
   trace->keep("trajectory_hold");
+}
+
+TEST_F(MotionPictures, InputShaper) {
+  constexpr double kFrequency = 8.0;
+  std::vector<config::AxisConfig> axes{config("x"), config("y")};
+  for (config::AxisConfig& axis : axes) axis.acceleration = axis.deceleration = 20.0;
+  axes[1].input_shaper = {{config::ShaperType::kZv, kFrequency, 0.0}};
+  build(axes);
+  const axis::Move as_planned = x().moveTo(0.4);
+  const axis::Move shaped = bench->axis("y").moveTo(0.4);
+  EXPECT_NEAR(as_planned.duration, 0.45, 1e-9);
+  EXPECT_NEAR(shaped.duration, 0.45 + 0.5 / kFrequency, 1e-9);
+  awaitRest();
+  const auto ringing = [this](const std::string& name) {
+    sim::SpringMass mass(kFrequency, 0.0, 0.0);
+    for (const MotionTrace::Step& step : trace->steps(name)) {
+      mass.moveTo(static_cast<double>(step.count), std::llround(step.time * 1e9));
+    }
+    return mass.ringing(1'000'000'000);
+  };
+  // The first jump of the acceleration alone makes 20,000/(2 pi 8)^2 steps, and is followed by
+  // another one 50 ms later.
+  EXPECT_GT(ringing("x"), 15.0);
+  EXPECT_LT(ringing("y"), 1.0);
+  trace->keep("input_shaper");
 }
 
 }  // namespace

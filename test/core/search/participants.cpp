@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cmath>
 
+#include "motor/input_shaping.h"
 #include "stepdriver_core/error.h"
 #include "support/corexy_bench.h"
 #include "support/gantry_bench.h"
@@ -39,6 +40,8 @@ constexpr double kRacked = 1.5;
 
 /// In this variant x and y share their motors, as on a CoreXY.
 constexpr int kSharing = 3;
+/// In this one the motions of x and z are shaped, and those of y aren't.
+constexpr int kShaped = 4;
 
 std::vector<config::AxisConfig> configsOf(int variant) {
   std::vector<config::AxisConfig> configs;
@@ -79,6 +82,10 @@ std::vector<config::AxisConfig> configsOf(int variant) {
     test::share(sharing, {{1.0, 1.0}, {1.0, -1.0}});
     for (std::size_t i = 0; i < sharing.size(); ++i) configs[i].kinematics = sharing[i].kinematics;
   }
+  if (variant == kShaped) {
+    configs[0].input_shaper = {{config::ShaperType::kZv, 30.0, 0.1}};
+    configs[2].input_shaper = {{config::ShaperType::kEi, 40.0, 0.05}};
+  }
   if (variant == 2) {
     add_brake(configs[2]);
     config::MotorConfig right = test::motorNamed("right");
@@ -94,6 +101,7 @@ std::vector<config::AxisConfig> configsOf(int variant) {
 machine::EmergencyDisable emergencyDisableOf(int variant) {
   switch (variant) {
     case 1:
+    case kShaped:
       return machine::EmergencyDisable::kRamp;
     case 2:
       return machine::EmergencyDisable::kOff;
@@ -139,7 +147,7 @@ std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs)
   return names;
 }
 
-/// For each axis, the longest deceleration, and 10 %.
+/// For each axis, the longest deceleration and 10 %, and the time of its shaper.
 std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
                                                 const Schedule& schedule) {
   const bool late =
@@ -151,7 +159,8 @@ std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisCo
     const double deceleration = config.stop_deceleration.value_or(config.deceleration);
     double time = config.max_speed / deceleration;
     if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
-    slowing[axis] = std::llround(1.1 * time * 1e9) + (late ? kLongestLead : kLead);
+    time = 1.1 * time + motor::shapingTimeOf(config);
+    slowing[axis] = std::llround(time * 1e9) + (late ? kLongestLead : kLead);
   }
   return slowing;
 }
@@ -658,11 +667,11 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
     motor = count;
   };
   constexpr pulse::Nanoseconds kStep = 1'000'000;
-  for (auto time = clock_.now() - engine_->state().slipped; time < last.profile->endNs();
-       time += kStep) {
-    move_to(last.profile->stateAt(time).position);
+  const motion::ShapedProfile made = last.planned.made();
+  for (auto time = clock_.now() - engine_->state().slipped; time < made.endNs(); time += kStep) {
+    move_to(made.stateAt(time).position);
   }
-  move_to(last.profile->endPosition());
+  move_to(made.endPosition());
   return now.origin + static_cast<double>(motor - slack) / now.steps_per_unit;
 }
 

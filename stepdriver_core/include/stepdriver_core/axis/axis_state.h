@@ -155,12 +155,21 @@ struct MovePiece {
   double jerk = 0.0;          ///< [unit/s^3] all through it
 };
 
+/// A part of a motion that an input shaper makes later.
+struct MotionPart {
+  double part = 1.0;   ///< of the whole
+  double delay = 0.0;  ///< [s]
+};
+
 /// What a move would be, piece after piece. Positions are those of the motor: with a backlash they
 /// differ from the joint's by the part that is taken up.
 struct MovePlan {
   Move move;                      ///< its id is 0
   double steps_per_unit = 0.0;    ///< [microsteps/unit] in the present microstep mode
-  std::vector<MovePiece> pieces;  ///< empty if nothing would move
+  std::vector<MovePiece> pieces;  ///< as planned; empty if nothing would move
+  /// The axis moves by the sum of these parts of the pieces, and of the motion before; empty if
+  /// motions aren't shaped.
+  std::vector<MotionPart> parts;
 };
 
 /// What a trajectory wants of its axes at one time; one number for each axis, in their units.

@@ -136,6 +136,16 @@ struct MotorConfig {
   double offset = 0.0;
 };
 
+/// How the motions of an axis are shaped, see motion::InputShaper.
+enum class ShaperType { kZv, kMzv, kEi, kTwoHumpEi };
+
+/// What shapes its motions, so that one oscillation of the machine comes to rest with them.
+struct ShaperConfig {
+  ShaperType type = ShaperType::kMzv;
+  double frequency = 0.0;  ///< [Hz] above 0
+  double damping = 0.1;    ///< its damping ratio: from 0 to below 1
+};
+
 /// The complete configuration of an axis, checked by readAxes(). A unit is m on a linear axis, rad
 /// on a rotary one; a step is a microstep of the configured mode.
 ///
@@ -160,7 +170,10 @@ struct AxisConfig : MotorConfig {
   double deceleration = 0.0;  ///< [unit/s^2]
   /// [unit/s^2] Of a stop; at least the deceleration, which is also the default.
   std::optional<double> stop_deceleration;
-  double jerk = 0.0;      ///< [unit/s^3] 0: the acceleration may jump
+  double jerk = 0.0;  ///< [unit/s^3] 0: the acceleration may jump
+  /// One for each oscillation; empty: motions are made as they are planned. There are none with a
+  /// start speed or a backlash.
+  std::vector<ShaperConfig> input_shaper;
   double backlash = 0.0;  ///< [unit] travel that a reversal loses; the motor makes it up
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;

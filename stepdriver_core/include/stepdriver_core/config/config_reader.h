@@ -157,6 +157,9 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     acceleration_mm_s2: 500.0
 ///     deceleration_mm_s2: 500.0 # default: the acceleration
 ///     backlash_mm: 0.0          # travel that a reversal loses; default: 0
+///     input_shaper:             # or a list of such maps; default: motions aren't shaped
+///       {type: mzv, frequency: 42.0, damping: 0.1}  # zv, mzv, ei or 2hump_ei; frequency: [Hz],
+///                                                   # or a list
 ///     min_position_mm: 0.0      # default: no limit
 ///     max_position_mm: 200.0
 ///     endstops:                 # both optional

@@ -53,6 +53,13 @@ struct MotorPowerSpec {
   bool feedback_active = false;  ///< its level while the power is there
 };
 
+/// A mass that a carriage pulls along by a spring, like the frame or the tool of a machine. It
+/// moves nothing else.
+struct SpringSpec {
+  double frequency = 0.0;  ///< [Hz] of its oscillation without damping; above 0
+  double damping = 0.0;    ///< damping ratio, from 0 to below 1
+};
+
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
@@ -71,6 +78,7 @@ struct RigAxisSpec {
   std::optional<BrakeSpec> brake;
   /// [mm/s|deg/s] how fast the load sinks towards min while neither the motor nor a brake holds it
   double load_falls = 0.0;
+  std::optional<SpringSpec> spring;
 };
 
 /// Axes whose motors together move their carriages, as on a CoreXY. A turn of the n-th axis's motor
@@ -120,8 +128,11 @@ struct RigAxisReport {
   double carriage = 0.0;        ///< [mm|deg]
   int microsteps = 1;           ///< the mode at the last STEP edge
   double fell = 0.0;            ///< [mm|deg] how far the load has sunk, in total
-  bool energized = false;       ///< current flows: enabled, awake, not in RESET, and with power
-  bool min_pressed = false;     ///< the reading of its line at the rig's latest time
+  /// [mm|deg] The amplitude with which the mass on the spring would ring on if the carriage stayed
+  /// here and nothing damped it; 0 without a spring.
+  double ringing = 0.0;
+  bool energized = false;    ///< current flows: enabled, awake, not in RESET, and with power
+  bool min_pressed = false;  ///< the reading of its line at the rig's latest time
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
 

@@ -96,6 +96,14 @@ bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
       shown.acceleration = piece.acceleration;
       shown.jerk = piece.jerk;
     }
+    for (const axis::MotionPart& part : planned.parts) {
+      response.shaper_parts.push_back(part.part);
+      response.shaper_delays.push_back(part.delay);
+    }
+    for (const config::ShaperConfig& shaper : axis_.config().input_shaper) {
+      response.ringing_frequencies.push_back(shaper.frequency);
+      response.ringing_dampings.push_back(shaper.damping);
+    }
   });
 }
 

@@ -80,6 +80,7 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
       response.carriage.push_back(report.carriage / config::configUnitsPerUnit(axis.kind));
       response.skew.push_back((report.carriage - first) / config::configUnitsPerUnit(axis.kind));
       response.fell.push_back(report.fell / config::configUnitsPerUnit(axis.kind));
+      response.ringing.push_back(report.ringing / config::configUnitsPerUnit(axis.kind));
       response.microsteps.push_back(report.microsteps);
       response.violations.push_back(report.totalViolations());
       response.violation_kinds.push_back(kindsText(report));

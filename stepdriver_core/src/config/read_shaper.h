@@ -1,0 +1,15 @@
+#pragma once
+
+#include <optional>
+
+#include "stepdriver_core/config/config_reader.h"
+
+namespace stepdriver::config {
+
+/// Reads `input_shaper`.
+///
+/// @param kind of the axis; empty: unknown, which has been reported.
+/// @param config the start speed and the backlash, for checking that there are none.
+void readShaper(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config);
+
+}  // namespace stepdriver::config
