@@ -83,6 +83,7 @@ const std::string kAxisMap = R"(
     brake: {pin: Brake, release_ms: 60.0, engage_ms: 30.0}
     homing: {switch: min, seek_speed_mm_s: 1.0, latch_speed_mm_s: 0.1, pull_off_mm: 1.0, max_travel_mm: 9.0}
     timing: {}
+    input_shaper: {type: zv, frequency: 42.0}
 )";
 
 Node driver(bool rotary) {

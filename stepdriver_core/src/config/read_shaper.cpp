@@ -80,12 +80,11 @@ class ShaperReader {
 
   std::vector<double> readFrequencies(ConfigReader& reader) {
     const auto* list = reader.value("frequency").as<ConfigValue::List>();
-    if (list == nullptr) {
+    if (list == nullptr || list->empty()) {
       const auto one = reader.findNumber("frequency", kFrequencies, Presence::kRequired);
       return one ? std::vector<double>{*one} : std::vector<double>{};
     }
     reader.allow("frequency");
-    if (list->empty()) reader.issue("frequency", "is empty, but must have at least one number");
     std::vector<double> frequencies;
     for (const ConfigValue& value : *list) {
       const int* integer = value.as<int>();

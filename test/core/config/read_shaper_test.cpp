@@ -53,8 +53,7 @@ TEST(ReadShaper, RefusesWhatIsNoShaper) {
                       {"input_shaper/frequency", "42 Hz",
                        "is \"42 Hz\" (a string), but must be a number from 0.5 to 1000"},
                       {"input_shaper/frequency", ConfigValue::List{},
-                       "is empty, but must have at least one "
-                       "number"},
+                       "is a list of 0, but must be a number from 0.5 to 1000"},
                       {"input_shaper/frequency", ConfigValue::List{42.0, 0.1},
                        "has 0.1, but must have numbers from 0.5 to 1000 only"},
                       {"input_shaper/frequency", ConfigValue::List{42.0, true},
