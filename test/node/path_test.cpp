@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <std_srvs/Trigger.h>
+#include <stepdriver/AppendPath.h>
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/FollowPathAction.h>
 #include <stepdriver/PathSegment.h>
@@ -57,6 +58,15 @@ class PathTest : public testing::Test {
     request.wait = true;
     if (change) change(request);
     return node.call<FollowPath>("follow_path", request);
+  }
+
+  AppendPath::Response append(std::uint64_t path, const std::vector<PathSegment>& segments,
+                              bool more_follows) {
+    AppendPath::Request request;
+    request.path = path;
+    request.segments = segments;
+    request.more_follows = more_follows;
+    return node.call<AppendPath>("append_path", request);
   }
 
   void expectNoViolation() {
@@ -188,6 +198,57 @@ TEST_F(PathTest, MovesNothingIfItIsRefused) {
   EXPECT_EQ(node.pulses(), 0);
 }
 
+TEST_F(PathTest, IsFedWhileItIsFollowed) {
+  node.set("simulation/speed", 2.0);
+  node.start();
+  const auto begun = follow({kSquare[0]}, [](auto& request) {
+    request.tolerance = 0.0005;
+    request.more_follows = true;
+    request.wait = false;
+  });
+  ASSERT_TRUE(begun.success) << begun.message;
+  ASSERT_NE(begun.path, 0U);
+  for (std::size_t i = 1; i < 8; ++i) {
+    const auto answer = append(begun.path, {kSquare[i % 4]}, i < 7);
+    ASSERT_TRUE(answer.success) << answer.message;
+    EXPECT_GE(answer.segments_ahead, 1U);
+    EXPECT_GT(answer.time_ahead, 0.0);
+    EXPECT_EQ(answer.target, kSquare[i % 4].end);
+    expectSays(answer.message, i < 7 ? "lie ahead" : "to the end of the path");
+  }
+  const auto more = append(begun.path, {kSquare[0]}, true);
+  EXPECT_FALSE(more.success);
+  expectSays(more.message, "the path is complete");
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() >= 4 * 3200; }));
+  ASSERT_TRUE(waitUntil([&] { return !append(begun.path, {}, true).success; })) << "it has no end";
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{3200, 3200}));
+  EXPECT_EQ(report.pulses_backward, (std::vector<std::int64_t>{3200, 3200}));
+  expectNoViolation();
+}
+
+TEST_F(PathTest, RefusesABadAppendAndContinues) {
+  node.set("simulation/speed", 1.0);
+  node.start();
+  const auto waits = follow(kSquare, [](auto& request) { request.more_follows = true; });
+  EXPECT_FALSE(waits.success);
+  expectSays(waits.message, "wait must be false if more_follows");
+  const auto begun = follow({kSquare[0]}, [](auto& request) {
+    request.more_follows = true;
+    request.wait = false;
+  });
+  ASSERT_TRUE(begun.success) << begun.message;
+  const auto far = append(begun.path, {kSquare[1], line({5.0, 0.0})}, true);
+  EXPECT_FALSE(far.success);
+  expectSays(far.message, "x: segment 1 of the path leads to 5 m");
+  const auto other = append(begun.path + 1000, {kSquare[1]}, true);
+  EXPECT_FALSE(other.success);
+  expectSays(other.message, "doesn't continue: it has ended");
+  EXPECT_TRUE(append(begun.path, {kSquare[1]}, false).success);
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() == 3200; }));
+  expectNoViolation();
+}
+
 class PathActionTest : public PathTest {
  protected:
   void start(double speed) {
@@ -260,6 +321,30 @@ TEST_F(PathActionTest, DeceleratesAlongThePathWhenItIsCancelled) {
   EXPECT_NEAR(place[0], place[1], 2.0 * kHalfStep) << "not on the first line";
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward[0], std::llround(place[0] * 80'000.0));
+  expectNoViolation();
+}
+
+TEST_F(PathActionTest, SucceedsOnlyWhenItIsToldItsEnd) {
+  start(2.0);
+  const Recorder<FollowPathActionFeedback> told(node.full("follow_path/feedback"));
+  ASSERT_TRUE(waitUntil([&] { return told.connected(); }));
+  FollowPathGoal fed = goal({kSquare[0]});
+  fed.more_follows = true;
+  client->sendGoal(fed);
+  ASSERT_TRUE(told.waitForLatest(
+      [](const FollowPathActionFeedback& now) { return now.feedback.path != 0; }));
+  const std::uint64_t path = told.messages().back().feedback.path;
+  // It comes to rest, and waits.
+  ASSERT_TRUE(told.waitForLatest([](const FollowPathActionFeedback& now) {
+    return now.feedback.segments_ahead == 0 && now.feedback.position.at(0) > 0.0199;
+  }));
+  EXPECT_EQ(client->getState(), State::ACTIVE);
+  EXPECT_TRUE(append(path, {kSquare[1], kSquare[2]}, true).success);
+  EXPECT_TRUE(append(path, {kSquare[3]}, true).success);
+  EXPECT_TRUE(append(path, {}, false).success);
+  EXPECT_EQ(client->await(), State::SUCCEEDED);
+  client->expectEnd(FollowPathResult::REACHED, "reached");
+  EXPECT_EQ(client->getResult()->position, (std::vector<double>{0.0, 0.0}));
   expectNoViolation();
 }
 

@@ -11,6 +11,10 @@ void Activity::look() {
   if (begun_ && !finished_) onLook();
 }
 
+void Activity::extend(const Extension& /*extension*/, const Ack& call) {
+  call->fail({Failure::Kind::kRefused, axes_.front()->name() + ": it follows no path"});
+}
+
 void Activity::end(const Why& why, const Ack& call) {
   if (finished_) return;
   if (begun_) return onEnd(why, call);

@@ -81,6 +81,8 @@ class Activity {
   virtual void resume(const Ack& /*call*/) {}
   /// The speed override or the limits have changed.
   virtual void speedChanged(const Ack& /*call*/) {}
+  /// Continues the path of its motion, see Manoeuvre::extend().
+  virtual void extend(const Extension& extension, const Ack& call);
   /// The caller of these homings no longer waits.
   virtual void cancelHomings(const std::vector<std::uint64_t>& /*ids*/) {}
   /// @return false if it does not disable its axis; otherwise this call waits for that too.

@@ -51,6 +51,8 @@ struct Goal {
   bool of_motor = false;  ///< true: the target is the motor's; false: the joint's
   MotorsTogether motors;
   motion::MotionLimits path_limits;  ///< [microsteps] of a kTogether: its path keeps them
+  /// At the target the axis waits for a path that continues its own: it isn't the end.
+  bool waits_at_target = false;
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
   pulse::Nanoseconds slipped_ns = 0;  ///< how far the timeline had slid by then
@@ -65,6 +67,18 @@ struct Goal {
 
 /// Makes the shared path of axes that are taken over at a motion time. @throw Refused
 using JoinPath = std::function<std::shared_ptr<const axis::SharedPath>(std::int64_t at)>;
+
+/// A path that continues the one that axes follow.
+struct Extension {
+  std::shared_ptr<const axis::SharedPath> of;  ///< the path that it continues
+  std::shared_ptr<const axis::SharedPath> path;
+  /// Positions on both paths between which they are the same. Before that, the new one isn't known.
+  motion::DoubleDouble same_from;
+  motion::DoubleDouble same_until;
+  bool moves_on =
+      false;  ///< it leads beyond the end of the other; otherwise only that is known now
+  std::vector<double> targets;  ///< [microsteps] of each joint, the commanded position at its end
+};
 
 /// Axes whose motions begin at the same motion time, and are independent from then on. The engine
 /// accepts all of them or none.

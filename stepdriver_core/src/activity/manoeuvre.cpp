@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "message_text.h"
+#include "motion/spline.h"
 #include "point_motion.h"
 #include "stepdriver_core/error.h"
 
@@ -23,6 +24,7 @@ double durationOf(const Context& context, const Goal& goal, std::int64_t end_ns)
 }
 
 bool isAt(const axis::AxisModel& axis, const Goal& goal) {
+  if (goal.waits_at_target) return false;
   if (!axis.sharers().empty() && goal.target) {
     constexpr double kRounding = 1e-6;
     return std::abs(static_cast<double>(*goal.target) - axis.exactCount()) <=
@@ -125,7 +127,12 @@ Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join,
       join_(std::move(join)),
       start_(std::move(start)),
       group_(join_ ? context.newGroup() : 0),
-      lead_(kLead) {}
+      lead_(kLead) {
+  for (const Order& order : orders_) {
+    if (!join_) break;
+    course_.targets.push_back(static_cast<double>(*order.goal.target) + order.goal.remainder);
+  }
+}
 
 // ---- plans ----
 
@@ -135,13 +142,23 @@ std::shared_ptr<const motion::Profile> Manoeuvre::planPath(std::int64_t at) {
     return std::make_shared<const motion::Profile>(std::move(profile));
   };
   if (path_ == nullptr) {
-    shared_path_ = join_(at);
-    return shared(shared_path_->plan(at, shared_path_->begin(), factor));
+    follow({join_(at), course_.targets});
+    return shared(course_.path->plan(at, course_.path->begin(), factor));
   }
-  const axis::SharedPath& along = *shared_path_;
-  if (!anyMoves()) return shared(along.plan(at, {path_->endPosition(), 0.0, 0.0}, factor));
+  const axis::SharedPath& along = *course_.path;
+  if (!anyMoves()) return shared(along.plan(at, along.restart(path_->endPosition()), factor));
   const motion::MotionState from = path_->stateAt(at);
   return shared(slowsDown() ? along.planStop(at, from) : along.plan(at, from, factor));
+}
+
+void Manoeuvre::follow(Course course) {
+  course_ = std::move(course);
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    Goal& goal = orders_[i].goal;
+    goal.target = motion::restingCount(course_.targets[i]);
+    goal.remainder = course_.targets[i] - static_cast<double>(*goal.target);
+    goal.waits_at_target = course_.path->waitsAtEnd();
+  }
 }
 
 Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
@@ -162,7 +179,7 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
       plans.path = planPath(plans.at);
       for (std::size_t i = 0; i < orders_.size(); ++i) {
         const motor::Motor& motor = orders_[i].axis->motor;
-        plans.planned.push_back({motor.shaped(shared_path_->profileOf(i, *plans.path)), 0.0,
+        plans.planned.push_back({motor.shaped(course_.path->profileOf(i, *plans.path)), 0.0,
                                  orders_[i].goal.path_limits, plans.at});
       }
       return plans;
@@ -203,9 +220,11 @@ std::vector<axis::Move> Manoeuvre::prepare() {
 
 // ---- orders to the engine ----
 
-void Manoeuvre::order(Plans plans) {
+void Manoeuvre::order(Plans plans, const Ack& extension) {
   OpenOrder open;
   open.mode = mode_;
+  open.course = course_;
+  open.extension = extension;
   open.follows = context_.newCommand(beginsTogether() ? start_->number : 0);
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     if (!plans.planned[i].motion) {
@@ -273,7 +292,7 @@ bool Manoeuvre::anyMoves() const {
 void Manoeuvre::change(Mode mode, const Ack& call) {
   mode_ = mode;
   if (call) calls_.push_back(call);
-  if (!anyMoves() && !held_) return calls_.clear();
+  if (!anyMoves() && (!held_ || awaits_)) return calls_.clear();
   try {
     order(plan(lead_));
   } catch (const std::exception& error) {
@@ -291,10 +310,10 @@ void Manoeuvre::stop(const Why& why, const Ack& call) {
   }
   why_ = why;
   if (anyMoves()) return change(Mode::kStop, call);
-  if (held_) drop();  // otherwise it has come to rest by itself
+  if (isParked()) drop();  // otherwise it has come to rest by itself
 }
 
-// Gives up the goals that it held at rest.
+// Gives up the goals that it kept at rest.
 void Manoeuvre::drop() {
   for (const Order& order : orders_) {
     activity::conclude(*order.axis, order.goal, droppedResult(order, &order == &orders_.front()));
@@ -306,6 +325,7 @@ void Manoeuvre::drop() {
 void Manoeuvre::hold(const Ack& call) {
   if (over_ || mode_ != Mode::kRun) return;
   if (orders_.front().goal.isStreamed()) return stop(kEndedByHold, call);
+  if (awaits_ && !anyMoves()) held_ = true;
   change(Mode::kHold, call);
 }
 
@@ -327,6 +347,80 @@ void Manoeuvre::resume(const Ack& call) {
 void Manoeuvre::replan(const Ack& call) {
   if (over_ || mode_ != Mode::kRun || !anyMoves()) return;
   change(Mode::kRun, call);
+}
+
+// ---- a longer path ----
+
+namespace {
+
+Failure outdated(const axis::AxisModel& axis) {
+  return {Failure::Kind::kOutdated, axis.name() + ": its path has changed meanwhile"};
+}
+
+}  // namespace
+
+void Manoeuvre::extend(Extension extension, const Ack& call) {
+  const axis::AxisModel& axis = *orders_.front().axis;
+  if (over_ || mode_ == Mode::kStop) {
+    const std::string why = why_.text.empty() ? "it has ended" : why_.text;
+    return call->fail(
+        {Failure::Kind::kRefused, axis.name() + ": the path doesn't continue: " + why});
+  }
+  if (extension_ || course_.path != extension.of) return call->fail(outdated(axis));
+  extension_.emplace(std::move(extension), call);
+  if (open_.empty()) tryExtension();
+}
+
+bool Manoeuvre::mayExtend(const Extension& extension) const {
+  const auto precedes = [](motion::DoubleDouble earlier, motion::DoubleDouble later) {
+    constexpr double kRounding = 1e-9;
+    return (later - earlier).hi > -kRounding;
+  };
+  if (course_.path != extension.of || context_.hasUnknownStop()) return false;
+  if (!precedes(extension.same_from, path_->stateAt(context_.motionNow()).position)) return false;
+  if (!extension.moves_on) return true;
+  if (mode_ == Mode::kRun && anyMoves()) return true;  // orderExtension() knows when it takes over
+  return (mode_ == Mode::kHold || awaits_) && precedes(path_->endPosition(), extension.same_until);
+}
+
+// The engine has handled all orders.
+void Manoeuvre::tryExtension() {
+  const auto [extension, call] = *std::exchange(extension_, std::nullopt);
+  if (!mayExtend(extension)) return call->fail(outdated(*orders_.front().axis));
+  if (extension.moves_on && mode_ == Mode::kRun) return orderExtension(extension, call);
+  follow({extension.path, extension.targets});
+  accepted_course_ = course_;
+  if (extension.moves_on) {
+    awaits_ = false;
+  } else if (awaits_ && !course_.path->waitsAtEnd()) {
+    awaits_ = false;
+    if (!held_) rested();
+  }
+}
+
+void Manoeuvre::orderExtension(const Extension& extension, const Ack& call) {
+  const bool from_rest = !anyMoves();
+  const auto revert = [this, call = call](Failure failure) {
+    follow(accepted_course_);
+    call->fail(std::move(failure));
+  };
+  follow({extension.path, extension.targets});
+  try {
+    if (from_rest) {
+      for (const Order& order : orders_) {
+        order.axis->refuseUnlessReady();
+        refuseIntoEndstop(order);
+      }
+    }
+    Plans plans = plan(lead_);
+    if (!from_rest && extension.same_until < path_->stateAt(plans.at).position) {
+      return revert(outdated(*orders_.front().axis));
+    }
+    from_rest_ = from_rest;
+    order(std::move(plans), call);
+  } catch (const std::exception& error) {
+    revert(failureOf(error));
+  }
 }
 
 // ---- news from the engine ----
@@ -354,7 +448,11 @@ bool Manoeuvre::look() {
     // Orders after a refused order are refused too.
     const std::vector<OpenOrder> orders = std::exchange(open_, {});
     for (const OpenOrder& order : orders) {
-      if (wasAccepted(order)) accept(order);
+      if (wasAccepted(order)) {
+        accept(order);
+      } else if (order.extension) {
+        order.extension->fail(outdated(*orders_.front().axis));
+      }
     }
     if (wasAccepted(orders.back())) {
       calls_.clear();
@@ -362,7 +460,8 @@ bool Manoeuvre::look() {
       refused();
     }
   }
-  if (!over_ && open_.empty() && !anyMoves() && !held_) rested();
+  if (!over_ && open_.empty() && extension_) tryExtension();
+  if (!over_ && open_.empty() && !anyMoves() && !isParked()) rested();
   return over_;
 }
 
@@ -382,8 +481,10 @@ void Manoeuvre::accept(const OpenOrder& order) {
   }
   started_ = true;
   from_rest_ = false;
+  awaits_ = false;
   accepted_mode_ = order.mode;
   accepted_path_ = order.plans.path;
+  accepted_course_ = order.course;
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     for (std::size_t i = 0; i < orders_.size(); ++i) {
       if (orders_[i].axis != before.axis || !order.plans.planned[i].motion) continue;
@@ -395,6 +496,7 @@ void Manoeuvre::accept(const OpenOrder& order) {
 
 void Manoeuvre::refused() {
   path_ = accepted_path_;
+  if (accepted_course_.path && course_.path != accepted_course_.path) follow(accepted_course_);
   for (auto before = predecessors_.begin(); before != predecessors_.end();) {
     // This was planned from the other's order: if that was refused, this one never began.
     if (before->call && before->axis->motor.state().accepted < before->serial) {
@@ -404,6 +506,12 @@ void Manoeuvre::refused() {
     const bool ended = !before->axis->moving();
     if (ended) conclude(context_, *before);
     before = ended ? predecessors_.erase(before) : before + 1;
+  }
+  // It still waits for the continuation of its path.
+  if (awaits_ && !anyMoves()) {
+    if (mode_ == Mode::kHold) held_ = true;
+    if (mode_ == Mode::kStop) drop();
+    return calls_.clear();
   }
   // The motion to change has ended by itself.
   if (started_ && !anyMoves()) {
@@ -479,8 +587,19 @@ void Manoeuvre::rested() {
     held_ = true;
     return calls_.clear();
   }
+  if (endsInWait()) {
+    awaits_ = true;
+    held_ = mode_ == Mode::kHold;
+    return calls_.clear();
+  }
   concludeGoals();
   finish();
+}
+
+// A stop that came too late to change anything ends it nevertheless.
+bool Manoeuvre::endsInWait() const {
+  return course_.path && course_.path->waitsAtEnd() && accepted_mode_ == Mode::kRun &&
+         mode_ != Mode::kStop && isDone();
 }
 
 void Manoeuvre::concludeGoals() {
@@ -501,6 +620,12 @@ void Manoeuvre::finish() {
   concludePredecessors();
   over_ = true;
   held_ = false;
+  awaits_ = false;
+  const Failure ended{Failure::Kind::kRefused,
+                      orders_.front().axis->name() + ": the path doesn't continue: " +
+                          (why_.text.empty() ? "it has ended" : why_.text)};
+  if (extension_) extension_->second->fail(ended);
+  extension_.reset();
   call_.reset();
   calls_.clear();
 }
@@ -521,6 +646,15 @@ std::vector<Predecessor> Manoeuvre::handOver() {
       before.orders.push_back({open.serials[i], open.mode != Mode::kRun});
     }
   }
+  const Failure replaced{
+      Failure::Kind::kRefused,
+      orders_.front().axis->name() + ": the path doesn't continue: another command took over"};
+  if (extension_) extension_->second->fail(replaced);
+  extension_.reset();
+  for (const OpenOrder& open : open_) {
+    if (open.extension) open.extension->fail(replaced);
+  }
+  open_.clear();
   over_ = true;
   call_.reset();
   calls_.clear();

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "context.h"
@@ -58,6 +59,18 @@ class Manoeuvre {
   /// The override or the limits have changed.
   void replan(const Ack& call);
 
+  /// Continues the path that the axes follow. If it comes too late, they come to rest at the end of
+  /// that path, and continue from there.
+  ///
+  /// @param call is answered when the engine has accepted the motion. It fails as outdated if the
+  ///   axes follow another path by now, or may have left the part that both paths share when the
+  ///   new one takes over.
+  void extend(Extension extension, const Ack& call);
+  /// The path that the axes follow; nullptr if they don't, or not yet.
+  std::shared_ptr<const axis::SharedPath> sharedPath() const { return course_.path; }
+  /// The motion along it that was ordered last.
+  std::shared_ptr<const motion::Profile> motionAlong() const { return path_; }
+
   /// Leaves the axes to another manoeuvre, which takes over during the motion.
   std::vector<Predecessor> handOver();
 
@@ -83,11 +96,19 @@ class Manoeuvre {
     std::shared_ptr<const motion::Profile> path;  // the motion along the shared path
   };
 
+  /// The shared path and its end.
+  struct Course {
+    std::shared_ptr<const axis::SharedPath> path;
+    std::vector<double> targets;  // [microsteps] of each joint
+  };
+
   /// An order that the engine has not yet handled.
   struct OpenOrder {
     std::vector<std::uint64_t> serials;  // by axis; 0: it has no part in it
     Mode mode = Mode::kRun;
     Plans plans;
+    Course course;
+    Ack extension;                                        // that it begins
     std::shared_ptr<std::vector<pulse::Follow>> follows;  // of its command
   };
 
@@ -95,7 +116,14 @@ class Manoeuvre {
   bool beginsTogether() const { return start_ && !started_ && mode_ == Mode::kRun; }
   Plans plan(pulse::Nanoseconds lead);
   std::shared_ptr<const motion::Profile> planPath(std::int64_t at);
-  void order(Plans plans);
+  void order(Plans plans, const Ack& extension = {});
+  void follow(Course course);
+  void tryExtension();
+  bool mayExtend(const Extension& extension) const;
+  void orderExtension(const Extension& extension, const Ack& call);
+  /// It stands at a place of its path from which it will continue.
+  bool isParked() const { return held_ || awaits_; }
+  bool endsInWait() const;
   void change(Mode mode, const Ack& call);
   bool anyMoves() const;
   /// Its last motions have come to their planned ends.
@@ -121,7 +149,9 @@ class Manoeuvre {
   std::vector<Order> orders_;
   const JoinPath join_;
   const std::shared_ptr<const CommonStart> start_;
-  std::shared_ptr<const axis::SharedPath> shared_path_;  // that was joined last
+  Course course_;                                       // that was joined last
+  Course accepted_course_;                              // of the motion that the engine follows
+  std::optional<std::pair<Extension, Ack>> extension_;  // waits until the engine has handled all
   std::uint64_t group_ = 0;
   std::vector<Predecessor> predecessors_;
   std::optional<Plans> prepared_;
@@ -134,6 +164,7 @@ class Manoeuvre {
   bool from_rest_ = true;
   bool started_ = false;  // the engine has accepted an order
   bool held_ = false;
+  bool awaits_ = false;  // at rest at the end of a path that waits there for its continuation
   bool over_ = false;
   axis::MoveResult result_;
   std::optional<Failure> failure_;

@@ -94,6 +94,13 @@ void Script::speedChanged(const Ack& call) {
   if (Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr) manoeuvre->replan(call);
 }
 
+void Script::extend(const Extension& extension, const Ack& call) {
+  Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr;
+  if (manoeuvre == nullptr) return Activity::extend(extension, call);
+  manoeuvre->extend(extension, call);
+  run();
+}
+
 pulse::Nanoseconds Script::due() const { return current_ ? current_->due() : pulse::kNever; }
 
 }  // namespace stepdriver::activity

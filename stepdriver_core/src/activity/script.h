@@ -46,6 +46,7 @@ class Script : public Activity {
   void refuseUnlessResumable() const override;
   void resume(const Ack& call) override;
   void speedChanged(const Ack& call) override;
+  void extend(const Extension& extension, const Ack& call) override;
   pulse::Nanoseconds due() const override;
   const Manoeuvre* motion() const override;
 

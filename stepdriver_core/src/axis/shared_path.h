@@ -23,6 +23,12 @@ class SharedPath {
 
   /// The position and the rate at the beginning of the path.
   virtual motion::MotionState begin() const = 0;
+  /// The state in which a motion continues from rest at a position on the path.
+  virtual motion::MotionState restart(motion::DoubleDouble position) const {
+    return {position, 0.0, 0.0};
+  }
+  /// Whether the axes wait at its end for another path that continues it.
+  virtual bool waitsAtEnd() const { return false; }
   /// The motion along the path to its end, from a position on it.
   virtual motion::Profile plan(std::int64_t at, const motion::MotionState& from,
                                double speed_override) const = 0;

@@ -30,7 +30,8 @@ double timeToRate(const motion::Profile& path, double rate) {
 
 }  // namespace
 
-TrajectoryPath::TrajectoryPath(std::vector<Member> members) : members_(std::move(members)) {
+TrajectoryPath::TrajectoryPath(std::vector<Member> members, DoubleDouble origin)
+    : members_(std::move(members)), origin_(origin) {
   endTogether();
 }
 
@@ -50,12 +51,30 @@ void TrajectoryPath::endTogether() {
 
 motion::Profile TrajectoryPath::plan(std::int64_t at_ns, const motion::MotionState& from,
                                      double speed_override) const {
-  return changeRate(at_ns, from, std::min(speed_override, 1.0), &Member::bounds);
+  return onPath(changeRate(at_ns, onCurves(from), std::min(speed_override, 1.0), &Member::bounds));
 }
 
 motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
                                          const motion::MotionState& from) const {
-  return changeRate(at_ns, from, 0.0, &Member::stop_bounds);
+  return onPath(changeRate(at_ns, onCurves(from), 0.0, &Member::stop_bounds));
+}
+
+motion::MotionState TrajectoryPath::restart(DoubleDouble position) const {
+  const std::int64_t at_ns = motion::splitNanoseconds(position - origin_).whole;
+  const bool rests = std::all_of(members_.begin(), members_.end(), [&](const Member& member) {
+    return member.curve->stateAt(at_ns).velocity == 0.0;
+  });
+  return {position, rests ? 1.0 : 0.0, 0.0};
+}
+
+motion::Profile TrajectoryPath::onPath(const motion::Profile& on_curves) const {
+  return origin_.hi == 0.0 ? on_curves : motion::scaled(on_curves, origin_, 1.0);
+}
+
+motion::MotionState TrajectoryPath::onCurves(const motion::MotionState& on_path) const {
+  motion::MotionState state = on_path;
+  state.position = state.position - origin_;
+  return state;
 }
 
 // As fast as the limits of all axes allow: now, or, if one of them is at its limit already, as soon
@@ -114,7 +133,9 @@ bool TrajectoryPath::keeps(const motion::Profile& path, Bounds bounds) const {
 }
 
 motion::Profile TrajectoryPath::profileOf(std::size_t member, const motion::Profile& path) const {
-  return motion::composeAlong(members_[member].curve, path);
+  if (origin_.hi == 0.0) return motion::composeAlong(members_[member].curve, path);
+  return motion::composeAlong(members_[member].curve,
+                              motion::scaled(path, DoubleDouble() - origin_, 1.0));
 }
 
 }  // namespace stepdriver::axis

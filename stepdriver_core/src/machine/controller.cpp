@@ -27,6 +27,7 @@ using activity::Order;
 using activity::Why;
 
 const Why kStopped{axis::MoveEnd::kStopped, "it was stopped"};
+constexpr const char* kPathEnded = "the path doesn't continue: it has ended";
 constexpr const char* kMovedMeanwhile = "it moved while its path was planned";
 const Why kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
 
@@ -709,10 +710,27 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
     for (std::size_t i = 0; path && i < starts.size(); ++i) {
       if (starts[i].moves || restOf(starts[i]) != path->from[i]) axes[i]->refuse(kMovedMeanwhile);
     }
-    return axis::PreparedTrajectory::join(prepared, starts);
+    auto joined = axis::PreparedTrajectory::join(prepared, starts);
+    if (!path || !path->window) return joined;
+    return std::shared_ptr<const axis::SharedPath>(
+        std::make_shared<const QueuedPath>(std::move(joined), path->window, true));
   };
   activities_.begin(std::make_unique<activity::FollowGoal>(context_, std::move(orders), join, call),
                     kTakenOver);
+}
+
+const Goal* Controller::goalOf(const axis::AxisModel& axis) const {
+  const Activity* owner = activities_.owner(axis);
+  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  return motion != nullptr ? motion->goalOf(axis) : nullptr;
+}
+
+void Controller::serve(const ExtendPath& wanted, const Ack& call) {
+  axis::AxisModel& extended = axis(wanted.axis);
+  Activity* owner = activities_.owner(extended);
+  const Goal* goal = goalOf(extended);
+  if (goal == nullptr || goal->move != wanted.move) extended.refuse(kPathEnded);
+  owner->extend(wanted.extension, call);
 }
 
 // ---- stops ----
@@ -724,9 +742,7 @@ void Controller::serve(const StopAxis& wanted, const Ack& call) {
 
 void Controller::serve(const StopMove& wanted, const Ack& call) {
   axis::AxisModel& stopped = axis(wanted.axis);
-  const Activity* owner = activities_.owner(stopped);
-  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
-  const Goal* goal = motion != nullptr ? motion->goalOf(stopped) : nullptr;
+  const Goal* goal = goalOf(stopped);
   if (goal == nullptr || goal->move != wanted.move) return;
   stopped.noteStop();
   activities_.end(stopped, kStopped, call);
@@ -1029,11 +1045,13 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
     if (motion.target) view.target = axis.positionOf(static_cast<double>(*motion.target));
     shown.motions.push_back(std::move(view));
   }
-  if (const auto* motion = owner != nullptr ? owner->motion() : nullptr;
-      motion && motion->isHeld()) {
+  if (const auto* motion = owner != nullptr ? owner->motion() : nullptr) {
     const Goal* goal = motion->goalOf(axis);
-    if (goal != nullptr && goal->target) {
+    if (motion->isHeld() && goal != nullptr && goal->target) {
       shown.held_target = axis.positionOf(static_cast<double>(*goal->target));
+    }
+    if (goal != nullptr && motion->sharedPath() && motion->motionAlong()) {
+      shown.path = {goal->move, motion->sharedPath(), motion->motionAlong(), motion->slowsDown()};
     }
   }
   shown.path_axis = axis.pathAxis();

@@ -62,6 +62,7 @@ class Controller {
   void serve(const FollowSetpoints& wanted, const Ack& call);
   void serve(const MoveLine& wanted, const Ack& call);
   void serve(const FollowTrajectory& wanted, const Ack& call);
+  void serve(const ExtendPath& wanted, const Ack& call);
   void serve(const StopAxis& wanted, const Ack& call);
   void serve(const StopMove& wanted, const Ack& call);
   void serve(const StopAll& wanted, const Ack& call);
@@ -93,6 +94,8 @@ class Controller {
   MayBegin goalOf(const Jog& wanted, const Ack& call);
   MayBegin positionGoal(const Setpoint& wanted, double timeout);
   MayBegin velocityGoal(const Setpoint& wanted, double timeout);
+  /// Of the axis's present or held motion.
+  const activity::Goal* goalOf(const axis::AxisModel& axis) const;
   /// The goal of the axis's present motion if that is streamed.
   const activity::Goal* streamedGoal(const axis::AxisModel& axis) const;
   /// Sets the soft limit ahead as the end of a velocity. @throw Refused if it can't begin.

@@ -50,6 +50,9 @@ class RequestText {
   std::string operator()(const FollowTrajectory& wanted) const {
     return "trajectory of " + names(wanted.axes);
   }
+  std::string operator()(const ExtendPath& wanted) const {
+    return fmt::format("append to the path {} of {}", wanted.move, name(wanted.axis));
+  }
   std::string operator()(const StopAxis& wanted) const { return "stop " + name(wanted.axis); }
   std::string operator()(const StopMove& wanted) const {
     return fmt::format("stop move {} of {}", wanted.move, name(wanted.axis));

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -30,6 +31,12 @@ namespace {
 constexpr double kLeastOverride = 0.01;
 constexpr double kMostOverride = 2.0;
 constexpr int kMostPreparations = 8;
+// Of an append: how far ahead the motion is changed at least, and how often that is tried before it
+// is changed only at its end.
+constexpr pulse::Nanoseconds kLeastLead = 20'000'000;
+constexpr int kMostExtensions = 5;
+// [s] How much of a path that was passed is kept: an order that the engine refuses takes it back.
+constexpr double kKept = 0.5;
 // [s] Of setpoints.
 constexpr double kShortestTimeout = 0.005;
 constexpr double kLongestTimeout = 60.0;
@@ -183,9 +190,69 @@ class Machine::Impl {
         expected.push_back({motion::DoubleDouble(origin.rest)});
       }
       wanted.path->targets = std::move(plan.targets);
+      if (plan.window) wanted.path->window = disposer_.keep(std::move(plan.window));
       wanted.prepared = disposer_.keep(
           std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected));
     });
+  }
+
+  // Replaces the path by a longer one, from some time ahead on; later if that was too soon.
+  PathAhead appendPath(const PathAppend& request) {
+    pulse::Nanoseconds lead = kLeastLead;
+    for (int i = 0;; ++i) {
+      const pulse::Nanoseconds began = clock_.now();
+      const auto snapshot = shell_->snapshot();
+      const auto id = followerOf(*snapshot, request.path);
+      if (!id) {
+        throw Refused(fmt::format("the path {} doesn't continue: it has ended", request.path));
+      }
+      const AxisSnapshot::Path& path = *snapshot->axes[*id].path;
+      const auto queued = std::dynamic_pointer_cast<const QueuedPath>(path.shared);
+      if (!queued) throw Refused("the path is complete: it was told that no more follows");
+      const double passed = path.along->stateAt(shell_->motionNow()).position.value();
+      if (request.segments.empty() && request.more_follows) return queued->aheadOf(passed);
+      double changeable = path.along->endPosition().value();
+      if (!path.slows_down && i < kMostExtensions) {
+        changeable = path.along->stateAt(shell_->motionNow() + lead).position.value();
+      }
+      QueuedPath::Longer longer = queued->extended(request.segments, request.more_follows,
+                                                   std::max(0.0, passed - kKept), changeable);
+      const std::shared_ptr<const QueuedPath> continued = disposer_.keep(std::move(longer.path));
+      const activity::Extension extension{queued,
+                                          continued,
+                                          longer.same_from,
+                                          longer.same_until,
+                                          !request.segments.empty(),
+                                          continued->targets()};
+      const activity::Reply reply = shell_->call(ExtendPath{*id, path.move, extension});
+      const bool outdated =
+          reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
+      if (outdated && i < kMostExtensions + kMostPreparations) {
+        lead = kLeastLead + 2 * (clock_.now() - began);
+        continue;
+      }
+      valueOf(reply);
+      return continued->aheadOf(passed);
+    }
+  }
+
+  std::optional<PathAhead> pathAhead(std::uint64_t number) const {
+    const auto snapshot = shell_->snapshot();
+    const auto id = followerOf(*snapshot, number);
+    if (!id) return std::nullopt;
+    const AxisSnapshot::Path& path = *snapshot->axes[*id].path;
+    const auto queued = std::dynamic_pointer_cast<const QueuedPath>(path.shared);
+    if (!queued) return std::nullopt;
+    return queued->aheadOf(path.along->stateAt(shell_->motionNow()).position.value());
+  }
+
+  // The axis by whose move a path is numbered.
+  static std::optional<AxisId> followerOf(const MachineSnapshot& snapshot, std::uint64_t path) {
+    for (AxisId id = 0; id < snapshot.axes.size(); ++id) {
+      const auto& followed = snapshot.axes[id].path;
+      if (followed && followed->move == path) return id;
+    }
+    return std::nullopt;
   }
 
   // The motion under way, now: about where a trajectory will begin.
@@ -415,6 +482,12 @@ CoordinatedMove Machine::followTrajectory(const TrajectoryRequest& request) {
 
 CoordinatedMove Machine::followPath(const PathRequest& request) {
   return impl_->followPath(request);
+}
+
+PathAhead Machine::appendPath(const PathAppend& request) { return impl_->appendPath(request); }
+
+std::optional<PathAhead> Machine::pathAhead(std::uint64_t path) const {
+  return impl_->pathAhead(path);
 }
 
 std::optional<CoordinatedResult> Machine::result(const CoordinatedMove& move) const {

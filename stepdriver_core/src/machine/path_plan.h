@@ -1,8 +1,13 @@
 #pragma once
 
+#include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "axis/path_axis.h"
+#include "motion/contour.h"
+#include "motion/contour_motion.h"
+#include "queued_path.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 
@@ -19,12 +24,45 @@ struct PathPlan {
   /// The first one is where the axes are at rest. The last one is on whole microsteps: if the path
   /// ends between two of them, the last piece brings the axes there. It makes no step.
   std::vector<axis::TrajectoryPoint> points;
-  std::vector<double> targets;  ///< [microsteps] the end of the path
+  std::vector<double> targets;               ///< [microsteps] the end of the path
+  std::shared_ptr<const PathWindow> window;  ///< of PathRequest::more_follows
 };
 
 /// @param axes, origins one for each name of the request.
 /// @throw Refused as Machine::followPath(), except for what PreparedTrajectory finds.
 PathPlan planPath(const PathRequest& request, const std::vector<axis::PathAxis>& axes,
                   const std::vector<PathOrigin>& origins);
+
+/// @name Parts of it
+/// @{
+/// [unit] The limits on a path. @param share of the limits of the axes.
+std::vector<motion::ContourLimits> contourLimits(const std::vector<axis::PathAxis>& axes,
+                                                 double share);
+/// [unit] A microstep of the finest axis.
+double resolutionOf(const std::vector<axis::PathAxis>& axes);
+/// @throw Refused if a segment leads beyond a soft limit.
+void requireRange(const motion::Contour& contour, const std::vector<axis::PathAxis>& axes);
+
+/// From the end of a path to the microsteps at which the axes come to rest. That is half a
+/// microstep or less: no step.
+struct RestOfPath {
+  double duration = 0.0;  ///< [s] 0: they are the same
+  std::vector<double> positions;
+};
+/// @param smooth the acceleration doesn't jump.
+RestOfPath restOf(const std::vector<axis::PathAxis>& axes, const std::vector<double>& end,
+                  bool smooth);
+
+/// The points of a trajectory along a path, to rest. @param first the number of the first segment.
+/// @throw Refused if a rounded corner leads beyond a soft limit.
+std::vector<axis::TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
+                                            const std::vector<axis::PathAxis>& axes,
+                                            std::size_t first);
+
+/// @param time_ns, segment are added to those of the knots.
+void appendKnots(std::vector<PathWindow::Knot>& window,
+                 const std::vector<motion::ContourKnot>& knots, std::int64_t time_ns,
+                 std::size_t segment);
+/// @}
 
 }  // namespace stepdriver::machine

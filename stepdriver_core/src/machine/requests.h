@@ -10,9 +10,11 @@
 
 #include "activity/call.h"
 #include "activity/context.h"
+#include "activity/goal.h"
 #include "axis/axis_memory.h"
 #include "axis/prepared_trajectory.h"
 #include "pulse/channel.h"
+#include "queued_path.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/streams.h"
@@ -75,8 +77,16 @@ struct FollowTrajectory {
   struct Path {
     std::vector<double> from;     ///< [microsteps] AxisSnapshot::rest of each axis
     std::vector<double> targets;  ///< [microsteps] the commanded positions at its end
+    /// If more segments follow.
+    std::shared_ptr<const PathWindow> window{};
   };
   std::optional<Path> path{};
+};
+/// Continues the path that axes follow.
+struct ExtendPath {
+  AxisId axis = 0;         ///< one of them
+  std::uint64_t move = 0;  ///< of that axis
+  activity::Extension extension;
 };
 struct StopAxis {
   AxisId axis = 0;
@@ -148,11 +158,11 @@ struct AwaitRest {};
 struct PowerDown {};
 /// @}
 
-using Request =
-    std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine,
-                 FollowTrajectory, StopAxis, StopMove, StopAll, Hold, Resume, SetSpeedOverride,
-                 SetLimits, Home, CancelHoming, Enable, Sleep, Reset, SetMicrosteps, SetPosition,
-                 Recover, BringUp, RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
+using Request = std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints,
+                             MoveLine, FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll,
+                             Hold, Resume, SetSpeedOverride, SetLimits, Home, CancelHoming, Enable,
+                             Sleep, Reset, SetMicrosteps, SetPosition, Recover, BringUp,
+                             RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
 
 /// @name Inputs of the controller
 /// @{

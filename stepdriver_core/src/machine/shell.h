@@ -64,6 +64,7 @@ class Shell : public pulse::NewsListener {
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
   axis::AxisState state(AxisId axis) const;
+  pulse::Nanoseconds motionNow() const { return clock_.now() - engine_.state().slipped; }
   double peakRate(AxisId axis) const;
 
   /// What the pulse thread waits for, if its GPIO chip doesn't answer; empty: it doesn't wait.

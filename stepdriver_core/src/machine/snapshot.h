@@ -9,6 +9,7 @@
 
 #include "axis/axis_memory.h"
 #include "axis/path_axis.h"
+#include "axis/shared_path.h"
 #include "motion/shaped_profile.h"
 #include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
@@ -37,6 +38,14 @@ struct AxisSnapshot {
   pulse::MotorCounts square_lags{};  ///< ChannelState::lags when the motors were square
   axis::AxisLimits limits;
   std::optional<double> held_target;  ///< [unit]
+  /// The path that it follows with other axes.
+  struct Path {
+    std::uint64_t move = 0;  ///< of this axis
+    std::shared_ptr<const axis::SharedPath> shared;
+    std::shared_ptr<const motion::Profile> along;  ///< the motion along it that was ordered last
+    bool slows_down = false;                       ///< that motion
+  };
+  std::optional<Path> path;
   std::vector<Motion> motions;
   axis::PathAxis path_axis;
   pulse::ChannelState channel;  ///< from the engine's last news

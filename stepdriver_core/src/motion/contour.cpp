@@ -221,7 +221,7 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
     segments_.push_back(placed(i == 0 ? start_ : segments[i - 1].end, segments[i], i));
   }
   for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    round(i, segments[i].tolerance, continuity);
+    round(i, segments[i], continuity);
   }
   if (continuity == Continuity::kCurvature) widen(segments);
 }
@@ -295,7 +295,7 @@ double Contour::sharpest(const Segment& segment, double rate) const {
   return 0.0;
 }
 
-void Contour::round(std::size_t corner, double tolerance, Continuity continuity) {
+void Contour::round(std::size_t corner, const ContourSegment& given, Continuity continuity) {
   Segment& before = segments_[corner];
   Segment& after = segments_[corner + 1];
   ContourPoint in;
@@ -325,9 +325,10 @@ void Contour::round(std::size_t corner, double tolerance, Continuity continuity)
     const double turning = kMidRounding * half_chord;
     // turning d + bending d^2 = tolerance
     const double bending = kMostBend * norm(jump);
-    const double root = std::sqrt(turning * turning + 4.0 * bending * tolerance);
-    distance = jump.empty() ? tolerance / turning : 2.0 * tolerance / (turning + root);
-    distance = std::min({distance, before.end.rate / 2.0, after.begin.rate / 2.0});
+    const double root = std::sqrt(turning * turning + 4.0 * bending * given.tolerance);
+    distance = jump.empty() ? given.tolerance / turning : 2.0 * given.tolerance / (turning + root);
+    distance = std::min(
+        {distance, before.end.rate * std::min(0.5, 1.0 - given.kept), after.begin.rate / 2.0});
     if (sharpness > 0.0)
       distance = std::min(distance, 1.0 / ((jump.empty() ? 2.0 : 4.0) * sharpness));
   }

@@ -34,6 +34,8 @@ struct ContourSegment {
   /// [unit] How far the corner at its end may be rounded; 0: an exact stop at the corner. It is
   /// ignored at the end of the contour and if there is no corner.
   double tolerance = 0.0;
+  /// Up to this parameter the corner at its end leaves it as it is.
+  double kept = 0.0;
 };
 
 /// A point of a contour and its derivatives with respect to the parameter of its segment.
@@ -66,7 +68,8 @@ enum class Continuity {
 /// path point of the same parameter than (m(0) - 0) |t2 - t1|/2 = 3/8 d sin(turn/2), nor is any
 /// point of the path farther from it. d is the largest that makes this the tolerance or less, and
 /// that is at most
-/// - half of either segment (half of its parameter), so that corners never overlap, and
+/// - half of either segment (half of its parameter), so that corners never overlap,
+/// - what a segment doesn't keep (ContourSegment::kept), and
 /// - 1/(2 max|p''|) over that half, so that its derivative is never 0: with y = |w|/d, it is at
 ///   least sqrt(cos^2(turn/2) + y^2 sin^2(turn/2)) - y/2.
 ///
@@ -167,7 +170,7 @@ class Contour {
 
   Segment placed(const std::vector<double>& from, const ContourSegment& given,
                  std::size_t index) const;
-  void round(std::size_t corner, double tolerance, Continuity continuity);
+  void round(std::size_t corner, const ContourSegment& given, Continuity continuity);
   bool isGentle(std::size_t corner) const;
   void widen(const std::vector<ContourSegment>& given);
   void overlap(std::size_t corner, double distance);

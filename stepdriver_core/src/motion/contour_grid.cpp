@@ -21,14 +21,18 @@ constexpr int kPartsOfCurve = 4;             // at least
 
 }  // namespace
 
-ContourGrid::ContourGrid(const Contour& contour) : contour_(contour), axes_(contour.axes()) {
-  positions_ = contour.start();
-  stops_.push_back(true);
+ContourGrid::ContourGrid(const Contour& contour, double begin)
+    : contour_(contour), axes_(contour.axes()) {
+  ContourPoint start;
+  contour.evaluate(0, begin, start);
+  positions_ = std::move(start.position);
+  stops_.push_back(false);
   for (std::size_t i = 0; i < contour.size(); ++i) {
     giveWay(i);
-    const double first = contour.roundedUntil(i);
-    const double last = contour.roundedFrom(i);
-    if (first > 0.0) divide(i, 0.0, first, kPartsOfCorner);
+    const double from = i == 0 ? begin : 0.0;
+    const double first = std::max(from, contour.roundedUntil(i));
+    const double last = std::max(from, contour.roundedFrom(i));
+    if (first > from) divide(i, from, first, kPartsOfCorner);
     if (last - first > kLeastPart) divide(i, first, last, contour.isLine(i) ? 1 : kPartsOfCurve);
     if (last < 1.0) divide(i, last, 1.0, kPartsOfCorner);
     stops_.back() = contour.stopsAfter(i);
@@ -81,7 +85,7 @@ std::vector<std::size_t> ContourGrid::quarter(const std::vector<bool>& which) {
   derivatives_.reserve(before.derivatives_.size() + 4 * axes_ * more);
   positions_.reserve(before.positions_.size() + axes_ * more);
   positions_.assign(before.position(0), before.position(0) + axes_);
-  stops_.assign(1, true);
+  stops_.assign(1, false);
   std::vector<std::size_t> origins;
   origins.reserve(before.size() + more);
   std::array<Place, 9> places;

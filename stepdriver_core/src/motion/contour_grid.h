@@ -19,7 +19,8 @@ inline void giveWayAt(std::size_t place) {
 /// straight part is one interval.
 class ContourGrid {
  public:
-  explicit ContourGrid(const Contour& contour);
+  /// @param begin the parameter of the first segment at which it begins.
+  explicit ContourGrid(const Contour& contour, double begin = 0.0);
 
   struct Interval {
     double length = 0.0;  ///< [unit]
@@ -44,6 +45,7 @@ class ContourGrid {
   const Interval& operator[](std::size_t index) const { return intervals_[index]; }
   /// Of the place before an interval; with the index size(), of the end.
   const double* position(std::size_t place) const { return &positions_[place * axes_]; }
+  /// At a corner, and at the end.
   bool stopsAt(std::size_t place) const { return stops_[place]; }
   /// The point at the middle parameter of an interval.
   void evaluateMiddle(std::size_t interval, ContourPoint& point) const {

@@ -68,8 +68,10 @@ class Knots {
     rests_.clear();
     positions_.clear();
     velocities_.clear();
-    appendPlace(0, 0.0, 0.0, 0);
-    double begin = 0.0;
+    parameters_.clear();
+    speeds_.clear();
+    double begin = std::sqrt(speed.square(0));
+    appendPlace(0, 0.0, begin, 0);
     for (std::size_t i = 0; i < grid_.size(); ++i) {
       giveWayAt(i);
       const double end = std::sqrt(speed.square(i + 1));
@@ -92,6 +94,20 @@ class Knots {
   double velocity(std::size_t knot, std::size_t axis) const {
     return velocities_[knot * axes_ + axis];
   }
+  double parameter(std::size_t knot) const { return parameters_[knot]; }
+  double speed(std::size_t knot) const { return speeds_[knot]; }
+  /// On the way from the knot before it.
+  bool isStraight(std::size_t knot) const {
+    const std::size_t last = intervals_[knot];
+    const std::size_t first = intervals_[knot - 1];
+    const bool whole = first + 1 == last && parameters_[knot - 1] == grid_[first].to;
+    return grid_[last].straight && (first == last || whole);
+  }
+  /// [s] Of the last knot that isn't after a place.
+  double timeAt(std::size_t place) const {
+    const auto later = std::lower_bound(intervals_.begin() + 1, intervals_.end(), place);
+    return times_[static_cast<std::size_t>(later - intervals_.begin()) - 1];
+  }
 
  private:
   void appendStraight(std::size_t interval, const ContourSpeed& speed) {
@@ -112,7 +128,9 @@ class Knots {
       positions_.push_back(from[j] + direction[j] * way);
       velocities_.push_back(direction[j] * speed);
     }
-    append(time, interval, false);
+    const ContourGrid::Interval& of = grid_[interval];
+    const double part = std::min(1.0, way / of.length);
+    append(time, interval, of.from + part * (of.to - of.from), speed, false);
   }
 
   void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
@@ -124,7 +142,7 @@ class Knots {
       positions_.push_back(position[j]);
       velocities_.push_back(direction[j] * speed);
     }
-    append(time, interval, rests);
+    append(time, interval, place == 0 ? grid_[0].from : grid_[interval].to, speed, rests);
   }
 
   // Of two knots that are too close to each other, one at rest stays, or else the earlier one.
@@ -133,15 +151,19 @@ class Knots {
     if (!rests || rests_.back()) return rests;
     times_.pop_back();
     intervals_.pop_back();
+    parameters_.pop_back();
+    speeds_.pop_back();
     rests_.pop_back();
     positions_.resize(positions_.size() - axes_);
     velocities_.resize(velocities_.size() - axes_);
     return true;
   }
 
-  void append(double time, std::size_t interval, bool rests) {
+  void append(double time, std::size_t interval, double parameter, double speed, bool rests) {
     times_.push_back(time);
     intervals_.push_back(interval);
+    parameters_.push_back(parameter);
+    speeds_.push_back(speed);
     rests_.push_back(rests);
   }
 
@@ -150,6 +172,8 @@ class Knots {
   double time_ = 0.0;
   std::vector<double> times_;
   std::vector<std::size_t> intervals_;  // of the grid, which end at the knot or contain it
+  std::vector<double> parameters_;
+  std::vector<double> speeds_;
   std::vector<bool> rests_;
   std::vector<double> positions_;
   std::vector<double> velocities_;
@@ -304,7 +328,8 @@ Excess lowerLimits(const Knots& knots, const std::vector<ContourLimits>& limits,
 }
 
 // The same motion, slower by a factor, at times of whole nanoseconds.
-std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid, double factor) {
+std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
+                                    const ContourGrid& grid, double factor, double ago) {
   const double last = knots.time(knots.size() - 1) * factor;
   if (!(last < Profile::kLongest)) {
     throw std::range_error("the motion along the path would take longer than 4e9 s");
@@ -312,11 +337,15 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid,
   std::vector<ContourKnot> made;
   made.reserve(knots.size());
   for (std::size_t i = 0; i < knots.size(); ++i) {
-    const double time = knots.time(i) * factor;
+    const double time = knots.time(i) * factor - ago;
     ContourKnot knot;
     knot.time_ns = std::llround(time * 1e9);
     const double later = static_cast<double>(knot.time_ns) * 1e-9 - time;
     knot.segment = grid[knots.interval(i)].segment;
+    knot.parameter = knots.parameter(i);
+    knot.speed = knots.speed(i) / factor;
+    knot.may_begin = knot.parameter >= contour.roundedUntil(knot.segment);
+    knot.straight = i + 1 < knots.size() && knots.isStraight(i + 1);
     knot.positions.reserve(grid.axes());
     knot.velocities.reserve(grid.axes());
     for (std::size_t j = 0; j < grid.axes(); ++j) {
@@ -331,10 +360,10 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid,
 
 }  // namespace
 
-std::vector<ContourKnot> planContour(const Contour& contour,
-                                     const std::vector<ContourLimits>& limits) {
-  ContourGrid grid(contour);
-  ContourSpeed speed(contour, grid, limits);
+ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                        const ContourBegin& begin) {
+  ContourGrid grid(contour, begin.parameter);
+  ContourSpeed speed(contour, grid, limits, begin.speed * begin.speed);
   Knots knots(grid);
   for (int i = 0; i < kMostDivisions; ++i) {
     speed.plan();
@@ -347,7 +376,15 @@ std::vector<ContourKnot> planContour(const Contour& contour,
     const Excess excess = lowerLimits(knots, limits, plans == 1 ? kLowerFirstBy : kLowerBy, speed);
     const double most = std::max(excess.acceleration, excess.speed);
     if (most > 1.0 + kSmallExcess && plans < kMostPlans) continue;
-    return slowedDown(knots, grid, std::max(std::sqrt(excess.acceleration), excess.speed));
+    double factor = std::max(std::sqrt(excess.acceleration), excess.speed);
+    ContourPlan plan;
+    if (begin.speed > 0.0) {
+      plan.excess = most;
+      factor = 1.0;
+    }
+    plan.settled_ns = std::llround(knots.timeAt(speed.settledUntil()) * factor * 1e9);
+    plan.knots = slowedDown(knots, contour, grid, factor, begin.ago);
+    return plan;
   }
 }
 

@@ -25,10 +25,36 @@ struct ContourKnot {
   std::vector<double> velocities;  ///< [unit/s]
   /// [unit/s^2] Empty if accelerations may jump.
   std::vector<double> accelerations;
+  double parameter = 0.0;  ///< of the segment
+  double speed = 0.0;      ///< [unit/s] along the contour
+  /// Another contour can begin here: no corner before it is being rounded.
+  bool may_begin = false;
+  /// On the way to the next knot, the segment of that one is straight.
+  bool straight = false;
 };
 
-/// The fastest motion along a contour, from rest to rest, within the limits of the axes and the
-/// speeds of the segments. Jerk limits are ignored: accelerations jump. See planSmoothContour().
+/// The place and the speed at which a motion along a contour begins.
+struct ContourBegin {
+  double parameter = 0.0;  ///< of the first segment
+  double speed = 0.0;      ///< [unit/s] along the contour
+  /// [s] How long ago the motion was exactly there; less than half a nanosecond.
+  double ago = 0.0;
+};
+
+/// The motion along a contour.
+struct ContourPlan {
+  std::vector<ContourKnot> knots;  ///< the first one at time 0 and at the begin
+  /// Up to this time the motion is also the fastest one if the contour continues at its end,
+  /// however its corner there is rounded.
+  std::int64_t settled_ns = 0;
+  /// The largest part of a limit that the motion uses if that is more than 1: if it begins at a
+  /// speed, it can't be slowed down as a whole.
+  double excess = 1.0;
+};
+
+/// The fastest motion along a contour to rest at its end, within the limits of the axes and the
+/// speeds of the segments. Jerk limits are ignored: accelerations jump. See
+/// planSmoothContour().
 ///
 /// The axes move on the cubics that have the positions and velocities of the knots at both ends.
 /// Between knots they are within a tenth of the resolution of the contour. In the whole of each
@@ -46,12 +72,11 @@ struct ContourKnot {
 /// motion is an exact trapezoid. A motion that is as fast as possible is at one of its limits at
 /// every time: intervals in which it isn't are divided, and so are those whose cubic would deviate.
 /// Limits that a cubic exceeds are then lowered there, and the passes are repeated. If an excess is
-/// left, the whole motion is slowed down by that factor.
+/// left, a motion from rest is slowed down by that factor as a whole.
 ///
 /// @param limits one for each axis.
-/// @return the knots, the first one at rest at time 0 and at the start of the contour.
 /// @throw std::range_error if it takes Profile::kLongest or longer.
-std::vector<ContourKnot> planContour(const Contour& contour,
-                                     const std::vector<ContourLimits>& limits);
+ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                        const ContourBegin& begin = {});
 
 }  // namespace stepdriver::motion

@@ -33,7 +33,7 @@ typename Bounds::value_type highestAt(const Bounds& bounds, double x) {
 }  // namespace
 
 ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
-                           const std::vector<ContourLimits>& limits)
+                           const std::vector<ContourLimits>& limits, double begin)
     : contour_(contour),
       grid_(grid),
       limits_(limits),
@@ -45,7 +45,7 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
       controllable_(grid.size() + 1, kUnbounded),
       squares_(grid.size() + 1, kUnbounded) {
   controllable_.back() = 0.0;
-  squares_.front() = 0.0;
+  squares_.front() = begin;
 }
 
 void ContourSpeed::lower(std::size_t interval, double acceleration, double speed) {
@@ -100,6 +100,27 @@ void ContourSpeed::plan() {
     squares_[i + 1] = x;
   }
   stale_.assign(size, false);
+}
+
+std::size_t ContourSpeed::settledUntil() {
+  constexpr double kRoundable = 0.5;  // of a segment
+  double fast = capAtEnd(grid_.size() - 1);
+  double slow = 0.0;
+  for (std::size_t i = grid_.size(); i-- > 0;) {
+    const ContourGrid::Interval& interval = grid_[i];
+    fast = grid_.stopsAt(i) ? 0.0 : largestBefore(i, fast);
+    if (interval.segment + 1 < contour_.size()) {
+      slow = grid_.stopsAt(i) ? 0.0 : largestBefore(i, slow);
+    } else if (interval.from < kRoundable && interval.straight) {
+      const double before = std::min(interval.to, kRoundable) - interval.from;
+      const double length = interval.length * before / (interval.to - interval.from);
+      slow = std::min(capBefore(i), slow + 2.0 * length * ramp(i).down);
+    } else if (interval.to <= kRoundable) {
+      slow = largestBefore(i, slow);
+    }
+    if (fast <= slow) return i;
+  }
+  return 0;
 }
 
 double ContourSpeed::capAt(std::size_t interval, const double* first) const {

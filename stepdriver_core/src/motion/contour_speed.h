@@ -15,8 +15,9 @@ namespace stepdriver::motion {
 class ContourSpeed {
  public:
   /// @param contour, grid, limits outlive this.
+  /// @param begin [unit^2/s^2] the square of the speed at the begin.
   ContourSpeed(const Contour& contour, const ContourGrid& grid,
-               const std::vector<ContourLimits>& limits);
+               const std::vector<ContourLimits>& limits, double begin = 0.0);
 
   /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
   /// these.
@@ -39,6 +40,11 @@ class ContourSpeed {
 
   /// [unit^2/s^2] @param place from 0 to the size of the grid.
   double square(std::size_t place) const { return squares_[place]; }
+  /// A place up to which the plan stays the same if the contour continues at its end, whether it
+  /// needn't slow down there or must be at rest half a segment before it, at the first place at
+  /// which the rounding of a corner may begin. Call it after plan().
+  std::size_t settledUntil();
+
   /// The accelerations along a straight interval that the axes allow [unit/s^2].
   struct Ramp {
     double up = 0.0;

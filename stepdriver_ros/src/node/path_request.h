@@ -22,6 +22,7 @@ machine::PathRequest pathRequest(const Fields& fields) {
   path.relative = fields.relative != 0;
   path.velocity = fields.velocity;
   path.tolerance = fields.tolerance;
+  path.more_follows = fields.more_follows != 0;
   return path;
 }
 

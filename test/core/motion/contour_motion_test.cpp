@@ -194,7 +194,8 @@ ContourSegment lineTo(std::vector<double> end, double tolerance) {
 
 TEST(ContourMotion, OfALineIsATrapezoid) {
   const Contour contour({0.0}, {lineTo({1000.0}, 0.0)}, 1.0);
-  const std::vector<ContourKnot> knots = motion::planContour(contour, {{1000.0, 2000.0, 4000.0}});
+  const std::vector<ContourKnot> knots =
+      motion::planContour(contour, {{1000.0, 2000.0, 4000.0}}).knots;
   // 1000/1000 + 1000/2/2000 + 1000/2/4000
   EXPECT_NEAR(durationOf(knots), 1.375, 1e-9);
   ASSERT_EQ(knots.size(), 4U);
@@ -214,7 +215,7 @@ TEST(ContourMotion, OfACircleKeepsItsSpeed) {
   const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0});
   // L/v + v/a: the circle needs half of the acceleration at its speed, and the ramps are short.
   const double expected = 2.0 * kPi * 1600.0 / 8000.0 + 0.1;
-  EXPECT_NEAR(durationOf(motion::planContour(contour, limits)), expected, 0.01 * expected);
+  EXPECT_NEAR(durationOf(motion::planContour(contour, limits).knots), expected, 0.01 * expected);
 }
 
 TEST(ContourMotion, StopsOnlyWhereItHasTo) {
@@ -223,7 +224,7 @@ TEST(ContourMotion, StopsOnlyWhereItHasTo) {
       {lineTo({1000.0, 0.0}, 20.0), lineTo({1000.0, 1000.0}, 0.0), lineTo({0.0, 1000.0}, 20.0)},
       1.0);
   const std::vector<ContourKnot> knots =
-      motion::planContour(contour, {{1000.0, 2000.0, 2000.0}, {1000.0, 2000.0, 2000.0}});
+      motion::planContour(contour, {{1000.0, 2000.0, 2000.0}, {1000.0, 2000.0, 2000.0}}).knots;
   int stops = 0;
   for (const ContourKnot& knot : knots) {
     if (knot.velocities[0] != 0.0 || knot.velocities[1] != 0.0) continue;
@@ -247,7 +248,7 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
   for (int i = 0; i < kPaths; ++i) {
     const test::RandomContour path = test::randomContour(random);
     const Contour contour = path.contour();
-    const std::vector<ContourKnot> knots = motion::planContour(contour, path.limits);
+    const std::vector<ContourKnot> knots = motion::planContour(contour, path.limits).knots;
     ASSERT_EQ(knots.front().time_ns, 0);
     std::vector<Profile> profiles;
     for (std::size_t axis = 0; axis < contour.axes(); ++axis) {

@@ -114,6 +114,14 @@ std::vector<Act> makeActs() {
        }},
       {"trajectory of z",
        [](Participants& all, int client) { all.postTrajectory(client, {kZ}, 0.006); }},
+      {"path of x and y that is fed",
+       [](Participants& all, int client) {
+         all.postPath(client, {kX, kY}, 0.006);
+       }},
+      {"append to the path",
+       [](Participants& all, int client) { all.appendToPath(client, kX, 0.004, false); }},
+      {"append to the path, and end it",
+       [](Participants& all, int client) { all.appendToPath(client, kX, 0.002, true); }},
       request("jog x", machine::Jog{kX, 0.05, {}}, moving({kX})),
       request("jog z back", machine::Jog{kZ, -0.05, {}}, moving({kZ})),
       request("end the jog of x", machine::Jog{kX, 0.0, {}}, {}),

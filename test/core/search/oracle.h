@@ -28,7 +28,8 @@ struct Meaning {
   bool ends_hold = false;   ///< whatever its answer, motions may begin in spite of an earlier hold
   std::uint64_t as_of = 0;  ///< nothing must have stopped it since this Oracle::moment(); 0: any
   std::array<bool, kAxes> axes{};  ///< the axes of the call
-  bool on_curve = false;           ///< it moves its axes along a trajectory
+  /// How many times as long as alone its axes may take to stop on its curve.
+  int longer_stop = 1;
 };
 
 /// Judges pulses by the answers that clients got. After the answer of a stop, only pulses of later
@@ -185,10 +186,8 @@ class Oracle {
     }
   }
 
-  // A stop along a trajectory can't use the acceleration that the trajectory itself has there, and
-  // first one axis may limit it and then the other.
   pulse::Nanoseconds slowingOf(std::size_t axis) const {
-    return on_curve_[axis] ? 2 * slowing_[axis] : slowing_[axis];
+    return std::max(1, longer_stops_[axis]) * slowing_[axis];
   }
 
   // Axes that share a path take as long as the slowest of them.
@@ -200,7 +199,7 @@ class Oracle {
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (!meaning.axes[axis]) continue;
       slowing_[axis] = longest;
-      if (meaning.on_curve) on_curve_[axis] = true;
+      longer_stops_[axis] = std::max(longer_stops_[axis], meaning.longer_stop);
     }
   }
 
@@ -272,7 +271,7 @@ class Oracle {
   }
 
   std::array<pulse::Nanoseconds, kAxes> slowing_;
-  std::array<bool, kAxes> on_curve_{};
+  std::array<int, kAxes> longer_stops_{};
   std::vector<std::size_t> sharing_;
   const std::function<pulse::Nanoseconds()> slipped_;
   std::uint64_t order_ = 0;

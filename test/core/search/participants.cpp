@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <cmath>
 
+#include "machine/path_plan.h"
+#include "machine/queued_path.h"
 #include "motor/input_shaping.h"
 #include "stepdriver_core/error.h"
 #include "support/corexy_bench.h"
@@ -813,7 +815,9 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
   std::vector<axis::PathAxis> facts;
   Meaning meaning;
   meaning.moves = true;
-  meaning.on_curve = true;
+  // A stop along a trajectory can't use the acceleration that the trajectory itself has there, and
+  // first one axis may limit it and then the other.
+  meaning.longer_stop = 2;
   for (const std::size_t axis : axes) {
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
@@ -850,6 +854,110 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
       };
     };
   };
+}
+
+namespace {
+
+// A path is at the limits of its axes everywhere.
+constexpr int kLongerStopOfPath = 3;
+
+machine::PathSegment lineTo(std::vector<double> end) {
+  machine::PathSegment segment;
+  segment.end = std::move(end);
+  return segment;
+}
+
+}  // namespace
+
+void Participants::postPath(int client, const std::vector<std::size_t>& axes, double size) {
+  const auto snapshot = controller_->snapshot();
+  machine::PathRequest request{{}, {}, true, 0.0, size / 10.0, true};
+  machine::FollowTrajectory wanted{axes, nullptr, {}, machine::FollowTrajectory::Path{}};
+  std::vector<axis::PathAxis> facts;
+  std::vector<machine::PathOrigin> origins;
+  std::vector<motion::MotionState> expected;
+  Meaning meaning;
+  meaning.moves = true;
+  meaning.longer_stop = kLongerStopOfPath;
+  for (const std::size_t axis : axes) {
+    const machine::AxisSnapshot& now = snapshot->axes.at(axis);
+    request.names.push_back(configs_[axis].name);
+    facts.push_back(now.path_axis);
+    origins.push_back({now.rest, now.commanded});
+    expected.push_back({motion::DoubleDouble(now.rest), 0.0, 0.0});
+    wanted.stops.push_back(now.state.stops);
+    wanted.path->from.push_back(now.rest);
+    meaning.axes[axis] = true;
+  }
+  request.segments = {lineTo({size, 0.0}), lineTo({size, size})};
+  try {
+    machine::PathPlan plan = machine::planPath(request, facts, origins);
+    wanted.path->targets = plan.targets;
+    wanted.path->window = plan.window;
+    wanted.prepared =
+        std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected);
+  } catch (const Refused& refused) {
+    return note(std::string("the path is refused: ") + refused.what());
+  }
+  // Posting the request is a separate step.
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.next = [=] {
+    post(client, "follow path", wanted, meaning);
+    clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
+      if (reply.failure) return;
+      Client& feeds = clients_[static_cast<std::size_t>(client)];
+      feeds.from = clock_.now() + static_cast<pulse::Nanoseconds>(1 + steps_ % 7 * 30) * 1'000'000;
+      feeds.next = [=] { appendToPath(client, axes.front(), 0.0, true); };
+    };
+  };
+}
+
+void Participants::appendToPath(int client, std::size_t axis, double size, bool is_last) {
+  const auto snapshot = controller_->snapshot();
+  const auto& path = snapshot->axes.at(axis).path;
+  const auto queued = path ? std::dynamic_pointer_cast<const machine::QueuedPath>(path->shared)
+                           : std::shared_ptr<const machine::QueuedPath>();
+  if (!queued) return note("there is no path to append to");
+  const pulse::Nanoseconds now = clock_.now() - engine_->state().slipped;
+  constexpr pulse::Nanoseconds kLead = 20'000'000;
+  const double passed = path->along->stateAt(now).position.value();
+  const double changeable = path->slows_down ? path->along->endPosition().value()
+                                             : path->along->stateAt(now + kLead).position.value();
+  machine::ExtendPath wanted{axis, path->move, {queued, nullptr, passed, passed, true, {}}};
+  try {
+    const machine::QueuedPath::Longer longer =
+        queued->extended({lineTo({size, size / 2.0})}, !is_last, passed, changeable);
+    wanted.extension.path = longer.path;
+    wanted.extension.same_from = longer.same_from;
+    wanted.extension.same_until = longer.same_until;
+    wanted.extension.targets = longer.path->targets();
+  } catch (const Refused& refused) {
+    return note(std::string("the append is refused: ") + refused.what());
+  }
+  // It continues a motion, but begins none if that was stopped.
+  Meaning meaning;
+  meaning.moves = true;
+  meaning.longer_stop = kLongerStopOfPath;
+  meaning.axes[0] = meaning.axes[1] = true;
+  meaning.as_of = oracle_.moment();
+  clients_[static_cast<std::size_t>(client)].next = [=] {
+    post(client, "append to the path", wanted, meaning);
+    clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
+      if (!reply.failure) moveEnds(*snapshot, wanted.extension.targets);
+    };
+  };
+}
+
+// The path of x and y leads somewhere else now.
+void Participants::moveEnds(const machine::MachineSnapshot& before,
+                            const std::vector<double>& targets) {
+  for (std::size_t axis = 0; axis < targets.size(); ++axis) {
+    const machine::AxisSnapshot& own = before.axes.at(axis);
+    for (auto& [name, move] : moves_) {
+      if (!own.path || move.id != own.path->move) continue;
+      move.rest = own.path_axis.positionOf(std::nearbyint(targets[axis]));
+    }
+  }
 }
 
 void Participants::emergencyStop(int client) {

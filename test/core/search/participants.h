@@ -112,6 +112,10 @@ class Participants {
   /// Streams positions, forward and back, at the period of streamJog().
   void streamSetpoints(int client, const std::vector<std::size_t>& axes);
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
+  /// A path of several axes at rest that is fed while they follow it.
+  void postPath(int client, const std::vector<std::size_t>& axes, double size);
+  /// Appends to the path that an axis follows, if it is one; a last segment ends it.
+  void appendToPath(int client, std::size_t axis, double size, bool is_last);
   void emergencyStop(int client);
   void shutDown(int client);
   void stopLastMove(int client, std::size_t axis);
@@ -195,6 +199,7 @@ class Participants {
   void advanceTo(pulse::Nanoseconds time);
   machine::InputReading readInputs();
   void queue(const machine::InputReading& reading);
+  void moveEnds(const machine::MachineSnapshot& before, const std::vector<double>& targets);
   void prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
                       const std::vector<std::uint64_t>& stops, int tries);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -86,10 +87,31 @@ struct PathRequest {
   /// [unit] How far corners may be rounded: the root of the sum of the squared distances of all
   /// axes. 0: the axes stop at each corner.
   double tolerance = 0.0;
+  /// More segments will be appended, see Machine::appendPath(): the axes wait at its end.
+  bool more_follows = false;
 };
 
-/// A path of more segments is refused: give it in parts.
+/// A path of more segments is refused, and so many may lie ahead of the axes: give it in parts.
 constexpr std::size_t kMostPathSegments = 20'000;
+
+/// Segments for a path that axes follow, as Machine::appendPath() takes them. Positions, velocity
+/// and tolerance are as in the PathRequest with which it began.
+struct PathAppend {
+  std::uint64_t path = 0;  ///< CoordinatedMove::id()
+  std::vector<PathSegment> segments;
+  /// (Default) they are the last ones: the path ends with them.
+  bool more_follows = false;
+};
+
+/// What lies ahead of axes on a path to which segments can be appended.
+struct PathAhead {
+  std::size_t segments = 0;     ///< that they have not passed
+  std::size_t room = 0;         ///< for so many more
+  double time = 0.0;            ///< [s] that they take at the speed override of 1
+  double passed = 0.0;          ///< [s] that the path took until now, at that override
+  bool more_follows = false;    ///< false: the end of these is the end of the path
+  std::vector<double> targets;  ///< [unit] the commanded positions at their end
+};
 
 /// An accepted motion of several axes.
 struct CoordinatedMove {
@@ -100,6 +122,8 @@ struct CoordinatedMove {
   };
   std::vector<Member> members;  ///< in the order of the request
   double duration = 0.0;        ///< [s] as planned
+  /// For Machine::appendPath(); never the same twice.
+  std::uint64_t id() const { return members.front().move.id; }
 };
 
 /// How and where a motion of several axes ended.

@@ -180,6 +180,24 @@ class Machine {
   ///   segment (the first is 0). Then nothing moves.
   CoordinatedMove followPath(const PathRequest& request);
 
+  /// Appends segments to a path that began with PathRequest::more_follows: the axes don't stop at
+  /// its former end, and the corner there is rounded, as far as they can still slow down for it. If
+  /// the segments come too late, the axes come to rest at the former end, wait there, and continue
+  /// from rest. Holds, stops and the speed override act as before; segments can also be appended
+  /// during a hold. The limits are those with which the path began. The path reaches its end, and
+  /// wait() returns, only after an append without PathAppend::more_follows, which may have no
+  /// segments. It is planned in the calling thread; that takes time in proportion to the appended
+  /// segments, and to all that lie ahead.
+  ///
+  /// @return what lies ahead afterwards, counted from the present position. An append without
+  ///   segments but with `more_follows` only asks for that.
+  /// @throw Refused if the axes no longer follow this path, if it is complete, if more than
+  ///   kMostPathSegments would lie ahead, or as followPath() for a segment, by its number among the
+  ///   appended ones. Then the path stays as it is.
+  PathAhead appendPath(const PathAppend& request);
+  /// What lies ahead on such a path; empty if no axis follows it any longer.
+  std::optional<PathAhead> pathAhead(std::uint64_t path) const;
+
   /// How a motion of several axes ended; empty if it hasn't ended.
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
   /// Returns when it has ended.

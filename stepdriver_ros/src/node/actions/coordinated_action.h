@@ -31,8 +31,8 @@ struct FollowingTogether {
 /// begins; until then its axes come to rest, or wait for the end of a hold, and a cancel stops
 /// them.
 ///
-/// @tparam Action MoveLineAction or FollowPathAction: their results and feedbacks have the same
-///   fields.
+/// @tparam Action MoveLineAction or FollowPathAction: their results have the same fields, and their
+///   feedbacks those of a MoveLineAction.
 template <typename Action>
 class CoordinatedAction : public MotionAction<Action, FollowingTogether<Action>> {
   using Base = MotionAction<Action, FollowingTogether<Action>>;
@@ -55,12 +55,15 @@ class CoordinatedAction : public MotionAction<Action, FollowingTogether<Action>>
         poll_(onQueue(queues.control(), node), kPollPeriod, [this] { return this->poll(); }) {}
 
   machine::Machine& machine() { return machine_; }
+  const machine::Machine& machine() const { return machine_; }
 
  private:
   /// Begins the motion. @throw Error if it is refused.
   virtual machine::CoordinatedMove move(const Goal& goal) = 0;
   /// The covered part of a motion, from 0 to 1. @param states of its axes, now.
   virtual double progressOfGoal(const Following& following, const States& states) const = 0;
+  /// Adds the fields that only this action has.
+  virtual void complete(const Following& /*following*/, Feedback& /*feedback*/) const {}
 
   Following begin(const GoalHandle& handle) override {
     Following following;
@@ -114,6 +117,7 @@ class CoordinatedAction : public MotionAction<Action, FollowingTogether<Action>>
     }
     following.progress = progressOfGoal(following, states);
     feedback.progress = following.progress;
+    complete(following, feedback);
     following.handle.publishFeedback(feedback);
   }
 

@@ -4,6 +4,7 @@
 #include <stepdriver/FollowPathAction.h>
 
 #include <algorithm>
+#include <cstdint>
 
 #include "coordinated_action.h"
 #include "node/path_request.h"
@@ -34,9 +35,20 @@ class PathAction : public CoordinatedAction<FollowPathAction> {
       if (state.held) return following.progress;
       time_left = std::max(time_left, state.time_left);
     }
+    if (const auto ahead = machine().pathAhead(following.move.id())) {
+      const double all = ahead->passed + ahead->time;
+      return std::clamp(all > 0.0 ? ahead->passed / all : 0.0, following.progress, 1.0);
+    }
     const double duration = following.move.duration;
     const double covered = duration > 0.0 ? 1.0 - time_left / duration : 1.0;
     return std::clamp(covered, following.progress, 1.0);
+  }
+
+  void complete(const Following& following, FollowPathFeedback& feedback) const override {
+    feedback.path = following.move.id();
+    if (const auto ahead = machine().pathAhead(feedback.path)) {
+      feedback.segments_ahead = static_cast<std::uint32_t>(ahead->segments);
+    }
   }
 };
 

@@ -4,6 +4,7 @@
 #include <ros/console.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
+#include <stepdriver/AppendPath.h>
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/RigReport.h>
@@ -139,13 +140,33 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
   const boost::function<bool(FollowPath::Request&, FollowPath::Response&)> path =
       [&machine](FollowPath::Request& request, FollowPath::Response& response) {
         return respond(response, [&] {
-          tell(machine, machine.followPath(pathRequest(request)), request.wait != 0, "a path",
-               response);
+          if (request.wait != 0 && request.more_follows != 0) {
+            throw Refused(
+                "wait must be false if more_follows: the answer has the number for append_path");
+          }
+          const machine::CoordinatedMove move = machine.followPath(pathRequest(request));
+          response.path = move.id();
+          tell(machine, move, request.wait != 0, "a path", response);
+        });
+      };
+  const boost::function<bool(AppendPath::Request&, AppendPath::Response&)> append =
+      [&machine](AppendPath::Request& request, AppendPath::Response& response) {
+        return respond(response, [&] {
+          const machine::PathAhead ahead = machine.appendPath(
+              {request.path, pathSegments(request.segments), request.more_follows != 0});
+          response.target = ahead.targets;
+          response.segments_ahead = static_cast<std::uint32_t>(ahead.segments);
+          response.room = static_cast<std::uint32_t>(ahead.room);
+          response.time_ahead = ahead.time;
+          response.message =
+              fmt::format("{} segments, {} s, lie ahead{}", ahead.segments, roundedText(ahead.time),
+                          ahead.more_follows ? "" : " to the end of the path");
         });
       };
   node_.setCallbackQueue(&queues_.lines());
   servers_.push_back(advertiseBounded(node_, "move_line", line));
   servers_.push_back(advertiseBounded(node_, "follow_path", path));
+  servers_.push_back(advertiseBounded(node_, "append_path", append));
 }
 
 void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {

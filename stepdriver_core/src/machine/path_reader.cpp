@@ -1,0 +1,178 @@
+#include "path_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "message_text.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::machine {
+
+using axis::PathAxis;
+using motion::ContourSegment;
+using Shape = PathSegment::Shape;
+
+namespace {
+
+constexpr double kShortestSegment = 1e-3;  // microsteps of one of its axes
+
+}  // namespace
+
+std::string segmentText(std::size_t index) { return fmt::format("segment {} of the path", index); }
+
+ContourSegment PathReader::read(const PathSegment& given) {
+  ContourSegment segment;
+  segment.end = positions(given.end, "positions");
+  switch (given.shape) {
+    case Shape::kLine:
+      break;
+    case Shape::kArcAround:
+    case Shape::kArcThrough:
+      readArc(given, segment);
+      break;
+    case Shape::kBezier:
+      segment.shape = ContourSegment::Shape::kBezier;
+      segment.control1 = positions(given.control1, "numbers in control1");
+      segment.control2 = positions(given.control2, "numbers in control2");
+      break;
+  }
+  requireLength(given, segment);
+  readSpeed(given, segment);
+  segment.tolerance = given.tolerance.value_or(frame_.tolerance);
+  requirePositive("tolerance", segment.tolerance);
+  before_ = segment.end;
+  ++index_;
+  return segment;
+}
+
+void PathReader::refuse(const std::string& why) const {
+  throw Refused(segmentText(index_) + " " + why);
+}
+
+std::vector<double> PathReader::positions(const std::vector<double>& given,
+                                          const char* what) const {
+  if (given.size() != axes_.size()) {
+    refuse(fmt::format("has {} {}, but must have {}", given.size(), what, axes_.size()));
+  }
+  std::vector<double> positions;
+  positions.reserve(given.size());
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    positions.push_back(place(i, given[i], what));
+  }
+  return positions;
+}
+
+double PathReader::place(std::size_t axis, double given, const char* what) const {
+  if (std::isfinite(given)) return frame_.zero[axis] + given;
+  axes_[axis].refuse(fmt::format("{} has {} among its {}, but they must be finite",
+                                 segmentText(index_), numberText(given), what));
+}
+
+void PathReader::requirePositive(const char* what, double value) const {
+  if (std::isfinite(value) && value >= 0.0) return;
+  refuse(fmt::format("has the {} {}, but it must be a finite number from 0 on", what,
+                     numberText(value)));
+}
+
+void PathReader::readArc(const PathSegment& given, ContourSegment& segment) const {
+  segment.shape = ContourSegment::Shape::kArc;
+  std::array<double, 2> from{};
+  std::array<double, 2> point{};
+  std::array<double, 2> to{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::size_t axis = axisOf(given.plane[k]);
+    segment.plane[k] = axis;
+    from[k] = before_[axis];
+    to[k] = segment.end[axis];
+    point[k] = place(axis, given.point[k], "numbers in point");
+  }
+  const auto [a, b] = segment.plane;
+  if (a == b || axes_[a].kind != axes_[b].kind) {
+    refuse(
+        fmt::format("is an arc in the plane of {} and {}, but must have two different axes "
+                    "of the same kind",
+                    given.plane[0], given.plane[1]));
+  }
+  const bool around = given.shape == Shape::kArcAround;
+  if (around) requireCircle(axes_[a], from, point, to);
+  const motion::Arc arc = around ? motion::arcAround(from, point, to, given.clockwise)
+                                 : motion::arcThrough(from, point, to);
+  if (arc.angle == 0.0) {
+    refuse("is an arc through three points that are in line, or of which two are the same");
+  }
+  segment.centre = arc.centre;
+  segment.angle = arc.angle;
+}
+
+std::size_t PathReader::axisOf(const std::string& name) const {
+  const auto found = std::find(frame_.names.begin(), frame_.names.end(), name);
+  if (found != frame_.names.end()) {
+    return static_cast<std::size_t>(found - frame_.names.begin());
+  }
+  refuse(fmt::format("is an arc in a plane of '{}', which isn't among the path's axes, {}", name,
+                     listText(frame_.names, "and")));
+}
+
+void PathReader::requireCircle(const PathAxis& axis, const std::array<double, 2>& from,
+                               const std::array<double, 2>& centre,
+                               const std::array<double, 2>& to) const {
+  const double begin = std::hypot(from[0] - centre[0], from[1] - centre[1]);
+  const double end = std::hypot(to[0] - centre[0], to[1] - centre[1]);
+  if (begin * axis.steps_per_unit < 1.0 || end * axis.steps_per_unit < 1.0) {
+    refuse(fmt::format("is an arc with a radius of {}, but it must be a microstep or more",
+                       axis.show(std::min(begin, end))));
+  }
+  if (std::abs(begin - end) <= kArcMismatch) return;
+  refuse(
+      fmt::format("is an arc that begins {} from its centre and ends {} from it; these may "
+                  "differ by {}",
+                  axis.show(begin), axis.show(end), axis.show(kArcMismatch)));
+}
+
+void PathReader::requireLength(const PathSegment& given, const ContourSegment& segment) const {
+  if (segment.shape == ContourSegment::Shape::kArc) return;
+  double longest = 0.0;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const auto take = [&](double position) {
+      const double way = std::abs(position - before_[i]) * axes_[i].steps_per_unit;
+      longest = std::max(longest, way);
+    };
+    take(segment.end[i]);
+    if (given.shape != Shape::kBezier) continue;
+    take(segment.control1[i]);
+    take(segment.control2[i]);
+  }
+  if (longest < kShortestSegment) refuse("has a length of 0, but must lead away from its begin");
+}
+
+void PathReader::readSpeed(const PathSegment& given, ContourSegment& segment) const {
+  requirePositive("velocity", given.velocity);
+  const double velocity = given.velocity > 0.0 ? given.velocity : frame_.velocity;
+  if (velocity == 0.0) return;
+  segment.speed = velocity;
+  bool linear_moves = false;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    linear_moves = linear_moves || (isLinear(i) && moves(segment, i));
+  }
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    segment.measured.push_back(isLinear(i) == linear_moves);
+  }
+}
+
+bool PathReader::moves(const ContourSegment& segment, std::size_t axis) const {
+  if (segment.end[axis] != before_[axis]) return true;
+  switch (segment.shape) {
+    case ContourSegment::Shape::kLine:
+      return false;
+    case ContourSegment::Shape::kArc:
+      return segment.plane[0] == axis || segment.plane[1] == axis;
+    case ContourSegment::Shape::kBezier:
+      return segment.control1[axis] != before_[axis] || segment.control2[axis] != before_[axis];
+  }
+  return false;
+}
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "axis/path_axis.h"
+#include "motion/contour.h"
+#include "stepdriver_core/machine/coordinated_move.h"
+
+namespace stepdriver::machine {
+
+/// What all segments of a path have in common.
+struct PathFrame {
+  std::vector<std::string> names;  ///< of the axes
+  std::vector<double> zero;        ///< [unit] positions of the segments count from here
+  double velocity = 0.0;           ///< see PathRequest
+  double tolerance = 0.0;
+};
+
+/// Reads the segments of a path, one after the other, and checks them.
+class PathReader {
+ public:
+  /// @param frame, axes outlive this. @param from [unit] where the first segment begins.
+  PathReader(const PathFrame& frame, const std::vector<axis::PathAxis>& axes,
+             std::vector<double> from)
+      : frame_(frame), axes_(axes), before_(std::move(from)) {}
+
+  /// @throw Refused naming the segment, by the number of those that were read before it.
+  motion::ContourSegment read(const PathSegment& given);
+
+ private:
+  [[noreturn]] void refuse(const std::string& why) const;
+  std::vector<double> positions(const std::vector<double>& given, const char* what) const;
+  double place(std::size_t axis, double given, const char* what) const;
+  void requirePositive(const char* what, double value) const;
+  void readArc(const PathSegment& given, motion::ContourSegment& segment) const;
+  std::size_t axisOf(const std::string& name) const;
+  void requireCircle(const axis::PathAxis& axis, const std::array<double, 2>& from,
+                     const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
+  void requireLength(const PathSegment& given, const motion::ContourSegment& segment) const;
+  void readSpeed(const PathSegment& given, motion::ContourSegment& segment) const;
+  bool isLinear(std::size_t axis) const { return axes_[axis].kind == config::Kind::kLinear; }
+  bool moves(const motion::ContourSegment& segment, std::size_t axis) const;
+
+  const PathFrame& frame_;
+  const std::vector<axis::PathAxis>& axes_;
+  std::vector<double> before_;  // [unit] the end of the segment before
+  std::size_t index_ = 0;
+};
+
+/// "segment 3 of the path"
+std::string segmentText(std::size_t index);
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,374 @@
+#include "queued_path.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "motion/backlash.h"
+#include "motion/profile_parts.h"
+#include "motion/profile_peaks.h"
+#include "motion/spline.h"
+#include "nanoseconds.h"
+#include "path_plan.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::machine {
+
+using axis::PathAxis;
+using axis::PathStart;
+using axis::TrajectoryPath;
+using axis::TrajectoryPoint;
+using motion::ContourSegment;
+using motion::DoubleDouble;
+using motion::Profile;
+
+namespace {
+
+// Of the excess of a plan from a speed.
+constexpr double kNoExcess = 1e-9;
+// Of the maximum speed: the backlash is at rest.
+constexpr double kStill = 1e-3;
+// [microsteps] A backlash at rest is so close to whole microsteps.
+constexpr double kNear = 1e-3;
+// If the axes can't slow down before a corner, its rounding begins later: the part of the segment
+// that is left for it is halved so often, and then it isn't rounded.
+constexpr int kHalvings = 6;
+// [ns] Straight lines aren't divided closer to their end.
+constexpr std::int64_t kShortestPart = 100'000;
+// Starts that are tried before the end of the path.
+constexpr int kMostStarts = 8;
+
+void appendPieces(std::vector<motion::Piece>& pieces, const Profile& profile) {
+  for (const motion::Piece& piece : profile.pieces()) pieces.push_back(piece);
+}
+
+}  // namespace
+
+// Where the new plan begins.
+struct QueuedPath::Start {
+  std::int64_t time_ns = 0;
+  std::size_t segment = 0;
+  motion::ContourBegin begin;
+  // At rest after the end of the path: the way from the microsteps of the axes to that end takes so
+  // long, and the contour begins with the new segments.
+  std::optional<double> from_rest;
+  bool on_straight = false;  // between two knots
+};
+
+struct QueuedPath::Continuation {
+  std::vector<ContourSegment> segments;  // from that of the start on
+  motion::ContourPlan plan;
+  std::vector<PathStart> states;
+};
+
+QueuedPath::QueuedPath(std::shared_ptr<const axis::SharedPath> motion,
+                       std::shared_ptr<const PathWindow> window, bool more_follows)
+    : motion_(std::dynamic_pointer_cast<const TrajectoryPath>(std::move(motion))),
+      window_(std::move(window)),
+      more_follows_(more_follows) {}
+
+std::size_t QueuedPath::segmentAt(std::int64_t time_ns) const {
+  const auto later =
+      std::upper_bound(window_->knots.begin() + 1, window_->knots.end(), time_ns,
+                       [](std::int64_t time, const auto& knot) { return time < knot.time_ns; });
+  return later == window_->knots.end() ? window_->segments.size() : later->segment;
+}
+
+PathAhead QueuedPath::aheadOf(double position) const {
+  PathAhead ahead;
+  ahead.segments = window_->segments.size() - segmentAt(nanoseconds(position));
+  ahead.room = kMostPathSegments - std::min(kMostPathSegments, ahead.segments);
+  ahead.time = std::max(0.0, motion_->end().value() - position);
+  ahead.passed = position;
+  ahead.more_follows = more_follows_;
+  ahead.targets = window_->segments.back().end;
+  return ahead;
+}
+
+std::vector<double> QueuedPath::targets() const {
+  std::vector<double> targets;
+  for (std::size_t k = 0; k < window_->axes.size(); ++k) {
+    targets.push_back(window_->axes[k].countOf(window_->segments.back().end[k]));
+  }
+  return targets;
+}
+
+std::vector<ContourSegment> QueuedPath::read(const std::vector<PathSegment>& given) const {
+  const std::vector<double>& end = window_->segments.back().end;
+  PathReader reader(window_->frame, window_->axes, end);
+  std::vector<ContourSegment> added;
+  added.reserve(given.size());
+  for (const PathSegment& segment : given) added.push_back(reader.read(segment));
+  requireRange(motion::Contour(end, added, resolutionOf(window_->axes)), window_->axes);
+  return added;
+}
+
+// On a straight line the speed changes evenly between two knots.
+QueuedPath::Start QueuedPath::onStraight(std::size_t knot, std::int64_t time_ns) const {
+  const PathWindow::Knot& before = window_->knots[knot];
+  const PathWindow::Knot& after = window_->knots[knot + 1];
+  const double from = before.segment == after.segment ? before.parameter : 0.0;
+  const double part = static_cast<double>(time_ns - before.time_ns) /
+                      static_cast<double>(after.time_ns - before.time_ns);
+  const double speed = before.speed + part * (after.speed - before.speed);
+  const double way = part * (before.speed + speed) / (before.speed + after.speed);
+  return {time_ns, after.segment, {from + way * (after.parameter - from), speed}, {}, true};
+}
+
+QueuedPath::Start QueuedPath::atRest() const {
+  const double duration = restOf(window_->axes, window_->segments.back().end, false).duration;
+  const auto end_ns = static_cast<std::int64_t>(std::ceil(motion_->end().value() * 1e9));
+  return {end_ns, window_->segments.size(), {}, duration, false};
+}
+
+// The earliest ones first; the last one is certainly possible.
+std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t time_ns) const {
+  const std::vector<PathWindow::Knot>& knots = window_->knots;
+  std::vector<Start> starts;
+  const auto first = std::lower_bound(
+      knots.begin(), knots.end(), time_ns,
+      [](const PathWindow::Knot& knot, std::int64_t time) { return knot.time_ns < time; });
+  if (first != knots.begin() && first != knots.end() && (first - 1)->straight &&
+      first->time_ns - time_ns > kShortestPart) {
+    starts.push_back(onStraight(static_cast<std::size_t>(first - knots.begin()) - 1, time_ns));
+  }
+  std::ptrdiff_t step = 1;
+  for (auto knot = first; knot != knots.end() && starts.size() < kMostStarts;) {
+    if (!knot->may_begin) {
+      ++knot;
+      continue;
+    }
+    starts.push_back({knot->time_ns, knot->segment, {knot->parameter, knot->speed}, {}, false});
+    knot += std::min(step, knots.end() - knot);
+    step *= 2;
+  }
+  const PathWindow::Knot& end = knots.back();
+  if (time_ns <= end.time_ns) {
+    starts.push_back({end.time_ns, end.segment, {end.parameter, end.speed}, {}, false});
+  }
+  starts.push_back(atRest());
+  return starts;
+}
+
+// Empty if a backlash is being taken up there.
+std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
+                                                           const JointPlace& joint) const {
+  const std::int64_t at_ns = start.time_ns - motion::splitNanoseconds(motion_->origin()).whole;
+  std::vector<PathStart> states;
+  for (std::size_t k = 0; k < window_->axes.size(); ++k) {
+    const PathAxis& axis = window_->axes[k];
+    PathStart& state = states.emplace_back();
+    state.motor = motion_->members()[k].curve->stateAt(at_ns);
+    if (axis.backlash == 0) continue;
+    const double slack = state.motor.position.value() - axis.countOf(joint.position[k]);
+    const double taking_up = state.motor.velocity - joint.velocity[k] * axis.steps_per_unit;
+    state.slack = std::nearbyint(slack);
+    const bool rests = std::abs(slack - state.slack) < kNear &&
+                       std::abs(taking_up) <= kStill * axis.limits.max_speed;
+    if (!rests) return std::nullopt;
+  }
+  return states;
+}
+
+// The plan begins exactly where the axes are.
+void QueuedPath::adjust(Start& start, const motion::ContourPoint& planned,
+                        const std::vector<PathStart>& states) const {
+  double square = 0.0;
+  double way = 0.0;
+  double speed = 0.0;
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const PathAxis& axis = window_->axes[k];
+    const PathStart& state = states[k];
+    const double rate = planned.first[k];
+    const double count = (state.motor.position - state.slack).value();
+    square += rate * rate;
+    way += rate * (axis.positionOf(count) - planned.position[k]);
+    speed += rate * state.motor.velocity / axis.steps_per_unit;
+  }
+  if (start.on_straight) {
+    start.begin.parameter = std::clamp(start.begin.parameter + way / square, 0.0, 1.0);
+    start.begin.speed = speed / std::sqrt(square);
+  } else if (speed > 0.0) {
+    // The times of knots are rounded to nanoseconds.
+    constexpr double kMost = 0.49e-9;
+    start.begin.ago = std::clamp(way / speed, -kMost, kMost);
+  }
+}
+
+// Empty if the axes can't follow the rest of the path from there.
+std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
+    Start start, const std::vector<ContourSegment>& added) const {
+  const std::vector<ContourSegment>& old = window_->segments;
+  const std::vector<PathAxis>& axes = window_->axes;
+  const std::vector<double>& from =
+      start.segment == 0 ? window_->start : old[start.segment - 1].end;
+  Continuation made;
+  made.segments.assign(old.begin() + static_cast<std::ptrdiff_t>(start.segment), old.end());
+  const std::size_t corner = made.segments.size();  // the number of the segment after it
+  made.segments.insert(made.segments.end(), added.begin(), added.end());
+  const double resolution = resolutionOf(axes);
+  const std::vector<motion::ContourLimits> limits = contourLimits(axes, kShareOfLimits);
+  if (corner == 1) made.segments.front().kept = start.begin.parameter;
+  const motion::Contour given(from, made.segments, resolution);
+  motion::ContourPoint place;
+  given.evaluate(0, start.begin.parameter, place);
+  const auto states = statesAt(start, jointAt(start, place));
+  if (!states) return std::nullopt;
+  made.states = *states;
+  adjust(start, place, made.states);
+  for (int halvings = 0; halvings <= kHalvings; ++halvings) {
+    if (corner > 0) {
+      const double first = corner == 1 ? start.begin.parameter : 0.0;
+      const double left = halvings == kHalvings ? 0.0 : std::ldexp(1.0 - first, -halvings);
+      made.segments[corner - 1].kept = 1.0 - left;
+    }
+    const motion::Contour contour(from, made.segments, resolution);
+    made.plan = motion::planContour(contour, limits, start.begin);
+    if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcess) return made;
+    if (corner == 0) break;
+  }
+  return std::nullopt;
+}
+
+QueuedPath::JointPlace QueuedPath::jointAt(const Start& start,
+                                           const motion::ContourPoint& place) const {
+  if (start.from_rest) {
+    const std::vector<double>& end = window_->segments.back().end;
+    return {restOf(window_->axes, end, false).positions, std::vector<double>(end.size(), 0.0)};
+  }
+  double square = 0.0;
+  for (const double rate : place.first) square += rate * rate;
+  JointPlace joint{place.position, place.first};
+  for (double& rate : joint.velocity) rate *= start.begin.speed / std::sqrt(square);
+  return joint;
+}
+
+// The motion so far, without what is passed, and from the start on the new one; null if there is no
+// room to take up a backlash.
+std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
+                                                         const Continuation& continuation,
+                                                         const std::vector<TrajectoryPoint>& points,
+                                                         std::int64_t passed_ns) const {
+  const DoubleDouble passed = motion::secondsOf(passed_ns);
+  std::vector<TrajectoryPath::Member> members = motion_->members();
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const PathAxis& axis = window_->axes[k];
+    const PathStart& state = continuation.states[k];
+    std::vector<motion::Waypoint> waypoints;
+    waypoints.reserve(points.size());
+    for (const TrajectoryPoint& point : points) {
+      const std::int64_t time_ns = nanoseconds(point.time);
+      if (time_ns == 0) continue;  // the start
+      waypoints.push_back({time_ns,
+                           axis.countOf(point.positions[k]),
+                           point.velocities[k] * axis.steps_per_unit,
+                           {}});
+    }
+    const motion::MotionState joint_state{state.motor.position - state.slack, state.motor.velocity,
+                                          0.0};
+    Profile motor = motion::planSpline(0, joint_state, waypoints);
+    if (axis.backlash > 0) {
+      motion::MotionLimits limits = axis.limits;
+      limits.acceleration = axis.mostAcceleration();
+      motion::MotorPlan plan = motion::planMotor(motor, state.slack, axis.backlash, limits);
+      if (plan.no_room) return nullptr;
+      motor = std::move(plan.profile);
+    }
+    std::vector<motion::Piece> pieces;
+    appendPieces(pieces, motion::part(*members[k].curve, passed - motion_->origin(),
+                                      motion::secondsOf(start.time_ns) - motion_->origin()));
+    appendPieces(pieces, motor);
+    const motion::ProfilePeaks peaks = motion::profilePeaks(motor, state.motor.velocity);
+    for (motion::MotorBounds* bounds : {&members[k].bounds, &members[k].stop_bounds}) {
+      bounds->acceleration = std::max(bounds->acceleration, std::abs(peaks.acceleration.value));
+    }
+    members[k].curve = std::make_shared<const Profile>(0, std::move(pieces));
+  }
+  return std::make_shared<const TrajectoryPath>(std::move(members), passed);
+}
+
+QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments, bool more_follows,
+                                        double passed, double changeable) const {
+  if (segments.empty()) {
+    return {std::make_shared<const QueuedPath>(motion_, window_, more_follows), passed,
+            motion_->end().value()};
+  }
+  if (!more_follows_) throw Refused("the path is complete: it was told that no more follows");
+  const std::int64_t passed_ns =
+      std::max(nanoseconds(passed), motion::splitNanoseconds(motion_->origin()).whole);
+  const PathAhead ahead = aheadOf(static_cast<double>(passed_ns) * 1e-9);
+  if (segments.size() > ahead.room) {
+    throw Refused(fmt::format(
+        "{} segments are too many: {} lie ahead of the axes, and there is room for {} more",
+        segments.size(), ahead.segments, ahead.room));
+  }
+  try {
+    const std::vector<ContourSegment> added = read(segments);
+    const std::int64_t changeable_ns =
+        std::max(nanoseconds(changeable), std::max(passed_ns, window_->settled_ns));
+    for (const Start& start : startsFrom(changeable_ns)) {
+      std::optional<Continuation> found = continueFrom(start, added);
+      if (!found) continue;
+      const Longer longer = continued(start, *std::move(found), added, more_follows, passed_ns);
+      if (longer.path) return longer;
+    }
+  } catch (const std::invalid_argument& error) {
+    throw Refused(error.what());
+  } catch (const std::range_error& error) {
+    throw Refused(error.what());
+  }
+  throw Refused(
+      "the path turns, and continues so close to the limits of the axes that their backlash "
+      "can't be taken up meanwhile");
+}
+
+QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation continuation,
+                                         const std::vector<ContourSegment>& added,
+                                         bool more_follows, std::int64_t passed_ns) const {
+  const double delay = start.from_rest.value_or(0.0);
+  if (delay > 0.0) {
+    const auto delay_ns = static_cast<std::int64_t>(std::ceil(delay * 1e9));
+    for (motion::ContourKnot& knot : continuation.plan.knots) knot.time_ns += delay_ns;
+    continuation.plan.settled_ns += delay_ns;
+  }
+  PathWindow window;
+  window.frame = window_->frame;
+  window.axes = window_->axes;
+  // What is passed.
+  const auto first_kept =
+      std::upper_bound(window_->knots.begin() + 1, window_->knots.end(), passed_ns,
+                       [](std::int64_t time, const auto& knot) { return time < knot.time_ns; }) -
+      1;
+  const std::size_t dropped = std::min(first_kept->segment, start.segment);
+  window.start = dropped == 0 ? window_->start : window_->segments[dropped - 1].end;
+  window.segments.assign(window_->segments.begin() + static_cast<std::ptrdiff_t>(dropped),
+                         window_->segments.begin() + static_cast<std::ptrdiff_t>(start.segment));
+  window.segments.insert(window.segments.end(), continuation.segments.begin(),
+                         continuation.segments.end());
+  for (auto knot = first_kept; knot != window_->knots.end() && knot->time_ns < start.time_ns;
+       ++knot) {
+    window.knots.push_back(*knot);
+    window.knots.back().segment -= dropped;
+  }
+  appendKnots(window.knots, continuation.plan.knots, start.time_ns, start.segment - dropped);
+  window.settled_ns = start.time_ns + continuation.plan.settled_ns;
+  // Refusals count the segments from the first appended one.
+  const std::size_t old = continuation.segments.size() - added.size();
+  for (motion::ContourKnot& knot : continuation.plan.knots) {
+    knot.segment -= std::min(knot.segment, old);
+  }
+  const std::vector<TrajectoryPoint> points =
+      pointsOf(std::move(continuation.plan.knots), window_->axes, 0);
+  continuation.plan.knots.clear();
+  auto motion = joined(start, continuation, points, passed_ns);
+  if (!motion) return {};
+  return {
+      std::make_shared<const QueuedPath>(
+          std::move(motion), std::make_shared<const PathWindow>(std::move(window)), more_follows),
+      static_cast<double>(passed_ns) * 1e-9, static_cast<double>(start.time_ns) * 1e-9};
+}
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,453 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/path_bench.h"
+#include "support/refusal.h"
+
+// Paths that are fed while axes follow them.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using machine::PathAhead;
+using machine::PathAppend;
+using test::CoordinatedMove;
+using test::CoordinatedResult;
+using test::kHalfMicrosteps;
+using test::kMicrostep;
+using test::kTolerance;
+using test::lineTo;
+using test::PathRequest;
+using test::PathSegment;
+using test::Place;
+
+class PathQueue : public test::PathBench {
+ protected:
+  /// The first segments of a path; the others follow.
+  CoordinatedMove begin(const PathRequest& whole, std::size_t count) {
+    whole_ = whole;
+    fed_ = count;
+    PathRequest first = whole;
+    first.segments.resize(count);
+    first.more_follows = true;
+    move_ = followPath(first);
+    return move_;
+  }
+
+  /// The next ones.
+  PathAhead feed(std::size_t count) {
+    PathAppend append{move_.id(), {}, false};
+    while (count-- > 0 && fed_ < whole_.segments.size()) {
+      append.segments.push_back(whole_.segments[fed_++]);
+    }
+    append.more_follows = fed_ < whole_.segments.size();
+    return machine().appendPath(append);
+  }
+
+  PathAhead append(const std::vector<PathSegment>& segments, bool more_follows = true) {
+    return machine().appendPath({move_.id(), segments, more_follows});
+  }
+  PathAhead ahead() { return append({}); }
+
+  /// Feeds a path in pieces, each when less than that is left [s].
+  CoordinatedResult feedInTime(const PathRequest& whole, std::size_t piece, double least) {
+    begin(whole, piece);
+    while (fed_ < whole_.segments.size()) {
+      EXPECT_TRUE(state("x").moving || state("y").moving) << "starved at segment " << fed_;
+      if (ahead().time < least) feed(piece);
+      advance(0.001);
+    }
+    return machine().wait(move_);
+  }
+
+  // The longest time between two pulses of either axis, after the first and before the last [s].
+  double longestPause() {
+    std::vector<double> times;
+    for (const std::string name : {"x", "y"}) {
+      for (const auto& crossing : crossings(name)) times.push_back(crossing.time_ns * 1e-9);
+    }
+    std::sort(times.begin(), times.end());
+    double longest = 0.0;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+      longest = std::max(longest, times[i] - times[i - 1]);
+    }
+    return longest;
+  }
+
+  void expectOnPath(const PathRequest& path, double more = 0.05 * kMicrostep) {
+    expectAtRest();
+    EXPECT_LE(farthest(pulsePlaces(), corners(path)), path.tolerance + kHalfMicrosteps + more);
+  }
+
+  void expectLimits() {
+    for (const std::string name : {"x", "y"}) {
+      const test::Differences seen = differences(name, 0.004);
+      EXPECT_LE(seen.speed, 0.1 / kMicrostep * 1.001) << name;
+      EXPECT_LE(seen.acceleration, 1.0 / kMicrostep * 1.02) << name;
+    }
+  }
+
+  PathRequest whole_;
+  std::size_t fed_ = 0;
+  CoordinatedMove move_;
+};
+
+PathRequest zigzag(std::size_t count) {
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 100e-6};
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-0.02, 0.02);
+  for (std::size_t i = 0; i < count; ++i) {
+    request.segments.push_back(lineTo({place(random), place(random)}));
+  }
+  return request;
+}
+
+TEST_F(PathQueue, FollowsACircleInPiecesAsFastAsInOneGo) {
+  const double in_one_go = finish(test::circle()).duration;
+  build({plotterAxis("x"), plotterAxis("y")});
+  const CoordinatedResult result = feedInTime(test::circle(), 5, 0.2);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  // A thousandth of the limits is left for the plans from a speed.
+  EXPECT_LE(result.duration, 1.002 * in_one_go);
+  EXPECT_LE(longestPause(), 0.01) << "it stopped";
+  EXPECT_EQ(bench->pulses("x"), 0);
+  EXPECT_EQ(bench->pulses("y"), 0);
+  expectOnPath(test::circle());
+  expectLimits();
+}
+
+TEST_F(PathQueue, FollowsLinesCurvesAndCornersInPieces) {
+  const double in_one_go = finish(test::mixed()).duration;
+  build({plotterAxis("x"), plotterAxis("y")});
+  const CoordinatedResult result = feedInTime(test::mixed(), 1, 0.15);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_LE(result.duration, 1.002 * in_one_go);
+  EXPECT_NEAR(result.positions[0], -0.010, kMicrostep / 2.0);
+  EXPECT_NEAR(result.positions[1], 0.010, kMicrostep / 2.0);
+  expectAtRest();
+  expectLimits();
+}
+
+TEST_F(PathQueue, OfRandomLinesKeepsLimitsAndTolerance) {
+  const double in_one_go = finish(zigzag(60)).duration;
+  build({plotterAxis("x"), plotterAxis("y")});
+  const CoordinatedResult result = feedInTime(zigzag(60), 2, 1.0);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_LE(result.duration, 1.002 * in_one_go);
+  expectOnPath(zigzag(60));
+  expectLimits();
+}
+
+// Appends come when the axes already slow down for the end: some corners are rounded less.
+TEST_F(PathQueue, IsFedAtTheLastMoment) {
+  for (const double least : {0.05, 0.03}) {
+    build({plotterAxis("x"), plotterAxis("y")});
+    const CoordinatedResult result = feedInTime(zigzag(60), 1, least);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    expectOnPath(zigzag(60));
+    expectLimits();
+  }
+}
+
+TEST_F(PathQueue, RestsOnThePathWhileItIsStarvedAndContinues) {
+  const PathRequest path = test::circle();
+  begin(path, 30);
+  awaitRest();
+  advance(1.0);
+  EXPECT_FALSE(machine().result(move_)) << "it isn't the end";
+  EXPECT_NEAR(state("x").position, path.segments[29].end[0], kMicrostep);
+  EXPECT_EQ(ahead().segments, 0U);
+  EXPECT_EQ(ahead().time, 0.0);
+  feed(30);
+  EXPECT_TRUE(state("x").moving);
+  awaitRest();
+  EXPECT_FALSE(machine().result(move_));
+  feed(40);
+  const CoordinatedResult result = machine().wait(move_);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectOnPath(path);
+  expectLimits();
+}
+
+TEST_F(PathQueue, IsFedWhileItSlowsDownToItsEnd) {
+  PathRequest path{{"x", "y"}, {lineTo({0.03, 0.0}), lineTo({0.06, 0.0})}, false, 0.0, kTolerance};
+  begin(path, 1);
+  // 30 mm at 100 mm/s: the axes slow down from 0.3 to 0.4 s.
+  advance(0.36);
+  const double slow = state("x").velocity;
+  EXPECT_LT(slow, 0.06);
+  feed(1);
+  advance(0.05);
+  EXPECT_GT(state("x").velocity, slow - 0.021) << "20 ms ahead nothing changes";
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  expectOnPath(path);
+  expectLimits();
+}
+
+TEST_F(PathQueue, EndsOnlyWhenItIsTold) {
+  begin(test::circle(), 20);
+  awaitRest();
+  advance(0.5);
+  EXPECT_FALSE(machine().result(move_));
+  const PathAhead end = append({}, false);
+  EXPECT_FALSE(end.more_follows);
+  const auto result = machine().result(move_);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->end, MoveEnd::kReached) << result->message;
+  EXPECT_REFUSED(append({lineTo({0.0, 0.0})}), "doesn't continue: it has ended");
+}
+
+TEST_F(PathQueue, CanBeToldItsEndWhileItMoves) {
+  begin(test::circle(), 20);
+  advance(0.1);
+  append({}, false);
+  EXPECT_REFUSED(append({lineTo({0.0, 0.0})}), "the path is complete");
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+}
+
+TEST_F(PathQueue, ContinuesFromBetweenTwoMicrosteps) {
+  PathRequest path{{"x", "y"}, {}, true, 0.0, kTolerance};
+  for (int i = 1; i <= 6; ++i) {
+    path.segments.push_back(lineTo({i * (0.002 + kMicrostep / 3.0), i * 0.001}));
+  }
+  begin(path, 1);
+  for (int i = 1; i < 6; ++i) {
+    awaitRest();
+    feed(1);
+  }
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 6 * 160 + 2);
+  expectOnPath(path);
+  expectLimits();
+}
+
+TEST_F(PathQueue, IsHeldFedAndResumed) {
+  const PathRequest path = test::circle();
+  begin(path, 40);
+  advance(0.3);
+  machine().hold();
+  feed(20);  // while it decelerates
+  awaitRest();
+  advance(0.1);
+  feed(20);  // at rest
+  EXPECT_FALSE(state("x").moving) << "fed during a hold";
+  machine().resume();
+  advance(0.01);
+  feed(20);
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectOnPath(path);
+  expectLimits();
+}
+
+TEST_F(PathQueue, IsHeldWhileStarved) {
+  const PathRequest path = test::circle();
+  begin(path, 40);
+  awaitRest();
+  machine().hold();
+  machine().resume();
+  advance(0.1);
+  EXPECT_FALSE(state("x").moving);
+  machine().hold();
+  feed(30);
+  advance(0.1);
+  EXPECT_FALSE(state("x").moving) << "fed during a hold";
+  machine().resume();
+  EXPECT_TRUE(state("x").moving);
+  awaitRest();
+  machine().hold();
+  feed(30);
+  append({}, false);
+  machine().resume();
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  expectOnPath(path);
+}
+
+TEST_F(PathQueue, IsToldItsEndDuringAHold) {
+  begin(test::circle(), 40);
+  awaitRest();
+  machine().hold();
+  append({}, false);
+  EXPECT_FALSE(machine().result(move_)) << "held";
+  machine().resume();
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+}
+
+TEST_F(PathQueue, RunsMoreSlowlyAtASpeedOverride) {
+  const PathRequest path = test::circle();
+  machine().setSpeedOverride(0.5);
+  begin(path, 20);
+  advance(0.2);
+  feed(20);
+  machine().setSpeedOverride(0.25);
+  feed(20);
+  advance(0.2);
+  machine().setSpeedOverride(1.5);
+  feed(40);
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  expectOnPath(path);
+  expectLimits();
+}
+
+// Whatever ends a path also ends one that is fed, in motion and while it waits.
+TEST_F(PathQueue, EndsWithEverythingThatEndsAPath) {
+  struct Ending {
+    const char* name;
+    std::function<void()> end;
+    MoveEnd how;
+  };
+  const std::vector<Ending> endings = {
+      {"stop", [this] { machine().stop(); }, MoveEnd::kStopped},
+      {"stop y", [this] { bench->axis("y").stop(); }, MoveEnd::kStopped},
+      {"cancel", [this] { machine().stop(move_); }, MoveEnd::kStopped},
+      {"disable y", [this] { bench->axis("y").enable(false); }, MoveEnd::kStopped},
+      {"emergency stop", [this] { machine().emergencyStop(); }, MoveEnd::kEmergencyStop},
+      {"a move of y", [this] { bench->axis("y").moveTo(0.0); }, MoveEnd::kStopped},
+  };
+  for (const bool starved : {false, true}) {
+    for (const Ending& ending : endings) {
+      SCOPED_TRACE(std::string(ending.name) + (starved ? " while starved" : ""));
+      build({plotterAxis("x"), plotterAxis("y")});
+      begin(test::circle(), 20);
+      if (starved) awaitRest();
+      if (!starved) {
+        advance(0.15);
+        feed(20);
+      }
+      ending.end();
+      const CoordinatedResult result = machine().wait(move_);
+      EXPECT_EQ(result.end, ending.how) << result.message;
+      EXPECT_REFUSED(feed(20), "doesn't continue");
+      awaitRest();
+      advance(0.2);
+      const auto x = bench->pulses("x");
+      EXPECT_REFUSED(feed(20), "doesn't continue");
+      advance(0.2);
+      EXPECT_EQ(bench->pulses("x"), x) << "it moved after its end";
+      expectAtRest();
+    }
+  }
+}
+
+TEST_F(PathQueue, KeepsItsLimits) {
+  begin(test::circle(), 20);
+  advance(0.1);
+  axis::AxisLimits slow;
+  slow.max_speed = 0.02;
+  slow.acceleration = slow.deceleration = 0.1;
+  bench->axis("x").setLimits(slow);
+  feed(80);
+  const CoordinatedResult result = machine().wait(move_);
+  EXPECT_EQ(result.end, MoveEnd::kReached);
+  EXPECT_LE(result.duration, 1.40);
+}
+
+TEST_F(PathQueue, TakesUpTheBacklashOnTheWay) {
+  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+  for (config::AxisConfig& axis : axes) axis.backlash = 0.0001;
+  build(axes);
+  const double in_one_go = finish(test::circle()).duration;
+  build(axes);
+  const CoordinatedResult result = feedInTime(test::circle(), 5, 0.2);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_NEAR(result.positions[0], 0.0, 1e-12);
+  EXPECT_NEAR(result.positions[1], 0.0, 1e-12);
+  EXPECT_EQ(bench->pulses("x"), 8);
+  EXPECT_LE(result.duration, 1.002 * in_one_go);
+  expectLimits();
+
+  build(axes);
+  finish(zigzag(40));
+  build(axes);
+  begin(zigzag(40), 1);
+  for (int i = 1; i < 40; ++i) {
+    if (i % 3 == 0) awaitRest();
+    advance(0.02);
+    feed(1);
+  }
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  expectLimits();
+}
+
+TEST_F(PathQueue, RefusesAWrongSegmentAndGoesOn) {
+  const PathRequest path = test::circle();
+  begin(path, 20);
+  advance(0.1);
+  const double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto end = path.segments[19].end;
+  EXPECT_REFUSED(append({lineTo({0.0, 0.01}), lineTo({0.0, kNan})}),
+                 "y: segment 1 of the path has nan among its positions");
+  EXPECT_REFUSED(append({lineTo({0.0, 0.01}), lineTo({0.0, -0.2})}),
+                 "y: segment 1 of the path leads to -0.2 m is below the soft limit");
+  EXPECT_REFUSED(append({lineTo(end)}), "segment 0 of the path has a length of 0");
+  EXPECT_REFUSED(append({lineTo({0.0})}), "segment 0 of the path has 1 positions, but must have 2");
+  EXPECT_REFUSED(append(std::vector<PathSegment>(1'000'000, lineTo({0.0, 0.0}))),
+                 "1000000 segments are too many");
+  PathSegment cusp = lineTo({0.0, 0.0});
+  cusp.shape = PathSegment::Shape::kBezier;
+  cusp.control1 = end;
+  cusp.control2 = {0.01, 0.0};
+  EXPECT_REFUSED(append({cusp}), "segment 0 is a Bezier with a cusp");
+  EXPECT_REFUSED(machine().appendPath({move_.id() + 1000, {}, true}), "doesn't continue");
+  feed(80);
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  expectOnPath(path);
+}
+
+TEST_F(PathQueue, IsOnlyForPathsThatSayThatMoreFollows) {
+  PathRequest path = test::circle();
+  move_ = followPath(path);
+  EXPECT_REFUSED(append({lineTo({0.0, 0.01})}), "the path is complete");
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+}
+
+TEST_F(PathQueue, IsRefusedWithAJerkLimit) {
+  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+  axes[1].jerk = 20.0;
+  build(axes);
+  EXPECT_REFUSED(begin(test::circle(), 20),
+                 "more_follows must be false for axes with a jerk limit");
+}
+
+TEST_F(PathQueue, TellsWhatLiesAhead) {
+  PathRequest path{{"x", "y"}, {}, false, 0.01, kTolerance};
+  for (int i = 1; i <= 10; ++i) path.segments.push_back(lineTo({i * 0.001, 0.0}));
+  begin(path, 5);
+  PathAhead now = ahead();
+  EXPECT_EQ(now.segments, 5U);
+  EXPECT_EQ(now.room, machine::kMostPathSegments - 5);
+  EXPECT_NEAR(now.time, 0.51, 0.002);
+  EXPECT_TRUE(now.more_follows);
+  EXPECT_EQ(now.targets, (std::vector<double>{0.005, 0.0}));
+  advance(0.255);
+  EXPECT_EQ(ahead().segments, 3U);
+  now = feed(5);
+  EXPECT_EQ(now.segments, 8U);
+  EXPECT_FALSE(now.more_follows);
+  EXPECT_EQ(machine().wait(move_).positions[0], 0.01);
+}
+
+TEST_F(PathQueue, IsFull) {
+  PathRequest path{{"x", "y"}, {}, false, 0.01, kTolerance};
+  for (int i = 1; i <= 30'000; ++i) path.segments.push_back(lineTo({i % 2 * 0.001, i * 1e-6}));
+  begin(path, 19'000);
+  EXPECT_REFUSED(feed(1500),
+                 "1500 segments are too many: 19000 lie ahead of the axes, and there "
+                 "is room for 1000 more");
+  machine().stop();
+}
+
+}  // namespace
+}  // namespace stepdriver
