@@ -44,6 +44,11 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node) {
   node.set("simulation/speed", 1.0);
   node.set("jog_timeout", kJogTimeout);
   node.set("setpoint/timeout", kJogTimeout);
+  node.set("motor_power/pin", "motor_power");
+  node.set("motor_power/on_ms", 20.0);
+  node.set("motor_power/off_delay_ms", 50.0);
+  node.set("motor_power/feedback/pin", "motor_power_feedback");
+  node.set("motor_power/feedback/active_level", "high");
   const auto pins = {"step", "dir", "ms1", "ms2", "ms3", "sleep", "reset"};
   std::vector<AxisFacts> facts;
   facts.push_back(setUpAxis(node, "x", pins, {100.0, 250.0, 0.0}));

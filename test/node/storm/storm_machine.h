@@ -14,7 +14,7 @@ constexpr double kJogTimeout = 0.2;
 /// Gives a node three linear axes of 20 steps/mm: x, with homing, switches, microstep pins, sleep
 /// and reset, and a stop that is slower than its speed suggests; y, with 8 mm of backlash, which
 /// shares the ENABLE line of x; z, with S-curves and an idle timeout. Positions are from -50 mm to
-/// 150 mm.
+/// 150 mm. A relay with a feedback switches the power of all motors.
 ///
 /// @return the oracle's data about them.
 std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node);
