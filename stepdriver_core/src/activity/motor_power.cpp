@@ -69,8 +69,8 @@ bool MotorPower::step(Context& context, bool may_go) {
   switch (state_) {
     case State::kOff:
       if (!wanted_) return false;
-      state_ = State::kLeaving;
-      since_ = context.now;
+      // It may have failed to switch off.
+      write(context, false);
       return true;
     case State::kLeaving:
       return leave(context);

@@ -506,6 +506,7 @@ void Participants::write() {
   for (Job& job : jobs_) {
     if (job.told || job.deadline > clock_.now()) continue;
     job.told = true;
+    pins_failed_ = true;
     pins_done_.push_back({job.job.id, ETIMEDOUT});
   }
 }
@@ -1198,14 +1199,14 @@ void Participants::checkRest() {
 // An emergency stop that nothing has ended leaves no motor with current, if it is configured so.
 void Participants::checkPower() {
   const bool off = emergencyDisableOf(schedule_.variant) != machine::EmergencyDisable::kHold;
-  if (!off || !engine_->emergencyStopped() || pins_failed_) return;
+  if (!off || !engine_->emergencyStopped()) return;
   const auto has_current = [this](const config::AxisConfig& config) {
     return rig_.report(config.name).energized;
   };
   const auto all_are_off = [&] {
     return std::none_of(configs_.begin(), configs_.end(), has_current);
   };
-  if (playUntil(all_are_off, kLongestCall)) return;
+  if (playUntil(all_are_off, kLongestCall) || pins_failed_) return;
   oracle_.complain("a motor has current long after an emergency stop");
 }
 
@@ -1345,6 +1346,7 @@ std::vector<std::string> Participants::run() {
   if (oracle_.complaints.empty()) checkCounts("at rest");
   if (oracle_.complaints.empty()) checkRest();
   if (oracle_.complaints.empty()) {
+    loses_edges_ = false;
     note("probe");
     probe();
   }
