@@ -177,8 +177,11 @@ std::string MotorPower::unreadable(const Context& context, int error) const {
 
 bool MotorPower::fail(Context& context, const std::string& why) {
   wanted_ = false;
-  failure_ = why;
-  is_news_ = true;
+  // What went wrong first is the reason of what follows.
+  if (failure_.empty()) {
+    failure_ = why;
+    is_news_ = true;
+  }
   if (state_ == State::kThere) lose(context);
   if (state_ == State::kThere || state_ == State::kComing) write(context, false);
   return true;

@@ -345,6 +345,24 @@ TEST_F(MotorPower, WhoseLineCantBeWrittenIsAFaultThatNamesIt) {
   EXPECT_THROW(bench->machine->shutdown(), GpioError);
 }
 
+TEST_F(MotorPower, ThatCouldNotBeSwitchedOffIsSwitchedOffBeforeItComesAgain) {
+  addFeedback();
+  options.motor_power->off_delay_ns = 0;
+  begin();
+  bench->rig.failWrites(kLine, 0, EIO);
+  bench->machine->emergencyStop();
+  bench->machine->advance(1.0);
+  EXPECT_NE(fault("y").find("the motor power line power can't be written"), std::string::npos)
+      << fault("y");
+  EXPECT_TRUE(switched(false).empty());
+  bench->rig.clearWriteFault(kLine);
+  bench->machine->recover();
+  EXPECT_EQ(switched(false).size(), 1U);
+  EXPECT_EQ(switched(true).size(), 2U);
+  EXPECT_EQ(moveX(0.001), axis::MoveEnd::kReached);
+  expectNoHarm();
+}
+
 TEST_F(MotorPower, IsRecorded) {
   begin();
   bench->machine->emergencyStop();
