@@ -38,8 +38,8 @@ class MotorPower {
   /// Why it was switched off, or could not be switched on; empty if nothing went wrong.
   const std::string& failure() const { return failure_; }
 
-  /// Switches it on, or keeps it on if it was to be switched off. Its line is switched off first, in
-  /// case that failed before.
+  /// Switches it on, or keeps it on if it was to be switched off. Its line is switched off first,
+  /// in case that failed before.
   void switchOn();
   /// Switches it off at this clock time, or as soon after it as look() allows.
   ///
