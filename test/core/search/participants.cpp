@@ -920,10 +920,11 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
                            : std::shared_ptr<const machine::QueuedPath>();
   if (!queued) return note("there is no path to append to");
   const pulse::Nanoseconds now = clock_.now() - engine_->state().slipped;
-  constexpr pulse::Nanoseconds kLead = 20'000'000;
+  constexpr pulse::Nanoseconds kAppendLead = 20'000'000;
   const double passed = path->along->stateAt(now).position.value();
-  const double changeable = path->slows_down ? path->along->endPosition().value()
-                                             : path->along->stateAt(now + kLead).position.value();
+  const double changeable = path->slows_down
+                                ? path->along->endPosition().value()
+                                : path->along->stateAt(now + kAppendLead).position.value();
   machine::ExtendPath wanted{axis, path->move, {queued, nullptr, passed, passed, true, {}}};
   try {
     const machine::QueuedPath::Longer longer =
