@@ -64,9 +64,9 @@ struct QueuedPath::Continuation {
   std::vector<PathStart> states;
 };
 
-QueuedPath::QueuedPath(std::shared_ptr<const axis::SharedPath> motion,
+QueuedPath::QueuedPath(const std::shared_ptr<const axis::SharedPath>& motion,
                        std::shared_ptr<const PathWindow> window, bool more_follows)
-    : motion_(std::dynamic_pointer_cast<const TrajectoryPath>(std::move(motion))),
+    : motion_(std::dynamic_pointer_cast<const TrajectoryPath>(motion)),
       window_(std::move(window)),
       more_follows_(more_follows) {}
 
@@ -312,7 +312,7 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
     for (const Start& start : startsFrom(changeable_ns)) {
       std::optional<Continuation> found = continueFrom(start, added);
       if (!found) continue;
-      const Longer longer = continued(start, *std::move(found), added, more_follows, passed_ns);
+      Longer longer = continued(start, *std::move(found), added, more_follows, passed_ns);
       if (longer.path) return longer;
     }
   } catch (const std::invalid_argument& error) {

@@ -53,7 +53,7 @@ class QueuedPath : public axis::SharedPath {
 
   /// @param motion along the window, from time 0 on.
   /// @param more_follows it isn't complete: the axes wait at its end.
-  QueuedPath(std::shared_ptr<const axis::SharedPath> motion,
+  QueuedPath(const std::shared_ptr<const axis::SharedPath>& motion,
              std::shared_ptr<const PathWindow> window, bool more_follows);
 
   /// A path that continues this one, and the positions between which both are the same.

@@ -78,7 +78,7 @@ struct FollowTrajectory {
     std::vector<double> from;     ///< [microsteps] AxisSnapshot::rest of each axis
     std::vector<double> targets;  ///< [microsteps] the commanded positions at its end
     /// If more segments follow.
-    std::shared_ptr<const PathWindow> window{};
+    std::shared_ptr<const PathWindow> window;
   };
   std::optional<Path> path{};
 };
