@@ -65,6 +65,20 @@ conclude() {
   summary+=$(printf '%-12s %-8s %s' "$1" "$2" "$3")$'\n'
 }
 
+# timed NAME FUNCTION: in a shell of its own, which writes the times of the processor, its own and that of
+# the programs that it ran, to log/NAME.times when it ends.
+timed() {
+  # shellcheck disable=SC2064  # this name, not that of a function called from here
+  trap "times >'$build/log/$1.times'" EXIT
+  "$2"
+}
+# processor_seconds NAME...: the sum of those.
+processor_seconds() {
+  cat "${@/#/$build/log/}" | awk -F '[ms ]+' '{ sum += 60 * ($1 + $3) + $2 + $4 } END { printf "%.0f", sum }'
+}
+# took NAME START: how long a stage ran, and how long processors worked for it.
+took() { printf '%5d s %7d s' "$((SECONDS - $2))" "$(processor_seconds "$1.times")"; }
+
 # stage NAME FUNCTION [NEEDED...]: runs a function, unless a stage that it needs didn't pass.
 stage() {
   local name=$1 function=$2 needed start=$SECONDS
@@ -75,16 +89,16 @@ stage() {
     return
   done
   say "" "==== $name"
-  run "$function"
+  run timed "$name" "$function"
   if ((run_status == 0)); then
     passed=$((passed + 1))
-    conclude "$name" passed "$((SECONDS - start)) s"
+    conclude "$name" passed "$(took "$name" "$start")"
   elif ((run_status == skip_status)); then
     skipped=$((skipped + 1))
     conclude "$name" skipped "$(tail -n 1 "$build/log/skipped")"
   else
     failed=$((failed + 1))
-    conclude "$name" FAILED "$((SECONDS - start)) s"
+    conclude "$name" FAILED "$(took "$name" "$start")"
   fi
 }
 
@@ -94,14 +108,14 @@ stage() {
 background_group=
 begin_background() {
   (($# > 0)) || return 0
-  rm -f "$build"/log/background-*.status
+  rm -f "$build"/log/background-*.{status,times}
   set -m
   (
     set +m
     renice -n 19 -p "$BASHPID" >/dev/null
     for function; do
       status=0
-      (set -e; "$function") >"$build/log/background-$function.log" 2>&1 &
+      (set -e; timed "background-$function" "$function") >"$build/log/background-$function.log" 2>&1 &
       wait "$!" || status=$?
       say "$status" >"$build/log/background-$function.status"
     done
@@ -464,6 +478,7 @@ check_board() { cross --board arm64; }
 
 choose_build_folder
 rm -rf "$build/ros"
+rm -f "$build"/log/*.times
 install_packages core ccache "${parts[@]}" "$(wants ros && echo plots ros-tests trace)" \
   "$(wants core && echo pictures bench)" "$(wants lint && echo ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
@@ -537,6 +552,11 @@ if wants arm64; then
   stage board check_board arm64
 fi
 
-say "" "$summary"
+for function in "${later[@]}"; do
+  [[ ! -f $build/log/background-$function.times ]] || summary+=$(printf '  %-27s %7d s' "$function" \
+    "$(processor_seconds "background-$function.times")")$'\n'
+done
+say "" "stage        result    time   processor time" "$summary" \
+  "In all $SECONDS s, and $(cd "$build/log" && processor_seconds ./*.times) s of processor time."
 say "$passed passed, $failed failed, $skipped skipped"
 ((failed == 0))
