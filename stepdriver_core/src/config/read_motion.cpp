@@ -39,7 +39,7 @@ std::optional<Kind> readKind(ConfigReader& axis) {
         "", fmt::format("has {} and {}, but must be either linear, with all keys in mm, or "
                         "rotary, with all keys in degrees",
                         linear, rotary));
-    return {};
+    return std::nullopt;
   }
   if (!linear.empty()) return Kind::kLinear;
   if (!rotary.empty()) return Kind::kRotary;
@@ -49,7 +49,7 @@ std::optional<Kind> readKind(ConfigReader& axis) {
                "acceleration_mm_s2 if it is linear, or steps_per_degree, max_speed_deg_s and "
                "acceleration_deg_s2 if it is rotary");
   }
-  return {};
+  return std::nullopt;
 }
 
 /// Reads the keys in one unit.

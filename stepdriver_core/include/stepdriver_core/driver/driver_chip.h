@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 /// What step/dir drivers require, as data: a chip that a configuration describes and a named one
