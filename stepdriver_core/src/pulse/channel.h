@@ -107,11 +107,15 @@ struct LineFailure {
 
 /// The state of a channel.
 struct ChannelState {
+  /// @name All that a step changes, if the axis has one motor
+  /// @{
   std::int64_t count = 0;  ///< [microsteps] active STEP edges forward minus those backward
   /// The part of the backlash that is taken up towards max: from 0 to all of it. The position of
   /// the joint is count minus this.
   std::int64_t slack = 0;
-  std::uint64_t pulses = 0;     ///< active STEP edges
+  std::uint64_t pulses = 0;  ///< active STEP edges
+  Nanoseconds rose = 0;      ///< clock time by which the last active STEP edge had happened
+  /// @}
   std::uint64_t taken = 0;      ///< serial of the last command that was handled
   std::uint64_t accepted = 0;   ///< serial of the last command that was not refused
   std::uint64_t following = 0;  ///< serial of the current profile; 0: at rest
@@ -126,7 +130,6 @@ struct ChannelState {
   Nanoseconds waited = 0;          ///< for the in-position output, before kNotInPosition
   Nanoseconds end_lateness = 0;    ///< of the pulse that was not sent, for kTooLate
   std::uint64_t epoch = 0;         ///< how many times the scale of `count` has changed
-  Nanoseconds rose = 0;            ///< clock time by which the last active STEP edge had happened
   std::uint64_t chip_faults = 0;   ///< how many times the fault line became active
   std::uint64_t line_errors = 0;   ///< failed writes and reads
   Nanoseconds ready = 0;           ///< clock time before which no step goes out
@@ -143,5 +146,8 @@ struct ChannelState {
 
   std::uint64_t faults() const { return chip_faults + line_errors; }
 };
+
+/// The beginning of a ChannelState that a step of an axis with one motor changes.
+constexpr std::size_t kStepBytes = offsetof(ChannelState, taken);
 
 }  // namespace stepdriver::pulse

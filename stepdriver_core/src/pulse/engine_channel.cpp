@@ -102,17 +102,16 @@ void EngineChannel::release(const Command& command) {
 void EngineChannel::countStep() {
   state.count += direction;
   state.slack = std::clamp<std::int64_t>(state.slack + direction, 0, config.backlash);
-  if (pulsed != all_motors) {
-    for (std::size_t i = 0; i < motors(); ++i) {
-      if ((pulsed & motorBit(i)) == 0) state.lags[i] -= direction;
-    }
-  }
   ++state.pulses;
   state.rose = rose;
   running = true;
   last_planned = next->time_ns;
   late = 0;
   pullNext();
+  if (isAlone()) return published.storeFirst<kStepBytes>(state);
+  for (std::size_t i = 0; i < motors(); ++i) {
+    if ((pulsed & motorBit(i)) == 0) state.lags[i] -= direction;
+  }
   publish();
 }
 

@@ -438,7 +438,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
   // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
   // may have ended others.
   if (emergencyStopped()) stopAll(now);
-  dropEnded();
+  if (news_) dropEnded();
   if (writes_.empty()) return;
   const std::uint64_t pulses = state_.pulses;
   const int error = writeLines(writes_.data(), writes_.size());
@@ -678,8 +678,11 @@ void PulseEngine::changed(Channel& channel) {
   if (channel.changed) return;
   channel.changed = true;
   changed_.push_back(&channel);
-  if (channel.shared == nullptr) return;
-  // A step of one motor may be what another axis waits for.
+  if (channel.shared != nullptr) changedTogether(channel);
+}
+
+// A step of one motor may be what another axis waits for.
+void PulseEngine::changedTogether(const Channel& channel) {
   for (const auto* all : {&channel.shared->axes(), &channel.shared->motors()}) {
     for (Channel* other : *all) changed(*other);
   }

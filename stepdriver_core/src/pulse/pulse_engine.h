@@ -192,6 +192,7 @@ class PulseEngine {
 
   // Times.
   void changed(Channel& channel);
+  void changedTogether(const Channel& channel);
   void scheduleChanged();
   void scheduleAll();
   bool schedule(Channel& channel);

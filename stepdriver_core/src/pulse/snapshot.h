@@ -19,13 +19,19 @@ class Snapshot {
   Snapshot() { store(T{}); }
 
   /// From one thread at a time.
-  void store(const T& value) {
+  void store(const T& value) { storeFirst<sizeof(T)>(value); }
+
+  /// Stores only the first bytes of a value: the rest is as it was when it was last stored. From
+  /// one thread at a time.
+  template <std::size_t kBytes>
+  void storeFirst(const T& value) {
+    static_assert(kBytes == sizeof(T) || (kBytes < sizeof(T) && kBytes % 8 == 0));
     const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);
     sequence_.store(sequence + 1, std::memory_order_relaxed);
     std::atomic_thread_fence(std::memory_order_release);
     // Word by word from the original: copying the whole first would double the cost.
     const auto* bytes = reinterpret_cast<const unsigned char*>(&value);
-    for (std::size_t i = 0; i < kWords; ++i) {
+    for (std::size_t i = 0; i < (kBytes + 7) / 8; ++i) {
       std::uint64_t word = 0;
       std::memcpy(&word, bytes + 8 * i, std::min<std::size_t>(8, sizeof(T) - 8 * i));
       words_[i].store(word, std::memory_order_relaxed);

@@ -38,6 +38,20 @@ TEST(Snapshot, IsNeverReadHalfWritten) {
   EXPECT_EQ(snapshot.load().words[11], 200'000U);
 }
 
+TEST(Snapshot, StoresTheBeginningOfAValueAndKeepsTheRest) {
+  Snapshot<Wide> snapshot;
+  Wide value;
+  value.words.fill(1);
+  snapshot.store(value);
+  value.words.fill(2);
+  snapshot.storeFirst<24>(value);
+  const auto words = snapshot.load().words;
+  EXPECT_EQ(words[0], 2U);
+  EXPECT_EQ(words[2], 2U);
+  EXPECT_EQ(words[3], 1U);
+  EXPECT_EQ(words[11], 1U);
+}
+
 TEST(Mailbox, HandsEveryItemOverInOrder) {
   Mailbox<std::uint64_t, 8> mailbox;
   std::thread sender([&] {
