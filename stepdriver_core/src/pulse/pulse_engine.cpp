@@ -38,6 +38,13 @@ std::size_t sharedMotors(const std::vector<SharedAxes>& shared) {
 
 }  // namespace
 
+inline void PulseEngine::changed(Channel& channel) {
+  if (channel.changed) return;
+  channel.changed = true;
+  changed_.push_back(&channel);
+  if (channel.shared != nullptr) changedTogether(channel);
+}
+
 PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
                          const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
                          std::optional<Signal> emergency_stop,
@@ -673,13 +680,6 @@ void PulseEngine::endOne(Channel& channel, EndReason reason, Nanoseconds now) {
 }
 
 // ---- times ----
-
-void PulseEngine::changed(Channel& channel) {
-  if (channel.changed) return;
-  channel.changed = true;
-  changed_.push_back(&channel);
-  if (channel.shared != nullptr) changedTogether(channel);
-}
 
 // A step of one motor may be what another axis waits for.
 void PulseEngine::changedTogether(const Channel& channel) {
