@@ -41,6 +41,25 @@ class Draw : public testing::Test {
     return std::stod(output.substr(output.find_last_of(" \n", place - 1)));
   }
 
+  /// Draws a triangle: the corners are rounded, and no axis stops there.
+  void expectRounded() {
+    ASSERT_TRUE(node.moveTo(0.005, true).success) << "pulses before the drawing aren't of it";
+    write("10 10\n30 10\n30 25\n10 10\n");
+    const auto end = draw({"--tolerance", "0.5"});
+    EXPECT_EQ(end.code, 0) << end.output;
+    expectSays(end.output, "71 of 71 mm, 100 %");
+    for (const std::string axis : {"x", "y"}) {
+      const double off = offIn(axis, end.output);
+      EXPECT_LE(off, 0.5 + 0.0125) << axis << " [mm]";
+      EXPECT_GT(off, 0.1) << axis << " [mm]: the axes stopped at the corners";
+    }
+    const auto report = node.rig();
+    for (const std::size_t axis : {0U, 1U}) {
+      EXPECT_EQ(report.pulses_forward[axis] - report.pulses_backward[axis], 800) << axis;
+    }
+    EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
+  }
+
   NodeUnderTest node;
   const TemporaryFile points;
   const TemporaryFile picture;
@@ -73,30 +92,15 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
 TEST_F(Draw, RoundsCornersWithinTheTolerance) {
   node.traced();
   node.start();
-  ASSERT_TRUE(node.moveTo(0.005, true).success) << "pulses before the drawing aren't of it";
-  write("10 10\n30 10\n30 25\n10 10\n");
-  const auto end = draw({"--tolerance", "0.5"});
-  EXPECT_EQ(end.code, 0) << end.output;
-  expectSays(end.output, "71 of 71 mm, 100 %");
-  for (const std::string axis : {"x", "y"}) {
-    const double off = offIn(axis, end.output);
-    EXPECT_LE(off, 0.5 + 0.0125) << axis << " [mm]";
-    EXPECT_GT(off, 0.1) << axis << " [mm]: the axes stopped at the corners";
-  }
-  const auto report = node.rig();
-  for (const std::size_t axis : {0U, 1U}) {
-    EXPECT_EQ(report.pulses_forward[axis] - report.pulses_backward[axis], 800) << axis;
-  }
-  EXPECT_LT(report.pulses_forward[1], 2000) << "the corner at (30, 25) wasn't rounded";
-  EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
+  expectRounded();
+  EXPECT_LT(node.rig().pulses_forward[1], 2000) << "the corner at (30, 25) wasn't rounded";
 }
 
-TEST_F(Draw, StopsAtEachCornerIfAnAxisHasAJerkLimit) {
+TEST_F(Draw, RoundsCornersIfAnAxisHasAJerkLimit) {
   node.set("axes/x/jerk_mm_s3", 20'000.0);
+  node.traced();
   node.start();
-  write("10 10\n30 10\n30 25\n");
-  EXPECT_EQ(draw().code, 0);
-  EXPECT_EQ(node.rig().pulses_forward, (std::vector<std::int64_t>{2400, 2000}));
+  expectRounded();
 }
 
 TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {

@@ -53,6 +53,11 @@ struct PathAxis {
   std::string whyBeyondLimits(double position, const std::string& what) const;
   /// @throw Refused if whyBeyondLimits() says why.
   void refuseBeyondLimits(double position, const std::string& what) const;
+  /// The same for many positions. @param text returns what: called only if it is refused.
+  template <typename Text>
+  void requireWithinLimits(double position, const Text& text) const {
+    if (!whyBeyondLimits(position, {}).empty()) refuseBeyondLimits(position, text());
+  }
 };
 
 /// The state of an axis at the beginning of a path.

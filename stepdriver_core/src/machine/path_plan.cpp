@@ -71,8 +71,9 @@ void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& a
   for (std::size_t i = 0; i < contour.size(); ++i) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       const auto [low, high] = contour.range(i, k);
-      axes[k].refuseBeyondLimits(low, segmentText(i) + " leads to");
-      axes[k].refuseBeyondLimits(high, segmentText(i) + " leads to");
+      const auto text = [i] { return segmentText(i) + " leads to"; };
+      axes[k].requireWithinLimits(low, text);
+      axes[k].requireWithinLimits(high, text);
     }
   }
 }
@@ -112,8 +113,9 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
   points.reserve(knots.size() + 1);
   for (motion::ContourKnot& knot : knots) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
-      axes[k].refuseBeyondLimits(knot.positions[k], segmentText(first + knot.segment) +
-                                                        ", rounded at its corners, leads to");
+      axes[k].requireWithinLimits(knot.positions[k], [&] {
+        return segmentText(first + knot.segment) + ", rounded at its corners, leads to";
+      });
     }
     points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),
                       std::move(knot.velocities), std::move(knot.accelerations)});
