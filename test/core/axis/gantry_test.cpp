@@ -40,6 +40,12 @@ class Gantry : public GantryTest {
     EXPECT_GT(y().state().velocity, 0.09);
     return move;
   }
+  /// The chip of the motor on a side reports a fault then.
+  void failAfter500Pulses(const std::string& side) {
+    sim::RigFaults faults;
+    faults.chip_fault_after = 500;
+    bench->rig.setFaults(side == "left" ? "y" : "y.right", faults);
+  }
 };
 
 TEST_F(Gantry, StepsBothMotorsAtTheSameTimes) {
@@ -99,9 +105,7 @@ TEST_F(Gantry, StopsBothMotorsAtAFaultOfEitherAndSaysWhose) {
     bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config},
                                     test::rigMotors(config), true, 1.0);
     y().setPosition(0.0);
-    sim::RigFaults faults;
-    faults.chip_fault_after = 500;
-    bench->rig.setFaults(side == "left" ? "y" : "y.right", faults);
+    failAfter500Pulses(side);
     const MoveResult result = move(0.05);
     EXPECT_EQ(result.end, MoveEnd::kFault);
     const std::string words = "the box of motor " + side + " reports a fault on ALM";
@@ -276,9 +280,7 @@ TEST_F(Gantry, StopsBothMotorsAtAFaultOfEitherDriver) {
       bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config},
                                       test::rigMotors(config), true, 1.0);
       y().setPosition(0.0);
-      sim::RigFaults faults;
-      faults.chip_fault_after = 500;
-      bench->rig.setFaults(side == "left" ? "y" : "y.right", faults);
+      failAfter500Pulses(side);
       const MoveResult result = move(0.05);
       EXPECT_EQ(result.end, MoveEnd::kFault);
       const std::string chip =

@@ -22,7 +22,38 @@ using namespace test;  // NOLINT(google-build-using-namespace)
 using axis::MoveEnd;
 using Shape = PathSegment::Shape;
 
-class Path : public PathBench {};
+class Path : public PathBench {
+ protected:
+  /// Follows the circle with a hold in its middle, to its end.
+  void holdAndResume() {
+    const CoordinatedMove move = followPath(circle());
+    advance(0.5);
+    machine().hold();
+    awaitRest();
+    EXPECT_TRUE(state("x").held);
+    advance(1.0);
+    machine().resume();
+    EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+    EXPECT_EQ(bench->pulses("x"), 0);
+    expectAtRest();
+  }
+
+  /// Stops on the circle, somewhere in its middle.
+  void stopOnTheWay() {
+    const CoordinatedMove move = followPath(circle());
+    advance(0.7);
+    bench->axis("y").stop();
+    EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
+    awaitRest();
+    expectAtRest();
+    EXPECT_GT(std::abs(state("x").position), 0.01);
+  }
+
+  void expectNextPathBeginsThere() {
+    EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
+    EXPECT_EQ(bench->pulses("x"), 0);
+  }
+};
 
 TEST_F(Path, FollowsACircleOfLinesWithoutStopping) {
   const CoordinatedMove move = followPath(circle());
@@ -112,33 +143,16 @@ TEST_F(Path, CountsRelativePositionsFromTheCommandedOnes) {
 }
 
 TEST_F(Path, IsHeldOnThePathAndResumed) {
-  const CoordinatedMove move = followPath(circle());
-  advance(0.5);
-  machine().hold();
-  awaitRest();
-  EXPECT_TRUE(state("x").held);
-  advance(1.0);
-  machine().resume();
-  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
-  EXPECT_EQ(bench->pulses("x"), 0);
-  expectAtRest();
+  holdAndResume();
   EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
             kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
 }
 
 TEST_F(Path, StopsOnThePath) {
-  const CoordinatedMove move = followPath(circle());
-  advance(0.7);
-  bench->axis("y").stop();
-  EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
-  awaitRest();
-  expectAtRest();
-  EXPECT_GT(std::abs(state("x").position), 0.01);
+  stopOnTheWay();
   EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
             kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
-  // The next path begins there.
-  EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
-  EXPECT_EQ(bench->pulses("x"), 0);
+  expectNextPathBeginsThere();
 }
 
 TEST_F(Path, EndsOnThePathAtAnEmergencyStop) {
@@ -330,30 +344,14 @@ TEST_F(SmoothPath, OfALineTakesTheSevenPhasesOfAMove) {
 }
 
 TEST_F(SmoothPath, IsHeldOnThePathAndResumed) {
-  const CoordinatedMove move = followPath(circle());
-  advance(0.5);
-  machine().hold();
-  awaitRest();
-  EXPECT_TRUE(state("x").held);
-  advance(1.0);
-  machine().resume();
-  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
-  EXPECT_EQ(bench->pulses("x"), 0);
-  expectAtRest();
+  holdAndResume();
   expectOnTheCircle();
 }
 
 TEST_F(SmoothPath, StopsOnThePath) {
-  const CoordinatedMove move = followPath(circle());
-  advance(0.7);
-  bench->axis("y").stop();
-  EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
-  awaitRest();
-  expectAtRest();
+  stopOnTheWay();
   expectOnTheCircle();
-  // The next path begins there.
-  EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
-  EXPECT_EQ(bench->pulses("x"), 0);
+  expectNextPathBeginsThere();
 }
 
 TEST_F(SmoothPath, EndsOnThePathAtAnEmergencyStop) {
