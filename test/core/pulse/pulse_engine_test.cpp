@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <map>
@@ -31,6 +32,22 @@ TEST_F(PulseEngineTest, PutsEachStepOutAtItsNanosecond) {
   EXPECT_EQ(engine->channel(0).ended, serial);
   EXPECT_EQ(engine->channel(0).end_time, profile.endNs());
   EXPECT_EQ(engine->state().slips, 0U);
+}
+
+TEST_F(PulseEngineTest, TellsWhatAStepChangesRightAfterIt) {
+  ChannelConfig loose = config(0);
+  loose.backlash = 5;
+  make({loose});
+  follow(cruise(1'000'000, 0, 100, 1000.0));
+  for (const std::int64_t count : {1, 3, 40}) {
+    runUntil(1'000'000 + count * 1'000'000);
+    const ChannelState state = engine->channel(0);
+    EXPECT_EQ(state.count, count);
+    EXPECT_EQ(state.slack, std::min<std::int64_t>(count, 5));
+    EXPECT_EQ(state.pulses, static_cast<std::uint64_t>(count));
+    EXPECT_EQ(state.rose, lines.rises(0).back());
+    EXPECT_EQ(state.following, serial);
+  }
 }
 
 TEST_F(PulseEngineTest, KeepsDirSetupAndHoldWhateverThePlanWants) {
