@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include "motion/limits.h"
 #include "motion/profile.h"
@@ -53,10 +54,11 @@ struct PathAxis {
   std::string whyBeyondLimits(double position, const std::string& what) const;
   /// @throw Refused if whyBeyondLimits() says why.
   void refuseBeyondLimits(double position, const std::string& what) const;
-  /// The same for many positions. @param text returns what: called only if it is refused.
-  template <typename Text>
-  void requireWithinLimits(double position, const Text& text) const {
-    if (!whyBeyondLimits(position, {}).empty()) refuseBeyondLimits(position, text());
+  /// @param what returns the text: called only if it is refused
+  template <typename What>
+  std::enable_if_t<std::is_invocable_v<What>> refuseBeyondLimits(double position,
+                                                                 const What& what) const {
+    if (!whyBeyondLimits(position, {}).empty()) refuseBeyondLimits(position, std::string(what()));
   }
 };
 

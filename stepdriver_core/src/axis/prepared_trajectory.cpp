@@ -64,9 +64,8 @@ void requireWithin(const PathAxis& axis, const Peak& peak, double most, const ch
 
 void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double begin) {
   for (const Peak& peak : {joint.lowest, joint.highest}) {
-    axis.requireWithinLimits(axis.positionOf(peak.value), [&] {
-      return fmt::format("the trajectory's position {},", at(begin + peak.time_s));
-    });
+    axis.refuseBeyondLimits(axis.positionOf(peak.value),
+                            fmt::format("the trajectory's position {},", at(begin + peak.time_s)));
   }
 }
 
@@ -259,7 +258,7 @@ motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t 
                             name(), numberText(point.time),
                             roughText(static_cast<double>(before.back().time_ns) * 1e-9)));
   }
-  axis.requireWithinLimits(point.positions[member], [&] { return name() + " at"; });
+  axis.refuseBeyondLimits(point.positions[member], [&] { return name() + " at"; });
   waypoint.position = axis.countOf(point.positions[member]);
   if (!point.velocities.empty()) {
     waypoint.velocity = point.velocities[member] * axis.steps_per_unit;

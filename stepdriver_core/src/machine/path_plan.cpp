@@ -72,8 +72,8 @@ void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& a
     for (std::size_t k = 0; k < axes.size(); ++k) {
       const auto [low, high] = contour.range(i, k);
       const auto text = [i] { return segmentText(i) + " leads to"; };
-      axes[k].requireWithinLimits(low, text);
-      axes[k].requireWithinLimits(high, text);
+      axes[k].refuseBeyondLimits(low, text);
+      axes[k].refuseBeyondLimits(high, text);
     }
   }
 }
@@ -113,7 +113,7 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
   points.reserve(knots.size() + 1);
   for (motion::ContourKnot& knot : knots) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
-      axes[k].requireWithinLimits(knot.positions[k], [&] {
+      axes[k].refuseBeyondLimits(knot.positions[k], [&] {
         return segmentText(first + knot.segment) + ", rounded at its corners, leads to";
       });
     }

@@ -445,7 +445,7 @@ void PulseEngine::writeSteps(Nanoseconds now) {
   // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
   // may have ended others.
   if (emergencyStopped()) stopAll(now);
-  if (news_) dropEnded();
+  if (news_) dropEnded();  // an end is news
   if (writes_.empty()) return;
   const std::uint64_t pulses = state_.pulses;
   const int error = writeLines(writes_.data(), writes_.size());
