@@ -40,12 +40,12 @@ void requireRequest(const PathRequest& request) {
   require("tolerance", request.tolerance);
 }
 
+}  // namespace
+
 bool isSmooth(const std::vector<PathAxis>& axes) {
   return std::any_of(axes.begin(), axes.end(),
                      [](const PathAxis& axis) { return axis.limits.jerk > 0.0; });
 }
-
-}  // namespace
 
 std::vector<motion::ContourLimits> contourLimits(const std::vector<PathAxis>& axes, double share) {
   std::vector<motion::ContourLimits> limits;
@@ -136,7 +136,15 @@ void appendKnots(std::vector<PathWindow::Knot>& window,
   window.reserve(window.size() + knots.size());
   for (const motion::ContourKnot& knot : knots) {
     window.push_back({time_ns + knot.time_ns, segment + knot.segment, knot.parameter, knot.speed,
-                      knot.may_begin, knot.straight});
+                      knot.acceleration, knot.average, knot.may_begin, knot.straight});
+  }
+}
+
+void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Contour& contour,
+               std::size_t first) {
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    segments[i].kept = 0.0;
+    segments[i].blend = contour.blendAfter(first + i);
   }
 }
 
@@ -144,11 +152,6 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
                   const std::vector<PathOrigin>& origins) {
   requireRequest(request);
   const bool smooth = isSmooth(axes);
-  if (smooth && request.more_follows) {
-    throw Refused(
-        "more_follows must be false for axes with a jerk limit: their path can't be continued from "
-        "a speed");
-  }
   PathWindow window;
   window.frame = {request.names, {}, request.velocity, request.tolerance};
   window.axes = axes;
@@ -162,13 +165,14 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
   try {
     const motion::Contour contour(
         window.start, window.segments, resolutionOf(axes),
-        smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection);
+        smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection,
+        request.more_follows);
     requireRange(contour, axes);
     const double share = request.more_follows ? QueuedPath::kShareOfLimits : 1.0;
     const std::vector<motion::ContourLimits> limits = contourLimits(axes, share);
     motion::ContourPlan planned;
     if (smooth) {
-      planned.knots = motion::planSmoothContour(contour, limits);
+      planned = motion::planSmoothContour(contour, limits);
     } else {
       planned = motion::planContour(contour, limits);
     }
@@ -177,6 +181,7 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       plan.targets.push_back(axes[k].countOf(window.segments.back().end[k]));
     }
     if (request.more_follows) {
+      if (smooth) setBlends(window.segments, contour, 0);
       window.settled_ns = planned.settled_ns;
       appendKnots(window.knots, planned.knots, 0, 0);
       plan.window = std::make_shared<const PathWindow>(std::move(window));

@@ -38,6 +38,8 @@ PathPlan planPath(const PathRequest& request, const std::vector<axis::PathAxis>&
 /// [unit] The limits on a path. @param share of the limits of the axes.
 std::vector<motion::ContourLimits> contourLimits(const std::vector<axis::PathAxis>& axes,
                                                  double share);
+/// Whether one of the axes has a jerk limit: accelerations don't jump.
+bool isSmooth(const std::vector<axis::PathAxis>& axes);
 /// [unit] A microstep of the finest axis.
 double resolutionOf(const std::vector<axis::PathAxis>& axes);
 /// @throw Refused if a segment leads beyond a soft limit.
@@ -59,6 +61,10 @@ std::vector<axis::TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> kno
                                             const std::vector<axis::PathAxis>& axes,
                                             std::size_t first);
 
+/// Sets how far the corners of segments are rounded. @param first the number of the first of them
+///   in the contour.
+void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Contour& contour,
+               std::size_t first);
 /// @param time_ns, segment are added to those of the knots.
 void appendKnots(std::vector<PathWindow::Knot>& window,
                  const std::vector<motion::ContourKnot>& knots, std::int64_t time_ns,

@@ -10,6 +10,7 @@
 #include "motion/backlash.h"
 #include "motion/profile_parts.h"
 #include "motion/profile_peaks.h"
+#include "motion/smooth_contour_motion.h"
 #include "motion/spline.h"
 #include "nanoseconds.h"
 #include "path_plan.h"
@@ -29,8 +30,10 @@ namespace {
 
 // Of the excess of a plan from a speed.
 constexpr double kNoExcess = 1e-9;
-// Of the maximum speed: the backlash is at rest.
+// Of the maximum speed: the backlash is at rest. With a jerk limit it comes to rest gently, and
+// must not have an acceleration.
 constexpr double kStill = 1e-3;
+constexpr double kStillGently = 1e-6;
 // [microsteps] A backlash at rest is so close to whole microsteps.
 constexpr double kNear = 1e-3;
 // If the axes can't slow down before a corner, its rounding begins later: the part of the segment
@@ -40,9 +43,31 @@ constexpr int kHalvings = 6;
 constexpr std::int64_t kShortestPart = 100'000;
 // Starts that are tried before the end of the path.
 constexpr int kMostStarts = 8;
+// Segments before and after a corner into which it may be rounded.
+constexpr std::size_t kMostRounded = 33;
 
 void appendPieces(std::vector<motion::Piece>& pieces, const Profile& profile) {
   for (const motion::Piece& piece : profile.pieces()) pieces.push_back(piece);
+}
+
+double largestJerk(const Profile& profile) {
+  double jerk = 0.0;
+  for (const motion::Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
+  return jerk;
+}
+
+double lengthBetween(const std::vector<double>& from, const std::vector<double>& to) {
+  double square = 0.0;
+  for (std::size_t k = 0; k < from.size(); ++k) square += (to[k] - from[k]) * (to[k] - from[k]);
+  return std::sqrt(square);
+}
+
+// The derivative at the end of a segment.
+double endRate(const std::vector<double>& from, const ContourSegment& segment) {
+  const motion::Contour alone(from, {segment}, 1.0);
+  motion::ContourPoint end;
+  alone.evaluate(0, 1.0, end);
+  return lengthBetween(std::vector<double>(end.first.size(), 0.0), end.first);
 }
 
 }  // namespace
@@ -115,19 +140,34 @@ QueuedPath::Start QueuedPath::onStraight(std::size_t knot, std::int64_t time_ns)
                       static_cast<double>(after.time_ns - before.time_ns);
   const double speed = before.speed + part * (after.speed - before.speed);
   const double way = part * (before.speed + speed) / (before.speed + after.speed);
-  return {time_ns, after.segment, {from + way * (after.parameter - from), speed}, {}, true};
+  return {time_ns,
+          after.segment,
+          {from + way * (after.parameter - from), speed, before.acceleration, before.average},
+          {},
+          true};
+}
+
+QueuedPath::Start QueuedPath::atKnot(const PathWindow::Knot& knot) {
+  return {knot.time_ns,
+          knot.segment,
+          {knot.parameter, knot.speed, knot.acceleration, knot.average},
+          {},
+          false};
 }
 
 QueuedPath::Start QueuedPath::atRest() const {
-  const double duration = restOf(window_->axes, window_->segments.back().end, false).duration;
+  const std::vector<double>& end = window_->segments.back().end;
+  const double duration = restOf(window_->axes, end, isSmooth(window_->axes)).duration;
   const auto end_ns = static_cast<std::int64_t>(std::ceil(motion_->end().value() * 1e9));
   return {end_ns, window_->segments.size(), {}, duration, false};
 }
 
-// The earliest ones first; the last one is certainly possible.
-std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t time_ns) const {
+// The earliest ones first, but none of which a later one allows the same; the last one is certainly
+// possible.
+std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t from_ns) const {
   const std::vector<PathWindow::Knot>& knots = window_->knots;
   std::vector<Start> starts;
+  const std::int64_t time_ns = std::max(from_ns, window_->settled_ns);
   const auto first = std::lower_bound(
       knots.begin(), knots.end(), time_ns,
       [](const PathWindow::Knot& knot, std::int64_t time) { return knot.time_ns < time; });
@@ -135,19 +175,31 @@ std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t time_ns) cons
       first->time_ns - time_ns > kShortestPart) {
     starts.push_back(onStraight(static_cast<std::size_t>(first - knots.begin()) - 1, time_ns));
   }
+  if (starts.empty() && from_ns < time_ns && isSmooth(window_->axes)) {
+    const auto until = std::make_reverse_iterator(first);
+    auto tried = knots.rend();
+    for (const bool accelerates : {true, false}) {
+      const auto settled = std::find_if(until, knots.rend(), [&](const PathWindow::Knot& knot) {
+        return knot.may_begin || (accelerates && knot.acceleration > 0.0) || knot.time_ns < from_ns;
+      });
+      if (settled == knots.rend() || settled->time_ns < from_ns || settled == tried) break;
+      starts.push_back(atKnot(*settled));
+      tried = settled;
+    }
+  }
   std::ptrdiff_t step = 1;
   for (auto knot = first; knot != knots.end() && starts.size() < kMostStarts;) {
     if (!knot->may_begin) {
       ++knot;
       continue;
     }
-    starts.push_back({knot->time_ns, knot->segment, {knot->parameter, knot->speed}, {}, false});
+    starts.push_back(atKnot(*knot));
     knot += std::min(step, knots.end() - knot);
     step *= 2;
   }
   const PathWindow::Knot& end = knots.back();
   if (time_ns <= end.time_ns) {
-    starts.push_back({end.time_ns, end.segment, {end.parameter, end.speed}, {}, false});
+    starts.push_back(atKnot(end));
   }
   starts.push_back(atRest());
   return starts;
@@ -164,10 +216,11 @@ std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
     state.motor = motion_->members()[k].curve->stateAt(at_ns);
     if (axis.backlash == 0) continue;
     const double slack = state.motor.position.value() - axis.countOf(joint.position[k]);
+    const double still = axis.limits.jerk > 0.0 ? kStillGently : kStill;
     const double taking_up = state.motor.velocity - joint.velocity[k] * axis.steps_per_unit;
     state.slack = std::nearbyint(slack);
     const bool rests = std::abs(slack - state.slack) < kNear &&
-                       std::abs(taking_up) <= kStill * axis.limits.max_speed;
+                       std::abs(taking_up) <= still * axis.limits.max_speed;
     if (!rests) return std::nullopt;
   }
   return states;
@@ -198,37 +251,93 @@ void QueuedPath::adjust(Start& start, const motion::ContourPoint& planned,
   }
 }
 
+// The first segment whose corner at the end is rounded into this one, or this one.
+std::size_t QueuedPath::firstRoundedInto(std::size_t segment) const {
+  const std::vector<ContourSegment>& segments = window_->segments;
+  std::size_t first = segment;
+  double away = 0.0;
+  for (std::size_t i = segment; i-- > 0 && segment - i <= kMostRounded;) {
+    if (segments[i].blend.value_or(0.0) > away) first = i;
+    if (segments[i].shape != ContourSegment::Shape::kLine) break;
+    const std::vector<double>& from = i == 0 ? window_->start : segments[i - 1].end;
+    away += lengthBetween(from, segments[i].end);
+  }
+  return first;
+}
+
+// The segments from this one on, with the corners that are rounded at the start or before it as
+// they are. The others may be rounded again, after the start.
+std::vector<ContourSegment> QueuedPath::aroundStart(const Start& start, std::size_t first) const {
+  const std::vector<ContourSegment>& old = window_->segments;
+  std::vector<ContourSegment> made(old.begin() + static_cast<std::ptrdiff_t>(first), old.end());
+  double away = 0.0;
+  bool near = true;  // roundings may reach the start
+  for (std::size_t i = start.segment; i < old.size(); ++i) {
+    ContourSegment& segment = made[i - first];
+    const bool line = segment.shape == ContourSegment::Shape::kLine;
+    near = near && (line || i == start.segment) && i <= start.segment + kMostRounded;
+    if (near) {
+      away += (i == start.segment ? 1.0 - start.begin.parameter : 1.0) *
+              endRate(i == 0 ? window_->start : old[i - 1].end, segment);
+      near = line;
+      if (i + 1 < old.size() && segment.blend.value_or(0.0) > away) continue;
+    }
+    segment.blend.reset();
+  }
+  if (start.segment < old.size()) made[start.segment - first].kept = start.begin.parameter;
+  return made;
+}
+
 // Empty if the axes can't follow the rest of the path from there.
 std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
-    Start start, const std::vector<ContourSegment>& added) const {
+    Start start, const std::vector<ContourSegment>& added, bool more_follows,
+    int most_halvings) const {
   const std::vector<ContourSegment>& old = window_->segments;
   const std::vector<PathAxis>& axes = window_->axes;
-  const std::vector<double>& from =
-      start.segment == 0 ? window_->start : old[start.segment - 1].end;
-  Continuation made;
-  made.segments.assign(old.begin() + static_cast<std::ptrdiff_t>(start.segment), old.end());
-  const std::size_t corner = made.segments.size();  // the number of the segment after it
-  made.segments.insert(made.segments.end(), added.begin(), added.end());
+  const bool smooth = isSmooth(axes);
+  const auto continuity = smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection;
+  const std::size_t first = smooth ? firstRoundedInto(start.segment) : start.segment;
+  const std::size_t before = start.segment - first;  // segments before that of the start
+  const std::vector<double>& from = first == 0 ? window_->start : old[first - 1].end;
+  std::vector<ContourSegment> segments;
+  if (smooth) {
+    segments = aroundStart(start, first);
+  } else {
+    segments.assign(old.begin() + static_cast<std::ptrdiff_t>(first), old.end());
+  }
+  const std::size_t corner = segments.size();  // the number of the segment after it
+  segments.insert(segments.end(), added.begin(), added.end());
   const double resolution = resolutionOf(axes);
   const std::vector<motion::ContourLimits> limits = contourLimits(axes, kShareOfLimits);
-  if (corner == 1) made.segments.front().kept = start.begin.parameter;
-  const motion::Contour given(from, made.segments, resolution);
+  const bool in_last = corner == before + 1;
+  if (in_last) segments[before].kept = start.begin.parameter;
+  const motion::Contour given(from, segments, resolution, continuity, more_follows);
   motion::ContourPoint place;
-  given.evaluate(0, start.begin.parameter, place);
+  given.evaluate(before, start.begin.parameter, place);
   const auto states = statesAt(start, jointAt(start, place));
   if (!states) return std::nullopt;
+  Continuation made;
   made.states = *states;
   adjust(start, place, made.states);
-  for (int halvings = 0; halvings <= kHalvings; ++halvings) {
-    if (corner > 0) {
-      const double first = corner == 1 ? start.begin.parameter : 0.0;
-      const double left = halvings == kHalvings ? 0.0 : std::ldexp(1.0 - first, -halvings);
-      made.segments[corner - 1].kept = 1.0 - left;
+  for (int halvings = 0; halvings <= most_halvings; ++halvings) {
+    if (corner > before) {
+      const double kept = in_last ? start.begin.parameter : 0.0;
+      const double left = halvings == kHalvings ? 0.0 : std::ldexp(1.0 - kept, -halvings);
+      segments[corner - 1].kept = 1.0 - left;
     }
-    const motion::Contour contour(from, made.segments, resolution);
-    made.plan = motion::planContour(contour, limits, start.begin);
-    if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcess) return made;
-    if (corner == 0) break;
+    const motion::Contour contour(from, segments, resolution, continuity, more_follows);
+    if (smooth) {
+      made.plan =
+          motion::planSmoothContour(contour.part(before, segments.size() - 1), limits, start.begin);
+    } else {
+      made.plan = motion::planContour(contour, limits, start.begin);
+    }
+    if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcess) {
+      made.segments.assign(segments.begin() + static_cast<std::ptrdiff_t>(before), segments.end());
+      if (smooth) setBlends(made.segments, contour, before);
+      return made;
+    }
+    if (corner == before) break;
   }
   return std::nullopt;
 }
@@ -237,7 +346,8 @@ QueuedPath::JointPlace QueuedPath::jointAt(const Start& start,
                                            const motion::ContourPoint& place) const {
   if (start.from_rest) {
     const std::vector<double>& end = window_->segments.back().end;
-    return {restOf(window_->axes, end, false).positions, std::vector<double>(end.size(), 0.0)};
+    return {restOf(window_->axes, end, isSmooth(window_->axes)).positions,
+            std::vector<double>(end.size(), 0.0)};
   }
   double square = 0.0;
   for (const double rate : place.first) square += rate * rate;
@@ -254,6 +364,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
                                                          std::int64_t passed_ns) const {
   const DoubleDouble passed = motion::secondsOf(passed_ns);
   std::vector<TrajectoryPath::Member> members = motion_->members();
+  const bool smooth = isSmooth(window_->axes);
   for (std::size_t k = 0; k < members.size(); ++k) {
     const PathAxis& axis = window_->axes[k];
     const PathStart& state = continuation.states[k];
@@ -262,13 +373,14 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
     for (const TrajectoryPoint& point : points) {
       const std::int64_t time_ns = nanoseconds(point.time);
       if (time_ns == 0) continue;  // the start
-      waypoints.push_back({time_ns,
-                           axis.countOf(point.positions[k]),
-                           point.velocities[k] * axis.steps_per_unit,
-                           {}});
+      motion::Waypoint& waypoint = waypoints.emplace_back();
+      waypoint.time_ns = time_ns;
+      waypoint.position = axis.countOf(point.positions[k]);
+      waypoint.velocity = point.velocities[k] * axis.steps_per_unit;
+      if (smooth) waypoint.acceleration = point.accelerations[k] * axis.steps_per_unit;
     }
-    const motion::MotionState joint_state{state.motor.position - state.slack, state.motor.velocity,
-                                          0.0};
+    motion::MotionState joint_state{state.motor.position - state.slack, state.motor.velocity, 0.0};
+    if (smooth) joint_state.acceleration = points.front().accelerations[k] * axis.steps_per_unit;
     Profile motor = motion::planSpline(0, joint_state, waypoints);
     if (axis.backlash > 0) {
       motion::MotionLimits limits = axis.limits;
@@ -284,6 +396,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
     const motion::ProfilePeaks peaks = motion::profilePeaks(motor, state.motor.velocity);
     for (motion::MotorBounds* bounds : {&members[k].bounds, &members[k].stop_bounds}) {
       bounds->acceleration = std::max(bounds->acceleration, std::abs(peaks.acceleration.value));
+      if (bounds->jerk > 0.0) bounds->jerk = std::max(bounds->jerk, largestJerk(motor));
     }
     members[k].curve = std::make_shared<const Profile>(0, std::move(pieces));
   }
@@ -307,13 +420,17 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
   }
   try {
     const std::vector<ContourSegment> added = read(segments);
-    const std::int64_t changeable_ns =
-        std::max(nanoseconds(changeable), std::max(passed_ns, window_->settled_ns));
-    for (const Start& start : startsFrom(changeable_ns)) {
-      std::optional<Continuation> found = continueFrom(start, added);
-      if (!found) continue;
-      Longer longer = continued(start, *std::move(found), added, more_follows, passed_ns);
-      if (longer.path) return longer;
+    const std::int64_t changeable_ns = std::max(nanoseconds(changeable), passed_ns);
+    const std::vector<Start> starts = startsFrom(changeable_ns);
+    // With a jerk limit, a later start is better than a corner that is rounded less.
+    for (const int halvings : {isSmooth(window_->axes) ? 0 : kHalvings, kHalvings}) {
+      for (const Start& start : starts) {
+        if (start.begin.speed == 0.0 && halvings < kHalvings) break;
+        std::optional<Continuation> found = continueFrom(start, added, more_follows, halvings);
+        if (!found) continue;
+        Longer longer = continued(start, *std::move(found), added, more_follows, passed_ns);
+        if (longer.path) return longer;
+      }
     }
   } catch (const std::invalid_argument& error) {
     throw Refused(error.what());
@@ -342,7 +459,8 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
       std::upper_bound(window_->knots.begin() + 1, window_->knots.end(), passed_ns,
                        [](std::int64_t time, const auto& knot) { return time < knot.time_ns; }) -
       1;
-  const std::size_t dropped = std::min(first_kept->segment, start.segment);
+  std::size_t dropped = std::min(first_kept->segment, start.segment);
+  if (isSmooth(window_->axes)) dropped = firstRoundedInto(dropped);
   window.start = dropped == 0 ? window_->start : window_->segments[dropped - 1].end;
   window.segments.assign(window_->segments.begin() + static_cast<std::ptrdiff_t>(dropped),
                          window_->segments.begin() + static_cast<std::ptrdiff_t>(start.segment));

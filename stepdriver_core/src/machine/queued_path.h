@@ -28,6 +28,8 @@ struct PathWindow {
     double parameter = 0.0;
     double speed = 0.0;  ///< [unit/s] along the path
     /// See motion::ContourKnot.
+    double acceleration = 0.0;
+    double average = 0.0;
     bool may_begin = false;
     bool straight = false;
   };
@@ -35,6 +37,8 @@ struct PathWindow {
   PathFrame frame;
   std::vector<axis::PathAxis> axes;
   std::vector<double> start;  ///< where the first segment begins
+  /// With a jerk limit, also those before them whose corners are rounded as far as the first one
+  /// ahead, and the `blend` of each is that of the plan.
   std::vector<motion::ContourSegment> segments;
   std::vector<Knot> knots;      ///< the last one is the end of the path
   std::int64_t settled_ns = 0;  ///< see motion::ContourPlan
@@ -63,7 +67,8 @@ class QueuedPath : public axis::SharedPath {
     double same_until = 0.0;  ///< [s]
   };
   /// Takes time in proportion to the segments that are planned again: those between the point from
-  /// which the axes slow down to rest at the present end, and the new end.
+  /// which the axes slow down to rest at the present end, and the new end. With a jerk limit, the
+  /// motion changes at a knot before that point at which the speed is highest or lowest, or rises.
   ///
   /// @param segments may be empty, to tell that this is the end.
   /// @param passed [s] a position that the axes have passed: what is before it is forgotten.
@@ -105,11 +110,15 @@ class QueuedPath : public axis::SharedPath {
 
   std::vector<motion::ContourSegment> read(const std::vector<PathSegment>& given) const;
   std::size_t segmentAt(std::int64_t time_ns) const;
-  std::vector<Start> startsFrom(std::int64_t time_ns) const;
+  std::size_t firstRoundedInto(std::size_t segment) const;
+  std::vector<motion::ContourSegment> aroundStart(const Start& start, std::size_t first) const;
+  std::vector<Start> startsFrom(std::int64_t from_ns) const;
+  static Start atKnot(const PathWindow::Knot& knot);
   Start onStraight(std::size_t knot, std::int64_t time_ns) const;
   Start atRest() const;
   std::optional<Continuation> continueFrom(Start start,
-                                           const std::vector<motion::ContourSegment>& added) const;
+                                           const std::vector<motion::ContourSegment>& added,
+                                           bool more_follows, int most_halvings) const;
   Longer continued(const Start& start, Continuation continuation,
                    const std::vector<motion::ContourSegment>& added, bool more_follows,
                    std::int64_t passed_ns) const;

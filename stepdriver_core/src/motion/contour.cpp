@@ -43,14 +43,18 @@ class GentleCorners {
   GentleCorners(double begin, double end) : begin_(begin), end_(end) {}
 
   /// @param length of the line before it. @param turn sin(turn/2). @param distance of its rounding
-  ///   if it overlaps no other one.
-  void append(double length, double turn, double distance, double tolerance) {
+  ///   if it overlaps no other one. @param fixed its rounding can't be changed. @param kept [unit]
+  ///   the part of the line that is kept as it is, apart from fixed roundings.
+  void append(double length, double turn, double distance, double tolerance, bool fixed,
+              double kept) {
     const double before = corners_.empty() ? 0.0 : corners_.back().place;
-    corners_.push_back({before + length, turn, distance, distance, tolerance});
+    if (kept > 0.0) begin_ = std::max(begin_, before + kept);
+    corners_.push_back({before + length, turn, distance, distance, tolerance, begin_, fixed});
   }
 
   std::vector<double> widened() {
     end_ += corners_.back().place;
+    yieldToFixed();
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       giveWay(i);
       widen(i);
@@ -77,6 +81,9 @@ class GentleCorners {
     double least;
     double distance;
     double tolerance;
+    double begin;  // no rounding before it, if it isn't fixed
+    bool fixed;
+    double taken = 0.0;  // of the tolerance, by fixed roundings
   };
 
   // (m(w) - |w|)/d for y = |w|/d
@@ -91,23 +98,58 @@ class GentleCorners {
     return std::min(corner + kMostNeighbours, corners_.size() - 1);
   }
 
+  double turnsWithin(std::size_t index, double distance) const {
+    double turns = 0.0;
+    for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
+      if (std::abs(corners_[i].place - corners_[index].place) < distance) turns += corners_[i].turn;
+    }
+    return turns;
+  }
+
+  // Fixed roundings leave less of the tolerance to the others. If corners have been added near a
+  // fixed one, their roundings don't overlap with it: others did already.
+  void yieldToFixed() {
+    for (std::size_t k = 0; k < corners_.size(); ++k) {
+      if (!corners_[k].fixed || corners_[k].distance == 0.0) continue;
+      const Corner& fixed = corners_[k];
+      for (std::size_t i = firstNear(k); i <= lastNear(k); ++i) {
+        Corner& other = corners_[i];
+        if (other.fixed || other.turn == 0.0) continue;
+        const double away = std::abs(other.place - fixed.place);
+        other.taken += fixed.turn * fixed.distance * roundingAt(away / fixed.distance);
+      }
+    }
+    for (Corner& corner : corners_) {
+      if (corner.fixed || corner.turn == 0.0) continue;
+      const double most = std::max(0.0, corner.tolerance - corner.taken);
+      corner.least = corner.distance = std::min(corner.least, most / (kMidRounding * corner.turn));
+    }
+    for (std::size_t k = 0; k < corners_.size(); ++k) {
+      const Corner& fixed = corners_[k];
+      if (!fixed.fixed || turnsWithin(k, 2.0 * fixed.distance) <= kMostTurns) continue;
+      for (std::size_t i = k + 1; i <= lastNear(k); ++i) {
+        Corner& other = corners_[i];
+        const double end = fixed.place + fixed.distance;
+        other.begin = std::max(other.begin, std::min(end, other.place - other.least));
+      }
+    }
+  }
+
   bool allows(std::size_t index, double distance) const {
     const Corner& corner = corners_[index];
-    double turns = 0.0;
     double deviation = 0.0;
     for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
       const double away = std::abs(corners_[i].place - corner.place);
-      if (away < 2.0 * distance) turns += corners_[i].turn;
       deviation += corners_[i].turn * distance * roundingAt(away / distance);
     }
-    return turns <= kMostTurns && deviation <= corner.tolerance;
+    return turnsWithin(index, 2.0 * distance) <= kMostTurns && deviation <= corner.tolerance;
   }
 
   void widen(std::size_t index) {
     Corner& corner = corners_[index];
-    if (corner.turn == 0.0) return;
+    if (corner.turn == 0.0 || corner.fixed) return;
     // Twice the distance is within the neighbours that are counted.
-    double high = kInside * std::min(corner.place - begin_, end_ - corner.place);
+    double high = kInside * std::min(corner.place - corner.begin, end_ - corner.place);
     if (index >= kMostNeighbours) {
       high = std::min(high, (corner.place - corners_[firstNear(index)].place) / 2.0);
     }
@@ -145,6 +187,7 @@ class GentleCorners {
       }
     }
     for (std::size_t i = 0; i < corners_.size(); ++i) {
+      if (corners_[i].fixed) continue;
       corners_[i].distance = std::max(corners_[i].least, corners_[i].distance * factors[i]);
     }
     return fits;
@@ -214,7 +257,7 @@ double acrossOf(const std::vector<double>& jump, const ContourPoint& in, double 
 }  // namespace
 
 Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& segments,
-                 double resolution, Continuity continuity)
+                 double resolution, Continuity continuity, bool continues)
     : start_(std::move(start)), resolution_(resolution) {
   segments_.reserve(segments.size());
   for (std::size_t i = 0; i < segments.size(); ++i) {
@@ -223,7 +266,8 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
   for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
     round(i, segments[i], continuity);
   }
-  if (continuity == Continuity::kCurvature) widen(segments);
+  open_.segment = size();
+  if (continuity == Continuity::kCurvature) widen(segments, continues);
 }
 
 Contour::Segment Contour::placed(const std::vector<double>& from, const ContourSegment& given,
@@ -320,8 +364,8 @@ void Contour::round(std::size_t corner, const ContourSegment& given, Continuity 
     if (!(across > kEven * sharpness)) jump.clear();
   }
   if (2.0 * half_chord < kSmooth && jump.empty()) return;
-  double distance = 0.0;
-  if (!turns_back) {
+  double distance = given.blend.value_or(0.0);
+  if (!turns_back && !given.blend) {
     const double turning = kMidRounding * half_chord;
     // turning d + bending d^2 = tolerance
     const double bending = kMostBend * norm(jump);
@@ -347,6 +391,7 @@ Contour Contour::part(std::size_t first, std::size_t last) const {
   Contour made(std::move(begin.position), {}, resolution_);
   made.segments_.assign(segments_.begin() + static_cast<std::ptrdiff_t>(first),
                         segments_.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  made.open_ = {open_.segment - std::min(open_.segment, first), open_.parameter};
   return made;
 }
 
@@ -357,23 +402,33 @@ bool Contour::isGentle(std::size_t corner) const {
 }
 
 // Lets the roundings of neighbouring gentle corners overlap.
-void Contour::widen(const std::vector<ContourSegment>& given) {
+void Contour::widen(const std::vector<ContourSegment>& given, bool continues) {
   for (std::size_t first = 0; first + 1 < size(); ++first) {
     giveWay(first);
     if (!isGentle(first)) continue;
     std::size_t last = first;
     while (last + 2 < size() && isGentle(last + 1)) ++last;
     // A collinear end needs nothing: it is no rounding, and doesn't stop.
+    const bool open = continues && last + 2 == size();
+    const double length = segments_[last + 1].begin.rate;
     GentleCorners corners(segments_[first].begin.blend,
-                          segments_[last + 1].begin.rate - segments_[last + 1].end.blend);
+                          open ? length / 2.0 : length - segments_[last + 1].end.blend);
     for (std::size_t i = first; i <= last; ++i) {
       const End& end = segments_[i].end;
-      corners.append(end.rate, norm(end.shift), end.blend, given[i].tolerance);
+      corners.append(end.rate, norm(end.shift), end.blend, given[i].tolerance,
+                     given[i].blend.has_value(), given[i].kept * end.rate);
     }
     const std::vector<double> distances = corners.widened();
     for (std::size_t i = first; i <= last; ++i) {
-      if (distances[i - first] > segments_[i].end.blend) overlap(i, distances[i - first]);
+      const double distance = distances[i - first];
+      if (distance < kLeastBlend * resolution_ && norm(segments_[i].end.shift) > 0.0) {
+        segments_[i].end.blend = segments_[i + 1].begin.blend = 0.0;
+        segments_[i].stops = true;
+      } else if (distance != segments_[i].end.blend || given[i].blend) {
+        overlap(i, distance);
+      }
     }
+    if (open) findOpen(first, last);
     first = last;
   }
 }
@@ -393,6 +448,22 @@ void Contour::overlap(std::size_t corner, double distance) {
     const double rate = norm(segments_[i].powers, axes());
     place += rate;
     segments_[i].overlaps.push_back({place, {rate, distance, shift, {}}});
+  }
+}
+
+// @param first, last corners between lines at the end of the contour.
+void Contour::findOpen(std::size_t first, std::size_t last) {
+  constexpr double kReaches = 1.0 - 1e-6;
+  double to_middle = segments_[last + 1].begin.rate / 2.0;  // of the last line, from the corner
+  for (std::size_t i = last + 1; i-- > first;) {
+    const double blend = segments_[i].end.blend;
+    if (blend >= to_middle * kReaches) {
+      std::size_t segment = i;
+      double before = segments_[i].end.rate - blend;
+      while (before < 0.0 && segment > 0) before += norm(segments_[--segment].powers, axes());
+      open_ = {segment, std::max(0.0, before / norm(segments_[segment].powers, axes()))};
+    }
+    to_middle += segments_[i].end.rate;
   }
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -34,8 +35,11 @@ struct ContourSegment {
   /// [unit] How far the corner at its end may be rounded; 0: an exact stop at the corner. It is
   /// ignored at the end of the contour and if there is no corner.
   double tolerance = 0.0;
-  /// Up to this parameter the corner at its end leaves it as it is.
+  /// Up to this parameter the corner at its end leaves it as it is, and so do all later corners.
   double kept = 0.0;
+  /// [unit] How far the corner at its end is rounded, as Contour::blendAfter() told of the same
+  /// corner, whatever else allows. Empty: as far as possible.
+  std::optional<double> blend;
 };
 
 /// A point of a contour and its derivatives with respect to the parameter of its segment.
@@ -92,7 +96,8 @@ enum class Continuity {
 /// corner that turns by 30 degrees or less has a d beyond its segments if
 /// - the sum of all roundings is within the tolerance at each corner; between two corners it is
 ///   convex, so it is largest at one of them,
-/// - it ends before any other kind of segment, corner or stop, and
+/// - it ends before any other kind of segment, corner or stop, and in the middle of the last
+///   segment if the contour will be continued,
 /// - the sum of sin(turn/2) of all corners within 2 d is 1/2 or less: so is that of all roundings
 /// at
 ///   any place, each of which changes the derivative by less than its sin(turn/2), so |p'| is 1/2
@@ -103,8 +108,9 @@ class Contour {
   ///   one. @param resolution [unit] what makes no difference: a microstep of the finest axis.
   /// @throw std::invalid_argument if a Bezier's derivative is (almost) 0 at a point, which no axis
   ///   can pass without a stop; it names the segment (the first is 0).
+  /// @param continues more segments will be appended.
   Contour(std::vector<double> start, const std::vector<ContourSegment>& segments, double resolution,
-          Continuity continuity = Continuity::kDirection);
+          Continuity continuity = Continuity::kDirection, bool continues = false);
 
   std::size_t axes() const { return start_.size(); }
   std::size_t size() const { return segments_.size(); }
@@ -116,9 +122,7 @@ class Contour {
   /// The same of the path as given, with all its corners.
   void evaluateGiven(std::size_t segment, double parameter, ContourPoint& point) const;
 
-  /// Some of its segments.
-  ///
-  /// @pre It stops before the first one and after the last one, or they are its ends.
+  /// Some of its segments, rounded as they are here.
   Contour part(std::size_t first, std::size_t last) const;
 
   /// The lowest and the highest position of an axis on a segment as given.
@@ -128,7 +132,17 @@ class Contour {
   /// one at its end: 0 and 1 if they aren't.
   double roundedUntil(std::size_t segment) const;
   double roundedFrom(std::size_t segment) const;
+  /// [unit] How far from the end of a segment the rounding of that corner reaches, d; 0: it isn't
+  /// rounded.
+  double blendAfter(std::size_t segment) const { return segments_[segment].end.blend; }
   bool isLine(std::size_t segment) const;
+  /// From here on the roundings of corners will change if the contour is continued, as they must
+  /// not reach beyond the middle of its last segment.
+  struct Place {
+    std::size_t segment = 0;
+    double parameter = 0.0;
+  };
+  Place openFrom() const { return open_; }
   /// Whether the motion has to stop at the end of a segment.
   bool stopsAfter(std::size_t segment) const { return segments_[segment].stops; }
   /// [unit/s] See ContourSegment.
@@ -172,8 +186,9 @@ class Contour {
                  std::size_t index) const;
   void round(std::size_t corner, const ContourSegment& given, Continuity continuity);
   bool isGentle(std::size_t corner) const;
-  void widen(const std::vector<ContourSegment>& given);
+  void widen(const std::vector<ContourSegment>& given, bool continues);
   void overlap(std::size_t corner, double distance);
+  void findOpen(std::size_t first, std::size_t last);
   std::pair<double, double> rounded(std::size_t segment) const;
   double sharpest(const Segment& segment, double rate) const;
   void blend(const End& end, double distance, double sign, ContourPoint& point) const;
@@ -181,6 +196,7 @@ class Contour {
   std::vector<double> start_;
   double resolution_;
   std::vector<Segment> segments_;
+  Place open_;
 };
 
 /// The centre and the angle of a ContourSegment.

@@ -155,7 +155,31 @@ ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
   return made;
 }
 
-void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint& point) const {
+ContourGrid ContourGrid::after(double distance) const {
+  std::size_t first = 0;
+  double begin = 0.0;
+  while (first + 1 < size() && begin + intervals_[first].length <= distance) {
+    begin += intervals_[first++].length;
+  }
+  ContourGrid made(*this);
+  const auto from = static_cast<std::ptrdiff_t>(first);
+  const auto width = static_cast<std::ptrdiff_t>(axes_);
+  made.intervals_.erase(made.intervals_.begin(), made.intervals_.begin() + from);
+  made.positions_.erase(made.positions_.begin(), made.positions_.begin() + from * width);
+  made.derivatives_.erase(made.derivatives_.begin(), made.derivatives_.begin() + 4 * from * width);
+  made.stops_.erase(made.stops_.begin(), made.stops_.begin() + from);
+  made.stops_.front() = false;
+  ContourPoint point;
+  Interval& cut = made.intervals_.front();
+  cut.from = evaluateAt(first, distance - begin, point);
+  cut.length -= distance - begin;
+  std::copy(point.position.begin(), point.position.end(), made.positions_.begin());
+  std::copy(point.first.begin(), point.first.end(), made.derivatives_.begin());
+  std::copy(point.second.begin(), point.second.end(), made.derivatives_.begin() + width);
+  return made;
+}
+
+double ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint& point) const {
   const Interval& of = intervals_[interval];
   point.position.resize(axes_);
   point.first.resize(axes_);
@@ -166,11 +190,9 @@ void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint
       point.position[j] = position(interval)[j] + distance * point.first[j];
       point.second[j] = 0.0;
     }
-    return;
+    return of.from + (of.to - of.from) * distance / of.length;
   }
-  Place begin;
-  Place middle;
-  Place end;
+  auto& [begin, middle, end] = scratch_;
   evaluate(of.segment, of.from, begin);
   const double part = std::clamp(distance / of.length, 0.0, 1.0);
   double parameter = of.from + part * (of.to - of.from);
@@ -185,6 +207,7 @@ void ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint
   evaluate(of.segment, parameter, end);
   point.position = end.point.position;
   withRespectToLength(end, point.first.data(), point.second.data());
+  return parameter;
 }
 
 bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -16,7 +17,7 @@ inline void giveWayAt(std::size_t place) {
 }
 
 /// A contour divided into short intervals of its length s, each from one place to the next. A
-/// straight part is one interval.
+/// straight part is one interval. Only one thread uses it at a time.
 class ContourGrid {
  public:
   /// @param begin the parameter of the first segment at which it begins.
@@ -39,6 +40,8 @@ class ContourGrid {
   ///
   /// @param distances in increasing order.
   ContourGrid divided(const std::vector<double>& distances) const;
+  /// From a distance from its start on, which is before its end.
+  ContourGrid after(double distance) const;
 
   std::size_t axes() const { return axes_; }
   std::size_t size() const { return intervals_.size(); }
@@ -55,7 +58,9 @@ class ContourGrid {
 
   /// The point at a distance from the begin of an interval, with the derivatives with respect to s;
   /// beyond an interval that isn't straight, its end.
-  void evaluateAt(std::size_t interval, double distance, ContourPoint& point) const;
+  ///
+  /// @return its parameter.
+  double evaluateAt(std::size_t interval, double distance, ContourPoint& point) const;
 
   /// @name The first two derivatives of the position with respect to s, at the ends of an interval.
   /// The second one jumps at a place if the curvature does; the first one only at a stop.
@@ -92,6 +97,7 @@ class ContourGrid {
   std::vector<double> positions_;
   std::vector<double> derivatives_;  // four of each interval
   std::vector<bool> stops_;
+  mutable std::array<Place, 3> scratch_;  // of evaluateAt()
 };
 
 }  // namespace stepdriver::motion

@@ -25,11 +25,15 @@ struct ContourKnot {
   std::vector<double> velocities;  ///< [unit/s]
   /// [unit/s^2] Empty if accelerations may jump.
   std::vector<double> accelerations;
-  double parameter = 0.0;  ///< of the segment
-  double speed = 0.0;      ///< [unit/s] along the contour
-  /// Another contour can begin here: no corner before it is being rounded.
+  double parameter = 0.0;     ///< of the segment
+  double speed = 0.0;         ///< [unit/s] along the contour
+  double acceleration = 0.0;  ///< [unit/s^2] along the contour; 0 if accelerations may jump
+  /// Another contour can begin here: no corner before it is being rounded, or if accelerations may
+  /// not jump, the state of the motion here allows all that has been planned for the time after it.
   bool may_begin = false;
-  /// On the way to the next knot, the segment of that one is straight.
+  double average = 0.0;  ///< [s] the time over which planSmoothContour() averaged
+  /// On the way to the next knot, the segment of that one is straight, and the acceleration
+  /// constant.
   bool straight = false;
 };
 
@@ -37,6 +41,11 @@ struct ContourKnot {
 struct ContourBegin {
   double parameter = 0.0;  ///< of the first segment
   double speed = 0.0;      ///< [unit/s] along the contour
+  /// @name Ignored if accelerations may jump
+  /// @{
+  double acceleration = 0.0;  ///< [unit/s^2] along the contour
+  double average = 0.0;       ///< [s] of the motion so far; 0: unknown
+  /// @}
   /// [s] How long ago the motion was exactly there; less than half a nanosecond.
   double ago = 0.0;
 };

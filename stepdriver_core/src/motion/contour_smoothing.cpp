@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kWidthRounding = 1e-9;
-constexpr int kMostRounds = 40;  // each of which joins maxima in pairs at least
+constexpr double kUneven = 0.01;        // of the highest acceleration
+constexpr double kEvenRounding = 1e-6;  // of the time of the average
+constexpr int kMostRounds = 40;         // each of which joins maxima in pairs at least
 
 // A maximum that is being lowered: it lies between two places, and so does its end at each side.
 class Maximum {
@@ -25,7 +27,7 @@ class Maximum {
     while (width(level_) < std::sqrt(level_) * time * (1.0 - kWidthRounding)) {
       while (left_ > 0 && places_[left_ - 1].square == level_) --left_;
       while (right_ + 1 < places_.size() && places_[right_ + 1].square == level_) ++right_;
-      if (width(level_) >= std::sqrt(level_) * time) return;
+      if (left_ == 0 || width(level_) >= std::sqrt(level_) * time) return;
       const double before = places_[left_ - 1].square;
       const double after = places_[right_ + 1].square;
       if (before > level_ || after > level_) return;  // a minimum
@@ -92,13 +94,23 @@ class MotionCursor {
 
   /// [s] When the acceleration changes next.
   double next() const { return next_ < times_.size() ? times_[next_] + delay_ : kInfinity; }
+  /// [s] When the acceleration changed last by more than this.
+  double lastChange(double by) {
+    for (; seen_ < next_; ++seen_) {
+      const double acceleration = accelerationAfter(seen_);
+      if (std::abs(acceleration - even_) > by) {
+        even_ = acceleration;
+        changed_ = times_[seen_] + delay_;
+      }
+    }
+    return changed_;
+  }
   State at(double time) {
     while (next() <= time) ++next_;
     if (next_ == 0) return {places_.front().distance, 0.0, 0.0};
     if (next_ == times_.size()) return {places_.back().distance, 0.0, 0.0};
     const SpeedPlace& from = places_[next_ - 1];
-    const SpeedPlace& to = places_[next_];
-    const double acceleration = (to.square - from.square) / (2.0 * (to.distance - from.distance));
+    const double acceleration = accelerationAfter(next_ - 1);
     const double passed = time - delay_ - times_[next_ - 1];
     const double begin = std::sqrt(from.square);
     return {from.distance + passed * (begin + passed * acceleration / 2.0),
@@ -106,10 +118,20 @@ class MotionCursor {
   }
 
  private:
+  double accelerationAfter(std::size_t place) const {
+    if (place + 1 == places_.size()) return 0.0;
+    const SpeedPlace& from = places_[place];
+    const SpeedPlace& to = places_[place + 1];
+    return (to.square - from.square) / (2.0 * (to.distance - from.distance));
+  }
+
   const std::vector<SpeedPlace>& places_;
   const std::vector<double>& times_;
   double delay_;
   std::size_t next_ = 0;
+  std::size_t seen_ = 0;  // places that have been looked at for a change
+  double even_ = 0.0;     // the acceleration after the last change
+  double changed_ = -kInfinity;
 };
 
 }  // namespace
@@ -189,20 +211,27 @@ std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time
   return places;
 }
 
-std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time) {
-  std::vector<double> times{0.0};
+std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time, bool moves) {
+  std::vector<double> times{moves ? -time : 0.0};
   times.reserve(places.size());
   for (std::size_t i = 1; i < places.size(); ++i) {
     const double speeds = std::sqrt(places[i - 1].square) + std::sqrt(places[i].square);
     times.push_back(times.back() + 2.0 * (places[i].distance - places[i - 1].distance) / speeds);
   }
+  if (moves) times[1] = 0.0;
+  double steepest = 0.0;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const double change = std::abs(places[i].square - places[i - 1].square);
+    steepest = std::max(steepest, change / (2.0 * (places[i].distance - places[i - 1].distance)));
+  }
   MotionCursor front(places, times, 0.0);
   MotionCursor rear(places, times, time);
   std::vector<SmoothPart> made;
   made.reserve(2 * places.size());
-  double distance = places.front().distance;
+  double distance = 0.0;
   for (double now = 0.0; now < kInfinity;) {
     giveWayAt(made.size());
+    const double changed = front.lastChange(kUneven * steepest);  // before now
     const MotionCursor::State ahead = front.at(now);
     const MotionCursor::State behind = rear.at(now);
     if (!made.empty()) {
@@ -213,7 +242,8 @@ std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double t
     made.push_back({now, distance, (ahead.distance - behind.distance) / time,
                     (ahead.speed - behind.speed) / time,
                     (ahead.acceleration - behind.acceleration) / time, behind.distance,
-                    ahead.distance, behind.acceleration, ahead.acceleration});
+                    ahead.distance, behind.acceleration, ahead.acceleration,
+                    changed <= now - time * (1.0 - kEvenRounding)});
     now = std::min(front.next(), rear.next());
   }
   made.back().distance = places.back().distance;

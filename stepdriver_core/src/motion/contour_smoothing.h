@@ -38,7 +38,7 @@ struct SpeedPlace {
 /// then lasts so long, or to the higher one of the two minima around it: then they become one
 /// maximum, which is lowered as well.
 ///
-/// @param places from rest to rest.
+/// @param places to rest. The first one is at rest, or what is up to the second one has passed.
 std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time);
 
 /// A part of a smoothed motion, with constant jerk.
@@ -54,6 +54,9 @@ struct SmoothPart {
   double front = 0.0;
   double rear_acceleration = 0.0;
   double front_acceleration = 0.0;
+  /// In the time of the average before its begin, the acceleration of the given motion was constant
+  /// apart from small changes.
+  bool even = false;
 };
 
 /// The moving average of a motion, whose distance at the time t is s0(t):
@@ -66,8 +69,11 @@ struct SmoothPart {
 /// one of speeds up to c. Going back in time from there, s0 falls by c or less per time, for T at
 /// least. Its average over T would then be after the place, which it is not.
 ///
-/// @param places from rest to rest. @param time T, above 0 [s]
+/// @param places from rest to rest; if it `moves`, the given motion was at the first one at the
+///   time -T and is at the second one at the time 0, when its average is at the distance 0.
+/// @param time T, above 0 [s]
 /// @return the last one is at rest.
-std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time);
+std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time,
+                                 bool moves = false);
 
 }  // namespace stepdriver::motion

@@ -102,13 +102,13 @@ void ContourSpeed::plan() {
   stale_.assign(size, false);
 }
 
-std::size_t ContourSpeed::settledUntil() {
+std::size_t ContourSpeed::settledUntil(std::size_t open) {
   constexpr double kRoundable = 0.5;  // of a segment
   double fast = capAtEnd(grid_.size() - 1);
   double slow = 0.0;
   for (std::size_t i = grid_.size(); i-- > 0;) {
     const ContourGrid::Interval& interval = grid_[i];
-    fast = grid_.stopsAt(i) ? 0.0 : largestBefore(i, fast);
+    fast = grid_.stopsAt(i) ? 0.0 : i >= open ? kUnbounded : largestBefore(i, fast);
     if (interval.segment + 1 < contour_.size()) {
       slow = grid_.stopsAt(i) ? 0.0 : largestBefore(i, slow);
     } else if (interval.from < kRoundable && interval.straight) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "motion/contour.h"
@@ -40,10 +41,14 @@ class ContourSpeed {
 
   /// [unit^2/s^2] @param place from 0 to the size of the grid.
   double square(std::size_t place) const { return squares_[place]; }
+  /// [unit^2/s^2] The highest from which the motion can still slow down for everything ahead.
+  double controllable(std::size_t place) const { return controllable_[place]; }
   /// A place up to which the plan stays the same if the contour continues at its end, whether it
   /// needn't slow down there or must be at rest half a segment before it, at the first place at
   /// which the rounding of a corner may begin. Call it after plan().
-  std::size_t settledUntil();
+  ///
+  /// @param open from this place on, its speed may be higher then.
+  std::size_t settledUntil(std::size_t open = std::numeric_limits<std::size_t>::max());
 
   /// The accelerations along a straight interval that the axes allow [unit/s^2].
   struct Ramp {

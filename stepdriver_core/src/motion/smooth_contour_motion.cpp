@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -25,6 +26,8 @@ constexpr double kMostRounding = 1e-3 / 60.0;
 constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
 constexpr int kMostReplans = 12;
 constexpr double kNoExcess = 1e-3;
+constexpr double kNoPart = 1e-9;         // of a segment
+constexpr double kSpeedRounding = 1e-9;  // of the square of a speed
 constexpr double kNoDifference = 1e-6;
 constexpr double kLowerSmoothBy = 1.002;
 constexpr double kShorterBy = 0.7;             // the time of the average
@@ -43,15 +46,18 @@ class SmoothKnots {
     double speed = 0.0;
     std::size_t interval = 0;
     std::size_t part = 0;  // of the smoothed motion, that ends or contains it
+    double parameter = 0.0;
+    double acceleration = 0.0;
+    bool even = false;        // see SmoothPart
+    bool ends_curve = false;  // between it and a straight part
   };
 
-  void append(const Knot& knot, const double* position, const double* first, const double* second,
-              double acceleration) {
+  void append(const Knot& knot, const double* position, const double* first, const double* second) {
     knots_.push_back(knot);
     const double square = knot.speed * knot.speed;
     for (std::size_t j = 0; j < axes_; ++j) {
       states_.push_back(
-          {position[j], first[j] * knot.speed, first[j] * acceleration + second[j] * square});
+          {position[j], first[j] * knot.speed, first[j] * knot.acceleration + second[j] * square});
     }
   }
   void dropLast() {
@@ -89,6 +95,7 @@ struct SmoothDemand {
     acceleration = std::max(acceleration, other.acceleration);
     jerk = std::max(jerk, other.jerk);
   }
+  double most() const { return std::max({speed, acceleration, jerk}); }
   // How much slower the motion has to be.
   double slowdown() const { return std::max({speed, std::sqrt(acceleration), std::cbrt(jerk)}); }
 };
@@ -235,19 +242,28 @@ class KnotMaker {
     for (std::size_t k = 0; k + 1 < parts_.size(); ++k) {
       giveWayAt(k);
       const SmoothPart& part = parts_[k];
-      if (std::abs(part.jerk - jerk) >
-          kSmallChange * highestJerk(grid_, interval_, limits_, time_)) {
+      const bool becomes_even = k > 0 && part.even && !parts_[k - 1].even;
+      if (becomes_even || std::abs(part.jerk - jerk) >
+                              kSmallChange * highestJerk(grid_, interval_, limits_, time_)) {
         appendBegin(part, k);
         jerk = part.jerk;
       }
       const SmoothPart& next = parts_[k + 1];
       while (interval_ + 1 < grid_.size() && begin_ + grid_[interval_].length < next.distance) {
-        const bool curved = !grid_[interval_].straight || !grid_[interval_ + 1].straight;
+        const bool straight = grid_[interval_].straight;
+        const bool curved = !straight || !grid_[interval_ + 1].straight;
         begin_ += grid_[interval_].length;
         ++interval_;
-        if (!curved || begin_ <= part.distance) continue;
-        const double h = timeTo(part, begin_ - part.distance, next.time - part.time);
-        appendPlace(interval_, part, h, k);
+        if (!curved) continue;
+        const double moved = begin_ - part.distance;
+        const double h = moved > 0.0 ? timeTo(part, moved, next.time - part.time) : 0.0;
+        // Without a knot there, a long quintic on a straight part would begin on the curve.
+        const bool ends_curve = straight != grid_[interval_].straight;
+        if (ends_curve && tooClose(part.time + h) && knots_.size() > 1 &&
+            !knots_.back().ends_curve) {
+          knots_.dropLast();
+        }
+        appendPlace(interval_, part, h, k, ends_curve);
       }
     }
     if (knots_.size() > 1 && parts_.back().time - knots_.back().time < closest_) {
@@ -264,12 +280,14 @@ class KnotMaker {
 
   void appendBegin(const SmoothPart& part, std::size_t index) {
     if (tooClose(part.time)) return;
-    grid_.evaluateAt(interval_, part.distance - begin_, point_);
-    knots_.append({part.time, part.distance, part.speed, interval_, index}, point_.position.data(),
-                  point_.first.data(), point_.second.data(), part.acceleration);
+    const double parameter = grid_.evaluateAt(interval_, part.distance - begin_, point_);
+    knots_.append({part.time, part.distance, part.speed, interval_, index, parameter,
+                   part.acceleration, part.even},
+                  point_.position.data(), point_.first.data(), point_.second.data());
   }
 
-  void appendPlace(std::size_t place, const SmoothPart& part, double h, std::size_t index) {
+  void appendPlace(std::size_t place, const SmoothPart& part, double h, std::size_t index,
+                   bool ends_curve = false) {
     if (tooClose(part.time + h)) return;
     const std::size_t before = place == 0 ? 0 : place - 1;
     const double* first = place == 0 ? grid_.firstAtBegin(0) : grid_.firstAtEnd(before);
@@ -277,8 +295,11 @@ class KnotMaker {
     const double speed = part.speed + h * (part.acceleration + h * part.jerk / 2.0);
     const double distance =
         part.distance + h * (part.speed + h * (part.acceleration / 2.0 + h * part.jerk / 6.0));
-    knots_.append({part.time + h, distance, speed, before, index}, grid_.position(place), first,
-                  second, part.acceleration + h * part.jerk);
+    const bool even = part.even && (h == 0.0 || parts_[index + 1].even);
+    knots_.append({part.time + h, distance, speed, before, index,
+                   place == 0 ? grid_[0].from : grid_[before].to, part.acceleration + h * part.jerk,
+                   even, ends_curve},
+                  grid_.position(place), first, second);
   }
 
   const ContourGrid& grid_;
@@ -292,19 +313,29 @@ class KnotMaker {
   double begin_ = 0.0;        // of it [unit]
 };
 
-// The motion between two stops.
+// The motion between two stops, or from a speed to a stop.
 class SmoothSection {
  public:
-  SmoothSection(const Contour& contour, const std::vector<ContourLimits>& limits)
-      : contour_(contour), limits_(limits), grid_(contour) {
+  SmoothSection(const Contour& contour, const std::vector<ContourLimits>& limits,
+                const ContourBegin& begin)
+      : contour_(contour), limits_(limits), begin_(begin), grid_(contour, begin.parameter) {
     findCaps();
   }
 
   struct Plan {
     SmoothKnots knots;
     std::vector<std::size_t> segments;  // of the knots
+    std::vector<bool> straight;         // the way to the next knot, at constant acceleration
+    double time = 0.0;                  // of the average
+    double settled = 0.0;               // s
     double slowdown = 1.0;
+    double excess = 1.0;  // if it begins at a speed: it can't be slowed down as a whole
+    bool possible() const { return excess <= 1.0 + kNoExcess; }
     double duration() const { return knots.back().time * slowdown; }
+    bool isBetterThan(const Plan& other) const {
+      if (!possible() || !other.possible()) return excess < other.excess;
+      return duration() < other.duration();
+    }
   };
 
   // Divides intervals in which quintics would deviate from the contour.
@@ -312,7 +343,9 @@ class SmoothSection {
     for (int i = 0;; ++i) {
       Plan best = bestOfTimes();
       std::vector<bool> deviates(grid_.size(), false);
-      if (i == kMostQuarterings || !findDeviations(best.knots, deviates)) return best;
+      if (!best.possible() || i == kMostQuarterings || !findDeviations(best.knots, deviates)) {
+        return best;
+      }
       grid_.quarter(deviates);
       findCaps();
     }
@@ -324,6 +357,28 @@ class SmoothSection {
     std::vector<CeilingSpan> speeds;
     std::vector<CeilingSpan> accelerations;
   };
+
+  // What the average contains when it begins at a speed: a motion at constant acceleration for the
+  // time T that has this mean place, speed and acceleration.
+  struct History {
+    double begin = 0.0;  // unit
+    double begin_speed = 0.0;
+    double end = 0.0;
+    double end_speed = 0.0;
+  };
+  History historyOver(double time) const {
+    double change = begin_.acceleration * time;
+    if (std::abs(change) < kNoDifference * begin_.speed) change = 0.0;
+    const double end = (begin_.speed + change / 6.0) * time / 2.0;
+    return {end - begin_.speed * time, begin_.speed - change / 2.0, end,
+            begin_.speed + change / 2.0};
+  }
+  bool moves() const { return begin_.speed > 0.0; }
+  static Plan impossible(std::size_t axes) {
+    Plan plan{SmoothKnots(axes), {}, {}};
+    plan.excess = kUnlimited;
+    return plan;
+  }
 
   void findCaps() {
     const ContourSpeed speed(contour_, grid_, limits_);
@@ -409,14 +464,18 @@ class SmoothSection {
     // On a straight line without other limits, four parts of this duration are the fastest.
     time = std::max(kShortestAverage, std::min(time, std::cbrt(caps_.back().to / (2.0 * jerk))));
     Plan best = plan(time);
+    if (begin_.average > 0.0) {
+      Plan next = plan(begin_.average);
+      if (next.isBetterThan(best)) best = std::move(next);
+    }
     int worse = 0;
     while (worse < 2 && time * kShorterBy > kShortestAverage) {
       time *= kShorterBy;
       Plan next = plan(time);
-      if (next.duration() < best.duration()) {
+      if (next.isBetterThan(best)) {
         best = std::move(next);
         worse = 0;
-      } else {
+      } else if (best.possible()) {
         ++worse;
       }
     }
@@ -428,57 +487,189 @@ class SmoothSection {
   Plan plan(double time) const {
     Lowered lowered;
     Plan best = planOnce(time, lowered);
-    for (int i = 1; i < kMostReplans && best.slowdown > 1.0 + kNoExcess; ++i) {
+    bool done = best.slowdown <= 1.0 + kNoExcess && best.possible();
+    for (int i = 1; i < kMostReplans && !done && best.excess < kUnlimited; ++i) {
       Plan next = planOnce(time, lowered);
-      const bool done = next.slowdown <= 1.0 + kNoExcess;
-      if (next.duration() < best.duration()) best = std::move(next);
-      if (done) break;
+      done = next.excess == kUnlimited || (next.slowdown <= 1.0 + kNoExcess && next.possible());
+      if (next.isBetterThan(best)) best = std::move(next);
     }
     return best;
   }
 
   // Adds to what is lowered.
   Plan planOnce(double time, Lowered& lowered) const {
+    History history;
+    if (moves()) {
+      history = historyOver(time);
+      const bool fits = history.begin_speed > 0.0 &&
+                        history.end_speed > kLeastSpeed * begin_.speed &&
+                        history.end < caps_.back().to * (1.0 - kMargin);
+      if (!fits) return impossible(limits_.size());
+    }
     std::vector<CeilingSpan> spans;
     spans.reserve(caps_.size() + lowered.speeds.size());
-    for (const std::vector<CeilingSpan>* some : {&caps_, &std::as_const(lowered.speeds)}) {
-      for (const CeilingSpan& span : *some) {
-        const double reach = span.value * time / 2.0;
-        spans.push_back({span.from - reach, span.to + reach, span.value});
-      }
+    const double averaged_until = history.end + history.end_speed * time;
+    const auto append = [&](const CeilingSpan& span) {
+      const double reach = span.value * time / 2.0;
+      spans.push_back({span.from - reach, span.to + reach, span.value});
+    };
+    for (const CeilingSpan& span : caps_) append(span);
+    for (CeilingSpan span : lowered.speeds) {
+      // What exceeds a limit near the begin is the change of its speed.
+      if (moves() && span.from < averaged_until)
+        span.value = std::max(span.value, history.end_speed);
+      append(span);
     }
     const Ceiling speeds(std::move(spans));
     const Ceiling accelerations(lowered.accelerations);
     std::vector<double> cuts;
     std::merge(speeds.places().begin(), speeds.places().end(), accelerations.places().begin(),
                accelerations.places().end(), std::back_inserter(cuts));
+    if (moves())
+      cuts.insert(std::upper_bound(cuts.begin(), cuts.end(), averaged_until), averaged_until);
     const ContourGrid grid = grid_.divided(cuts);
-    ContourSpeed speed(contour_, grid, limits_);
-    double begin = 0.0;
-    for (std::size_t i = 0; i < grid.size(); ++i) {
+    std::optional<ContourGrid> rest;
+    if (moves()) rest.emplace(grid.after(history.end));
+    const ContourGrid& ahead = rest ? *rest : grid;
+    const double begin_square = history.end_speed * history.end_speed;
+    ContourSpeed speed(contour_, ahead, limits_, begin_square);
+    double begin = history.end;
+    for (std::size_t i = 0; i < ahead.size(); ++i) {
       giveWayAt(i);
-      const double end = begin + grid[i].length;
-      const double margin = kMargin * grid[i].length;
-      const double highest = speeds.lowest(begin + margin, end - margin);
+      const double end = begin + ahead[i].length;
+      const double margin = kMargin * ahead[i].length;
+      double highest = speeds.lowest(begin + margin, end - margin);
+      if (moves() && (begin + end) / 2.0 < averaged_until) {
+        highest = nearBegin(highest, history.end_speed);
+      }
       speed.restrict(i, highest * highest,
-                     std::min(time * highestJerk(grid, i, limits_, time),
+                     std::min(time * highestJerk(ahead, i, limits_, time),
                               accelerations.lowest(begin + margin, end - margin)));
       begin = end;
     }
     speed.plan();
-    const std::vector<SmoothPart> parts = smoothed(flattenPeaks(placesOf(grid, speed), time), time);
-    Plan plan{KnotMaker(grid, limits_, parts, time, closestKnots()).make(), {}, 1.0};
+    if (speed.controllable(0) < begin_square * (1.0 - kSpeedRounding))
+      return impossible(limits_.size());
+    std::vector<SpeedPlace> given = placesOf(ahead, speed, history.end);
+    const SpeedPlace past{history.begin, history.begin_speed * history.begin_speed};
+    if (moves()) given.insert(given.begin(), past);
+    std::vector<SpeedPlace> places = flattenPeaks(given, time);
+    if (moves() && !keepPast(places, past, {history.end, begin_square})) {
+      return impossible(limits_.size());
+    }
+    const std::vector<SmoothPart> parts = smoothed(places, time, moves());
+    Plan plan{KnotMaker(grid, limits_, parts, time, closestKnots()).make(), {}, {}};
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
       plan.segments.push_back(grid[plan.knots[i].interval].segment);
+      plan.straight.push_back(i + 1 < plan.knots.size() && isEven(plan.knots, i, parts, grid));
     }
-    plan.slowdown = lower(plan.knots, parts, grid, lowered).slowdown();
+    const SmoothDemand demand = lower(plan.knots, parts, grid, lowered);
+    if (moves()) {
+      plan.excess = demand.most();
+    } else {
+      plan.slowdown = demand.slowdown();
+    }
+    plan.time = time;
+    const double settled = settledIn(ahead, history.end, time, speed);
+    plan.settled = timeBefore(parts, beforePeak(given, places, settled));
     return plan;
   }
 
-  static std::vector<SpeedPlace> placesOf(const ContourGrid& grid, const ContourSpeed& speed) {
-    std::vector<SpeedPlace> places{{0.0, 0.0}};
+  // Whether the motion up to its begin is as it was; then the begin is the second place.
+  static bool keepPast(std::vector<SpeedPlace>& places, const SpeedPlace& past,
+                       const SpeedPlace& begin) {
+    const double close = kNoDifference * (begin.distance - past.distance);
+    const auto next = std::find_if(places.begin() + 1, places.end(), [&](const SpeedPlace& place) {
+      return place.distance > begin.distance + close;
+    });
+    if (next == places.end()) return false;
+    const SpeedPlace& before = *(next - 1);
+    const double part = (begin.distance - before.distance) / (next->distance - before.distance);
+    const double square = before.square + part * (next->square - before.square);
+    const auto differs = [](double a, double b) { return std::abs(a - b) > kNoDifference * b; };
+    if (differs(places.front().square, past.square) || differs(square, begin.square)) return false;
+    places.erase(places.begin() + 1, next);
+    places.front() = past;
+    places.insert(places.begin() + 1, begin);
+    return true;
+  }
+
+  // [unit/s] The speed limits there hold for the average, which has been within them so far.
+  double nearBegin(double highest, double speed) const {
+    if (begin_.acceleration < 0.0) highest = std::min(highest, speed);
+    const bool close = highest < speed && speed < kMostOver * highest;
+    return close ? speed : highest;
+  }
+
+  // Whether the way to the next knot is straight, at constant acceleration.
+  static bool isEven(const SmoothKnots& knots, std::size_t index,
+                     const std::vector<SmoothPart>& parts, const ContourGrid& grid) {
+    const SmoothKnots::Knot& from = knots[index];
+    const SmoothKnots::Knot& to = knots[index + 1];
+    if (!from.even) return false;
+    for (std::size_t k = from.part; k < to.part; ++k) {
+      if (!parts[k + 1].even || parts[k].jerk != 0.0) return false;
+    }
+    if (!to.even || parts[from.part].jerk != 0.0) return false;
+    // A knot at the end of an interval belongs to it, so the way may begin after that.
+    const bool whole = from.parameter == grid[from.interval].to && from.interval < to.interval;
+    for (std::size_t k = from.interval + (whole ? 1 : 0); k <= to.interval; ++k) {
+      if (!grid[k].straight || grid[k].segment != grid[to.interval].segment) return false;
+    }
+    return true;
+  }
+
+  // [unit] The place after which the averaged motion depends on what follows the contour, apart from
+  // peaks.
+  double settledIn(const ContourGrid& grid, double begin, double time, ContourSpeed& speed) const {
+    const Contour::Place open = contour_.openFrom();
+    double lowest = kUnlimited;  // that will be higher
+    double from = kUnlimited;
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      const ContourGrid::Interval& interval = grid_[i];
+      const bool before = interval.segment < open.segment ||
+                          (interval.segment == open.segment && interval.to <= open.parameter);
+      if (before) continue;
+      from = std::min(from, caps_[i].from);
+      lowest = std::min(lowest, caps_[i].value);
+    }
+    if (lowest < kUnlimited) from -= lowest * time / 2.0;
+    std::size_t place = 0;
+    double distance = begin;
+    while (place < grid.size() && distance < from) distance += grid[place++].length;
+    const std::size_t until = speed.settledUntil(place);
+    for (place = 0, distance = begin; place < until; ++place) distance += grid[place].length;
+    return distance;
+  }
+
+  // The begin of the last peak before a distance if that has been lowered: if the contour
+  // continues, it may be higher.
+  static double beforePeak(const std::vector<SpeedPlace>& given,
+                           const std::vector<SpeedPlace>& flattened, double distance) {
+    auto begin =
+        std::upper_bound(flattened.begin() + 1, flattened.end() - 1, distance,
+                         [](double x, const SpeedPlace& place) { return x < place.distance; });
+    --begin;
+    while (begin != flattened.begin() && (begin - 1)->square >= begin->square) --begin;
+    const double most = begin->square * (1.0 + kNoDifference);
+    const bool lowered = std::any_of(given.begin(), given.end(), [&](const SpeedPlace& place) {
+      return place.distance >= begin->distance && place.distance <= distance && place.square > most;
+    });
+    return lowered ? begin->distance : distance;
+  }
+
+  // [s] When the given motion comes to a distance.
+  static double timeBefore(const std::vector<SmoothPart>& parts, double distance) {
+    const auto later =
+        std::upper_bound(parts.begin() + 1, parts.end(), distance,
+                         [](double x, const SmoothPart& part) { return x < part.front; });
+    return (later - 1)->time;
+  }
+
+  static std::vector<SpeedPlace> placesOf(const ContourGrid& grid, const ContourSpeed& speed,
+                                          double begin) {
+    std::vector<SpeedPlace> places{{begin, speed.square(0)}};
     places.reserve(3 * grid.size());
-    double begin = 0.0;
     const auto append = [&](double distance, double square) {
       if (distance > places.back().distance) places.push_back({distance, square});
     };
@@ -510,10 +701,13 @@ class SmoothSection {
       worst.include(demand);
       const double slowdown = demand.slowdown();
       if (slowdown < 1.0 + kNoDifference) continue;
+      const double speed = std::max(knots[i - 1].speed, knots[i].speed);
       bool straight = true;
       for (std::size_t k = knots[i - 1].interval; k <= knots[i].interval; ++k) {
         straight = straight && grid[k].straight;
       }
+      // So slowly, a curve makes no difference.
+      if (speed < kSlow * capNear(knots[i].distance)) straight = true;
       const std::size_t last = std::min(knots[i].part + 1, parts.size() - 1);
       double acceleration = 0.0;
       for (std::size_t k = knots[i - 1].part; k < last; ++k) {
@@ -522,8 +716,7 @@ class SmoothSection {
       }
       if (!straight || demand.speed > 1.0) {
         lowered.speeds.push_back({knots[i - 1].distance, knots[i].distance,
-                                  std::max(knots[i - 1].speed, knots[i].speed) /
-                                      ((straight ? demand.speed : slowdown) * kLowerSmoothBy)});
+                                  speed / ((straight ? demand.speed : slowdown) * kLowerSmoothBy)});
       }
       if (acceleration > 0.0) {
         const double by =
@@ -535,10 +728,23 @@ class SmoothSection {
     return worst;
   }
 
+  double capNear(double distance) const {
+    const auto after =
+        std::upper_bound(caps_.begin() + 1, caps_.end(), distance,
+                         [](double x, const CeilingSpan& span) { return x < span.from; });
+    return (after - 1)->value;
+  }
+
   static constexpr double kMargin = 1e-9;  // of an interval, for rounding
+  static constexpr double kSlow = 0.2;     // of the highest constant speed along an interval
+  // Of the speed at the begin: no average that would first come nearer to rest.
+  static constexpr double kLeastSpeed = 0.1;
+  // The places of another grid, and what was lowered for it, make such a difference to a speed.
+  static constexpr double kMostOver = 1.01;
 
   const Contour& contour_;
   const std::vector<ContourLimits>& limits_;
+  const ContourBegin& begin_;
   ContourGrid grid_;
   std::vector<CeilingSpan> caps_;  // of the speed, of each interval
 };
@@ -565,29 +771,61 @@ double SmoothSection::capOf(std::size_t interval, const ContourSpeed& speed) con
   return cap;
 }
 
+// The end of a segment, at rest.
+ContourKnot restAtEnd(const Contour& contour, std::size_t segment) {
+  ContourPoint end;
+  contour.evaluate(segment, 1.0, end);
+  ContourKnot knot;
+  knot.segment = segment;
+  knot.positions = std::move(end.position);
+  knot.velocities.assign(contour.axes(), 0.0);
+  knot.accelerations.assign(contour.axes(), 0.0);
+  knot.parameter = 1.0;
+  knot.may_begin = true;
+  return knot;
+}
+
 }  // namespace
 
-std::vector<ContourKnot> planSmoothContour(const Contour& contour,
-                                           const std::vector<ContourLimits>& limits) {
-  std::vector<ContourKnot> made;
+ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                              const ContourBegin& begin) {
+  ContourPlan made;
   std::int64_t begin_ns = 0;
+  ContourBegin from = begin;
   for (std::size_t first = 0; first < contour.size();) {
     std::size_t last = first;
     while (last + 1 < contour.size() && !contour.stopsAfter(last)) ++last;
+    if (first == last && from.parameter > 1.0 - kNoPart) {  // it begins at a stop
+      if (from.speed > 0.0) made.excess = kUnlimited;
+      made.knots.push_back(restAtEnd(contour, first));
+      from = {};
+      ++first;
+      continue;
+    }
     const Contour part = contour.part(first, last);
-    const SmoothSection::Plan plan = SmoothSection(part, limits).fastest();
+    const SmoothSection::Plan plan = SmoothSection(part, limits, from).fastest();
+    made.excess = std::max(made.excess, plan.excess);
+    if (!plan.possible()) return made;
     const double end = static_cast<double>(begin_ns) * 1e-9 + plan.duration();
     if (!(end < Profile::kLongest)) {
       throw std::range_error("the motion along the path would take longer than 4e9 s");
     }
     const double factor = plan.slowdown;
-    for (std::size_t i = made.empty() ? 0 : 1; i < plan.knots.size(); ++i) {
-      const double time = plan.knots[i].time * factor;
+    made.settled_ns = begin_ns + std::llround(plan.settled * factor * 1e9);
+    for (std::size_t i = made.knots.empty() ? 0 : 1; i < plan.knots.size(); ++i) {
+      const SmoothKnots::Knot& planned = plan.knots[i];
+      const double time = planned.time * factor - from.ago;
       const std::int64_t time_ns = std::llround(time * 1e9);
       const double later = static_cast<double>(time_ns) * 1e-9 - time;
       ContourKnot knot;
       knot.time_ns = begin_ns + time_ns;
       knot.segment = first + plan.segments[i];
+      knot.parameter = planned.parameter;
+      knot.speed = planned.speed / factor;
+      knot.acceleration = planned.acceleration / (factor * factor);
+      knot.may_begin = planned.even;
+      knot.average = plan.time * factor;
+      knot.straight = plan.straight[i];
       for (std::size_t j = 0; j < contour.axes(); ++j) {
         const SmoothKnots::State& state = plan.knots.state(i, j);
         const double velocity = state.velocity / factor;
@@ -596,10 +834,11 @@ std::vector<ContourKnot> planSmoothContour(const Contour& contour,
         knot.velocities.push_back(velocity + later * acceleration);
         knot.accelerations.push_back(acceleration);
       }
-      made.push_back(std::move(knot));
+      made.knots.push_back(std::move(knot));
     }
-    begin_ns = made.back().time_ns;
+    begin_ns = made.knots.back().time_ns;
     first = last + 1;
+    from = {};
   }
   return made;
 }

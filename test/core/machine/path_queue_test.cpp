@@ -413,12 +413,157 @@ TEST_F(PathQueue, IsOnlyForPathsThatSayThatMoreFollows) {
   EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
 }
 
-TEST_F(PathQueue, IsRefusedWithAJerkLimit) {
-  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
-  axes[1].jerk = 20.0;
-  build(axes);
-  EXPECT_REFUSED(begin(test::circle(), 20),
-                 "more_follows must be false for axes with a jerk limit");
+// With a jerk limit: y has the lower one.
+class SmoothPathQueue : public PathQueue {
+ protected:
+  static constexpr double kJerkX = 20.0;  // m/s^3
+  static constexpr double kJerkY = 10.0;
+
+  void SetUp() override { buildSmooth(); }
+
+  void buildSmooth(double backlash = 0.0) {
+    std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+    axes[0].jerk = kJerkX;
+    axes[1].jerk = kJerkY;
+    for (config::AxisConfig& axis : axes) axis.backlash = backlash;
+    build(axes);
+  }
+
+  // The cubics of the motion differ from its quintics by up to 0.01 microsteps, and on an arc these
+  // differ from it.
+  void expectSmooth() {
+    expectLimits();
+    constexpr double kApart = 0.02;  // s
+    const double rounding = 8.0 * 0.03 / (kApart * kApart * kApart);
+    EXPECT_LE(differences("x", kApart).jerk, kJerkX / kMicrostep + rounding);
+    EXPECT_LE(differences("y", kApart).jerk, kJerkY / kMicrostep + rounding);
+  }
+};
+
+TEST_F(SmoothPathQueue, FollowsACircleInPiecesNearlyAsFastAsInOneGo) {
+  const double in_one_go = finish(test::circle()).duration;
+  for (const std::size_t piece : {1U, 5U, 20U}) {
+    SCOPED_TRACE(std::to_string(piece) + " at a time");
+    buildSmooth();
+    const CoordinatedResult result = feedInTime(test::circle(), piece, 0.5);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    EXPECT_LE(result.duration, 1.1 * in_one_go);
+    EXPECT_LE(longestPause(), 0.01) << "it stopped";
+    EXPECT_EQ(bench->pulses("x"), 0);
+    EXPECT_EQ(bench->pulses("y"), 0);
+    expectOnPath(test::circle());
+    expectSmooth();
+  }
+}
+
+TEST_F(SmoothPathQueue, FollowsLinesCurvesAndCornersInPieces) {
+  const double in_one_go = finish(test::mixed()).duration;
+  buildSmooth();
+  const CoordinatedResult result = feedInTime(test::mixed(), 1, 0.25);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_LE(result.duration, 1.1 * in_one_go);
+  EXPECT_NEAR(result.positions[0], -0.010, kMicrostep / 2.0);
+  EXPECT_NEAR(result.positions[1], 0.010, kMicrostep / 2.0);
+  expectAtRest();
+  expectSmooth();
+}
+
+TEST_F(SmoothPathQueue, OfRandomLinesKeepsLimitsAndTolerance) {
+  const double in_one_go = finish(zigzag(60)).duration;
+  for (const double least : {1.0, 0.1, 0.05}) {
+    SCOPED_TRACE(std::to_string(least) + " s ahead");
+    buildSmooth();
+    const CoordinatedResult result = feedInTime(zigzag(60), 2, least);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    if (least == 1.0) {
+      EXPECT_LE(result.duration, 1.01 * in_one_go);
+    }
+    expectOnPath(zigzag(60));
+    expectSmooth();
+  }
+}
+
+TEST_F(SmoothPathQueue, RestsOnThePathWhileItIsStarvedAndContinues) {
+  const PathRequest path = test::circle();
+  begin(path, 30);
+  awaitRest();
+  advance(1.0);
+  EXPECT_FALSE(machine().result(move_)) << "it isn't the end";
+  EXPECT_NEAR(state("x").position, path.segments[29].end[0], kMicrostep);
+  feed(30);
+  EXPECT_TRUE(state("x").moving);
+  awaitRest();
+  EXPECT_FALSE(machine().result(move_));
+  feed(40);
+  const CoordinatedResult result = machine().wait(move_);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectOnPath(path);
+  expectSmooth();
+}
+
+// On a straight line that is continued, the axes don't stop.
+TEST_F(SmoothPathQueue, IsFedBeforeItSlowsDownToItsEnd) {
+  PathRequest path{{"x", "y"}, {lineTo({0.03, 0.0}), lineTo({0.06, 0.0})}, false, 0.0, kTolerance};
+  begin(path, 1);
+  // 30 mm at 100 mm/s: the axes slow down from 0.3 to 0.45 s.
+  advance(0.25);
+  feed(1);
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  EXPECT_LE(longestPause(), 0.02);
+  expectOnPath(path);
+  expectSmooth();
+  // 60 mm at 100 mm/s, 0.1 s of acceleration and 0.05 s until that is reached.
+  EXPECT_NEAR(machine().result(move_)->duration, 0.75, 0.001);
+}
+
+TEST_F(SmoothPathQueue, IsHeldFedResumedAndSlowedDown) {
+  const PathRequest path = test::circle();
+  begin(path, 40);
+  advance(0.3);
+  machine().hold();
+  feed(20);  // while it decelerates
+  awaitRest();
+  advance(0.1);
+  feed(10);  // at rest
+  EXPECT_FALSE(state("x").moving) << "fed during a hold";
+  machine().resume();
+  advance(0.01);
+  machine().setSpeedOverride(0.5);
+  feed(10);
+  advance(0.2);
+  machine().setSpeedOverride(1.0);
+  feed(20);
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 0);
+  expectOnPath(path);
+  expectLimits();
+}
+
+TEST_F(SmoothPathQueue, StopsAsOtherPathsDo) {
+  begin(test::circle(), 20);
+  advance(0.15);
+  feed(20);
+  machine().stop();
+  EXPECT_EQ(machine().wait(move_).end, MoveEnd::kStopped);
+  EXPECT_REFUSED(feed(20), "doesn't continue");
+  awaitRest();
+  const auto x = bench->pulses("x");
+  advance(0.2);
+  EXPECT_EQ(bench->pulses("x"), x) << "it moved after its end";
+  expectOnPath(test::circle());
+  expectLimits();
+}
+
+TEST_F(SmoothPathQueue, TakesUpTheBacklashOnTheWay) {
+  buildSmooth(0.0001);
+  const double in_one_go = finish(test::circle()).duration;
+  buildSmooth(0.0001);
+  const CoordinatedResult result = feedInTime(test::circle(), 5, 0.5);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(bench->pulses("x"), 8);
+  EXPECT_LE(result.duration, 1.1 * in_one_go);
+  expectSmooth();
 }
 
 TEST_F(PathQueue, TellsWhatLiesAhead) {

@@ -15,6 +15,7 @@
 #include "axis/prepared_trajectory.h"
 #include "machine/path_plan.h"
 #include "motion/profile_peaks.h"
+#include "motion/spline.h"
 #include "stepdriver_core/error.h"
 #include "support/random_contour.h"
 
@@ -38,7 +39,7 @@ std::vector<PathAxis> axesOf(const std::vector<motion::ContourLimits>& limits,
     axis.name = std::string("x") + std::to_string(axes.size());
     axis.backlash = backlash;
     axis.limits = {std::min(10.0, limit.speed), limit.speed, limit.acceleration, limit.deceleration,
-                   0.0};
+                   std::isfinite(limit.jerk) ? limit.jerk : 0.0};
     axis.stop_limits = axis.limits;
   }
   return axes;
@@ -87,26 +88,59 @@ Profile motionOf(const QueuedPath& path, std::size_t axis, double from) {
 
 double endOf(const QueuedPath& path) { return path.aheadOf(0.0).time; }
 
-void expectWithin(const Profile& profile, const PathAxis& axis) {
+// Differences of the velocity around a time [s], which cover several of the cubics of a quintic.
+void expectJerkWithin(const Profile& profile, const PathAxis& axis, double around) {
+  const double apart = 0.3 * axis.mostAcceleration() / axis.limits.jerk;
+  const double most = axis.backlash > 0 ? 1.05 : 1.01;
+  const auto velocity = [&](double time) {
+    return profile.stateAt(std::llround(time * 1e9)).velocity;
+  };
+  const double last = std::min(around + 20.0 * apart, profile.duration().value() - 2.0 * apart);
+  for (double t = std::max(0.0, around - 20.0 * apart); t < last; t += apart / 2.0) {
+    const double jerk =
+        (velocity(t + 2.0 * apart) - 2.0 * velocity(t + apart) + velocity(t)) / (apart * apart);
+    ASSERT_LE(std::abs(jerk), most * axis.limits.jerk) << "at " << t << " s";
+    const double acceleration = (velocity(t + apart) - velocity(t)) / apart;
+    ASSERT_LE(std::abs(acceleration), most * axis.mostAcceleration()) << "at " << t << " s";
+  }
+}
+
+void expectWithin(const Profile& profile, const PathAxis& axis, double seam) {
   for (const motion::Piece& piece : profile.pieces()) {
-    for (const double t : {0.0, piece.duration.value()}) {
+    const double h = piece.duration.value();
+    // What the acceleration of a cubic may differ from that of its quintic by.
+    const double more = axis.limits.jerk > 0.0 ? 32.0 * motion::kQuinticError / (h * h) : 0.0;
+    for (const double t : {0.0, h}) {
       ASSERT_LE(std::abs(piece.velocityAt(t).value()), axis.limits.max_speed * (1.0 + 1e-6));
-      ASSERT_LE(std::abs(piece.accelerationAt(t).value()), axis.mostAcceleration() * (1.0 + 1e-3));
+      ASSERT_LE(std::abs(piece.accelerationAt(t).value()),
+                axis.mostAcceleration() * (1.0 + 1e-3) + more);
     }
   }
+  if (axis.limits.jerk > 0.0) expectJerkWithin(profile, axis, seam);
   const double jump = motion::profilePeaks(profile, profile.piece(0).v0).velocity_jump.value;
   ASSERT_LE(std::abs(jump), 1e-3 * axis.limits.max_speed);
 }
 
-class RandomQueue : public testing::TestWithParam<std::int64_t> {};
+struct Axes {
+  std::int64_t backlash;  // microsteps
+  bool jerk;              // limited
+};
+
+class RandomQueue : public testing::TestWithParam<Axes> {};
 
 TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
   std::mt19937 random(2027);
   int paths = 0;
   double ratios = 0.0;
   for (int i = 0; i < 300; ++i) {
-    const test::RandomContour given = test::randomContour(random);
-    const std::vector<PathAxis> axes = axesOf(given.limits, GetParam());
+    test::RandomContour given = test::randomContour(random);
+    for (motion::ContourLimits& limits : given.limits) {
+      if (!GetParam().jerk) break;
+      // Accelerations that take 1 to 100 ms to build up.
+      const double rate = std::pow(10.0, std::uniform_real_distribution<double>(1.0, 3.0)(random));
+      limits.jerk = limits.acceleration * rate;
+    }
+    const std::vector<PathAxis> axes = axesOf(given.limits, GetParam().backlash);
     const PathRequest whole = requestOf(given, axes);
     std::shared_ptr<const QueuedPath> path;
     std::shared_ptr<const QueuedPath> in_one_go;
@@ -138,20 +172,22 @@ TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
       for (std::size_t k = 0; k < axes.size(); ++k) {
         const Profile before = motionOf(*path, k, now);
         const Profile after = motionOf(*longer.path, k, now);
+        SCOPED_TRACE("axis " + std::to_string(k) + " from " + std::to_string(now) + " same until " +
+                     std::to_string(longer.same_until));
         const auto same_ns = std::llround((longer.same_until - now) * 1e9);
         for (const double part : {0.0, 0.3, 0.7, 1.0}) {
           const auto at = static_cast<std::int64_t>(part * static_cast<double>(same_ns));
           ASSERT_NEAR(before.stateAt(at).position.value(), after.stateAt(at).position.value(),
                       1e-5);
         }
-        expectWithin(after, axes[k]);
+        expectWithin(after, axes[k], longer.same_until - now);
         if (testing::Test::HasFatalFailure()) return;
       }
       path = longer.path;
     }
     const std::vector<double> targets = path->targets();
     for (std::size_t k = 0; k < axes.size(); ++k) {
-      const double slack = static_cast<double>(GetParam());
+      const double slack = static_cast<double>(GetParam().backlash);
       const double end = motionOf(*path, k, now).endPosition().value();
       ASSERT_GE(end, targets[k] - 0.5 - 1e-9);
       ASSERT_LE(end, targets[k] + 0.5 + slack + 1e-9);
@@ -162,11 +198,13 @@ TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
   }
   EXPECT_GT(paths, 30);
   // With a backlash a motion changes only while nothing of it is being taken up.
-  EXPECT_LE(ratios / paths, GetParam() > 0 ? 1.03 : 1.003);
+  EXPECT_LE(ratios / paths, GetParam().backlash > 0 ? 1.03 : 1.003);
   RecordProperty("ratio", std::to_string(ratios / paths));
 }
 
-INSTANTIATE_TEST_SUITE_P(Backlash, RandomQueue, testing::Values(0, 7));
+INSTANTIATE_TEST_SUITE_P(Axes, RandomQueue,
+                         testing::Values(Axes{0, false}, Axes{7, false}, Axes{0, true},
+                                         Axes{7, true}));
 
 TEST(QueuedPath, NeedsMemoryForWhatLiesAheadOnly) {
   const std::vector<PathAxis> axes = axesOf({{8000.0, 80'000.0, 80'000.0}, {8000.0, 8e4, 8e4}}, 3);

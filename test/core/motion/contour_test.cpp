@@ -150,52 +150,102 @@ std::vector<ContourSegment> gentleLines(std::mt19937& random) {
   return lines;
 }
 
+// Of gentle lines: the deviation, continuity, and a derivative that isn't small.
+void expectGentle(const Contour& contour, const std::vector<ContourSegment>& lines, int* overlaps) {
+  ContourPoint point;
+  ContourPoint given;
+  contour.evaluate(0, 0.0, point);
+  ASSERT_LT(distance(point.position, contour.start()), 1e-12);
+  for (std::size_t segment = 0; segment < contour.size(); ++segment) {
+    const double first = contour.roundedUntil(segment);
+    const double last = contour.roundedFrom(segment);
+    ASSERT_LE(first, last);
+    *overlaps += first == last ? 1 : 0;
+    const double before = segment == 0 ? 0.0 : lines[segment - 1].tolerance;
+    // A corner without a turn has no rounding of its own: its neighbours' count.
+    double most = std::max(before, lines[segment].tolerance);
+    if (segment > 1) most = std::max(most, lines[segment - 2].tolerance);
+    if (segment + 1 < contour.size()) most = std::max(most, lines[segment + 1].tolerance);
+    for (int k = 0; k <= 100; ++k) {
+      const double u = k / 100.0;
+      contour.evaluate(segment, u, point);
+      contour.evaluateGiven(segment, u, given);
+      ASSERT_LE(distance(point.position, given.position), most * (1.0 + 1e-9) + 1e-9)
+          << "segment " << segment << " at " << u;
+      const std::vector<double> zero(3);
+      ASSERT_GT(distance(point.first, zero), 0.49 * distance(given.first, zero));
+      if (u > first + 1e-9 && u < last - 1e-9) {
+        ASSERT_LT(distance(point.position, given.position), 1e-12);
+      }
+    }
+    if (segment + 1 == contour.size()) continue;
+    const Shape in = shapeOf(point);
+    contour.evaluate(segment + 1, 0.0, given);
+    ASSERT_LT(distance(point.position, given.position), 1e-9);
+    if (contour.stopsAfter(segment)) {
+      ASSERT_LT(distance(point.position, lines[segment].end), 1e-9);
+      continue;
+    }
+    const Shape out = shapeOf(given);
+    ASSERT_LT(distance(in.direction, out.direction), 1.1e-6);
+    ASSERT_LT(distance(in.curvature, out.curvature), 1e-6) << "segment " << segment;
+  }
+}
+
 TEST(Contour, OverlapsTheRoundingsOfShortLines) {
   std::mt19937 random(11);
   int overlaps = 0;
   for (int i = 0; i < 100; ++i) {
+    SCOPED_TRACE("path " + std::to_string(i));
     const std::vector<ContourSegment> lines = gentleLines(random);
     const Contour contour({0.0, 0.0, 0.0}, lines, 1.0, Continuity::kCurvature);
-    ContourPoint point;
-    ContourPoint given;
-    contour.evaluate(0, 0.0, point);
-    ASSERT_LT(distance(point.position, contour.start()), 1e-12);
-    for (std::size_t segment = 0; segment < contour.size(); ++segment) {
-      const double first = contour.roundedUntil(segment);
-      const double last = contour.roundedFrom(segment);
-      ASSERT_LE(first, last);
-      overlaps += first == last ? 1 : 0;
-      const double before = segment == 0 ? 0.0 : lines[segment - 1].tolerance;
-      // A corner without a turn has no rounding of its own: its neighbours' count.
-      double most = std::max(before, lines[segment].tolerance);
-      if (segment > 1) most = std::max(most, lines[segment - 2].tolerance);
-      if (segment + 1 < contour.size()) most = std::max(most, lines[segment + 1].tolerance);
-      for (int k = 0; k <= 100; ++k) {
-        const double u = k / 100.0;
-        contour.evaluate(segment, u, point);
-        contour.evaluateGiven(segment, u, given);
-        ASSERT_LE(distance(point.position, given.position), most * (1.0 + 1e-9) + 1e-9)
-            << "path " << i << " segment " << segment << " at " << u;
-        const std::vector<double> zero(3);
-        ASSERT_GT(distance(point.first, zero), 0.49 * distance(given.first, zero));
-        if (u > first + 1e-9 && u < last - 1e-9) {
-          ASSERT_LT(distance(point.position, given.position), 1e-12);
-        }
-      }
-      if (segment + 1 == contour.size()) continue;
-      const Shape in = shapeOf(point);
-      contour.evaluate(segment + 1, 0.0, given);
-      ASSERT_LT(distance(point.position, given.position), 1e-9);
-      if (contour.stopsAfter(segment)) {
-        ASSERT_LT(distance(point.position, lines[segment].end), 1e-9);
-        continue;
-      }
-      const Shape out = shapeOf(given);
-      ASSERT_LT(distance(in.direction, out.direction), 1.1e-6);
-      ASSERT_LT(distance(in.curvature, out.curvature), 1e-6) << "path " << i << ' ' << segment;
-    }
+    ASSERT_NO_FATAL_FAILURE(expectGentle(contour, lines, &overlaps));
   }
   EXPECT_GT(overlaps, 2000);
+}
+
+// A contour that continues: what was rounded up to a place on it stays as it is, and the other
+// corners are rounded again, together with those of the added lines.
+TEST(Contour, KeepsTheRoundingsThatHaveBegun) {
+  std::mt19937 random(12);
+  int overlaps = 0;
+  int widened = 0;
+  for (int i = 0; i < 100; ++i) {
+    SCOPED_TRACE("path " + std::to_string(i));
+    std::vector<ContourSegment> lines = gentleLines(random);
+    const std::size_t count =
+        std::uniform_int_distribution<std::size_t>(2, lines.size() - 1)(random);
+    const std::vector<double> start(3);
+    const Contour shorter(start,
+                          {lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(count)}, 1.0,
+                          Continuity::kCurvature, true);
+    const std::size_t at = std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
+    const double parameter = std::uniform_real_distribution<double>(0.0, 1.0)(random);
+    double away = 0.0;
+    for (std::size_t k = 0; k + 1 < count; ++k) {
+      const double length = distance(k == 0 ? start : lines[k - 1].end, lines[k].end);
+      if (k >= at) away += k == at ? (1.0 - parameter) * length : length;
+      if (k < at || shorter.blendAfter(k) > away) lines[k].blend = shorter.blendAfter(k);
+    }
+    lines[at].kept = parameter;
+    const Contour longer(start, lines, 1.0, Continuity::kCurvature);
+    ContourPoint before;
+    ContourPoint after;
+    for (std::size_t segment = 0; segment <= at; ++segment) {
+      for (int k = 0; k <= 20; ++k) {
+        const double u = k / 20.0 * (segment == at ? parameter : 1.0);
+        shorter.evaluate(segment, u, before);
+        longer.evaluate(segment, u, after);
+        ASSERT_LT(distance(before.position, after.position), 1e-9) << segment << " at " << u;
+        ASSERT_LT(distance(before.first, after.first), 1e-9) << segment << " at " << u;
+      }
+    }
+    widened +=
+        longer.blendAfter(count - 1) > distance(lines[count - 2].end, lines[count - 1].end) / 2.0;
+    ASSERT_NO_FATAL_FAILURE(expectGentle(longer, lines, &overlaps));
+  }
+  EXPECT_GT(overlaps, 1000);
+  EXPECT_GT(widened, 20);
 }
 
 TEST(Contour, FindsTheCircleOfAnArc) {

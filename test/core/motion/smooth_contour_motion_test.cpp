@@ -132,7 +132,7 @@ class NearContour {
 TEST(SmoothContourMotion, OfALineHasTheSevenPhasesOfTheFastest) {
   const auto duration = [](double length, const ContourLimits& limits) {
     const Contour contour({0.0}, {straightTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
-    return secondsOf(motion::planSmoothContour(contour, {limits}));
+    return secondsOf(motion::planSmoothContour(contour, {limits}).knots);
   };
   // 1000/1000 + 1000/5000 + 5000/50000
   EXPECT_NEAR(duration(1000.0, {1000.0, 5000.0, 5000.0, 50'000.0}), 1.3, 1e-6);
@@ -153,7 +153,7 @@ TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
   }
   const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
   const Contour contour({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
-  const double smooth = secondsOf(motion::planSmoothContour(contour, limits));
+  const double smooth = secondsOf(motion::planSmoothContour(contour, limits).knots);
   const double fastest = secondsOf(motion::planContour(contour, limits).knots);
   RecordProperty("smooth", std::to_string(smooth));
   RecordProperty("fastest", std::to_string(fastest));
@@ -180,7 +180,7 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
       path.limits[axis].jerk = path.limits[axis].acceleration * std::pow(10.0, number(1.0, 3.0));
     }
     const Contour contour = path.contour(Continuity::kCurvature);
-    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits);
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits).knots;
     ASSERT_EQ(knots.front().time_ns, 0);
     for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
       ASSERT_NEAR(knots.back().positions[axis], path.segments.back().end[axis], 1e-9);
@@ -259,7 +259,7 @@ TEST(SmoothContourMotion, KeepsTheJerkAtExtremes) {
       limits.jerk = limits.acceleration * std::pow(10.0, number(-1.0, 5.0));
     }
     const Contour contour = path.contour(Continuity::kCurvature);
-    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits);
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits).knots;
     for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
       for (std::size_t k = 1; k < knots.size(); ++k) {
         for (const double u : {0.0, 0.5, 1.0}) {
