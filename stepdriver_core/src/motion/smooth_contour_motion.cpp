@@ -619,8 +619,8 @@ class SmoothSection {
     return true;
   }
 
-  // [unit] The place after which the averaged motion depends on what follows the contour, apart from
-  // peaks.
+  // [unit] The place after which the averaged motion depends on what follows the contour, apart
+  // from peaks.
   double settledIn(const ContourGrid& grid, double begin, double time, ContourSpeed& speed) const {
     const Contour::Place open = contour_.openFrom();
     double lowest = kUnlimited;  // that will be higher

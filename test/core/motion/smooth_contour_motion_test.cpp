@@ -11,7 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "motion/contour_grid.h"
 #include "support/random_contour.h"
+#include "support/smooth_optimum.h"
 
 // The motion along a path with jerk limits: within all limits, on the path, and how much longer it
 // takes than without them. A unit is a microstep.
@@ -228,6 +230,151 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
   RecordProperty("worst_ratio", std::to_string(worst_ratio));
   RecordProperty("worst_jerk", std::to_string(worst_jerk));
   RecordProperty("worst_distance", std::to_string(worst_distance));
+}
+
+// The distance and the speed along a section at a time, from its knots.
+class AlongSection {
+ public:
+  AlongSection(const motion::ContourGrid& grid, const std::vector<ContourKnot>& knots)
+      : knots_(knots) {
+    double begin = 0.0;
+    std::size_t interval = 0;
+    for (const ContourKnot& knot : knots) {
+      const auto ends_before = [&](const motion::ContourGrid::Interval& of) {
+        return of.segment < knot.segment || (of.segment == knot.segment && of.to < knot.parameter);
+      };
+      while (interval + 1 < grid.size() && ends_before(grid[interval])) {
+        begin += grid[interval++].length;
+      }
+      const motion::ContourGrid::Interval& in = grid[interval];
+      const double part = std::clamp((knot.parameter - in.from) / (in.to - in.from), 0.0, 1.0);
+      distances_.push_back(begin + part * in.length);
+    }
+  }
+
+  struct State {
+    double distance;
+    double speed;
+  };
+  State at(double time) const {
+    std::size_t k = 1;
+    while (k + 1 < knots_.size() && static_cast<double>(knots_[k].time_ns) * 1e-9 < time) ++k;
+    const double begin = static_cast<double>(knots_[k - 1].time_ns) * 1e-9;
+    const double h = static_cast<double>(knots_[k].time_ns) * 1e-9 - begin;
+    const double u = std::clamp((time - begin) / h, 0.0, 1.0);
+    const double v0 = h * knots_[k - 1].speed;
+    const double v1 = h * knots_[k].speed;
+    const double way = distances_[k] - distances_[k - 1];
+    const double c2 = 3.0 * way - 2.0 * v0 - v1;
+    const double c3 = v0 + v1 - 2.0 * way;
+    return {distances_[k - 1] + u * (v0 + u * (c2 + u * c3)),
+            (v0 + u * (2.0 * c2 + u * 3.0 * c3)) / h};
+  }
+
+ private:
+  const std::vector<ContourKnot>& knots_;
+  std::vector<double> distances_;
+};
+
+// [s] The optimum between two stops, at places that the planned motion passes at even times.
+double optimumOf(const Contour& section, const std::vector<ContourLimits>& limits,
+                 const std::vector<ContourKnot>& knots, int parts) {
+  const motion::ContourGrid grid(section);
+  std::vector<double> begins{0.0};
+  for (std::size_t i = 0; i < grid.size(); ++i) begins.push_back(begins.back() + grid[i].length);
+  const AlongSection along(grid, knots);
+  std::vector<test::SmoothOptimum::Place> places;
+  std::vector<double> squares;
+  ContourPoint point;
+  ContourPoint before;
+  ContourPoint after;
+  std::size_t interval = 0;
+  for (int i = 0; i <= parts; ++i) {
+    const AlongSection::State state = along.at(secondsOf(knots) * i / parts);
+    const double distance = i == parts ? begins.back() : state.distance;
+    if (i > 0 && i < parts && distance < places.back().distance + 1e-9 * begins.back()) continue;
+    while (interval + 1 < grid.size() && begins[interval + 1] <= distance) ++interval;
+    const double in = std::clamp(distance - begins[interval], 0.0, grid[interval].length);
+    grid.evaluateAt(interval, in, point);
+    test::SmoothOptimum::Place place{distance, std::numeric_limits<double>::infinity(), point.first,
+                                     point.second, std::vector<double>(limits.size())};
+    if (!grid[interval].straight) {
+      const double near = std::max(0.0, in - 1e-3 * grid[interval].length);
+      const double far = std::min(grid[interval].length, in + 1e-3 * grid[interval].length);
+      grid.evaluateAt(interval, near, before);
+      grid.evaluateAt(interval, far, after);
+      for (std::size_t j = 0; j < limits.size(); ++j) {
+        place.third[j] = (after.second[j] - before.second[j]) / (far - near);
+      }
+    }
+    const std::vector<bool>& measured = section.measured(grid[interval].segment);
+    double sum = 0.0;
+    for (std::size_t j = 0; j < limits.size(); ++j) {
+      const double square = point.first[j] * point.first[j];
+      if (measured.empty() || measured[j]) sum += square;
+      if (square > 0.0)
+        place.most = std::min(place.most, limits[j].speed * limits[j].speed / square);
+    }
+    const double speed = section.speed(grid[interval].segment);
+    if (sum > 0.0) place.most = std::min(place.most, speed * speed / sum);
+    places.push_back(std::move(place));
+    squares.push_back(std::max(1e-12, state.speed * state.speed));
+  }
+  return test::SmoothOptimum(std::move(places), limits, std::move(squares)).duration();
+}
+
+TEST(SmoothContourMotion, HasAKnownOptimumOnALine) {
+  const auto durations = [](double length, const ContourLimits& limit) {
+    const Contour contour({0.0}, {straightTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    const std::vector<ContourLimits> limits{limit};
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
+    return std::pair(secondsOf(knots), optimumOf(contour, limits, knots, 400));
+  };
+  for (const double jerk : {20'000.0, 50'000.0, 1e6}) {
+    const auto [planned, found] = durations(1000.0, {1000.0, 5000.0, 5000.0, jerk});
+    EXPECT_NEAR(found, 1.0 + 0.2 + 5000.0 / jerk, 0.01 * planned);
+    EXPECT_NEAR(found, planned, 0.01 * planned);
+  }
+}
+
+// How much longer the planned motion takes than an optimum with the same limits.
+TEST(SmoothContourMotion, IsNearTheOptimumOnRandomPaths) {
+  std::mt19937 random(2027);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  constexpr int kPaths = 100;
+  double ratios = 0.0;
+  double worst = 0.0;
+  double jerk_ratios = 0.0;
+  for (int i = 0; i < kPaths; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    for (ContourLimits& limits : path.limits) {
+      limits.jerk = limits.acceleration * std::pow(10.0, number(1.0, 3.0));
+    }
+    const Contour contour = path.contour(Continuity::kCurvature);
+    double planned = 0.0;
+    double optimum = 0.0;
+    for (std::size_t first = 0; first < contour.size();) {
+      std::size_t last = first;
+      while (!contour.stopsAfter(last) && last + 1 < contour.size()) ++last;
+      const Contour section = contour.part(first, last);
+      const std::vector<ContourKnot> knots = motion::planSmoothContour(section, path.limits).knots;
+      planned += secondsOf(knots);
+      optimum += optimumOf(section, path.limits, knots, 600);
+      first = last + 1;
+    }
+    const double ratio = planned / optimum;
+    EXPECT_GE(ratio, 0.98) << "path " << i;
+    ratios += ratio;
+    worst = std::max(worst, ratio);
+    jerk_ratios += optimum / secondsOf(motion::planContour(contour, path.limits).knots);
+  }
+  EXPECT_LE(ratios / kPaths, 1.13);
+  EXPECT_LE(worst, 2.0);
+  RecordProperty("mean_ratio", std::to_string(ratios / kPaths));
+  RecordProperty("worst_ratio", std::to_string(worst));
+  RecordProperty("optimum_with_jerk_to_without", std::to_string(jerk_ratios / kPaths));
 }
 
 // Far from 0, with a tiny and a very long line at the end, and accelerations that take 10 us to 10
