@@ -7,6 +7,17 @@ export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH"
 export LC_ALL=C.UTF-8 PYTHONNOUSERSITE=1 PYTHONDONTWRITEBYTECODE=1
 unset PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV PYENV_VERSION
 unset LD_LIBRARY_PATH PKG_CONFIG_PATH CMAKE_PREFIX_PATH CMAKE_GENERATOR DESTDIR CDPATH "${!ROS_@}"
+# STEPDRIVER_UNDERLAY names a folder with ROS packages that the system's own lack, such as /opt/ros/noetic.
+if [[ -n ${STEPDRIVER_UNDERLAY:-} ]]; then
+  [[ -f $STEPDRIVER_UNDERLAY/setup.bash ]] || {
+    printf '%s\n' "STEPDRIVER_UNDERLAY=$STEPDRIVER_UNDERLAY: there is no setup.bash in it" >&2
+    exit 1
+  }
+  set +u
+  # shellcheck disable=SC1091
+  source "$STEPDRIVER_UNDERLAY/setup.bash"
+  set -u
+fi
 # Nothing here reads messages in Lisp or JavaScript.
 export ROS_LANG_DISABLE=geneus:genlisp:gennodejs
 
@@ -138,6 +149,23 @@ list_packages() {
     NF && wanted { print $1 }' "$root/scripts/packages.txt"
 }
 
+# Removes from `missing` the optional packages that apt doesn't know. Without package lists apt knows none,
+# so all of them stay.
+leave_out_unknown() {
+  local package kept=() unknown=()
+  compgen -G '/var/lib/apt/lists/*_Packages*' >/dev/null || return 0
+  for package in "${missing[@]}"; do
+    if grep -qE "^$package +# optional" "$root/scripts/packages.txt" &&
+      ! apt-cache show "$package" >/dev/null 2>&1; then
+      unknown+=("$package")
+    else
+      kept+=("$package")
+    fi
+  done
+  ((${#unknown[@]} == 0)) || say "Without what this system doesn't have: ${unknown[*]}"
+  missing=("${kept[@]}")
+}
+
 # Installs the missing packages of the named groups. Asks apt, and for root, only if some are missing.
 install_packages() {
   local wanted present missing as_root=()
@@ -148,6 +176,8 @@ install_packages() {
     sed -n 's/^installed //p') || true
   mapfile -t missing <<<"$(printf '%s\n' "${wanted[@]}" | grep -vxF -e "$present")"
   [[ -n ${missing[0]} ]] || return 0
+  leave_out_unknown
+  ((${#missing[@]} > 0)) || return 0
 
   if (($(id -u) != 0)); then
     command -v sudo >/dev/null ||
@@ -162,6 +192,8 @@ install_packages() {
     apt-get -q -y -o DPkg::Lock::Timeout=600 -o Acquire::Retries=3)
   quietly apt-update "${apt[@]}" update ||
     say "apt-get update failed; trying with the package lists as they are"
+  leave_out_unknown
+  ((${#missing[@]} > 0)) || return 0
   quietly apt-install "${apt[@]}" install --no-install-recommends "${missing[@]}" ||
     die "apt-get couldn't install the packages (its output is above)"
 }

@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test.sh [--lint] [--core] [--kernel] [--ros] [--sanitize] [--bad-days]
+usage: scripts/test.sh [--lint] [--core] [--kernel] [--node] [--ros] [--sanitize] [--bad-days]
                        [--soak] [--fuzz] [--arm64]
 
 Installs missing packages, builds, and runs the named parts; by default all but --soak.
@@ -19,10 +19,10 @@ Installs missing packages, builds, and runs the named parts; by default all but 
           with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
           (test/kernel), with each libgpiod of this Debian; includes --core
-  --ros   the catkin package, its rostests, its install space with all commands and the service, which
-          other computers can reach the node, a package that depends on it, and the trace of a move, read
-          by sigrok-cli; the commands of the pages; with --kernel also the whole node on that kernel's
-          GPIO chips
+  --node  the catkin package and its rostests
+  --ros   the same, its install space with all commands and the service, which other computers can reach
+          the node, a package that depends on it, and the trace of a move, read by sigrok-cli; the commands
+          of the pages; with --kernel also the whole node on that kernel's GPIO chips
   --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
           ThreadSanitizer; a node with each of them in a storm of requests
   --bad-days  floods of clients against a node (test/bad_days), for two seconds each
@@ -40,7 +40,7 @@ parts=() flood_seconds=2
 for argument; do
   case $argument in
     --soak) parts+=(bad-days) flood_seconds=60 ;;
-    --lint | --core | --kernel | --ros | --sanitize | --bad-days | --fuzz | --arm64) parts+=("${argument#--}") ;;
+    --lint | --core | --kernel | --node | --ros | --sanitize | --bad-days | --fuzz | --arm64) parts+=("${argument#--}") ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
@@ -48,6 +48,7 @@ done
 ((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize bad-days fuzz arm64)
 wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 ! wants kernel || wants core || parts+=(core)
+! wants ros || wants node || parts+=(node)
 
 # ---- stages ----
 
@@ -479,8 +480,9 @@ check_board() { cross --board arm64; }
 choose_build_folder
 rm -rf "$build/ros"
 rm -f "$build"/log/*.times
-install_packages core ccache "${parts[@]}" "$(wants ros && echo plots ros-tests trace)" \
-  "$(wants core && echo pictures bench)" "$(wants lint && echo ros plots ros-tests bench)" \
+install_packages core ccache "${parts[@]}" "$(wants node && echo ros plots ros-tests)" \
+  "$(wants ros && echo trace)" "$(wants core && echo pictures bench)" \
+  "$(wants lint && echo ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
   "$(wants fuzz && echo ros)"
 # If they can't be installed, its stages say so.
@@ -524,9 +526,11 @@ if wants kernel; then
   stage kernel test_kernel core-build
   stage kernel-gpiod2 test_kernel_gpiod2 kernel
 fi
-if wants ros; then
+if wants node; then
   stage node-build build_node
   stage node-tests test_node node-build
+fi
+if wants ros; then
   ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
   ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
   stage install check_install node-build

@@ -3,6 +3,8 @@
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
+# shellcheck source=scripts/roots.sh
+source "$root/scripts/roots.sh"
 
 usage() {
   cat <<'END'
@@ -11,8 +13,9 @@ usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--keep]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
 copies the checkout into it, and runs scripts/demo.sh, scripts/test.sh and the demo again there as root,
-without a terminal. On Ubuntu, whose own packages have no diagnostic_updater, it only runs
-scripts/test.sh --core, without the benchmarks: its Google Benchmark is too old. Prints their exit
+without a terminal. On Ubuntu it first makes an underlay that stands for ROS Noetic, in /opt/ros/noetic:
+diagnostic_updater, rospy and roslaunch, from the sources of Ubuntu 22.04's packages. Then it only runs
+scripts/test.sh --core --node, without the benchmarks: its Google Benchmark is too old. Prints the exit
 codes, and exits with 0 if all of them are 0. Needs root.
 
 The base root is kept in ~/.cache/stepdriver/roots (or in the folder that STEPDRIVER_ROOTS names) for
@@ -47,52 +50,19 @@ while (($# > 0)); do
   shift
 done
 [[ -n $suite ]] || { usage >&2 && exit 2; }
-[[ -z $only || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core can be tried"
+[[ -z $only || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core --node can be tried"
 (($(id -u) == 0)) || die "needs root, for debootstrap and chroot: sudo $0 $suite"
-command -v debootstrap >/dev/null || die "needs debootstrap: apt-get install debootstrap"
 
 # ---- the base ----
 
-# The mirror from which this machine's apt gets the suites, or the default address.
-mirror_of() {
-  local label=$1 default=$2 found
-  # shellcheck disable=SC2016
-  found=$(apt-get indextargets --format '$(LABEL) $(REPO_URI)' 2>/dev/null |
-    sed -n "s/^$label //p" | head -n 1) || true
-  printf '%s' "${found:-$default}"
-}
-
-# How this machine's apt reaches the mirrors: proxies, certificates, checks.
-apt_transport() {
-  apt-config dump | grep -E '^Acquire::(http|https|Check-|Retries|ForceIPv)' || true
-}
-
-roots=${STEPDRIVER_ROOTS:-${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/stepdriver/roots}
-mkdir -p "$roots"
-roots=$(cd "$roots" && pwd -P)
-base=$roots/$suite
 commands=(demo.sh test.sh demo.sh)
+underlay=
 [[ -z $only ]] || commands=("$only")
 if [[ $suite == focal ]]; then
-  components=main,universe
-  mirror=$(mirror_of Ubuntu http://archive.ubuntu.com/ubuntu)
-  security_suite="$mirror $suite-security"
-  commands=('test.sh --core')
-else
-  components=main
-  mirror=$(mirror_of Debian http://deb.debian.org/debian)
-  security_suite="$(mirror_of Debian-Security http://deb.debian.org/debian-security) $suite-security"
+  commands=('test.sh --core --node')
+  underlay=/opt/ros/noetic
 fi
-
-if [[ ! -d $base ]]; then
-  say "Making $base from $mirror"
-  rm -rf "$base.new"
-  include=()
-  [[ $mirror != https* ]] || include=(--include=ca-certificates)
-  run debootstrap --variant=minbase --components="$components" "${include[@]}" "$suite" "$base.new" "$mirror" >"$base.log" 2>&1
-  ((run_status == 0)) || die "debootstrap failed; its output: $base.log"
-  mv "$base.new" "$base"
-fi
+make_base_root "$suite"
 
 # ---- the copy ----
 
@@ -107,15 +77,9 @@ remove_work() {
 at_exit remove_work
 say "Copying the checkout into a clean $suite in $work"
 cp -a "$base/." "$work/"
-cp -L /etc/resolv.conf "$work/etc/resolv.conf"
+connect_root "$work"
 # As an installer of Debian writes it.
 printf '127.0.0.1 localhost\n127.0.1.1 %s\n' "$(hostname)" >"$work/etc/hosts"
-apt_transport >"$work/etc/apt/apt.conf.d/90host"
-cat >"$work/etc/apt/sources.list" <<END
-deb $mirror $suite ${components/,/ }
-deb $mirror $suite-updates ${components/,/ }
-deb $security_suite ${components/,/ }
-END
 
 mkdir -p "$work$checkout"
 if git -C "$root" rev-parse --is-inside-work-tree >/dev/null 2>&1; then
@@ -147,8 +111,41 @@ in_root() {
   "${inside[@]}" /usr/bin/env -i HOME=/root LANG=C.UTF-8 \
     PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
     ${http_proxy+http_proxy="$http_proxy"} ${https_proxy+https_proxy="$https_proxy"} \
-    ${no_proxy+no_proxy="$no_proxy"} "$@"
+    ${no_proxy+no_proxy="$no_proxy"} ${underlay:+STEPDRIVER_UNDERLAY="$underlay"} "$@"
 }
+
+# diagnostic_updater, which Ubuntu 20.04 lacks, and what its Python packages of ROS do worse than Noetic's:
+# rospy spoils the second call of a persistent connection, and roslaunch is older. The sources are those of
+# Ubuntu 22.04's packages, whose version is one of Noetic's; the changes for Debian aren't needed.
+make_underlay() {
+  mkdir -p "$work/tmp/underlay/lists/partial"
+  printf 'deb-src %s jammy universe\n' "$mirror" >"$work/tmp/underlay/sources.list"
+  # shellcheck disable=SC2016
+  in_root bash -euxc '
+    cd /tmp/underlay
+    own=(-o Dir::Etc::sourcelist="$PWD/sources.list" -o Dir::Etc::sourceparts=-
+      -o Dir::State::lists="$PWD/lists" -o APT::Sandbox::User=root)
+    export DEBIAN_FRONTEND=noninteractive
+    apt-get -q update
+    apt-get -q -y --no-install-recommends install build-essential catkin cmake libdiagnostic-msgs-dev \
+      librosbag-storage-dev libroscpp-dev libstd-msgs-dev python3-roslaunch python3-rospy \
+      ros-message-generation ros-std-msgs xz-utils
+    apt-get "${own[@]}" -q update
+    apt-get "${own[@]}" -q --download-only --tar-only source ros-diagnostics ros-ros-comm
+    for file in ros-*.orig.tar.xz; do tar -xf "$file"; done
+    for package in diagnostics-*/diagnostic_updater ros_comm-*/tools/{rosgraph,rosmaster,rosparam,roslaunch} \
+      ros_comm-*/clients/rospy; do
+      cmake -S "$package" -B "build/$package" -DCMAKE_BUILD_TYPE=Release -DCATKIN_ENABLE_TESTING=OFF \
+        -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCMAKE_INSTALL_PREFIX="$1"
+      cmake --build "build/$package" --target install
+    done' make_underlay "$underlay"
+  rm -rf "$work/tmp/underlay"
+}
+if [[ -n $underlay ]]; then
+  say "Building packages of ROS into $underlay of that root"
+  run make_underlay >"$roots/$suite-underlay.log" 2>&1
+  ((run_status == 0)) || die "that failed; its output: $roots/$suite-underlay.log"
+fi
 
 exit_codes=''
 worst=0

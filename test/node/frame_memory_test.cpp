@@ -23,6 +23,11 @@ class FrameMemory : public testing::Test {
     node.start();
     before = reserved();
   }
+  void SetUp() override {
+    if (node.process().output().find("Large messages have no common limit") != std::string::npos) {
+      GTEST_SKIP() << "this roscpp calls its functions directly, and the node says so";
+    }
+  }
 
   std::size_t reserved() { return node.process().kilobytes("VmSize"); }
 

@@ -2,7 +2,7 @@ import pathlib
 import tempfile
 import unittest
 
-import support  # noqa: F401: the path to the modules
+import support
 from stepdriver_plots import drawing
 from stepdriver_plots.errors import BadDrawing, Undrawable
 
@@ -31,6 +31,7 @@ class DrawingTest(unittest.TestCase):
                 self.read("points.txt", text)
             self.assertIn(words, str(caught.exception))
 
+    @support.needs_svgelements
     def test_turns_an_svg_upright_and_fits_it_into_the_limits(self):
         strokes, in_place = self.read("a.svg", '<svg><path d="M0 0H10V20"/></svg>')
         self.assertFalse(in_place)
@@ -71,6 +72,7 @@ class DrawingTest(unittest.TestCase):
         self.assertIn("the speed 125 mm/s is above the 100 mm/s that x and y allow from (30, 40) to",
                       str(caught.exception))
 
+    @support.needs_svgelements
     def test_refuses_groups_that_are_nested_without_end(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "deep.svg"

@@ -1,10 +1,16 @@
 """The path to the modules under test, and motions for them."""
 
+import importlib.util
 import pathlib
 import sys
+import unittest
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "stepdriver_ros/scripts"
 sys.path.insert(0, str(SCRIPTS))
+
+# Ubuntu 20.04 lacks it.
+needs_svgelements = unittest.skipUnless(
+    importlib.util.find_spec("svgelements"), "there is no python3-svgelements")
 
 VCD = """\
 $version by hand $end

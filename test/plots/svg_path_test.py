@@ -11,6 +11,7 @@ from stepdriver_plots.svg_path import read_svg
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" %s>%s</svg>'
 
 
+@support.needs_svgelements
 class SvgPathTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()

@@ -1,6 +1,7 @@
 """The style of the pictures, and the graphs of motions and drawings."""
 
 import sys
+import warnings
 
 try:
     import matplotlib
@@ -10,6 +11,9 @@ except ImportError:
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
 from matplotlib.ticker import MaxNLocator, MultipleLocator  # noqa: E402
+
+# Older versions, as in Ubuntu 20.04, measure their texts with another backend, and say so.
+warnings.filterwarnings("ignore", message="tight_layout : falling back to Agg renderer")
 
 # With a fixed hash salt, the same motion gives the same file.
 matplotlib.rcParams.update({

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "common/text.h"
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::base {
@@ -133,7 +134,8 @@ void checkWheels(const BaseConfig& config, ConfigReader& reader) {
     reader.issue("steering/max_angle_deg",
                  fmt::format("is {}, but must be at most {} with a wheel in the middle, which "
                              "doesn't turn if the steering is square to it",
-                             config.steering->max_angle * kDegrees, kMostAngleOfMiddle));
+                             ros_node::roundedText(config.steering->max_angle * kDegrees),
+                             ros_node::roundedText(kMostAngleOfMiddle)));
   }
 }
 

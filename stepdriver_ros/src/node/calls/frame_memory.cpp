@@ -85,6 +85,11 @@ void limitFrameMemory() {
   if (libraryRead() == nullptr) {
     throw std::runtime_error(std::string("the library roscpp has no function ") + kRead);
   }
+  if (!libraryCallsByName(kRead)) {
+    ROS_WARN(
+        "Large messages have no common limit: this roscpp, like Ubuntu's, calls its functions "
+        "directly. A client that claims to send 1 GB can take the memory of this node");
+  }
 }
 
 }  // namespace stepdriver::ros_node

@@ -13,9 +13,10 @@ constexpr std::uint32_t kSmallFrame = 64 << 10;
 /// for each connection, before the bytes have come: a few silent clients then take all of a limited
 /// address space, and the node with it. Programs that refer to this function close the connection
 /// of a client whose large message doesn't fit into kMostFrameMemory. The memory of a message
-/// counts until it has been handled, or until its connection ends.
+/// counts until it has been handled, or until its connection ends. If this roscpp can't be given
+/// that limit because it calls its functions directly, a warning says so.
 ///
-/// @throw std::runtime_error if this roscpp can't be given that limit.
+/// @throw std::runtime_error if this roscpp has no such function.
 void limitFrameMemory();
 
 }  // namespace stepdriver::ros_node
