@@ -23,6 +23,15 @@ Function libraryFunction(const char* symbol) {
   return function;
 }
 
+/// What lies at an address that the loader has found.
+template <typename Content>
+const Content* contentAt(ElfW(Addr) address) {
+  const Content* content = nullptr;
+  static_assert(sizeof(void*) == sizeof(address));
+  std::memcpy(&content, &address, sizeof(address));
+  return content;
+}
+
 /// Whether the library that has this function also calls it by its name, so that a function of the
 /// program takes its place there too. With the linker's option -Bsymbolic-functions, which Ubuntu's
 /// packages are built with, it calls its own one directly.
@@ -43,11 +52,11 @@ inline bool libraryCallsByName(const char* symbol) {
   const ElfW(Sym)* symbols = nullptr;
   const char* names = nullptr;
   for (const ElfW(Dyn)* each = library->l_ld; each->d_tag != DT_NULL; ++each) {
-    if (each->d_tag == DT_JMPREL) entries = reinterpret_cast<const char*>(each->d_un.d_ptr);
+    if (each->d_tag == DT_JMPREL) entries = contentAt<char>(each->d_un.d_ptr);
     if (each->d_tag == DT_PLTRELSZ) bytes = each->d_un.d_val;
     if (each->d_tag == DT_PLTREL) with_addend = each->d_un.d_val == DT_RELA;
-    if (each->d_tag == DT_SYMTAB) symbols = reinterpret_cast<const ElfW(Sym)*>(each->d_un.d_ptr);
-    if (each->d_tag == DT_STRTAB) names = reinterpret_cast<const char*>(each->d_un.d_ptr);
+    if (each->d_tag == DT_SYMTAB) symbols = contentAt<ElfW(Sym)>(each->d_un.d_ptr);
+    if (each->d_tag == DT_STRTAB) names = contentAt<char>(each->d_un.d_ptr);
   }
   if (entries == nullptr || symbols == nullptr || names == nullptr) return false;
   const std::size_t size = with_addend ? sizeof(ElfW(Rela)) : sizeof(ElfW(Rel));
