@@ -17,8 +17,8 @@ namespace stepdriver::test {
 ///
 /// x = s'^2 at the places of the grid is what is looked for. With differences of three neighbours
 /// for x' and x'', each axis has the velocity q' sqrt(x), the acceleration q'' x + q' x'/2 and the
-/// jerk sqrt(x) (q''' x + 3/2 q'' x' + 1/2 q' x''). The sum of the duration and of the logarithms of
-/// the unused parts of all limits, with falling weights, is minimized by Newton's method, whose
+/// jerk sqrt(x) (q''' x + 3/2 q'' x' + 1/2 q' x''). The sum of the duration and of the logarithms
+/// of the unused parts of all limits, with falling weights, is minimized by Newton's method, whose
 /// matrix has five diagonals. The jerk's limits aren't convex: it is an optimum among similar
 /// motions.
 class SmoothOptimum {
