@@ -452,6 +452,8 @@ class SmoothSection {
     return found;
   }
 
+  static double mostOf(const Plan& best) { return best.possible() ? best.duration() : kUnlimited; }
+
   Plan bestOfTimes() const {
     double time = 0.0;
     double jerk = kUnlimited;
@@ -465,13 +467,13 @@ class SmoothSection {
     time = std::max(kShortestAverage, std::min(time, std::cbrt(caps_.back().to / (2.0 * jerk))));
     Plan best = plan(time);
     if (begin_.average > 0.0) {
-      Plan next = plan(begin_.average);
+      Plan next = plan(begin_.average, mostOf(best));
       if (next.isBetterThan(best)) best = std::move(next);
     }
     int worse = 0;
     while (worse < 2 && time * kShorterBy > kShortestAverage) {
       time *= kShorterBy;
-      Plan next = plan(time);
+      Plan next = plan(time, mostOf(best));
       if (next.isBetterThan(best)) {
         best = std::move(next);
         worse = 0;
@@ -484,14 +486,23 @@ class SmoothSection {
 
   double capOf(std::size_t interval, const ContourSpeed& speed) const;
 
-  Plan plan(double time) const {
+  // @param most [s] longer plans aren't needed: each replan makes a plan longer, apart from what it
+  //   is slowed down by as a whole.
+  Plan plan(double time, double most = kUnlimited) const {
     Lowered lowered;
     Plan best = planOnce(time, lowered);
-    bool done = best.slowdown <= 1.0 + kNoExcess && best.possible();
-    for (int i = 1; i < kMostReplans && !done && best.excess < kUnlimited; ++i) {
+    bool done = best.excess == kUnlimited || best.knots.back().time >= most ||
+                (best.slowdown <= 1.0 + kNoExcess && best.possible());
+    for (int i = 1; i < kMostReplans && !done; ++i) {
       Plan next = planOnce(time, lowered);
-      done = next.excess == kUnlimited || (next.slowdown <= 1.0 + kNoExcess && next.possible());
-      if (next.isBetterThan(best)) best = std::move(next);
+      if (next.excess == kUnlimited) break;
+      const double shortest = next.knots.back().time;
+      done = (next.slowdown <= 1.0 + kNoExcess && next.possible()) || shortest >= most;
+      if (next.isBetterThan(best)) {
+        best = std::move(next);
+      } else if (best.possible() && shortest >= best.duration()) {
+        break;
+      }
     }
     return best;
   }
