@@ -123,8 +123,7 @@ try_development() {
     cd stepdriver
     git init -q
     $after
-    cmake --build --preset dev -j $jobs --target stepdriver_check
-    build/catkin-dev/devel/lib/stepdriver/stepdriver_check --config config/a4988.yaml --backend simulated"
+    cmake --build --preset dev -j $jobs --target stepdriver_generate_messages"
 }
 # roslaunch ends by the interrupt after its start, in order.
 try_node() {

@@ -40,6 +40,11 @@ class WallClock : public testing::TestWithParam<Jump> {
     node.set("simulation/speed", 1.0);
     node.set("jog_timeout", 0.3);
   }
+  void SetUp() override {
+#ifndef _GLIBCXX_USE_PTHREAD_COND_CLOCKWAIT  // before gcc 10 and glibc 2.30
+    GTEST_SKIP() << "waits with a timeout follow the wall clock in this C++ library";
+#endif
+  }
 
   void jump() const { faults->wall_clock_ns = GetParam().seconds * 1'000'000'000; }
   static double offset() { return static_cast<double>(GetParam().seconds); }
