@@ -18,9 +18,7 @@ namespace {
 
 using ros_node::AxisOfJoint;
 using ros_node::BadTrajectory;
-using ros_node::TimedTrajectory;
-using ros_node::timedTrajectory;
-using ros_node::withDelay;
+using ros_node::trajectoryRequest;
 
 const AxisOfJoint kAxes{{"shoulder", "x"}, {"elbow", "y"}};
 const ros::Time kNow(1000.0);
@@ -64,21 +62,22 @@ void expectBad(BadTrajectory::Kind kind, const std::string& words, const Action&
 
 void expectBadMessage(BadTrajectory::Kind kind, const std::string& words,
                       const trajectory_msgs::JointTrajectory& trajectory) {
-  expectBad(kind, words, [&] { timedTrajectory(trajectory, kAxes, kNow); });
+  expectBad(kind, words, [&] { trajectoryRequest(trajectory, kAxes, kNow); });
 }
 
 TEST(ReadingTrajectories, NamesTheAxesOfTheJointsInTheirOrder) {
-  const TimedTrajectory read = timedTrajectory(message({"elbow", "shoulder"}, {1.0}), kAxes, kNow);
-  EXPECT_EQ(read.request.names, (std::vector<std::string>{"y", "x"}));
+  const machine::TrajectoryRequest read =
+      trajectoryRequest(message({"elbow", "shoulder"}, {1.0}), kAxes, kNow);
+  EXPECT_EQ(read.names, (std::vector<std::string>{"y", "x"}));
 }
 
 TEST(ReadingTrajectories, TakesAllThatAPointHas) {
   auto given = message({"shoulder"}, {0.5});
   given.points[0].velocities = {0.25};
   given.points[0].accelerations = {-2.0};
-  const TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
-  ASSERT_EQ(read.request.points.size(), 1U);
-  const axis::TrajectoryPoint& point = read.request.points[0];
+  const machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  ASSERT_EQ(read.points.size(), 1U);
+  const axis::TrajectoryPoint& point = read.points[0];
   EXPECT_EQ(point.time, 0.5);
   EXPECT_EQ(point.positions, std::vector<double>{0.05});
   EXPECT_EQ(point.velocities, std::vector<double>{0.25});
@@ -97,41 +96,21 @@ TEST(ReadingTrajectories, RefusesJointsThatAreNotThereNoneAndOneTwice) {
 
 TEST(ReadingTrajectories, StartsAtOnceWithoutAStampAndLaterWithOneAhead) {
   auto given = message({"elbow"}, {0.5, 1.0});
-  TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
-  EXPECT_EQ(read.delay, 0.0);
-  expectTimes(read.request, {0.5, 1.0});
+  machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  EXPECT_EQ(read.begin_in, 0.0);
+  expectTimes(read, {0.5, 1.0});
   given.header.stamp = kNow + ros::Duration(0.25);
-  read = timedTrajectory(given, kAxes, kNow);
-  EXPECT_NEAR(read.delay, 0.25, kRounding);
-  expectTimes(read.request, {0.5, 1.0});
-}
-
-TEST(ReadingTrajectories, RestsUntilALaterStart) {
-  auto given = message({"elbow", "shoulder"}, {0.5, 1.0});
-  given.header.stamp = kNow + ros::Duration(0.25);
-  const auto request = withDelay(timedTrajectory(given, kAxes, kNow), {3.0, 4.0});
-  expectTimes(request, {0.25, 0.75, 1.25});
-  EXPECT_EQ(request.points[0].positions, (std::vector<double>{3.0, 4.0}));
-  EXPECT_EQ(request.points[0].velocities, (std::vector<double>{0.0, 0.0}));
-  EXPECT_EQ(request.points[0].accelerations, (std::vector<double>{0.0, 0.0}));
-}
-
-TEST(ReadingTrajectories, ChecksWhereADelayedTrajectoryBeginsAllTheSame) {
-  auto given = message({"elbow"}, {0.0, 1.0});
-  given.points[0].positions = {7.0};
-  given.header.stamp = kNow + ros::Duration(0.25);
-  const auto request = withDelay(timedTrajectory(given, kAxes, kNow), {3.0});
-  expectTimes(request, {0.0, 0.25, 1.25});
-  EXPECT_EQ(request.points[0].positions, std::vector<double>{7.0});
-  EXPECT_EQ(request.points[1].positions, std::vector<double>{3.0});
+  read = trajectoryRequest(given, kAxes, kNow);
+  EXPECT_NEAR(read.begin_in, 0.25, kRounding);
+  expectTimes(read, {0.5, 1.0});
 }
 
 TEST(ReadingTrajectories, ComesSoonerByWhatOfItHasGoneBy) {
   auto given = message({"elbow"}, {0.0, 0.5, 1.0});
   given.header.stamp = kNow - ros::Duration(0.2);
-  const TimedTrajectory read = timedTrajectory(given, kAxes, kNow);
-  EXPECT_EQ(read.delay, 0.0);
-  expectTimes(read.request, {0.0, 0.3, 0.8});
+  const machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  EXPECT_EQ(read.begin_in, 0.0);
+  expectTimes(read, {0.0, 0.3, 0.8});
 }
 
 TEST(ReadingTrajectories, RefusesAPointInThePast) {
@@ -148,10 +127,10 @@ TEST(ReadingTrajectories, RefusesAPointInThePast) {
 TEST(ReadingTrajectories, TakesAStampOfAnyYear) {
   auto given = message({"elbow"}, {1.0});
   given.header.stamp = ros::Time(4'294'967'295, 0);
-  EXPECT_NEAR(timedTrajectory(given, kAxes, kNow).delay, 4'294'967'295.0 - kNow.toSec(), 1e-5);
+  EXPECT_NEAR(trajectoryRequest(given, kAxes, kNow).begin_in, 4'294'967'295.0 - kNow.toSec(), 1e-5);
   given.header.stamp = ros::Time(1, 0);
   expectBad(BadTrajectory::Kind::kOldStamp, "is in the past by 4294967293 s",
-            [&] { timedTrajectory(given, kAxes, ros::Time(4'294'967'295, 0)); });
+            [&] { trajectoryRequest(given, kAxes, ros::Time(4'294'967'295, 0)); });
 }
 
 TEST(ReadingTrajectories, HasNoLimitWhereNoToleranceIsGivenOrItIsLifted) {

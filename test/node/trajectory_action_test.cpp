@@ -359,18 +359,53 @@ TEST_F(TrajectoryActionTest, StartsWhenItsStampSays) {
   expectNoViolation();
 }
 
+TEST_F(TrajectoryActionTest, TakesOverFromATrajectoryWhenItsStampSays) {
+  start(1.0);
+  send(there(0.08, 4.0));
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 500; }));
+  TrajectoryClient other(node.full("follow_joint_trajectory"), false);
+  ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
+  Goal goal = there(0.06, 2.0);
+  const ros::Time stamp = ros::Time::now() + ros::Duration(1.0);
+  goal.trajectory.header.stamp = stamp;
+  other.sendGoal(goal);
+  while (ros::Time::now() < stamp) {
+    const State state = client->getState();
+    if (ros::Time::now() < stamp) {
+      EXPECT_EQ(state, State::ACTIVE) << said();
+    }
+  }
+  EXPECT_EQ(await(), State::PREEMPTED) << said();
+  ASSERT_TRUE(other.waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(other.getState(), State::SUCCEEDED) << other.getResult()->error_string;
+  EXPECT_EQ(node.pulses(), 4800);
+  expectNoViolation();
+}
+
+TEST_F(TrajectoryActionTest, ACancelBeforeItsStampLeavesTheMotionBeforeIt) {
+  start(1.0);
+  send(there(0.08, 2.0));
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 500; }));
+  TrajectoryClient other(node.full("follow_joint_trajectory"), false);
+  ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
+  Goal goal = ofOne("x_joint", 0.06, 2.0);
+  goal.trajectory.header.stamp = ros::Time::now() + ros::Duration(1000.0);
+  other.sendGoal(goal);
+  ASSERT_TRUE(waitUntil([&other] { return other.getState() == State::ACTIVE; }));
+  other.cancelGoal();
+  ASSERT_TRUE(other.waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(other.getState(), State::PREEMPTED) << other.getResult()->error_string;
+  EXPECT_EQ(await(), State::SUCCEEDED) << said();
+  EXPECT_EQ(node.pulses(), 6400);
+  expectNoViolation();
+}
+
 TEST_F(TrajectoryActionTest, AStopEndsATrajectoryThatWaitsForItsStart) {
   start(1.0);
-  const Recorder<AxisStates> states(node.full("axis_states"));
   Goal goal = there(0.02, 0.7);
   goal.trajectory.header.stamp = ros::Time::now() + ros::Duration(1000.0);
   send(goal);
-  ASSERT_TRUE(states.waitFor([](const AxisStates& s) { return s.moving.at(0) != 0; }));
-  // Its axes wait, so that no other start can come before it.
-  TrajectoryClient other(node.full("follow_joint_trajectory"), false);
-  ASSERT_TRUE(other.waitForServer(ros::Duration(kBound.count())));
-  EXPECT_EQ(other.sendGoalAndWait(goal), State::REJECTED);
-  expectSays(other.getResult()->error_string, "needs its axes at rest");
+  ASSERT_TRUE(waitUntil([this] { return client->getState() == State::ACTIVE; }));
   EXPECT_TRUE(node.call<std_srvs::Trigger>("stop").success);
   expectAborted(Result::GOAL_TOLERANCE_VIOLATED, "stopped");
   EXPECT_EQ(node.pulses(), 0);

@@ -16,6 +16,7 @@
 #include <future>
 #include <string>
 
+#include "support/control_msgs_client.h"
 #include "support/fault_injection.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
@@ -113,23 +114,24 @@ TEST_P(WallClock, ThatIsSetDuringAJogLetsItEndAfterTheLastMessage) {
 // When it is accepted, its start becomes a time of the machine.
 TEST_P(WallClock, ThatIsSetDoesNotChangeTheStartOfATrajectoryThatWaits) {
   node.start();
-  const Recorder<AxisStates> states(node.full("axis_states"));
-  ros::Publisher commands =
-      ros::NodeHandle().advertise<trajectory_msgs::JointTrajectory>(node.full("command"), 1);
-  ASSERT_TRUE(waitUntil([&commands] { return commands.getNumSubscribers() == 1; }));
-  trajectory_msgs::JointTrajectory wanted;
+  TrajectoryClient client(node.full("follow_joint_trajectory"), false);
+  ASSERT_TRUE(client.waitForServer(ros::Duration(kBound.count())));
+  action_msgs::FollowJointTrajectoryGoal goal;
+  trajectory_msgs::JointTrajectory& wanted = goal.trajectory;
   wanted.header.stamp = ros::Time::now() + ros::Duration(3.0);
   wanted.joint_names = {"x_joint"};
   wanted.points.resize(1);
   wanted.points[0].positions = {0.01};
   wanted.points[0].velocities = {0.0};
   wanted.points[0].time_from_start = ros::Duration(0.5);
-  commands.publish(wanted);
-  ASSERT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) != 0; }));
+  client.sendGoal(goal);
+  ASSERT_TRUE(
+      waitUntil([&] { return client.getState() == actionlib::SimpleClientGoalState::ACTIVE; }));
+  EXPECT_EQ(node.pulses(), 0);
   jump();
   EXPECT_TRUE(waitUntil([this] { return node.pulses() == pulsesOf(0.01); }));
-  // It was at rest before the move, too: the latest state counts.
-  EXPECT_TRUE(states.waitForLatest([](const AxisStates& s) { return s.moving.at(0) == 0; }));
+  EXPECT_TRUE(client.waitForResult(ros::Duration(kBound.count())));
+  EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::SUCCEEDED);
 }
 
 INSTANTIATE_TEST_SUITE_P(By, WallClock,

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "come_to_rest.h"
+#include "driver_activities.h"
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::activity {
 namespace {
@@ -29,6 +31,9 @@ void Activities::begin(std::unique_ptr<Activity> activity, const Why& why) {
     at_speed = at_speed && (now == nullptr || now->canHandOver());
   }
   if (at_speed) activity->prepare();
+  if (!activity->leavesLaterMotions()) {
+    for (const axis::AxisModel* axis : activity->axes()) schedule_.drop(*axis, why);
+  }
   for (axis::AxisModel* axis : activity->axes()) {
     if (Activity* next = heir(*axis)) next->end(why);
   }
@@ -71,6 +76,7 @@ void Activities::takeOver(std::unique_ptr<Activity> activity) {
 }
 
 void Activities::end(const axis::AxisModel& axis, const Why& why, const Ack& call) {
+  schedule_.drop(axis, why);
   if (Activity* next = heir(axis)) next->end(why);
   if (Activity* now = owner(axis)) now->end(why, call);
 }
@@ -83,6 +89,60 @@ void Activities::look() {
   // Activities that begin during the loop are included.
   for (std::size_t i = 0; i < all_.size(); ++i) all_[i]->look();
   while (sweep()) {
+  }
+  lookAtSchedule();
+}
+
+void Activities::refuseWhileSharersAreBusy(const axis::AxisModel& axis) const {
+  for (const axis::AxisModel* sharer : axis.sharers()) {
+    for (const Activity* busy : {owner(*sharer), heir(*sharer)}) {
+      if (busy == nullptr) continue;
+      const bool homes = busy->homingPhase() != axis::HomingPhase::kNone;
+      if (!homes && busy->work() == Activity::Work::kMoves) continue;
+      axis.refuse("busy: " + sharer->name() + ", which shares its motors, " +
+                  (homes ? "is being homed" : "has its driver's pins written"));
+    }
+  }
+}
+
+// ---- motions that begin later ----
+
+bool Activities::mayBeTakenOver(const axis::AxisModel& axis) const {
+  const Activity* now = owner(axis);
+  return heir(axis) == nullptr && (now == nullptr || now->canHandOver());
+}
+
+std::vector<axis::Move> Activities::beginLater(LaterMotion motion) {
+  for (const Order& order : motion.orders) {
+    const Activity* now = owner(*order.axis);
+    if (mayBeTakenOver(*order.axis) || (now != nullptr && now->isInBackground())) continue;
+    order.axis->refuse(
+        now != nullptr && now->homingPhase() != axis::HomingPhase::kNone
+            ? "busy: it is being homed; a trajectory that begins later is accepted after that"
+            : "busy: it is about to move; a trajectory that begins later is accepted when it moves "
+              "or is at rest");
+  }
+  return schedule_.add(std::move(motion));
+}
+
+void Activities::lookAtSchedule() {
+  schedule_.look();
+  for (axis::AxisModel* axis : schedule_.toWake()) {
+    if (isFree(*axis)) begin(std::make_unique<WakeUp>(context_, *axis, nullptr), {});
+  }
+  while (std::optional<Schedule::Due> due = schedule_.takeDue()) {
+    try {
+      for (const axis::AxisModel* axis : due->activity->axes()) {
+        axis->refuseUnlessReady();
+        refuseWhileSharersAreBusy(*axis);
+        if (!mayBeTakenOver(*axis) || axis->mustWake()) {
+          axis->refuse("busy: its driver's pins are being written");
+        }
+      }
+      begin(std::move(due->activity), {axis::MoveEnd::kReplaced, "another command took over"});
+    } catch (const Error& error) {
+      due->call->fail(failureOf(error));
+    }
   }
 }
 
@@ -121,7 +181,7 @@ void Activities::forEach(const std::function<void(Activity&)>& action) const {
 }
 
 pulse::Nanoseconds Activities::due() const {
-  pulse::Nanoseconds due = pulse::kNever;
+  pulse::Nanoseconds due = schedule_.due();
   for (const auto& activity : all_) {
     if (activity->hasBegun()) due = std::min(due, activity->due());
   }

@@ -7,6 +7,7 @@
 
 #include "activity.h"
 #include "context.h"
+#include "schedule.h"
 
 namespace stepdriver::activity {
 
@@ -17,7 +18,7 @@ namespace stepdriver::activity {
 /// writes of pins. Ending an owner also ends its heir.
 class Activities {
  public:
-  explicit Activities(Context& context) : context_(context) {}
+  explicit Activities(Context& context) : context_(context), schedule_(context) {}
 
   Activity* owner(const axis::AxisModel& axis) const { return find(axis, true); }
   Activity* heir(const axis::AxisModel& axis) const { return find(axis, false); }
@@ -25,6 +26,10 @@ class Activities {
   bool isFree(const axis::AxisModel& axis) const {
     return owner(axis) == nullptr && heir(axis) == nullptr;
   }
+
+  /// @throw Refused if an axis that shares the motors of this one is homed, or has its driver's
+  ///   pins written.
+  void refuseWhileSharersAreBusy(const axis::AxisModel& axis) const;
 
   /// Gives an activity its axes: at once, from motions that it takes over, or as the heir of their
   /// present owners. Replaced activities are told why.
@@ -37,6 +42,13 @@ class Activities {
   void end(const axis::AxisModel& axis, const Why& why, const Ack& call = {});
   void endAll(const Why& why, const Ack& call = {});
 
+  /// A motion that begins later. @throw Refused if an axis can't be taken over then; then nothing
+  /// has changed.
+  /// @return the move of each axis.
+  std::vector<axis::Move> beginLater(LaterMotion motion);
+  Schedule& schedule() { return schedule_; }
+  const Schedule& schedule() const { return schedule_; }
+
   /// Each owner handles what has happened; finished activities leave their axes, and heirs begin.
   void look();
 
@@ -48,10 +60,13 @@ class Activities {
   Activity* find(const axis::AxisModel& axis, bool begun) const;
   void takeOver(std::unique_ptr<Activity> activity);
   void beginParts(Activity& of);
+  void lookAtSchedule();
+  bool mayBeTakenOver(const axis::AxisModel& axis) const;
   bool sweep();
   bool mayBegin(const Activity& activity) const;
 
   Context& context_;
+  Schedule schedule_;
   std::vector<std::unique_ptr<Activity>> all_;  // in the order in which they were accepted
 };
 

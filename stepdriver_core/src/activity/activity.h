@@ -73,6 +73,8 @@ class Activity {
   /// Whether other commands wait for it instead of being refused, because no client has requested
   /// it.
   virtual bool isInBackground() const { return false; }
+  /// Whether motions that begin later on its axes, see Schedule, are kept when it begins.
+  virtual bool leavesLaterMotions() const { return isInBackground(); }
 
   virtual void hold(const Ack& /*call*/) {}
   /// @throw Refused if it is held, and can't be resumed now.

@@ -41,6 +41,13 @@ class Enable : public PinScript {
   Steps plan() override;
 };
 
+/// Wakes a motor that is idle, because a motion of its axis begins soon.
+class WakeUp : public Enable {
+ public:
+  using Enable::Enable;
+  bool isInBackground() const override { return true; }
+};
+
 /// Switches the motor's current off when the axis has come to rest.
 class Disable : public PinScript {
  public:

@@ -37,16 +37,17 @@ Activity::Handover handoverOf(const std::vector<Order>& orders) {
 }  // namespace
 
 FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call,
-                       std::shared_ptr<const CommonStart> start)
+                       std::shared_ptr<const CommonStart> start, std::int64_t begins_ns)
     : Script(context, axesOf(orders), handoverOf(orders), std::move(call)),
       orders_(std::move(orders)),
       join_(std::move(join)),
-      start_(std::move(start)) {}
+      start_(std::move(start)),
+      begins_ns_(begins_ns) {}
 
 std::unique_ptr<FollowStep> FollowGoal::follow() {
   return std::make_unique<FollowStep>(
       context(), orders_, join_, [this] { return takePredecessors(); },
-      [this] { return takeCall(); }, start_);
+      [this] { return takeCall(); }, start_, begins_ns_);
 }
 
 void FollowGoal::prepare() {

@@ -16,13 +16,14 @@ namespace stepdriver::activity {
 /// come to rest first, and it is woken up.
 class FollowGoal : public Script {
  public:
-  /// @param join empty for a single axis. @param start see Manoeuvre.
+  /// @param join empty for a single axis. @param start, begins_ns see Manoeuvre.
   FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call,
-             std::shared_ptr<const CommonStart> start = {});
+             std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0);
 
   void prepare() override;
   void hold(const Ack& call) override;
   bool isStreamed() const override { return orders_.front().goal.isStreamed(); }
+  bool leavesLaterMotions() const override { return begins_ns_ > 0 || isStreamed(); }
 
  protected:
   Steps plan() override;
@@ -33,6 +34,7 @@ class FollowGoal : public Script {
   std::vector<Order> orders_;
   const JoinPath join_;
   const std::shared_ptr<const CommonStart> start_;
+  const std::int64_t begins_ns_;
   std::unique_ptr<FollowStep> prepared_;
 };
 

@@ -121,11 +121,12 @@ std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::s
 }
 
 Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join,
-                     std::shared_ptr<const CommonStart> start)
+                     std::shared_ptr<const CommonStart> start, std::int64_t begins_ns)
     : context_(context),
       orders_(std::move(orders)),
       join_(std::move(join)),
       start_(std::move(start)),
+      begins_ns_(begins_ns),
       group_(join_ ? context.newGroup() : 0),
       lead_(kLead) {
   for (const Order& order : orders_) {
@@ -174,6 +175,7 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
       plans.at = std::max(plans.at, earliestStart(context_, *axis, lead));
     }
   }
+  if (!started_ && !slowsDown()) plans.at = std::max(plans.at, begins_ns_);
   try {
     if (!alone) {
       plans.path = planPath(plans.at);

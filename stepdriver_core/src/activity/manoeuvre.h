@@ -23,8 +23,9 @@ class Manoeuvre {
  public:
   /// @param join of orders that are kTogether; empty for one order alone.
   /// @param start of one order alone that begins at the same time as others; may be empty.
+  /// @param begins_ns motion time before which it doesn't begin.
   Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join = {},
-            std::shared_ptr<const CommonStart> start = {});
+            std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0);
 
   /// Plans the first order; nothing is ordered yet.
   ///
@@ -149,6 +150,7 @@ class Manoeuvre {
   std::vector<Order> orders_;
   const JoinPath join_;
   const std::shared_ptr<const CommonStart> start_;
+  const std::int64_t begins_ns_;
   Course course_;                                       // that was joined last
   Course accepted_course_;                              // of the motion that the engine follows
   std::optional<std::pair<Extension, Ack>> extension_;  // waits until the engine has handled all

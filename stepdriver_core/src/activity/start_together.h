@@ -23,6 +23,7 @@ class StartTogether : public Script {
   StartTogether(Context& context, std::vector<Start> starts);
 
   void prepare() override;
+  bool leavesLaterMotions() const override { return true; }
   void hold(const Ack& call) override { end(kEndedByHold, call); }
   std::vector<Part> takeParts() override;
   bool isStreamed() const override { return true; }

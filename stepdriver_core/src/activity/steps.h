@@ -132,11 +132,11 @@ class PowerStep : public Step {
 /// Follows a motion to its end.
 class FollowStep : public Step {
  public:
-  /// @param predecessors, call are taken when it begins. @param start see Manoeuvre.
+  /// @param predecessors, call are taken when it begins. @param start, begins_ns see Manoeuvre.
   FollowStep(Context& context, std::vector<Order> orders, JoinPath join,
              std::function<std::vector<Predecessor>()> predecessors, std::function<Ack()> call,
-             std::shared_ptr<const CommonStart> start = {})
-      : manoeuvre_(context, std::move(orders), std::move(join), std::move(start)),
+             std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0)
+      : manoeuvre_(context, std::move(orders), std::move(join), std::move(start), begins_ns),
         predecessors_(std::move(predecessors)),
         call_(std::move(call)) {}
 

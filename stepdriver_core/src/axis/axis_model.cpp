@@ -9,6 +9,7 @@
 
 #include "config/restart_speed.h"
 #include "message_text.h"
+#include "motion/backlash.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
@@ -64,6 +65,20 @@ PathStart AxisModel::pathStart(std::int64_t at) const {
   const double count = start.motor.position.value();
   start.slack = count - jointAt(count);
   start.moves = moving();
+  return start;
+}
+
+PathStart AxisModel::laterPathStart(std::int64_t at) const {
+  const motor::Motion* latest = motor.motions().latest();
+  return latest != nullptr ? laterPathStart(at, *latest->planned.plan()) : pathStart(at);
+}
+
+PathStart AxisModel::laterPathStart(std::int64_t at, const motion::Profile& planned) const {
+  PathStart start;
+  start.motor = planned.stateAt(at);
+  const double count = start.motor.position.value();
+  start.slack = motion::slackAt(planned, at, backlash()).value_or(count - jointAt(count));
+  start.moves = at < planned.endNs();
   return start;
 }
 

@@ -78,6 +78,10 @@ class AxisModel {
   PathAxis pathAxis() const;
   /// Its state at a motion time.
   PathStart pathStart(std::int64_t at) const;
+  /// The state at a motion time that may be far ahead, if its motion continues as planned.
+  PathStart laterPathStart(std::int64_t at) const;
+  /// The same at the end of, or during, another motion of the motor before that.
+  PathStart laterPathStart(std::int64_t at, const motion::Profile& planned) const;
   /// @}
 
   /// @name Limits

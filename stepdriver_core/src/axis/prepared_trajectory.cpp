@@ -160,16 +160,16 @@ double endVelocity(const Profile& profile) {
 PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        const std::vector<TrajectoryPoint>& points,
                                        const std::vector<motion::MotionState>& expected,
-                                       const SlowingDown& slowing)
-    : axes_(std::move(axes)), allow_slower_(slowing.allowed) {
+                                       bool allow_slower)
+    : axes_(std::move(axes)), allow_slower_(allow_slower) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   lone_position_ = points.size() == 1 && points.front().velocities.empty();
-  Source source{points, expected, slowing.wait};
+  Source source{points, expected};
   const bool moves = std::any_of(expected.begin(), expected.end(),
                                  [](const auto& state) { return state.velocity != 0.0; });
   // These have only a way from the start, which join() plans.
   const bool only_way = lone_position_ || (points.size() == 1 && moves);
-  if (slowing.allowed && !only_way) source.slowdown = slowdownFor(source).value_or(1.0);
+  if (allow_slower_ && !only_way) source.slowdown = slowdownFor(source).value_or(1.0);
   parts_.reserve(axes_.size());
   for (std::size_t member = 0; member < axes_.size(); ++member) {
     parts_.push_back(prepare(member, source));
@@ -211,7 +211,7 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
     for (std::size_t i = 0; i < waypoints.size(); ++i) {
       giveWay(i);
       motion::Waypoint& waypoint = waypoints[i];
-      waypoint.time_ns = nanoseconds(source.timeOf(source.points[i].time));
+      waypoint.time_ns = nanoseconds(source.slowdown * source.points[i].time);
       if (waypoint.velocity) *waypoint.velocity /= source.slowdown;
       if (waypoint.acceleration) *waypoint.acceleration /= source.slowdown * source.slowdown;
     }

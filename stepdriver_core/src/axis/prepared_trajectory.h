@@ -18,12 +18,6 @@
 
 namespace stepdriver::axis {
 
-/// Whether the times of a trajectory's points may become longer.
-struct SlowingDown {
-  bool allowed = false;
-  double wait = 0.0;  ///< [s] times up to this stay as they are
-};
-
 /// A trajectory that is planned and checked except for its first segment, which depends on the
 /// positions of the axes when it begins. Preparing it takes time in proportion to its points, in
 /// any thread; joining it to the motions of the axes then takes a bounded time.
@@ -41,11 +35,11 @@ class PreparedTrajectory {
   /// @param expected [microsteps] the state of each joint in which the trajectory will probably
   ///   begin. Velocities of points without them, and the factor, depend on it; the path begins in
   ///   the actual state nevertheless.
+  /// @param allow_slower whether the times of the points may become longer.
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
   ///   first segment.
   PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points,
-                     const std::vector<motion::MotionState>& expected,
-                     const SlowingDown& slowing = {});
+                     const std::vector<motion::MotionState>& expected, bool allow_slower = false);
   PreparedTrajectory(const PreparedTrajectory&) = delete;
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
@@ -81,13 +75,9 @@ class PreparedTrajectory {
   struct Source {
     const std::vector<TrajectoryPoint>& points;
     const std::vector<motion::MotionState>& expected;
-    double wait = 0.0;      // s
-    double slowdown = 1.0;  // the factor on the times after that
+    double slowdown = 1.0;  // the factor on the times
 
-    double timeOf(double time) const {
-      return time > wait ? wait + slowdown * (time - wait) : time;
-    }
-    double duration() const { return timeOf(points.back().time); }
+    double duration() const { return slowdown * points.back().time; }
   };
   // The way to the first point.
   struct Head {

@@ -302,7 +302,8 @@ pulse::Nanoseconds Controller::idleDue(const axis::AxisModel& axis) const {
   const motor::Power& power = axis.motor.power();
   const bool stays = axis.config.idle_timeout <= 0.0 || power.isIdle() || !power.wantsEnabled() ||
                      power.wantsSleep() || axis.fault || !context_.mode.closed.empty() ||
-                     context_.mode.held || !activities_.isFree(axis);
+                     context_.mode.held || !activities_.isFree(axis) ||
+                     activities_.schedule().has(axis);
   if (stays) return pulse::kNever;
   return axis.rest_since + nanoseconds(axis.config.idle_timeout);
 }
@@ -363,15 +364,7 @@ void Controller::refuseUnlessReadyToMove(const axis::AxisModel& axis) const {
       axis.refuse("busy: its driver's pins are being written");
     }
   }
-  for (const axis::AxisModel* sharer : axis.sharers()) {
-    for (const Activity* busy : {activities_.owner(*sharer), activities_.heir(*sharer)}) {
-      if (busy == nullptr) continue;
-      const bool homes = busy->homingPhase() != axis::HomingPhase::kNone;
-      if (!homes && busy->work() == Activity::Work::kMoves) continue;
-      axis.refuse("busy: " + sharer->name() + ", which shares its motors, " +
-                  (homes ? "is being homed" : "has its driver's pins written"));
-    }
-  }
+  activities_.refuseWhileSharersAreBusy(axis);
   axis.refuseWhileHeld();
 }
 
@@ -705,8 +698,8 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
           {activity::Failure::Kind::kOutdated, axes[i]->name() + ": " + kMovedMeanwhile});
     }
   }
-  const auto join = [prepared = wanted.prepared, axes, path = wanted.path](std::int64_t at) {
-    const std::vector<axis::PathStart> starts = activity::startsOf(axes, at);
+  const auto join = [prepared = wanted.prepared, axes,
+                     path = wanted.path](const std::vector<axis::PathStart>& starts) {
     for (std::size_t i = 0; path && i < starts.size(); ++i) {
       if (starts[i].moves || restOf(starts[i]) != path->from[i]) axes[i]->refuse(kMovedMeanwhile);
     }
@@ -715,8 +708,15 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
     return std::shared_ptr<const axis::SharedPath>(
         std::make_shared<const QueuedPath>(std::move(joined), path->window, true));
   };
-  activities_.begin(std::make_unique<activity::FollowGoal>(context_, std::move(orders), join, call),
-                    kTakenOver);
+  if (wanted.begins_ns > 0) {
+    std::vector<axis::PathAxis> facts = wanted.prepared->axes();
+    return call->succeed(
+        activities_.beginLater({std::move(orders), join, std::move(facts), wanted.begins_ns}));
+  }
+  const auto join_at = [join, axes](std::int64_t at) { return join(activity::startsOf(axes, at)); };
+  activities_.begin(
+      std::make_unique<activity::FollowGoal>(context_, std::move(orders), join_at, call),
+      kTakenOver);
 }
 
 const Goal* Controller::goalOf(const axis::AxisModel& axis) const {
@@ -742,6 +742,7 @@ void Controller::serve(const StopAxis& wanted, const Ack& call) {
 
 void Controller::serve(const StopMove& wanted, const Ack& call) {
   axis::AxisModel& stopped = axis(wanted.axis);
+  if (activities_.schedule().dropMove(stopped, wanted.move, kStopped)) return;
   const Goal* goal = goalOf(stopped);
   if (goal == nullptr || goal->move != wanted.move) return;
   stopped.noteStop();
@@ -758,6 +759,7 @@ void Controller::serve(const Hold& /*wanted*/, const Ack& call) {
   if (!context_.mode.closed.empty()) throw Refused(context_.mode.closed);
   if (context_.mode.held) return;
   context_.mode.held = true;
+  activities_.schedule().dropAll({axis::MoveEnd::kStopped, "the machine was put on hold"});
   for (const auto& axis : context_.axes) ++axis->stops;
   activities_.forEach([&](Activity& activity) {
     if (activity.hasBegun()) activity.hold(call);

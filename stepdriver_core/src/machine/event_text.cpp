@@ -48,7 +48,8 @@ class RequestText {
     return text;
   }
   std::string operator()(const FollowTrajectory& wanted) const {
-    return "trajectory of " + names(wanted.axes);
+    const std::string what = "trajectory of " + names(wanted.axes);
+    return wanted.begins_ns > 0 ? what + ", later" : what;
   }
   std::string operator()(const ExtendPath& wanted) const {
     return fmt::format("append to the path {} of {}", wanted.move, name(wanted.axis));

@@ -15,6 +15,7 @@
 #include "machine/disposer.h"
 #include "machine_axis.h"
 #include "message_text.h"
+#include "motion/backlash.h"
 #include "nanoseconds.h"
 #include "path_plan.h"
 #include "pulse/measure.h"
@@ -169,12 +170,21 @@ class Machine::Impl {
   }
 
   CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
+    if (!(request.begin_in >= 0.0 && request.begin_in < motion::Profile::kLongest)) {
+      throw Refused(fmt::format("the trajectory begins in {} s, but must begin in 0 to {} s",
+                                numberText(request.begin_in),
+                                numberText(motion::Profile::kLongest)));
+    }
+    const std::int64_t begins_ns =
+        request.begin_in > 0.0 ? shell_->motionNow() + nanoseconds(request.begin_in) : 0;
     return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
+      wanted.begins_ns = begins_ns;
       std::vector<axis::PathAxis> facts = factsOf(now, wanted.axes);
-      const std::vector<motion::MotionState> expected = expectedStates(wanted.axes, facts);
+      const std::vector<motion::MotionState> expected = begins_ns > 0
+                                                            ? statesAt(begins_ns, now, wanted.axes)
+                                                            : expectedStates(wanted.axes, facts);
       wanted.prepared = disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(
-          std::move(facts), request.points, expected,
-          axis::SlowingDown{request.allow_slower, request.wait}));
+          std::move(facts), request.points, expected, request.allow_slower));
     });
   }
 
@@ -266,6 +276,25 @@ class Machine::Impl {
           {facts[i].countOf(state.planned), state.velocity * facts[i].steps_per_unit, 0.0});
     }
     return expected;
+  }
+
+  // The states of joints at a time ahead, as far as their present motions tell.
+  static std::vector<motion::MotionState> statesAt(std::int64_t at, const MachineSnapshot& now,
+                                                   const std::vector<AxisId>& axes) {
+    std::vector<motion::MotionState> states;
+    states.reserve(axes.size());
+    for (const AxisId axis : axes) {
+      const AxisSnapshot& own = now.axes.at(axis);
+      motion::MotionState& state = states.emplace_back();
+      state.position = motion::DoubleDouble(own.rest);
+      if (!own.state.moving || own.motions.empty()) continue;
+      const motion::Profile& plan = *own.motions.back().planned.plan();
+      const double slack =
+          motion::slackAt(plan, at, own.backlash).value_or(static_cast<double>(own.channel.slack));
+      state = plan.stateAt(at);
+      state.position = state.position - slack;
+    }
+    return states;
   }
 
   // Prepares a trajectory from the facts about its axes, and again if these have changed meanwhile.

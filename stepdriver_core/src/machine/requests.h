@@ -81,6 +81,7 @@ struct FollowTrajectory {
     std::shared_ptr<const PathWindow> window;
   };
   std::optional<Path> path{};
+  std::int64_t begins_ns = 0;  ///< motion time at which it takes over; 0: at once
 };
 /// Continues the path that axes follow.
 struct ExtendPath {

@@ -350,4 +350,39 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
   return joined;
 }
 
+std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::int64_t backlash) {
+  constexpr std::size_t kMostPieces = 500;
+  const double most = static_cast<double>(backlash);
+  if (backlash == 0) return 0.0;
+  if (motor.pieceCount() == 0) return std::nullopt;
+  // Backwards, from turn to turn, until the motor has come over the whole backlash: what was before
+  // that doesn't matter.
+  const DoubleDouble time = secondsOf(std::max<std::int64_t>(0, time_ns - motor.startNs()));
+  std::vector<double> turns{motor.stateAt(time_ns).position.value()};
+  double lowest = turns.front();
+  double highest = turns.front();
+  const auto take = [&](DoubleDouble position) {
+    turns.push_back(position.value());
+    lowest = std::min(lowest, turns.back());
+    highest = std::max(highest, turns.back());
+  };
+  std::size_t index = motor.pieceAt(time);
+  for (std::size_t pieces = 0; highest - lowest < most; --index, ++pieces) {
+    if (pieces == kMostPieces) return std::nullopt;
+    const Piece piece = motor.piece(index);
+    const double until = std::min((time - motor.pieceStart(index)).value(), piece.duration.value());
+    std::vector<double> own;
+    for (double t = piece.firstTurn(0.0); t < until; t = piece.firstTurn(t)) own.push_back(t);
+    for (auto turn = own.rbegin(); turn != own.rend(); ++turn) take(piece.positionAt(*turn));
+    take(piece.p0);
+    if (index == 0) break;
+  }
+  if (highest - lowest < most) return std::nullopt;
+  double slack = 0.0;
+  for (std::size_t i = turns.size(); i-- > 1;) {
+    slack = std::clamp(slack + turns[i - 1] - turns[i], 0.0, most);
+  }
+  return slack;
+}
+
 }  // namespace stepdriver::motion

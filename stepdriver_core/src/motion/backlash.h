@@ -32,6 +32,10 @@ struct MotorPlan {
 MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
                     const MotionLimits& limits);
 
+/// The part of a backlash that is taken up at a time of a motor's motion [microsteps]. It is empty
+/// if the motion before that doesn't determine it: the motor turned so little, or so often.
+std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::int64_t backlash);
+
 /// A motor's plan for a joint's motion whose first part was unknown when the rest was planned.
 struct JoinedMotor {
   Profile profile;

@@ -254,6 +254,20 @@ TEST_F(CoreXyHoming, IsRefusedWhileTheOtherMoves) {
             "x: busy: y, which shares its motors, is at work; it is homed when both are at rest");
 }
 
+// It would move the motors that the other one needs to find its switch.
+TEST_F(CoreXyHoming, IsNotDisturbedByATrajectoryOfTheOtherThatBeginsMeanwhile) {
+  machine::TrajectoryRequest later{{"y"}, {{1.0, {0.01}, {0.0}, {}}}};
+  later.begin_in = 0.5;
+  const auto move = bench.machine->followTrajectory(later);
+  EXPECT_EQ(x().home().end, axis::HomingEnd::kHomed);
+  const auto result = bench.machine->result(move);
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->end, MoveEnd::kStopped);
+  EXPECT_NE(result->message.find("x, which shares its motors, is being homed"), std::string::npos)
+      << result->message;
+  EXPECT_EQ(y().state().position, 0.0);
+}
+
 // ---- other matrices ----
 
 class ThreeAxes : public testing::Test {

@@ -114,6 +114,12 @@ std::vector<Act> makeActs() {
        }},
       {"trajectory of z",
        [](Participants& all, int client) { all.postTrajectory(client, {kZ}, 0.006); }},
+      {"trajectory of x and y that begins later",
+       [](Participants& all, int client) {
+         all.postLaterTrajectory(client, {kX, kY}, 0.008);
+       }},
+      {"trajectory of z that begins later",
+       [](Participants& all, int client) { all.postLaterTrajectory(client, {kZ}, 0.006); }},
       {"path of x and y that is fed",
        [](Participants& all, int client) {
          all.postPath(client, {kX, kY}, 0.006);

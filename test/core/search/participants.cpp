@@ -629,6 +629,7 @@ void Participants::noteGoals(Ask& asked) {
   } else if (const auto* trajectory = std::get_if<machine::FollowTrajectory>(&asked.request)) {
     asked.goals = trajectory->axes;
     asked.together = true;
+    asked.begins_later = trajectory->begins_ns > 0;
   } else if (const auto* jogs = std::get_if<machine::JogTogether>(&asked.request)) {
     for (const machine::Jog& jog : jogs->jogs) asked.parts.push_back(jog.axis);
   } else if (const auto* setpoints = std::get_if<machine::FollowSetpoints>(&asked.request)) {
@@ -690,7 +691,8 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
     const auto& ordered = ordered_[axis];
     const auto begun = static_cast<std::ptrdiff_t>(asked.orders[axis]);
     const std::uint64_t accepted = engine_->channel(static_cast<int>(axis)).accepted;
-    if (std::none_of(ordered.begin() + begun, ordered.end(), [&](const Ordered& order) {
+    if (!asked.begins_later &&
+        std::none_of(ordered.begin() + begun, ordered.end(), [&](const Ordered& order) {
           return order.serial <= accepted && order.together == asked.together;
         })) {
       oracle_.complain(who + " succeeds, but the engine has not begun it");
@@ -800,18 +802,29 @@ void Participants::postStreamedSetpoints(int client, const machine::FollowSetpoi
 }
 
 void Participants::postTrajectory(int client, std::vector<std::size_t> axes, double size) {
+  wish(client, std::move(axes), size, 0);
+}
+
+void Participants::postLaterTrajectory(int client, std::vector<std::size_t> axes, double size) {
+  wish(client, std::move(axes), size,
+       static_cast<pulse::Nanoseconds>(2 + steps_ % 9 * 25) * 1'000'000);
+}
+
+void Participants::wish(int client, std::vector<std::size_t> axes, double size,
+                        pulse::Nanoseconds begin_in) {
   const auto snapshot = controller_->snapshot();
-  std::vector<std::uint64_t> stops;
-  stops.reserve(axes.size());
-  for (const std::size_t axis : axes) stops.push_back(snapshot->axes.at(axis).state.stops);
-  clients_[static_cast<std::size_t>(client)].next = [this, client, axes = std::move(axes), size,
-                                                     stops = std::move(stops)] {
-    prepareAndPost(client, axes, size, stops, 0);
+  Wish wish{std::move(axes), size, {}, begin_in};
+  wish.stops.reserve(wish.axes.size());
+  for (const std::size_t axis : wish.axes) {
+    wish.stops.push_back(snapshot->axes.at(axis).state.stops);
+  }
+  clients_[static_cast<std::size_t>(client)].next = [this, client, wish = std::move(wish)] {
+    prepareAndPost(client, wish, 0);
   };
 }
 
-void Participants::prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
-                                  const std::vector<std::uint64_t>& stops, int tries) {
+void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
+  const std::vector<std::size_t>& axes = wish.axes;
   const auto snapshot = controller_->snapshot();
   std::vector<axis::PathAxis> facts;
   Meaning meaning;
@@ -828,9 +841,9 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
   static constexpr std::array<double, 3> speeds = {3.0, 0.0, 0.0};
   std::vector<axis::TrajectoryPoint> points(places.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    points[i].time = 0.25 * static_cast<double>(i + 1);
-    points[i].positions.assign(axes.size(), places.at(i) * size);
-    points[i].velocities.assign(axes.size(), speeds.at(i) * size);
+    points[i].time = (wish.begin_in > 0 ? 0.4 : 0.25) * static_cast<double>(i + 1);
+    points[i].positions.assign(axes.size(), places.at(i) * wish.size);
+    points[i].velocities.assign(axes.size(), speeds.at(i) * wish.size);
     points[i].accelerations.assign(axes.size(), 0.0);
   }
   std::shared_ptr<const axis::PreparedTrajectory> prepared;
@@ -844,14 +857,18 @@ void Participants::prepareAndPost(int client, const std::vector<std::size_t>& ax
   }
   // Posting the request is a separate step.
   Client& who = clients_[static_cast<std::size_t>(client)];
-  who.next = [this, client, axes, size, stops, tries, prepared, meaning] {
-    post(client, "follow trajectory", machine::FollowTrajectory{axes, prepared, stops}, meaning);
+  who.next = [this, client, wish, tries, prepared, meaning] {
+    const pulse::Nanoseconds now = clock_.now() - engine_->state().slipped;
+    const std::int64_t begins_ns = wish.begin_in > 0 ? now + wish.begin_in : 0;
+    post(client, "follow trajectory",
+         machine::FollowTrajectory{wish.axes, prepared, wish.stops, std::nullopt, begins_ns},
+         meaning);
     clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
       const bool outdated =
           reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
       if (!outdated || tries >= 8) return;
       clients_[static_cast<std::size_t>(client)].next = [=] {
-        prepareAndPost(client, axes, size, stops, tries + 1);
+        prepareAndPost(client, wish, tries + 1);
       };
     };
   };

@@ -112,6 +112,8 @@ class Participants {
   /// Streams positions, forward and back, at the period of streamJog().
   void streamSetpoints(int client, const std::vector<std::size_t>& axes);
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
+  /// One that begins a little later, whatever the axes do until then.
+  void postLaterTrajectory(int client, std::vector<std::size_t> axes, double size);
   /// A path of several axes at rest that is fed while they follow it.
   void postPath(int client, const std::vector<std::size_t>& axes, double size);
   /// Appends to the path that an axis follows, if it is one; a last segment ends it.
@@ -148,6 +150,7 @@ class Participants {
     std::vector<std::size_t> goals;  ///< axes for which it has a goal
     std::vector<std::size_t> parts;  ///< axes that it may move, or refuse, one by one
     bool together = false;           ///< along one path
+    bool begins_later = false;       ///< not when it is answered
     bool relative = false;
     std::vector<double> ways;  ///< of a relative goal, by goal
     std::vector<std::optional<double>> targets;
@@ -200,8 +203,15 @@ class Participants {
   machine::InputReading readInputs();
   void queue(const machine::InputReading& reading);
   void moveEnds(const machine::MachineSnapshot& before, const std::vector<double>& targets);
-  void prepareAndPost(int client, const std::vector<std::size_t>& axes, double size,
-                      const std::vector<std::uint64_t>& stops, int tries);
+  /// What a trajectory is prepared from.
+  struct Wish {
+    std::vector<std::size_t> axes;
+    double size = 0.0;
+    std::vector<std::uint64_t> stops;
+    pulse::Nanoseconds begin_in = 0;
+  };
+  void wish(int client, std::vector<std::size_t> axes, double size, pulse::Nanoseconds begin_in);
+  void prepareAndPost(int client, const Wish& wish, int tries);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
                        int left);
   void postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,

@@ -35,8 +35,10 @@ struct TrajectoryRequest {
   /// accelerations by its square. CoordinatedMove::duration is that of the slower trajectory.
   /// (Default) such a trajectory is refused.
   bool allow_slower = false;
-  /// [s] The first point that `allow_slower` doesn't delay: a wait at rest before the motion.
-  double wait = 0.0;
+  /// [s] When it begins, from now on; 0: at once. Until then its axes continue whatever they do; at
+  /// that nanosecond of motion time it takes over from their motions. See
+  /// Machine::followTrajectory().
+  double begin_in = 0.0;
 };
 
 /// A segment of a path, from the end of the one before it; the first begins where the axes stand.

@@ -158,6 +158,12 @@ class Machine {
   /// motion, which may last longer than the points. A long one is planned in the calling thread and
   /// delays no other call.
   ///
+  /// If it begins later, it is checked now, from the states that its axes will have then, and again
+  /// if one of their plans changes. Until it begins, only streamed setpoints and jogs, and earlier
+  /// trajectories, leave it as it is: a stop, a hold, a fault, an endstop, new limits and any other
+  /// motion of one of its axes drop it, and its result says why. So does a trajectory that begins
+  /// no later; one that begins after it takes over from it.
+  ///
   /// @throw Refused as moveTo(), and if a position is beyond a soft limit, a velocity by more than
   ///   axis::kTrajectoryTolerance beyond the maximum, an acceleration beyond the larger of
   ///   acceleration and deceleration, if a velocity jumps by more than the start speed, if with a

@@ -82,6 +82,7 @@ FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
   following.goal = goal->trajectory.points.back().positions;
   following.goal_velocity = goal->trajectory.points.back().velocities;
   following.began = ros::Time::now();
+  following.begins_later = goal->trajectory.header.stamp > following.began;
   return following;
 }
 
@@ -97,7 +98,8 @@ void TrajectoryAction::takeOver(const Following& newer, Following& older) {
         return std::any_of(newer.joints.begin(), newer.joints.end(),
                            [&joint](const auto& other) { return other.name == joint.name; });
       });
-  if (shared) older.preempted_by = "a newer goal took over";
+  if (!shared) return;
+  (newer.begins_later ? older.followed_by : older.preempted_by) = "a newer goal took over";
 }
 
 void TrajectoryAction::stop(const Following& following) { machine_.stop(following.move); }
@@ -115,6 +117,9 @@ bool TrajectoryAction::conclude(Following& following) {
   if (!result) return false;
   const bool reached = result->end == axis::MoveEnd::kReached;
   GoalHandle& handle = following.handle;
+  if (result->end == axis::MoveEnd::kReplaced && following.preempted_by.empty()) {
+    following.preempted_by = following.followed_by;
+  }
   if (!reached && !following.preempted_by.empty()) {
     const std::string why = fmt::format("{}; {}", following.preempted_by, result->message);
     handle.setCanceled(resultOf(Result::SUCCESSFUL, why), why);

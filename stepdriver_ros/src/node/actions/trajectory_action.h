@@ -30,6 +30,8 @@ struct FollowingTrajectory {
   std::optional<double> wanted_duration;  // [s] up to the last point; empty: its stamp isn't 0
   double slipped_before = 0.0;            // [s] slip of the machine's timeline
   std::string preempted_by;               // a cancel or a newer goal, in words; otherwise empty
+  std::string followed_by;                // a newer goal that begins later, in words
+  bool begins_later = false;              // its stamp lay ahead when it was accepted
   std::string violated;                   // a path tolerance, in words; empty: not violated
 };
 

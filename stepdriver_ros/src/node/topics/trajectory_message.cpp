@@ -50,22 +50,6 @@ axis::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point
   return converted;
 }
 
-std::vector<double> restingPositions(const machine::Machine& machine,
-                                     const std::vector<std::string>& axes, double delay) {
-  std::vector<double> positions;
-  for (const std::string& axis : axes) {
-    const axis::AxisState state = machine.axis(axis).state();
-    if (state.moving) {
-      throw Refused(
-          fmt::format("{}: it moves; a trajectory that starts later, {} s from now by its "
-                      "header.stamp, needs its axes at rest",
-                      axis, roundedText(delay)));
-    }
-    positions.push_back(state.position);
-  }
-  return positions;
-}
-
 }  // namespace
 
 AxisOfJoint axisOfJoint(const machine::Machine& machine) {
@@ -93,46 +77,26 @@ std::vector<std::string> axesOf(const std::vector<std::string>& joints, const Ax
   return found;
 }
 
-TimedTrajectory timedTrajectory(const trajectory_msgs::JointTrajectory& message,
-                                const AxisOfJoint& axes, ros::Time now) {
-  TimedTrajectory trajectory;
-  trajectory.request.names = axesOf(message.joint_names, axes);
+machine::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTrajectory& message,
+                                             const AxisOfJoint& axes, ros::Time now) {
+  machine::TrajectoryRequest request;
+  request.names = axesOf(message.joint_names, axes);
   if (message.points.empty()) throw BadTrajectory(Wrong::kInvalid, "it has no points");
   const double ahead = message.header.stamp.isZero() ? 0.0 : secondsFrom(now, message.header.stamp);
-  if (ahead > kShortestDelay) trajectory.delay = ahead;
+  if (ahead > kShortestDelay) request.begin_in = ahead;
   const double late = std::max(0.0, -ahead);
   for (std::size_t i = 0; i < message.points.size(); ++i) {
-    trajectory.request.points.push_back(pointOf(message.points[i], timeOf(message, i, late)));
+    request.points.push_back(pointOf(message.points[i], timeOf(message, i, late)));
   }
-  return trajectory;
-}
-
-machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
-                                     const std::vector<double>& positions) {
-  machine::TrajectoryRequest request = trajectory.request;
-  auto first_to_come = request.points.begin();
-  if (first_to_come->time == 0.0 && request.points.size() > 1) ++first_to_come;
-  for (auto point = first_to_come; point != request.points.end(); ++point) {
-    point->time += trajectory.delay;
-  }
-  axis::TrajectoryPoint rest;
-  rest.time = trajectory.delay;
-  rest.positions = positions;
-  rest.velocities.resize(positions.size());
-  rest.accelerations.resize(positions.size());
-  request.points.insert(first_to_come, rest);
-  request.wait = trajectory.delay;
   return request;
 }
 
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,
                                        const AxisOfJoint& axes, bool allow_slower) {
-  TimedTrajectory trajectory = timedTrajectory(message, axes, ros::Time::now());
-  trajectory.request.allow_slower = allow_slower;
-  if (trajectory.delay == 0.0) return machine.followTrajectory(trajectory.request);
-  return machine.followTrajectory(
-      withDelay(trajectory, restingPositions(machine, trajectory.request.names, trajectory.delay)));
+  machine::TrajectoryRequest request = trajectoryRequest(message, axes, ros::Time::now());
+  request.allow_slower = allow_slower;
+  return machine.followTrajectory(request);
 }
 
 }  // namespace stepdriver::ros_node

@@ -38,34 +38,19 @@ AxisOfJoint axisOfJoint(const machine::Machine& machine);
 /// @throw BadTrajectory if a joint is unknown or named twice, or none is named.
 std::vector<std::string> axesOf(const std::vector<std::string>& joints, const AxisOfJoint& axes);
 
-/// A trajectory's message, translated for the axes.
-struct TimedTrajectory {
-  machine::TrajectoryRequest request;
-  double delay = 0.0;  ///< [s] until it starts; the request's times count from the start
-};
-
-/// Reads a message. The header's stamp gives the start of the trajectory; 0 means at once. A stamp
-/// in the past shortens the time to the points. A first point at time 0 only gives the start
-/// position, and is never too late if others follow. The machine checks the numbers and their
-/// count.
+/// Translates a message for the axes. The header's stamp gives the start of the trajectory; 0 means
+/// at once. A stamp in the past shortens the time to the points. A first point at time 0 only gives
+/// the start position, and is never too late if others follow. The machine checks the numbers and
+/// their count.
 ///
 /// @throw BadTrajectory
-TimedTrajectory timedTrajectory(const trajectory_msgs::JointTrajectory& message,
-                                const AxisOfJoint& axes, ros::Time now);
+machine::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTrajectory& message,
+                                             const AxisOfJoint& axes, ros::Time now);
 
-/// Adds the rest before the start of a trajectory; a first point at time 0 still gives the start
-/// position.
-///
-/// @param positions [unit] of its axes.
-machine::TrajectoryRequest withDelay(const TimedTrajectory& trajectory,
-                                     const std::vector<double>& positions);
-
-/// Makes the machine follow a message. A delayed trajectory keeps its axes at rest until its start;
-/// stops and later commands end that like a motion.
+/// Makes the machine follow a message.
 ///
 /// @param allow_slower see machine::TrajectoryRequest.
-/// @throw BadTrajectory; Refused as Machine::followTrajectory(), and if the trajectory is delayed
-///   and one of its axes moves.
+/// @throw BadTrajectory; Refused as Machine::followTrajectory().
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,
                                        const AxisOfJoint& axes, bool allow_slower);
