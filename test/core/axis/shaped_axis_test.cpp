@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,6 +19,8 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "support/bench.h"
 #include "support/corexy_bench.h"
+#include "support/differences.h"
+#include "support/gantry_bench.h"
 #include "support/motion_trace.h"
 
 // Axes whose motions are shaped, by the edges on the rig's lines. The frame that they pull along by
@@ -326,6 +329,221 @@ TEST(ShapedAxis, AxesThatShareMotorsAreShapedOneByOne) {
   EXPECT_NEAR(bench.report("x").carriage, 20.0, 1e-6);
   EXPECT_NEAR(bench.report("y").carriage, -10.0, 1e-6);
   EXPECT_EQ(violationsOf(bench.report("x")), "");
+}
+
+// ---- several axes, streams ----
+
+using machine::CoordinatedMove;
+using machine::PathRequest;
+using machine::PathSegment;
+using machine::SetpointMode;
+using machine::TrajectoryRequest;
+using Together = std::function<CoordinatedMove(machine::Machine&)>;
+
+std::vector<Together> motionsOfTwoAxes() {
+  const auto follow = [](const TrajectoryRequest& request) {
+    return [request](machine::Machine& machine) { return machine.followTrajectory(request); };
+  };
+  TrajectoryRequest later{{"x", "y"}, {{0.3, {0.01, 0.02}, {0.0, 0.0}, {}}}};
+  later.begin_in = 0.2;
+  PathRequest path{{"x", "y"}, {}, false, 0.0, 0.001};
+  path.segments.resize(2);
+  path.segments[0].end = {0.02, 0.0};
+  path.segments[1].end = {0.02, 0.01};
+  return {
+      [](machine::Machine& machine) {
+        return machine.moveLine({{"x", "y"}, {0.02, 0.01}});
+      },
+      follow({{"x", "y"}, {{0.5, {0.02, 0.01}, {}, {}}}}),
+      follow({{"x", "y"}, {{0.3, {0.02, 0.01}, {}, {}}, {0.6, {0.01, 0.0}, {}, {}}}}),
+      follow({{"x", "y"}, {{0.3, {0.01, 0.02}, {0.0, 0.0}, {}}}}),
+      follow(later),
+      [path](machine::Machine& machine) { return machine.followPath(path); },
+  };
+}
+
+TEST(ShapedAxis, WhatSeveralAxesDoIsAnnouncedWithTheTimeOfTheShaper) {
+  for (const Together& begin : motionsOfTwoAxes()) {
+    Bench as_planned({plain("x"), plain("y")});
+    const double planned = begin(*as_planned.machine).duration;
+    Bench bench({shaped("x"), plain("y")});
+    const CoordinatedMove move = begin(*bench.machine);
+    EXPECT_NEAR(move.duration, planned + shaperTime(), 1e-9);
+    const std::int64_t begun = bench.clock.now();
+    const machine::CoordinatedResult result = bench.machine->wait(move);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    EXPECT_NEAR(result.duration, move.duration, 1e-8);
+    EXPECT_LE(lastPulse(bench), begun + std::llround((0.3 + move.duration) * 1e9));
+    expectClean(bench);
+  }
+}
+
+// Fed at 100 Hz: a ramp that ends after two and a half oscillations.
+void streamRamp(Bench& bench, SetpointMode mode) {
+  for (int i = 1; i <= 30; ++i) {
+    const double t = std::min(0.01 * i, 0.13);
+    const double value = mode == SetpointMode::kPosition ? 0.2 * t : (0.01 * i < 0.13 ? 0.2 : 0.0);
+    const auto refusals = bench.machine->followSetpoints(mode, 0.1, {{"x", value, {}}});
+    EXPECT_EQ(refusals.front(), "");
+    bench.machine->advance(0.01);
+  }
+}
+
+TEST(ShapedAxis, AStreamOfSetpointsIsShapedAndKeepsTheLimits) {
+  for (const SetpointMode mode : {SetpointMode::kPosition, SetpointMode::kVelocity}) {
+    const auto after_stream = [mode](const config::AxisConfig& config) {
+      Bench bench({config});
+      streamRamp(bench, mode);
+      expectClean(bench);
+      EXPECT_FALSE(bench.axis().state().moving);
+      std::vector<test::Crossing> crossings;
+      std::int64_t before = 0;
+      for (const auto& step : test::MotionTrace(bench).steps("x")) {
+        crossings.push_back(
+            {std::llround(step.time * 1e9), static_cast<double>(before + step.count) / 2.0});
+        before = step.count;
+      }
+      const test::Differences found = test::differencesOf(crossings, 0.004);
+      EXPECT_LE(found.speed, 0.25 * kScale * 1.001);
+      EXPECT_LE(found.acceleration, 25.0 * kScale * 1.01);
+      return ringing(bench, bench.clock.now());
+    };
+    const double without = after_stream(plain());
+    EXPECT_GT(without, 100.0);
+    EXPECT_LE(after_stream(shaped()), 0.01 * without);
+  }
+}
+
+TEST(ShapedAxis, BothMotorsOfAnAxisAreShaped) {
+  const auto after_move = [](bool is_shaped) {
+    config::AxisConfig config = test::gantryAxis();
+    config.max_speed = 0.1;
+    config.acceleration = config.deceleration = 10.0;
+    if (is_shaped) config.input_shaper = shaped().input_shaper;
+    Bench bench({config}, test::rigMotors(config));
+    const axis::Move move = bench.axis("y").moveTo(0.1 * 2.5 / kFrequency);
+    EXPECT_EQ(bench.axis("y").wait(move).end, MoveEnd::kReached);
+    if (!is_shaped) bench.machine->advance(shaperTime());
+    EXPECT_EQ(bench.pulses("y"), bench.pulses("y.right"));
+    EXPECT_EQ(violationsOf(bench.report("y.right")), "");
+    return std::pair(ringing(bench, bench.clock.now(), "y"),
+                     ringing(bench, bench.clock.now(), "y.right"));
+  };
+  const auto [left, right] = after_move(false);
+  const auto [shaped_left, shaped_right] = after_move(true);
+  EXPECT_GT(std::min(left, right), 50.0);
+  EXPECT_LE(shaped_left, 0.01 * left);
+  EXPECT_LE(shaped_right, 0.01 * right);
+}
+
+constexpr double kRadius = 0.02;  // m
+
+// Two turns around (-kRadius, 0).
+PathRequest circle() {
+  PathRequest path{{"x", "y"}, {}, false, 0.25, 0.0001};
+  PathSegment turn;
+  turn.shape = PathSegment::Shape::kArcAround;
+  turn.plane = {"x", "y"};
+  turn.point = {-kRadius, 0.0};
+  turn.end = {0.0, 0.0};
+  path.segments = {turn, turn};
+  return path;
+}
+
+struct Pulse {
+  double time;
+  double x;
+  double y;
+};
+
+std::vector<Pulse> pulsesOf(Bench& bench) {
+  std::vector<Pulse> pulses;
+  const test::MotionTrace trace(bench);
+  for (const std::string axis : {"x", "y"}) {
+    for (const auto& step : trace.steps(axis)) {
+      const double place = static_cast<double>(step.count) / kScale;
+      pulses.push_back(
+          {step.time, axis == "x" ? place : std::nan(""), axis == "y" ? place : std::nan("")});
+    }
+  }
+  std::sort(pulses.begin(), pulses.end(),
+            [](const Pulse& a, const Pulse& b) { return a.time < b.time; });
+  Pulse now{0.0, 0.0, 0.0};
+  for (Pulse& pulse : pulses) {
+    if (std::isnan(pulse.x)) pulse.x = now.x;
+    if (std::isnan(pulse.y)) pulse.y = now.y;
+    now = pulse;
+  }
+  return pulses;
+}
+
+// At the angular velocity w, a shaped circle is a circle again, whose radius is smaller by the
+// factor |A1 + A2 exp(-i w t2)|.
+TEST(ShapedAxis, ACircleIsAsMuchSmallerAsItsClosedFormSaysAndDoesNotRing) {
+  const auto after_path = [](const config::AxisConfig& x, const config::AxisConfig& y) {
+    Bench bench({x, y});
+    const CoordinatedMove move = bench.machine->followPath(circle());
+    EXPECT_EQ(bench.machine->wait(move).end, MoveEnd::kReached);
+    if (x.input_shaper.empty()) bench.machine->advance(shaperTime());
+    expectClean(bench, "x");
+    expectClean(bench, "y");
+    const double left =
+        std::max(ringing(bench, bench.clock.now(), "x"), ringing(bench, bench.clock.now(), "y"));
+    return std::pair(left, pulsesOf(bench));
+  };
+  const auto [without, exact] = after_path(plain("x"), plain("y"));
+  const auto [with, smaller] = after_path(shaped("x"), shaped("y"));
+  EXPECT_GT(without, 100.0);
+  EXPECT_LE(with, 0.01 * without);
+  const auto shaper = motor::inputShaperOf(shaped());
+  ASSERT_EQ(shaper->impulses().size(), 2U);
+  const double a1 = shaper->impulses()[0].part;
+  const double a2 = shaper->impulses()[1].part;
+  const double angle = 0.25 / kRadius * static_cast<double>(shaper->impulses()[1].delay_ns) * 1e-9;
+  const double radius = kRadius * std::sqrt(a1 * a1 + a2 * a2 + 2.0 * a1 * a2 * std::cos(angle));
+  EXPECT_LT(radius, kRadius - 0.0002);
+  constexpr double kHalfMicrosteps = 0.71 / kScale;
+  const auto expectRadius = [](const std::vector<Pulse>& pulses, double wanted) {
+    const double begin = pulses.front().time;
+    const double duration = pulses.back().time - begin;
+    for (const Pulse& pulse : pulses) {
+      const double part = (pulse.time - begin) / duration;
+      if (part < 0.2 || part > 0.8) continue;
+      ASSERT_NEAR(std::hypot(pulse.x + kRadius, pulse.y), wanted, kHalfMicrosteps + 1e-7);
+    }
+  };
+  expectRadius(exact, kRadius);
+  expectRadius(smaller, radius);
+}
+
+TEST(ShapedAxis, ACornerIsRoundedByAtMostTheToleranceAndWhatTheShaperAdds) {
+  constexpr double kTolerance = 0.0002;
+  PathRequest path{{"x", "y"}, {}, false, 0.0, kTolerance};
+  path.segments.resize(2);
+  path.segments[0].end = {0.03, 0.0};
+  path.segments[1].end = {0.03, 0.03};
+  const auto farthest = [&path](const config::AxisConfig& x, const config::AxisConfig& y) {
+    Bench bench({x, y});
+    EXPECT_EQ(bench.machine->wait(bench.machine->followPath(path)).end, MoveEnd::kReached);
+    expectClean(bench, "x");
+    expectClean(bench, "y");
+    double worst = 0.0;
+    for (const Pulse& pulse : pulsesOf(bench)) {
+      worst = std::max(worst, std::min(std::abs(pulse.y), std::abs(0.03 - pulse.x)));
+    }
+    return worst;
+  };
+  const auto shaper = motor::inputShaperOf(shaped());
+  const double a2 = shaper->impulses()[1].part;
+  const double t2 = static_cast<double>(shaper->impulses()[1].delay_ns) * 1e-9;
+  const double lag = a2 * t2;
+  const double bound =
+      20.0 / 2.0 * ((1.0 - a2) * lag * lag + a2 * (t2 - lag) * (t2 - lag));  // each axis
+  const double plainly = farthest(plain("x"), plain("y"));
+  const double worst = farthest(shaped("x"), shaped("y"));
+  EXPECT_LE(plainly, kTolerance + 1.0 / kScale);
+  EXPECT_GT(worst, plainly);
+  EXPECT_LE(worst, kTolerance + bound + 1.0 / kScale);
 }
 
 }  // namespace
