@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -338,6 +339,52 @@ TEST_F(PathQueue, EndsWithEverythingThatEndsAPath) {
       EXPECT_EQ(bench->pulses("x"), x) << "it moved after its end";
       expectAtRest();
     }
+  }
+}
+
+TEST_F(PathQueue, EndsAtAnEndstopOfOneOfItsAxes) {
+  begin(test::circle(), 20);
+  advance(0.15);
+  feed(20);
+  sim::RigFaults closed;
+  closed.max_stuck = true;
+  bench->rig.setFaults("y", closed);
+  const CoordinatedResult result = machine().wait(move_);
+  EXPECT_EQ(result.end, MoveEnd::kEndstopMax);
+  EXPECT_NE(result.message.find("y stands at"), std::string::npos) << result.message;
+  const auto x = bench->pulses("x");
+  EXPECT_REFUSED(feed(20), "doesn't continue");
+  advance(0.5);
+  EXPECT_EQ(bench->pulses("x"), x);
+  // The next path begins from there.
+  bench->rig.setFaults("y", {});
+  EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}}).end, MoveEnd::kReached);
+  expectAtRest();
+}
+
+TEST_F(PathQueue, EndsAtAFaultOfOneOfItsAxesInMotionAndWhenItContinues) {
+  for (const bool starved : {false, true}) {
+    build({plotterAxis("x"), plotterAxis("y")});
+    begin(test::circle(), 20);
+    if (starved) {
+      awaitRest();
+    } else {
+      advance(0.15);
+    }
+    bench->rig.failWrites("y.step", 0, EIO);
+    feed(20);
+    const CoordinatedResult result = machine().wait(move_);
+    EXPECT_EQ(result.end, MoveEnd::kFault) << result.message;
+    EXPECT_NE(result.message.find("y.step"), std::string::npos) << result.message;
+    EXPECT_REFUSED(feed(20), "doesn't continue");
+    const auto x = bench->pulses("x");
+    advance(0.5);
+    EXPECT_EQ(bench->pulses("x"), x);
+    bench->rig.clearWriteFault("y.step");
+    machine().recover();
+    EXPECT_REFUSED(feed(20), "doesn't continue");
+    advance(0.5);
+    EXPECT_EQ(bench->pulses("x"), x) << "nothing of it is left after a recover";
   }
 }
 
