@@ -78,7 +78,7 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
 /// The last act of a run moves each axis by 2 mm in two minutes, so the limits are at least that
 /// high.
 Act readAct(Input& input) {
-  constexpr std::size_t kKinds = 11;
+  constexpr std::size_t kKinds = 14;
   const std::size_t kind = input.any(kKinds);
   const std::size_t axis = input.any(search::kAxes);
   switch (kind) {
@@ -151,6 +151,29 @@ Act readAct(Input& input) {
               [=](Participants& all, int client) {
                 all.postTrajectory(client, {axis, other}, size);
               }};
+    }
+    case 10: {
+      const double size = input.number(0.012);
+      const std::size_t other = (axis + 1) % search::kAxes;
+      return {fmt::format("trajectory of {} and {} that begins later, {}", axis, other, size),
+              [=](Participants& all, int client) {
+                all.postLaterTrajectory(client, {axis, other}, size);
+              }};
+    }
+    case 11: {
+      const double size = input.number(0.012);
+      const std::size_t other = (axis + 1) % search::kAxes;
+      return {fmt::format("path of {} and {} that is fed, {}", axis, other, size),
+              [=](Participants& all, int client) {
+                all.postPath(client, {axis, other}, size);
+              }};
+    }
+    case 12: {
+      const double size = input.number(0.012);
+      const bool is_last = input.any(2) == 1;
+      return {
+          fmt::format("append to the path of {}, {}{}", axis, size, is_last ? ", the last" : ""),
+          [=](Participants& all, int client) { all.appendToPath(client, axis, size, is_last); }};
     }
     default: {
       const int microsteps = static_cast<int>(input.any(34)) - 1;

@@ -18,9 +18,10 @@ double RandomCommands::velocity(const axis::Axis& axis) {
 }
 
 // There and back, from wherever the axes are: many are refused because of that.
-void RandomCommands::trajectory() {
+void RandomCommands::trajectory(double begin_in) {
   machine::TrajectoryRequest request;
   request.names = names_;
+  request.begin_in = begin_in;
   for (int i = 1; i <= 2; ++i) {
     axis::TrajectoryPoint point;
     point.time = 0.8 * i;
@@ -36,16 +37,57 @@ void RandomCommands::trajectory() {
   machine_.followTrajectory(request);
 }
 
+// Small squares around wherever the axes are.
+void RandomCommands::beginPath() {
+  machine::PathRequest request;
+  request.names = names_;
+  request.relative = true;
+  request.tolerance = random_.within(0.0, 0.001);
+  request.more_follows = random_.chance(0.8);
+  for (const double way : {0.004, 0.0, -0.004}) {
+    machine::PathSegment& segment = request.segments.emplace_back();
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      segment.end.push_back(i % 2 == 0 ? way : way * way * 500.0);
+    }
+  }
+  path_ = machine_.followPath(request).id();
+}
+
+void RandomCommands::appendToPath() {
+  machine::PathAppend append{path_, {}, random_.chance(0.7)};
+  for (int i = 0; i < 3; ++i) {
+    machine::PathSegment& segment = append.segments.emplace_back();
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      segment.end.push_back(random_.within(-0.005, 0.005));
+    }
+  }
+  machine_.appendPath(append);
+}
+
 std::string RandomCommands::choose() {
   struct Weighted {
     const char* name;
     std::int64_t weight;
   };
-  static constexpr Weighted kKinds[] = {
-      {"move", 30},  {"relative move", 8}, {"jog", 6},      {"line", 16},  {"trajectory", 8},
-      {"plan", 2},   {"stop", 4},          {"stop all", 1}, {"hold", 2},   {"resume", 10},
-      {"speed", 4},  {"limits", 2},        {"disable", 1},  {"enable", 8}, {"emergency stop", 1},
-      {"recover", 8}};
+  static constexpr Weighted kKinds[] = {{"move", 30},
+                                        {"relative move", 8},
+                                        {"jog", 6},
+                                        {"line", 16},
+                                        {"trajectory", 8},
+                                        {"plan", 2},
+                                        {"stop", 4},
+                                        {"stop all", 1},
+                                        {"hold", 2},
+                                        {"resume", 10},
+                                        {"speed", 4},
+                                        {"limits", 2},
+                                        {"disable", 1},
+                                        {"enable", 8},
+                                        {"emergency stop", 1},
+                                        {"recover", 8},
+                                        {"later trajectory", 6},
+                                        {"path", 6},
+                                        {"append", 8}};
   std::int64_t sum = 0;
   for (const Weighted& kind : kKinds) sum += kind.weight;
   std::int64_t left = random_.whole(0, sum - 1);
@@ -68,7 +110,10 @@ void RandomCommands::send() {
          for (std::size_t i = 0; i < names_.size(); ++i) places.push_back(place());
          machine_.moveLine({names_, std::move(places)});
        }},
-      {"trajectory", [&] { trajectory(); }},
+      {"trajectory", [&] { trajectory(0.0); }},
+      {"later trajectory", [&] { trajectory(random_.within(0.001, 1.0)); }},
+      {"path", [&] { beginPath(); }},
+      {"append", [&] { appendToPath(); }},
       {"plan", [&] { axis.plan(place(), false, 0.0); }},
       {"stop", [&] { axis.stop(); }},
       {"stop all", [&] { machine_.stop(); }},

@@ -38,12 +38,16 @@ class RandomCommands {
   double place() { return random_.within(-kReach, kReach); }
   double velocity(const axis::Axis& axis);
   axis::Axis& anyAxis();
-  void trajectory();
+  /// @param begin_in [s] whatever the axes do until then
+  void trajectory(double begin_in);
+  void beginPath();
+  void appendToPath();
 
   machine::Machine& machine_;
   const std::vector<std::string> names_;
   motion::Random random_;
   Counts counts_;
+  std::uint64_t path_ = 0;  // the last one; 0: there was none
 };
 
 }  // namespace stepdriver::soak

@@ -5,6 +5,8 @@
 #include <std_msgs/Float64MultiArray.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
+#include <stepdriver/AppendPath.h>
+#include <stepdriver/FollowPath.h>
 #include <stepdriver/Home.h>
 #include <stepdriver/HomeAxes.h>
 #include <stepdriver/Jog.h>
@@ -13,6 +15,7 @@
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/PathSegment.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
 #include <stepdriver/SpeedOverride.h>
@@ -189,12 +192,17 @@ void DriverTopics::command(int client, const std::vector<std::size_t>& axes,
 }
 
 void DriverTopics::followTrajectory(int client, const std::vector<std::size_t>& axes,
-                                    const std::vector<double>& positions, double duration) {
+                                    const std::vector<double>& positions, double duration,
+                                    double ahead) {
   TrajectoryGoal goal;
   goal.goal.trajectory = trajectoryOf(axes, positions, duration);
-  Request request = messageOf(
-      client, setOf(axes),
-      "follow_joint_trajectory" + shown(axes, positions) + " in " + shown(duration) + " s");
+  std::string text =
+      "follow_joint_trajectory" + shown(axes, positions) + " in " + shown(duration) + " s";
+  if (ahead > 0.0) {
+    goal.goal.trajectory.header.stamp = ros::Time::now() + ros::Duration(ahead);
+    text += ", " + shown(ahead) + " s ahead";
+  }
+  Request request = messageOf(client, setOf(axes), text);
   request.is_trajectory = true;
   goal.goal_id.id = std::to_string(log_.begin(request));
   trajectory_goal_.publish(goal);
@@ -284,6 +292,48 @@ bool DriverCalls::moveLine(const std::vector<std::size_t>& axes,
         }
         return arrivals;
       });
+}
+
+namespace {
+
+std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size) {
+  std::vector<stepdriver::PathSegment> segments(3);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      segments[i].end.push_back((i + axis) % 2 == 0 ? size : -size / 2.0);
+    }
+  }
+  return segments;
+}
+
+}  // namespace
+
+std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, double size,
+                                      bool more_follows) {
+  stepdriver::FollowPath service;
+  for (const std::size_t axis : axes) service.request.name.push_back(kAxisNames.at(axis));
+  service.request.segments = zigzag(axes.size(), size);
+  service.request.relative = true;
+  service.request.tolerance = 0.0005;
+  service.request.more_follows = more_follows;
+  Request request = requestOf(Kind::kMotion, setOf(axes), "follow_path of " + shown(size), false);
+  request.is_path = true;
+  std::uint64_t path = 0;
+  call(request, "follow_path", service, [&path](const stepdriver::FollowPath::Response& response) {
+    path = response.path;
+    return std::vector<Arrival>();
+  });
+  return path;
+}
+
+bool DriverCalls::appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
+                             bool more_follows) {
+  stepdriver::AppendPath service;
+  service.request.path = path;
+  service.request.segments = zigzag(axes.size(), size);
+  service.request.more_follows = more_follows;
+  return call(requestOf(Kind::kOther, 0U, "append_path of " + shown(size), false), "append_path",
+              service);
 }
 
 bool DriverCalls::home(std::size_t axis, bool wait) {

@@ -26,8 +26,9 @@ class DriverTopics {
   void setpoints(int client, const std::vector<double>& positions);
   void command(int client, const std::vector<std::size_t>& axes,
                const std::vector<double>& positions, double duration);
+  /// @param ahead [s] how far ahead its stamp lies; 0: none
   void followTrajectory(int client, const std::vector<std::size_t>& axes,
-                        const std::vector<double>& positions, double duration);
+                        const std::vector<double>& positions, double duration, double ahead);
   void cancelTrajectories();
   void moveByAction(int client, std::size_t axis, double position, bool relative);
   void cancelMove(std::size_t axis);
@@ -70,6 +71,10 @@ class DriverCalls {
   bool moveRounds(std::size_t axis, double rounds, bool wait);
   bool moveLine(const std::vector<std::size_t>& axes, const std::vector<double>& positions,
                 bool relative, double duration, bool wait);
+  /// A zigzag of three lines around the positions of the axes. @return its number; 0: refused
+  std::uint64_t followPath(const std::vector<std::size_t>& axes, double size, bool more_follows);
+  bool appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
+                  bool more_follows);
   bool home(std::size_t axis, bool wait);
   bool homeAll(bool wait);
   bool microstep(std::size_t axis, int microsteps);

@@ -18,6 +18,7 @@ constexpr std::int64_t kArrival = 250 * kMillisecond;
 constexpr double kStopMargin = 1.1;
 /// A trajectory keeps half of the limits here, so that its path leaves the other half for a stop.
 constexpr double kTrajectoryStops = 2.0;
+constexpr double kPathStops = 3.0;
 constexpr std::int64_t kLongestTrajectory = 20'000 * kMillisecond;
 constexpr double kPositionError = 0.05;  // [1/16 steps]
 /// Half a step of the coarsest mode in use, and a margin.
@@ -70,6 +71,7 @@ class Stalls {
 /// The requests to an axis, as far as a lookup by time needs them.
 struct AxisRequests {
   std::vector<std::int64_t> trajectories;  // times at which trajectories were sent
+  std::vector<std::int64_t> paths;         // and paths
   std::vector<const Request*> renamings;   // requests that may change the origin of its positions
 };
 
@@ -86,6 +88,7 @@ class Judge {
       for (std::size_t axis = 0; axis < of_axis_.size(); ++axis) {
         if (!isOf(request, axis)) continue;
         if (request.is_trajectory) of_axis_[axis].trajectories.push_back(request.sent);
+        if (request.is_path) of_axis_[axis].paths.push_back(request.sent);
         if (request.kind == Kind::kSetPosition || request.kind == Kind::kHoming) {
           of_axis_[axis].renamings.push_back(&request);
         }
@@ -221,10 +224,16 @@ class Judge {
     double seconds = 0.0;
     // Axes that move together stop as slowly as the slowest of them.
     for (const AxisFacts& facts : seen_.axes) seconds = std::max(seconds, facts.longest_stop);
-    const auto& trajectories = of_axis_[axis].trajectories;
-    const auto recent = std::lower_bound(trajectories.begin(), trajectories.end(),
-                                         ending.sent - kLongestTrajectory);
-    if (recent != trajectories.end() && *recent <= *ending.answered) seconds *= kTrajectoryStops;
+    const auto any = [&ending](const std::vector<std::int64_t>& sent) {
+      const auto recent =
+          std::lower_bound(sent.begin(), sent.end(), ending.sent - kLongestTrajectory);
+      return recent != sent.end() && *recent <= *ending.answered;
+    };
+    if (any(of_axis_[axis].paths)) {
+      seconds *= kPathStops;
+    } else if (any(of_axis_[axis].trajectories)) {
+      seconds *= kTrajectoryStops;
+    }
     const std::int64_t longest = std::llround(seconds * kStopMargin * 1e9);
     // The rig's clock doesn't excuse a long stall: what is late in it, and all that comes after it,
     // is late by as much.

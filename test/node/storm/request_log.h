@@ -46,6 +46,7 @@ struct Request {
   bool has_answer = true;      ///< false: a message of a topic or an action, which nobody answers
   bool waits = false;          ///< it is answered when its motion has ended
   bool is_trajectory = false;  ///< its axes may stop more slowly
+  bool is_path = false;        ///< and still more slowly: it is at the limits everywhere
   std::int64_t sent = 0;
   std::optional<std::int64_t> answered;
   bool success = false;

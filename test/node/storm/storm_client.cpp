@@ -89,7 +89,18 @@ void StormClient::sendMotion() {
         if (chance(0.5)) {
           topics_.command(number_, axes, positions, duration);
         } else {
-          topics_.followTrajectory(number_, axes, positions, duration);
+          const double ahead = chance(0.5) ? between(0.05, 3.0) : 0.0;
+          topics_.followTrajectory(number_, axes, positions, duration, ahead);
+        }
+      },
+      [&] {
+        const auto axes = someAxes();
+        std::uint64_t path = calls_.followPath(axes, between(-kFarthest, kFarthest) / 3.0, true);
+        while (path != 0 && chance(0.7)) {
+          const bool more = chance(0.7);
+          pause(0.3);
+          if (!calls_.appendPath(path, axes, between(-kFarthest, kFarthest) / 3.0, more)) path = 0;
+          if (!more) path = 0;
         }
       },
       [&] { jog(); },
