@@ -378,7 +378,7 @@ TEST_F(TrajectoryActionTest, TakesOverFromATrajectoryWhenItsStampSays) {
   EXPECT_EQ(await(), State::PREEMPTED) << said();
   ASSERT_TRUE(other.waitForResult(ros::Duration(kBound.count())));
   EXPECT_EQ(other.getState(), State::SUCCEEDED) << other.getResult()->error_string;
-  EXPECT_EQ(node.pulses(), 4800);
+  EXPECT_EQ(node.pulses(), 7200) << "of both axes";
   expectNoViolation();
 }
 
@@ -396,7 +396,7 @@ TEST_F(TrajectoryActionTest, ACancelBeforeItsStampLeavesTheMotionBeforeIt) {
   ASSERT_TRUE(other.waitForResult(ros::Duration(kBound.count())));
   EXPECT_EQ(other.getState(), State::PREEMPTED) << other.getResult()->error_string;
   EXPECT_EQ(await(), State::SUCCEEDED) << said();
-  EXPECT_EQ(node.pulses(), 6400);
+  EXPECT_EQ(node.pulses(), 9600) << "of both axes";
   expectNoViolation();
 }
 
