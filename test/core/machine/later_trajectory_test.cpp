@@ -209,7 +209,7 @@ INSTANTIATE_TEST_SUITE_P(
                 MoveEnd::kEmergencyStop, "emergency stop"},
         Between{"AMove", [](auto&, auto& m) { m.axis("y").moveTo(0.0, true); }, MoveEnd::kReplaced,
                 "another command took over"},
-        Between{"ALine",
+        Between{"ALineOfAnAxis",
                 [](auto&, auto& m) {
                   m.moveLine({{"x"}, {0.1}});
                 },
