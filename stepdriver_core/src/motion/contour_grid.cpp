@@ -10,7 +10,6 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kMostTurn = 0.12;           // [rad] of an interval
 constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an interval
 constexpr double kMostArcDeviation = 0.005;  // of the resolution
 constexpr double kLeastPart = 1e-9;          // of a segment
@@ -21,8 +20,8 @@ constexpr int kPartsOfCurve = 4;             // at least
 
 }  // namespace
 
-ContourGrid::ContourGrid(const Contour& contour, double begin)
-    : contour_(contour), axes_(contour.axes()) {
+ContourGrid::ContourGrid(const Contour& contour, double begin, double most_turn)
+    : contour_(contour), most_turn_(most_turn), axes_(contour.axes()) {
   ContourPoint start;
   contour.evaluate(0, begin, start);
   positions_ = std::move(start.position);
@@ -75,10 +74,12 @@ void ContourGrid::divide(std::size_t segment, double from, double to, int parts)
   }
 }
 
-std::vector<std::size_t> ContourGrid::quarter(const std::vector<bool>& which) {
+std::vector<std::size_t> ContourGrid::divideEach(const std::vector<bool>& which,
+                                                 std::size_t parts) {
   const ContourGrid before = std::move(*this);
   axes_ = before.axes_;
-  const auto more = 3 * static_cast<std::size_t>(std::count(which.begin(), which.end(), true));
+  const auto more =
+      (parts - 1) * static_cast<std::size_t>(std::count(which.begin(), which.end(), true));
   intervals_.clear();
   derivatives_.clear();
   intervals_.reserve(before.size() + more);
@@ -88,7 +89,7 @@ std::vector<std::size_t> ContourGrid::quarter(const std::vector<bool>& which) {
   stops_.assign(1, false);
   std::vector<std::size_t> origins;
   origins.reserve(before.size() + more);
-  std::array<Place, 9> places;
+  std::vector<Place> places(2 * parts + 1);  // with the middles of the parts
   for (std::size_t i = 0; i < before.size(); ++i) {
     giveWayAt(i);
     const Interval& interval = before[i];
@@ -223,7 +224,7 @@ bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& 
     second += (c - b) * (c - b);
   }
   const double turn = std::sqrt(first) + std::sqrt(second);
-  if (turn > kMostTurn) return true;
+  if (turn > most_turn_) return true;
   // Of a cubic from an arc of this length and turn, at a constant speed.
   const double length = middle.rate * (end.parameter - begin.parameter);
   return length * turn * turn * turn / 384.0 > kMostArcDeviation * contour_.resolution();

@@ -20,8 +20,15 @@ inline void giveWayAt(std::size_t place) {
 /// straight part is one interval. Only one thread uses it at a time.
 class ContourGrid {
  public:
+  /// @name [rad] By how much an interval turns at most, for the acceleration along it
+  /// @{
+  static constexpr double kTurnOfEvenSpeed = 0.12;        ///< constant
+  static constexpr double kTurnOfEvenAcceleration = 0.2;  ///< such that those of the axes are
+  /// @}
+
   /// @param begin the parameter of the first segment at which it begins.
-  explicit ContourGrid(const Contour& contour, double begin = 0.0);
+  explicit ContourGrid(const Contour& contour, double begin = 0.0,
+                       double most_turn = kTurnOfEvenSpeed);
 
   struct Interval {
     double length = 0.0;  ///< [unit]
@@ -31,10 +38,10 @@ class ContourGrid {
     double to = 0.0;
   };
 
-  /// Divides some of the intervals that aren't straight, each into four.
+  /// Divides some of the intervals that aren't straight, each into this many.
   ///
   /// @return the former index of each interval.
-  std::vector<std::size_t> quarter(const std::vector<bool>& which);
+  std::vector<std::size_t> divideEach(const std::vector<bool>& which, std::size_t parts);
 
   /// With straight intervals divided at some distances from the start.
   ///
@@ -92,6 +99,7 @@ class ContourGrid {
   void withRespectToLength(const Place& place, double* first, double* second) const;
 
   const Contour& contour_;
+  double most_turn_;
   std::size_t axes_;
   std::vector<Interval> intervals_;
   std::vector<double> positions_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -15,7 +17,10 @@ namespace {
 // [s] Knots aren't closer than this, so that rounded times and positions don't change
 // accelerations. In such a time an acceleration makes no difference to the position.
 constexpr double kShortestPiece = 20e-6;
-constexpr int kMostPlans = 12;
+// What exceeds a limit after so many plans slows the whole motion down; one that begins at a speed
+// can't be slowed down.
+constexpr int kMostPlans = 6;
+constexpr int kMostPlansFromSpeed = 12;
 // Of a limit: less is left for the whole motion to be slowed down by.
 constexpr double kSmallExcess = 1e-3;
 // Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
@@ -28,10 +33,19 @@ constexpr double kLowerBy = 1.005;
 constexpr double kFullUse = 0.94;
 constexpr double kMostSquareRatio = 1.5;
 constexpr double kSmallPart = 0.005;
-// Of a limit: if a cubic exceeds it by so much, its interval is divided.
+// If both ends of an interval are checked, and that lowers the speed by so much, it is divided,
+// unless it is too short even for that.
+constexpr double kMostLoss = 1.02;
+constexpr double kSmallestPart = 1e-4;
+// Of a limit: if a cubic exceeds it by so much, both ends of its interval are checked, and it is
+// divided if that is still possible.
 constexpr double kPoorCubic = 1.01;
+constexpr double kPoorLowered = 1.003;
+// Of the duration of an interval with constant acceleration along it.
+constexpr double kMostStretch = 0.1;
 constexpr double kMostDeviation = 0.02;  // of the resolution
 constexpr int kMostDivisions = 4;
+constexpr std::size_t kPartsOfDivided = 2;
 
 // A straight part, from a speed to another one, and what lies between.
 struct Trapezoid {
@@ -56,14 +70,36 @@ Trapezoid trapezoidOf(double length, double begin_square, double end_square,
   return made;
 }
 
-// The knots of a planned speed.
+// The demands of a cubic on the axes, in parts of their limits: the largest of all axes.
+struct Demand {
+  double acceleration_at_begin = 0.0;
+  double acceleration_at_end = 0.0;
+  double speed = 0.0;
+
+  double acceleration() const { return std::max(acceleration_at_begin, acceleration_at_end); }
+};
+
+// The knots of a planned speed. What follows from the speeds at both ends of an interval is kept
+// until they change.
 class Knots {
  public:
-  explicit Knots(const ContourGrid& grid) : grid_(grid), axes_(grid.axes()) {}
+  Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits)
+      : grid_(grid), limits_(limits), axes_(grid.axes()), kept_(grid.size()) {}
+
+  /// After ContourGrid::divideEach(): its result, and what was divided.
+  void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided) {
+    std::vector<Kept> kept;
+    kept.reserve(origins.size());
+    for (const std::size_t origin : origins) {
+      kept.push_back(divided[origin] ? Kept{} : kept_[origin]);
+    }
+    kept_ = std::move(kept);
+  }
 
   void make(const ContourSpeed& speed) {
     time_ = 0.0;
     times_.clear();
+    places_.clear();
     intervals_.clear();
     rests_.clear();
     positions_.clear();
@@ -78,13 +114,23 @@ class Knots {
       if (grid_[i].straight) {
         appendStraight(i, speed);
       } else {
-        time_ += 2.0 * grid_[i].length / (begin + end);
+        if (begin != kept_[i].begin || end != kept_[i].end) {
+          kept_[i] = {begin, end, durationOf(i, begin, end), {}, false};
+        }
+        time_ += kept_[i].duration;
       }
       appendPlace(i + 1, time_, end, i);
       begin = end;
     }
   }
 
+  /// Of an interval that isn't straight.
+  double beginSpeed(std::size_t interval) const { return kept_[interval].begin; }
+  double endSpeed(std::size_t interval) const { return kept_[interval].end; }
+  double duration(std::size_t interval) const { return kept_[interval].duration; }  ///< [s]
+  /// Whether setFollows() has been called for its cubic.
+  bool follows(std::size_t interval) const { return kept_[interval].follows; }
+  void setFollows(std::size_t interval) { kept_[interval].follows = true; }
   std::size_t size() const { return times_.size(); }
   double time(std::size_t knot) const { return times_[knot]; }
   std::size_t interval(std::size_t knot) const { return intervals_[knot]; }
@@ -109,7 +155,82 @@ class Knots {
     return times_[static_cast<std::size_t>(later - intervals_.begin()) - 1];
   }
 
+  /// Of the cubic that ends at a knot.
+  Demand demand(std::size_t knot) {
+    const std::size_t place = places_[knot];
+    const bool whole = place != kNoPlace && places_[knot - 1] + 1 == place;
+    if (!whole || grid_[place - 1].straight) return cubicDemand(knot);
+    std::optional<Demand>& kept = kept_[place - 1].demand;
+    if (!kept) kept = cubicDemand(knot);
+    return *kept;
+  }
+
  private:
+  static constexpr std::size_t kNoPlace = std::numeric_limits<std::size_t>::max();
+
+  // Of an interval, if it isn't straight.
+  struct Kept {
+    double begin = -1.0;  // unit/s
+    double end = -1.0;
+    double duration = 0.0;  // s
+    std::optional<Demand> demand;
+    bool follows = false;
+  };
+
+  Demand cubicDemand(std::size_t knot) const {
+    const double duration = time(knot) - time(knot - 1);
+    Demand demand;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      const double way = position(knot, j) - position(knot - 1, j);
+      const double v0 = velocity(knot - 1, j);
+      const double v1 = velocity(knot, j);
+      const double mean = way / duration;
+      const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / duration;
+      const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / duration;
+      const int direction = directionOf(v0, v1);
+      const auto part = [&](double a) {
+        return std::abs(a) / accelerationTowards(limits_[j], direction, a > 0.0 ? 1 : -1);
+      };
+      demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
+      demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
+      double speed = std::max(std::abs(v0), std::abs(v1));
+      const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
+      if (turn > 0.0 && turn < 1.0) {
+        speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
+      }
+      demand.speed = std::max(demand.speed, speed / limits_[j].speed);
+    }
+    return demand;
+  }
+
+  // [s] The duration closest to T = 2 length/(begin + end), that of a constant s'', for which the
+  // accelerations at both ends of the cubic keep to their limits. For T (1 + e), they are
+  // a - 6 e way/T^2 at the begin and b + 6 e way/T^2 at the end, but for e^2. If there is none, the
+  // excess is the same at both limits.
+  double durationOf(std::size_t interval, double begin, double end) const {
+    const double even = 2.0 * grid_[interval].length / (begin + end);
+    double least = -kMostStretch;
+    double most = kMostStretch;
+    for (std::size_t j = 0; j < axes_; ++j) {
+      const double way = grid_.position(interval + 1)[j] - grid_.position(interval)[j];
+      const double v0 = grid_.firstAtBegin(interval)[j] * begin;
+      const double v1 = grid_.firstAtEnd(interval)[j] * end;
+      const double slope = 6.0 * way / (even * even);
+      const double at_begin = slope - (4.0 * v0 + 2.0 * v1) / even;
+      const double at_end = (2.0 * v0 + 4.0 * v1) / even - slope;
+      const int direction = directionOf(v0, v1);
+      const double up = accelerationTowards(limits_[j], direction, 1);
+      const double down = -accelerationTowards(limits_[j], direction, -1);
+      if (std::abs(slope) * kMostStretch < kSmallExcess * up) continue;
+      const auto by_begin = std::minmax({(at_begin - up) / slope, (at_begin - down) / slope});
+      const auto by_end = std::minmax({(down - at_end) / slope, (up - at_end) / slope});
+      least = std::max({least, by_begin.first, by_end.first});
+      most = std::min({most, by_begin.second, by_end.second});
+    }
+    const double stretch = least > most ? (least + most) / 2.0 : std::clamp(0.0, least, most);
+    return even * (1.0 + std::clamp(stretch, -kMostStretch, kMostStretch));
+  }
+
   void appendStraight(std::size_t interval, const ContourSpeed& speed) {
     const Trapezoid made =
         trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
@@ -130,7 +251,7 @@ class Knots {
     }
     const ContourGrid::Interval& of = grid_[interval];
     const double part = std::min(1.0, way / of.length);
-    append(time, interval, of.from + part * (of.to - of.from), speed, false);
+    append(time, interval, kNoPlace, of.from + part * (of.to - of.from), speed, false);
   }
 
   void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
@@ -142,7 +263,7 @@ class Knots {
       positions_.push_back(position[j]);
       velocities_.push_back(direction[j] * speed);
     }
-    append(time, interval, place == 0 ? grid_[0].from : grid_[interval].to, speed, rests);
+    append(time, interval, place, place == 0 ? grid_[0].from : grid_[interval].to, speed, rests);
   }
 
   // Of two knots that are too close to each other, one at rest stays, or else the earlier one.
@@ -151,6 +272,7 @@ class Knots {
     if (!rests || rests_.back()) return rests;
     times_.pop_back();
     intervals_.pop_back();
+    places_.pop_back();
     parameters_.pop_back();
     speeds_.pop_back();
     rests_.pop_back();
@@ -159,61 +281,30 @@ class Knots {
     return true;
   }
 
-  void append(double time, std::size_t interval, double parameter, double speed, bool rests) {
+  void append(double time, std::size_t interval, std::size_t place, double parameter, double speed,
+              bool rests) {
     times_.push_back(time);
     intervals_.push_back(interval);
+    places_.push_back(place);
     parameters_.push_back(parameter);
     speeds_.push_back(speed);
     rests_.push_back(rests);
   }
 
   const ContourGrid& grid_;
+  const std::vector<ContourLimits>& limits_;
   std::size_t axes_;
   double time_ = 0.0;
+  std::vector<Kept> kept_;  // of each interval
   std::vector<double> times_;
   std::vector<std::size_t> intervals_;  // of the grid, which end at the knot or contain it
+  std::vector<std::size_t> places_;     // or kNoPlace, within a straight part
   std::vector<double> parameters_;
   std::vector<double> speeds_;
   std::vector<bool> rests_;
   std::vector<double> positions_;
   std::vector<double> velocities_;
 };
-
-// The demands of a cubic on the axes, in parts of their limits: the largest of all axes.
-struct Demand {
-  double acceleration_at_begin = 0.0;
-  double acceleration_at_end = 0.0;
-  double speed = 0.0;
-
-  double acceleration() const { return std::max(acceleration_at_begin, acceleration_at_end); }
-};
-
-// Of the cubic that ends at a knot.
-Demand demandOf(const Knots& knots, std::size_t knot, const std::vector<ContourLimits>& limits) {
-  const double duration = knots.time(knot) - knots.time(knot - 1);
-  Demand demand;
-  for (std::size_t j = 0; j < limits.size(); ++j) {
-    const double way = knots.position(knot, j) - knots.position(knot - 1, j);
-    const double v0 = knots.velocity(knot - 1, j);
-    const double v1 = knots.velocity(knot, j);
-    const double mean = way / duration;
-    const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / duration;
-    const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / duration;
-    const int direction = directionOf(v0, v1);
-    const auto part = [&](double a) {
-      return std::abs(a) / accelerationTowards(limits[j], direction, a > 0.0 ? 1 : -1);
-    };
-    demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
-    demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
-    double speed = std::max(std::abs(v0), std::abs(v1));
-    const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
-    if (turn > 0.0 && turn < 1.0) {
-      speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
-    }
-    demand.speed = std::max(demand.speed, speed / limits[j].speed);
-  }
-  return demand;
-}
 
 // By what factor limits are exceeded; 1 if they aren't.
 struct Excess {
@@ -224,10 +315,7 @@ struct Excess {
 // Whether an interval is so long that the motion isn't close to any limit at one of its ends, or
 // that the highest speed differs much between them: a motion that is as fast as possible is at one
 // of its limits everywhere.
-bool wastesTime(const ContourGrid& grid, const ContourSpeed& speed, std::size_t interval,
-                const Demand& demand) {
-  if (grid[interval].straight) return false;
-  if (demand.acceleration() > kPoorCubic) return true;
+bool wastesTime(const ContourSpeed& speed, std::size_t interval, const Demand& demand) {
   const double begin = speed.square(interval);
   const double end = speed.square(interval + 1);
   const double begin_use = begin / speed.capAtBegin(interval);
@@ -256,9 +344,9 @@ double evenDeviation(const ContourGrid& grid, std::size_t interval, double begin
 // How far the middle of that cubic is from the contour [unit], at a right angle to the contour's
 // direction in the middle of the interval.
 double middleDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end,
-                       ContourPoint& middle) {
+                       double duration, ContourPoint& middle) {
   grid.evaluateMiddle(interval, middle);
-  const double eighth = 0.25 * grid[interval].length / (begin + end);  // of the duration
+  const double eighth = duration / 8.0;
   double off_square = 0.0;
   double along = 0.0;
   double rate_square = 0.0;
@@ -276,8 +364,7 @@ double middleDeviation(const ContourGrid& grid, std::size_t interval, double beg
 
 // Divides the intervals that deviate, and those that waste time, unless they take only a small part
 // of their segment's.
-bool divideLong(const Knots& knots, const std::vector<ContourLimits>& limits, double deviation,
-                ContourGrid& grid, ContourSpeed& speed) {
+bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots& knots) {
   std::vector<bool> divided(grid.size(), false);
   std::vector<double> times;  // of the segments
   for (std::size_t i = 1; i < knots.size(); ++i) {
@@ -287,32 +374,42 @@ bool divideLong(const Knots& knots, const std::vector<ContourLimits>& limits, do
   bool any = false;
   for (std::size_t i = 1; i < knots.size(); ++i) {
     const std::size_t interval = knots.interval(i);
-    const double time = knots.time(i) - knots.time(i - 1);
-    const Demand demand = demandOf(knots, i, limits);
-    const bool small = time < kSmallPart * times[grid[interval].segment];
-    if (small && demand.acceleration() < kPoorCubic) continue;
-    if (wastesTime(grid, speed, interval, demand)) divided[interval] = any = true;
+    if (grid[interval].straight) continue;
+    const double part = (knots.time(i) - knots.time(i - 1)) / times[grid[interval].segment];
+    const Demand demand = knots.demand(i);
+    const bool poor = demand.acceleration() > kPoorCubic;
+    if (poor) speed.checkBothEnds(interval);
+    if (poor || (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) ||
+        (part >= kSmallPart && wastesTime(speed, interval, demand))) {
+      divided[interval] = any = true;
+    }
   }
   ContourPoint middle;
   for (std::size_t i = 0; i < grid.size(); ++i) {
-    if (grid[i].straight || divided[i]) continue;
-    const double begin = std::sqrt(speed.square(i));
-    const double end = std::sqrt(speed.square(i + 1));
+    if (grid[i].straight || divided[i] || knots.follows(i)) continue;
+    const double begin = knots.beginSpeed(i);
+    const double end = knots.endSpeed(i);
     if (evenDeviation(grid, i, begin, end) > deviation ||
-        middleDeviation(grid, i, begin, end, middle) > deviation) {
+        middleDeviation(grid, i, begin, end, knots.duration(i), middle) > deviation) {
       divided[i] = any = true;
+    } else {
+      knots.setFollows(i);
     }
   }
-  if (any) speed.regrid(grid.quarter(divided), divided);
-  return any;
+  if (!any) return false;
+  const std::vector<std::size_t> origins = grid.divideEach(divided, kPartsOfDivided);
+  speed.regrid(origins, divided);
+  knots.regrid(origins, divided);
+  return true;
 }
 
-// Lowers the limits of the intervals of the cubics that exceed them; returns the largest excess.
-Excess lowerLimits(const Knots& knots, const std::vector<ContourLimits>& limits, double by_more,
-                   ContourSpeed& speed) {
+// Lowers the limits of the intervals of the cubics that exceed them, or has both ends of them
+// checked; returns the largest excess.
+Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, ContourSpeed& speed,
+                   Knots& knots) {
   Excess worst;
   for (std::size_t i = 1; i < knots.size(); ++i) {
-    const Demand demand = demandOf(knots, i, limits);
+    const Demand demand = knots.demand(i);
     const Excess excess{std::max(1.0, demand.acceleration()), std::max(1.0, demand.speed)};
     worst.acceleration = std::max(worst.acceleration, excess.acceleration);
     worst.speed = std::max(worst.speed, excess.speed);
@@ -321,7 +418,8 @@ Excess lowerLimits(const Knots& knots, const std::vector<ContourLimits>& limits,
     const std::size_t first = std::min(knots.interval(i - 1) + (i > 1 ? 1 : 0), last);
     const auto by = [&](double factor) { return factor > 1.0 ? factor * by_more : 1.0; };
     for (std::size_t k = first; k <= last; ++k) {
-      speed.lower(k, by(excess.acceleration), by(excess.speed));
+      const bool checks = excess.acceleration > poor && !grid[k].straight && speed.checkBothEnds(k);
+      speed.lower(k, checks ? 1.0 : by(excess.acceleration), by(excess.speed));
     }
   }
   return worst;
@@ -362,20 +460,26 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
 
 ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                         const ContourBegin& begin) {
-  ContourGrid grid(contour, begin.parameter);
-  ContourSpeed speed(contour, grid, limits, begin.speed * begin.speed);
-  Knots knots(grid);
+  ContourGrid grid(contour, begin.parameter, ContourGrid::kTurnOfEvenAcceleration);
+  ContourSpeed speed(contour, grid, limits, begin.speed * begin.speed, CheckedAcceleration::kMean);
+  Knots knots(grid, limits);
   for (int i = 0; i < kMostDivisions; ++i) {
     speed.plan();
     knots.make(speed);
-    if (!divideLong(knots, limits, kMostDeviation * contour.resolution(), grid, speed)) break;
+    if (!divideLong(kMostDeviation * contour.resolution(), grid, speed, knots)) break;
   }
+  const int most_plans = begin.speed > 0.0 ? kMostPlansFromSpeed : kMostPlans;
   for (int plans = 1;; ++plans) {
     speed.plan();
     knots.make(speed);
-    const Excess excess = lowerLimits(knots, limits, plans == 1 ? kLowerFirstBy : kLowerBy, speed);
+    const bool first = plans == 1;
+    const Excess excess = lowerLimits(first ? kLowerFirstBy : kLowerBy,
+                                      first               ? kPoorCubic
+                                      : begin.speed > 0.0 ? 1.0
+                                                          : kPoorLowered,
+                                      grid, speed, knots);
     const double most = std::max(excess.acceleration, excess.speed);
-    if (most > 1.0 + kSmallExcess && plans < kMostPlans) continue;
+    if (most > 1.0 + kSmallExcess && plans < most_plans) continue;
     double factor = std::max(std::sqrt(excess.acceleration), excess.speed);
     ContourPlan plan;
     if (begin.speed > 0.0) {

@@ -74,14 +74,22 @@ struct ContourPlan {
 ///
 ///     -a <= q'(s) s'' + q''(s) x <= a,   q'(s)^2 x <= v^2
 ///
-/// s'' is constant between two places, and these hold at both. A pass from the end computes the
-/// largest x at each place from which the motion can still be slowed down, a pass from the start
-/// the largest of these that the motion can reach (H. Pham and Q.-C. Pham, A new approach to
-/// time-optimal path parameterization based on reachability analysis, 2018). On straight parts the
-/// motion is an exact trapezoid. A motion that is as fast as possible is at one of its limits at
-/// every time: intervals in which it isn't are divided, and so are those whose cubic would deviate.
-/// Limits that a cubic exceeds are then lowered there, and the passes are repeated. If an excess is
-/// left, a motion from rest is slowed down by that factor as a whole.
+/// A pass from the end computes the largest x at each place from which the motion can still be
+/// slowed down, a pass from the start the largest of these that the motion can reach (H. Pham and
+/// Q.-C. Pham, A new approach to time-optimal path parameterization based on reachability analysis,
+/// 2018). On straight parts the motion is an exact trapezoid.
+///
+/// On curves, an axis that accelerates at its limit does so evenly, and s'' changes on the way. So
+/// what is limited between two places is the mean of an axis's acceleration, and the time of the
+/// cubic is chosen with which its accelerations keep to the limits at both ends. If there is no
+/// such time, because the axis at its limit changes or turns on the way, the interval is divided,
+/// and the limits hold at both ends of its parts with a constant s''. That makes the motion slower,
+/// so these are divided further if they are long.
+///
+/// A motion that is as fast as possible is at one of its limits at every time: intervals in which
+/// it isn't are divided, and so are those whose cubic would deviate. Limits that a cubic exceeds
+/// are then lowered there, and the passes are repeated. If an excess is left, a motion from rest is
+/// slowed down by that factor as a whole.
 ///
 /// @param limits one for each axis.
 /// @throw std::range_error if it takes Profile::kLongest or longer.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 namespace stepdriver::motion {
@@ -33,7 +34,8 @@ typename Bounds::value_type highestAt(const Bounds& bounds, double x) {
 }  // namespace
 
 ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
-                           const std::vector<ContourLimits>& limits, double begin)
+                           const std::vector<ContourLimits>& limits, double begin,
+                           CheckedAcceleration checked)
     : contour_(contour),
       grid_(grid),
       limits_(limits),
@@ -41,6 +43,7 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
       speed_shares_(grid.size(), 1.0),
       most_squares_(grid.size(), kUnbounded),
       most_accelerations_(grid.size(), kUnbounded),
+      checked_(grid.size(), checked),
       stale_(grid.size(), true),
       controllable_(grid.size() + 1, kUnbounded),
       squares_(grid.size() + 1, kUnbounded) {
@@ -60,10 +63,29 @@ void ContourSpeed::restrict(std::size_t interval, double square, double accelera
   stale_[interval] = true;
 }
 
+bool ContourSpeed::checkBothEnds(std::size_t interval) {
+  if (checked_[interval] == CheckedAcceleration::kAtBothEnds) return false;
+  checked_[interval] = CheckedAcceleration::kAtBothEnds;
+  stale_[interval] = true;
+  return true;
+}
+
+double ContourSpeed::lossOfBothEnds(std::size_t interval) {
+  constexpr double kRounding = 1e-9;
+  const double most = controllable_[interval];
+  const bool counts = checked_[interval] == CheckedAcceleration::kAtBothEnds && most > 0.0 &&
+                      squares_[interval] >= most * (1.0 - kRounding);
+  if (!counts) return 1.0;
+  checked_[interval] = CheckedAcceleration::kMean;
+  const double higher = largestBefore(interval, controllable_[interval + 1]);
+  checked_[interval] = CheckedAcceleration::kAtBothEnds;
+  return higher / most;
+}
+
 void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
                           const std::vector<bool>& divided) {
-  const auto spread = [&](std::vector<double>& values) {
-    std::vector<double> made;
+  const auto spread = [&](auto& values) {
+    std::decay_t<decltype(values)> made;
     made.reserve(origins.size() + 1);
     for (const std::size_t origin : origins) made.push_back(values[origin]);
     if (values.size() > divided.size()) made.push_back(values.back());  // of the last place
@@ -73,6 +95,7 @@ void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
   spread(speed_shares_);
   spread(most_squares_);
   spread(most_accelerations_);
+  spread(checked_);
   spread(controllable_);
   spread(squares_);
   stale_.clear();
@@ -171,8 +194,9 @@ double ContourSpeed::peakSquare(std::size_t interval) const {
   return std::max({std::min(meeting, capAtBegin(interval)), begin, end});
 }
 
-// What the accelerations of the axes at both ends of an interval allow, with x and u at its begin:
-// at its end x is x + 2 length u.
+// What the accelerations of the axes in an interval allow, with x and u at its begin: at its end x
+// is x + 2 length u = e^2. With b^2 = x, the mean of an acceleration is
+// (q1' e - q0' b) (b + e)/(2 length), and b e is (b^2 + e^2)/2 but for (e - b)^2/2.
 void ContourSpeed::collectBounds(std::size_t interval) {
   above_.clear();
   below_.clear();
@@ -187,8 +211,13 @@ void ContourSpeed::collectBounds(std::size_t interval) {
     const int direction = directionOf(first_begin[j], first_end[j]);
     const double most = share * accelerationTowards(limits_[j], direction, 1);
     const double least = -share * accelerationTowards(limits_[j], direction, -1);
-    addBounds(first_begin[j], second_begin[j], least, most);
-    addBounds(first_end[j] + twice * second_end[j], second_end[j], least, most);
+    if (checked_[interval] == CheckedAcceleration::kMean) {
+      const double change = first_end[j] - first_begin[j];
+      addBounds(first_end[j] + change / 2.0, 2.0 * change / twice, least, most);
+    } else {
+      addBounds(first_begin[j], second_begin[j], least, most);
+      addBounds(first_end[j] + twice * second_end[j], second_end[j], least, most);
+    }
   }
   const double along = most_accelerations_[interval];
   if (along == kUnbounded) return;

@@ -12,13 +12,20 @@
 
 namespace stepdriver::motion {
 
+/// What keeps to the accelerations of the axes in an interval that isn't straight.
+enum class CheckedAcceleration {
+  kMean,
+  kAtBothEnds,  ///< with a constant s''
+};
+
 /// The square of the highest speed along a contour at each place of its grid, see planContour().
 class ContourSpeed {
  public:
   /// @param contour, grid, limits outlive this.
   /// @param begin [unit^2/s^2] the square of the speed at the begin.
   ContourSpeed(const Contour& contour, const ContourGrid& grid,
-               const std::vector<ContourLimits>& limits, double begin = 0.0);
+               const std::vector<ContourLimits>& limits, double begin = 0.0,
+               CheckedAcceleration checked = CheckedAcceleration::kAtBothEnds);
 
   /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
   /// these.
@@ -26,7 +33,14 @@ class ContourSpeed {
   /// Limits the square of the speed in an interval [unit^2/s^2], and the acceleration along it
   /// [unit/s^2], for the next plan().
   void restrict(std::size_t interval, double square, double acceleration);
-  /// After ContourGrid::quarter(): its result, and what was divided.
+  /// From the next plan() on, an interval keeps to the accelerations at both ends.
+  ///
+  /// @return whether that is new.
+  bool checkBothEnds(std::size_t interval);
+  /// By what factor the square of the speed before an interval would be higher if only the mean of
+  /// its accelerations counted; 1 if it is lower anyway. Call it after plan().
+  double lossOfBothEnds(std::size_t interval);
+  /// After ContourGrid::divideEach(): its result, and what was divided.
   void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided);
   /// Plans everything the first time, then only what has changed since.
   void plan();
@@ -82,6 +96,7 @@ class ContourSpeed {
   std::vector<double> speed_shares_;
   std::vector<double> most_squares_;
   std::vector<double> most_accelerations_;
+  std::vector<CheckedAcceleration> checked_;
   std::vector<bool> stale_;           // each interval that has changed since the last plan
   std::vector<double> controllable_;  // the largest x at each place from which it can slow down
   std::vector<double> squares_;       // x at each place

@@ -33,7 +33,8 @@ constexpr double kLowerSmoothBy = 1.002;
 constexpr double kShorterBy = 0.7;             // the time of the average
 constexpr double kShortestAverage = 1e-3;      // s
 constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
-constexpr int kMostQuarterings = 4;
+constexpr int kMostDivisionRounds = 4;
+constexpr std::size_t kPartsOfDivision = 4;
 
 // The knots of a motion between two stops, at any time.
 class SmoothKnots {
@@ -343,10 +344,10 @@ class SmoothSection {
     for (int i = 0;; ++i) {
       Plan best = bestOfTimes();
       std::vector<bool> deviates(grid_.size(), false);
-      if (!best.possible() || i == kMostQuarterings || !findDeviations(best.knots, deviates)) {
+      if (!best.possible() || i == kMostDivisionRounds || !findDeviations(best.knots, deviates)) {
         return best;
       }
-      grid_.quarter(deviates);
+      grid_.divideEach(deviates, kPartsOfDivision);
       findCaps();
     }
   }

@@ -42,17 +42,21 @@ void appendQuintic(std::vector<Piece>& pieces, const Segment& segment) {
   pieces.push_back(cubic(part, from, v0, segment.end.position, *segment.end.velocity));
 }
 
+// @pre kind() is kCubic
+Piece cubicOf(const Segment& segment) {
+  return cubic(segment.duration(), segment.begin.position, *segment.begin.velocity,
+               segment.end.position, *segment.end.velocity);
+}
+
 void append(std::vector<Piece>& pieces, const Segment& segment) {
   const Knot& begin = segment.begin;
   const Knot& end = segment.end;
-  const DoubleDouble duration = segment.duration();
   switch (segment.kind()) {
     case SegmentKind::kLine:
-      pieces.push_back(line(duration, begin.position, end.position));
+      pieces.push_back(line(segment.duration(), begin.position, end.position));
       break;
     case SegmentKind::kCubic:
-      pieces.push_back(
-          cubic(duration, begin.position, *begin.velocity, end.position, *end.velocity));
+      pieces.push_back(cubicOf(segment));
       requireReach(reach(pieces.back()), segment.index);
       break;
     case SegmentKind::kQuintic:
@@ -67,7 +71,7 @@ struct Ends {
   double end = 0.0;
 };
 
-Ends takeJerk(SplineJerk& worst, const Segment& segment) {
+Ends takeJerk(SplineJerk& worst, const Segment& segment, const Piece* made = nullptr) {
   const double start = static_cast<double>(segment.begin.time_ns) * 1e-9;
   const double duration = segment.duration().value();
   const auto take = [&](double jerk, double time_s) {
@@ -75,8 +79,7 @@ Ends takeJerk(SplineJerk& worst, const Segment& segment) {
   };
   if (segment.kind() == SegmentKind::kLine) return {};
   if (segment.kind() == SegmentKind::kCubic) {
-    const Piece piece = cubic(segment.duration(), segment.begin.position, *segment.begin.velocity,
-                              segment.end.position, *segment.end.velocity);
+    const Piece piece = made != nullptr ? *made : cubicOf(segment);
     take(piece.j, start);
     return {piece.a, piece.accelerationAt(piece.duration).value()};
   }
@@ -96,8 +99,9 @@ class JerkMeter {
  public:
   explicit JerkMeter(double acceleration_before) : before_(acceleration_before) {}
 
-  void take(const Segment& segment) {
-    const Ends ends = takeJerk(worst_, segment);
+  /// @param made the cubic of the segment, if it has been made.
+  void take(const Segment& segment, const Piece* made = nullptr) {
+    const Ends ends = takeJerk(worst_, segment, made);
     jumpTo(ends.begin, segment.begin.time_ns);
     before_ = ends.end;
   }
@@ -156,8 +160,9 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints) {
   JerkMeter meter(begin_acceleration_);
   for (std::size_t i = 1; i < segments.size(); ++i) {
     giveWay(i);
-    append(pieces, segments.at(i));
-    meter.take(segments.at(i));
+    const Segment segment = segments.at(i);
+    append(pieces, segment);
+    meter.take(segment, &pieces.back());
   }
   meter.jumpTo(0.0, waypoints.back().time_ns);
   profile_.emplace(0, std::move(pieces));
