@@ -503,7 +503,7 @@ TEST(ShapedAxis, ACircleIsAsMuchSmallerAsItsClosedFormSaysAndDoesNotRing) {
   const double radius = kRadius * std::sqrt(a1 * a1 + a2 * a2 + 2.0 * a1 * a2 * std::cos(angle));
   EXPECT_LT(radius, kRadius - 0.0002);
   constexpr double kHalfMicrosteps = 0.71 / kScale;
-  const auto expectRadius = [](const std::vector<Pulse>& pulses, double wanted) {
+  const auto expect_radius = [](const std::vector<Pulse>& pulses, double wanted) {
     const double begin = pulses.front().time;
     const double duration = pulses.back().time - begin;
     for (const Pulse& pulse : pulses) {
@@ -512,8 +512,8 @@ TEST(ShapedAxis, ACircleIsAsMuchSmallerAsItsClosedFormSaysAndDoesNotRing) {
       ASSERT_NEAR(std::hypot(pulse.x + kRadius, pulse.y), wanted, kHalfMicrosteps + 1e-7);
     }
   };
-  expectRadius(exact, kRadius);
-  expectRadius(smaller, radius);
+  expect_radius(exact, kRadius);
+  expect_radius(smaller, radius);
 }
 
 TEST(ShapedAxis, ACornerIsRoundedByAtMostTheToleranceAndWhatTheShaperAdds) {
