@@ -6,7 +6,9 @@
 #include <optional>
 #include <utility>
 
+#include "motion/braking.h"
 #include "motion/profile_parts.h"
+#include "stepdriver_core/axis/axis_state.h"
 
 namespace stepdriver::axis {
 namespace {
@@ -18,6 +20,9 @@ constexpr double kSteepestJerk = kSteepest * kSteepest;  // 1/s^2
 constexpr double kGentler = 0.8;
 constexpr int kTries = 60;             // down to a millionth of the steepest
 constexpr double kFirstDelay = 0.010;  // s
+// Braking as steeply as each place allows: so many slopes at most, and none shorter than this.
+constexpr double kMostSlopes = 100.0;
+constexpr double kShortestSlope = 0.001;  // s
 
 // When a path from planRate() reaches the rate, or its end [s].
 double timeToRate(const motion::Profile& path, double rate) {
@@ -56,7 +61,31 @@ motion::Profile TrajectoryPath::plan(std::int64_t at_ns, const motion::MotionSta
 
 motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
                                          const motion::MotionState& from) const {
-  return onPath(changeRate(at_ns, onCurves(from), 0.0, &Member::stop_bounds));
+  const motion::MotionState begin = onCurves(from);
+  motion::Profile even = changeRate(at_ns, begin, 0.0, &Member::stop_bounds);
+  const double time = timeToRate(even, 0.0);
+  if (time > kShortestSlope) {
+    if (std::optional<motion::Profile> steeper = brake(at_ns, begin, time)) {
+      return onPath(*std::move(steeper));
+    }
+  }
+  return onPath(even);
+}
+
+std::optional<motion::Profile> TrajectoryPath::brake(std::int64_t at_ns,
+                                                     const motion::MotionState& from,
+                                                     double sooner_than) const {
+  std::vector<motion::BoundCourse> courses;
+  courses.reserve(members_.size());
+  for (const Member& member : members_) {
+    if (member.stop_bounds.jerk > 0.0) return std::nullopt;
+    // The tolerance is for what a trajectory itself may exceed.
+    const double most = member.stop_bounds.acceleration / (1.0 + kTrajectoryTolerance);
+    courses.push_back({member.curve, {most, 0.0}});
+  }
+  const double slice = std::max(kShortestSlope, sooner_than / kMostSlopes);
+  return motion::planBraking(at_ns, from, courses, slice, sooner_than,
+                             members_.front().curve->duration());
 }
 
 motion::MotionState TrajectoryPath::restart(DoubleDouble position) const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "motion/compose.h"
@@ -45,6 +46,9 @@ class TrajectoryPath : public SharedPath {
   /// Of the position on the curves.
   motion::Profile changeRate(std::int64_t at, const motion::MotionState& from, double rate,
                              Bounds bounds) const;
+  /// The steepest stop, if it takes less than a time [s] and no motor has a jerk limit.
+  std::optional<motion::Profile> brake(std::int64_t at, const motion::MotionState& from,
+                                       double sooner_than) const;
   motion::Profile onPath(const motion::Profile& on_curves) const;
   motion::MotionState onCurves(const motion::MotionState& on_path) const;
   motion::RateLimits steepest(const motion::MotionState& from, double delay, Bounds bounds) const;

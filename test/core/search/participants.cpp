@@ -823,15 +823,21 @@ void Participants::wish(int client, std::vector<std::size_t> axes, double size,
   };
 }
 
+namespace {
+
+// A stop along a trajectory or a path can't use the acceleration that it has there itself, and
+// first one axis may limit it and then the other.
+constexpr int kLongerStopOnCurve = 2;
+
+}  // namespace
+
 void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
   const std::vector<std::size_t>& axes = wish.axes;
   const auto snapshot = controller_->snapshot();
   std::vector<axis::PathAxis> facts;
   Meaning meaning;
   meaning.moves = true;
-  // A stop along a trajectory can't use the acceleration that the trajectory itself has there, and
-  // first one axis may limit it and then the other.
-  meaning.longer_stop = 2;
+  meaning.longer_stop = kLongerStopOnCurve;
   for (const std::size_t axis : axes) {
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
@@ -876,9 +882,6 @@ void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
 
 namespace {
 
-// A path is at the limits of its axes everywhere.
-constexpr int kLongerStopOfPath = 3;
-
 machine::PathSegment lineTo(std::vector<double> end) {
   machine::PathSegment segment;
   segment.end = std::move(end);
@@ -896,7 +899,7 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
   std::vector<motion::MotionState> expected;
   Meaning meaning;
   meaning.moves = true;
-  meaning.longer_stop = kLongerStopOfPath;
+  meaning.longer_stop = kLongerStopOnCurve;
   for (const std::size_t axis : axes) {
     const machine::AxisSnapshot& now = snapshot->axes.at(axis);
     request.names.push_back(configs_[axis].name);
@@ -956,7 +959,7 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
   // It continues a motion, but begins none if that was stopped.
   Meaning meaning;
   meaning.moves = true;
-  meaning.longer_stop = kLongerStopOfPath;
+  meaning.longer_stop = kLongerStopOnCurve;
   meaning.axes[0] = meaning.axes[1] = true;
   meaning.as_of = oracle_.moment();
   clients_[static_cast<std::size_t>(client)].next = [=] {
