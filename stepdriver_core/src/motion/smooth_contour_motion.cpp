@@ -27,7 +27,7 @@ constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no
 constexpr int kMostReplans = 12;
 constexpr double kNoExcess = 1e-3;
 constexpr double kNoPart = 1e-9;         // of a segment
-constexpr double kSpeedRounding = 1e-9;  // of the square of a speed
+constexpr double kSquareRounding = 1e-9;  // of the square of a speed
 constexpr double kNoDifference = 1e-6;
 constexpr double kLowerSmoothBy = 1.002;
 constexpr double kShorterBy = 0.7;             // the time of the average
@@ -560,7 +560,7 @@ class SmoothSection {
       begin = end;
     }
     speed.plan();
-    if (speed.controllable(0) < begin_square * (1.0 - kSpeedRounding))
+    if (speed.controllable(0) < begin_square * (1.0 - kSquareRounding))
       return impossible(limits_.size());
     std::vector<SpeedPlace> given = placesOf(ahead, speed, history.end);
     const SpeedPlace past{history.begin, history.begin_speed * history.begin_speed};
