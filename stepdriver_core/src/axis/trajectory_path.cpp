@@ -20,7 +20,7 @@ constexpr double kSteepestJerk = kSteepest * kSteepest;  // 1/s^2
 constexpr double kGentler = 0.8;
 constexpr int kTries = 60;             // down to a millionth of the steepest
 constexpr double kFirstDelay = 0.010;  // s
-// Braking as steeply as each place allows: so many slopes at most, and none shorter than this.
+// Braking as steeply as each place allows: at most this many slopes, none shorter than this.
 constexpr double kMostSlopes = 100.0;
 constexpr double kShortestSlope = 0.001;  // s
 
