@@ -184,7 +184,7 @@ std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
       const motion::MotionState& from = source.expected[member];
       const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
       try {
-        const Profile curve = motion::planSpline(0, from, waypoints);
+        const Profile curve = motion::planSpline(0, from, waypoints, axis.mostAcceleration());
         more = std::max(more, slowdownOf(axis, motion::profilePeaks(curve),
                                          motion::splineJerk(from, waypoints)));
       } catch (const std::invalid_argument& error) {
@@ -290,7 +290,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
   part.begins_at_start = waypoints.size() > 1 && waypoints.front().time_ns == 0;
   part.bounds = {axis.mostAcceleration() * kMore, axis.limits.jerk * kMore};
   try {
-    part.spline = std::make_unique<const motion::SplineTail>(waypoints);
+    part.spline = std::make_unique<const motion::SplineTail>(waypoints, axis.mostAcceleration());
   } catch (const std::invalid_argument& error) {
     axis.refuse(error.what());
   }

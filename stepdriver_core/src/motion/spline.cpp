@@ -13,6 +13,11 @@
 namespace stepdriver::motion {
 namespace {
 
+// If the acceleration of a quintic keeps a limit L, its fourth derivative is at most 96 L/T^2
+// (Markov's inequality for the second derivative of a cubic), so with this many cubics the error of
+// the acceleration is below kQuinticAccelerationError L.
+constexpr double kMostCubics = 64.0;
+
 Piece line(DoubleDouble duration, DoubleDouble from, DoubleDouble to) {
   return {duration, from, ((to - from) / duration).value(), 0.0, 0.0};
 }
@@ -23,11 +28,9 @@ double reach(const Piece& piece) {
          std::abs(piece.j) * t * t * t / 6.0;
 }
 
-void appendQuintic(std::vector<Piece>& pieces, const Segment& segment) {
-  const Quintic curve = segment.quintic();
-  requireReach(curve.reach(), segment.index);
+void appendCubics(std::vector<Piece>& pieces, const Segment& segment, const Quintic& curve,
+                  double count) {
   const DoubleDouble duration = segment.duration();
-  const double count = cubicsFor(1.0, curve.largestFourthDerivative(), kQuinticError);
   const DoubleDouble part = duration / DoubleDouble(count);
   DoubleDouble from = segment.begin.position;
   double v0 = *segment.begin.velocity;
@@ -42,13 +45,37 @@ void appendQuintic(std::vector<Piece>& pieces, const Segment& segment) {
   pieces.push_back(cubic(part, from, v0, segment.end.position, *segment.end.velocity));
 }
 
+bool exceeds(std::vector<Piece>::const_iterator piece, std::vector<Piece>::const_iterator end,
+             double acceleration) {
+  return std::any_of(piece, end, [&](const Piece& cubic) {
+    const double last = cubic.a + cubic.j * cubic.duration.value();
+    return std::max(std::abs(cubic.a), std::abs(last)) > acceleration;
+  });
+}
+
+void appendQuintic(std::vector<Piece>& pieces, const Segment& segment, double most_acceleration) {
+  const Quintic curve = segment.quintic();
+  requireReach(curve.reach(), segment.index);
+  const double fourth = curve.largestFourthDerivative();
+  const double duration = segment.duration().value();
+  const auto before = static_cast<std::ptrdiff_t>(pieces.size());
+  for (double count = cubicsFor(1.0, fourth, kQuinticError);; count *= 2.0) {
+    appendCubics(pieces, segment, curve, count);
+    const double h = 1.0 / count;
+    const double error = h * h / 12.0 * fourth / (duration * duration);
+    if (error <= kQuinticAccelerationError * most_acceleration || count >= kMostCubics) break;
+    if (!exceeds(pieces.begin() + before, pieces.end(), most_acceleration)) break;
+    pieces.resize(static_cast<std::size_t>(before));
+  }
+}
+
 // @pre kind() is kCubic
 Piece cubicOf(const Segment& segment) {
   return cubic(segment.duration(), segment.begin.position, *segment.begin.velocity,
                segment.end.position, *segment.end.velocity);
 }
 
-void append(std::vector<Piece>& pieces, const Segment& segment) {
+void append(std::vector<Piece>& pieces, const Segment& segment, double most_acceleration) {
   const Knot& begin = segment.begin;
   const Knot& end = segment.end;
   switch (segment.kind()) {
@@ -60,7 +87,7 @@ void append(std::vector<Piece>& pieces, const Segment& segment) {
       requireReach(reach(pieces.back()), segment.index);
       break;
     case SegmentKind::kQuintic:
-      appendQuintic(pieces, segment);
+      appendQuintic(pieces, segment, most_acceleration);
       break;
   }
 }
@@ -126,13 +153,15 @@ double accelerationAtBegin(const Segment& segment) {
 }  // namespace
 
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
-                   const std::vector<Waypoint>& waypoints) {
+                   const std::vector<Waypoint>& waypoints, double most_acceleration) {
   requirePlannable(from, waypoints);
   const Segments segments(waypoints);
   std::vector<Piece> pieces;
   pieces.reserve(waypoints.size());
-  append(pieces, segments.first(from));
-  for (std::size_t i = 1; i < segments.size(); ++i) append(pieces, segments.at(i));
+  append(pieces, segments.first(from), most_acceleration);
+  for (std::size_t i = 1; i < segments.size(); ++i) {
+    append(pieces, segments.at(i), most_acceleration);
+  }
   return {start_ns, std::move(pieces)};
 }
 
@@ -146,7 +175,8 @@ SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& wayp
   return meter.worst();
 }
 
-SplineTail::SplineTail(const std::vector<Waypoint>& waypoints) {
+SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, double most_acceleration)
+    : most_acceleration_(most_acceleration) {
   requireWaypoints(waypoints);
   const Segments segments(waypoints);
   const Segment first = segments.first({});
@@ -161,7 +191,7 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints) {
   for (std::size_t i = 1; i < segments.size(); ++i) {
     giveWay(i);
     const Segment segment = segments.at(i);
-    append(pieces, segment);
+    append(pieces, segment, most_acceleration);
     meter.take(segment, &pieces.back());
   }
   meter.jumpTo(0.0, waypoints.back().time_ns);
@@ -174,9 +204,11 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints) {
 std::vector<Piece> SplineTail::head(const MotionState& from) const {
   requireStart(from);
   std::vector<Piece> pieces;
-  append(pieces, {{0, from.position, from.velocity, from.acceleration},
-                  {first_.time_ns, first_.position, first_.velocity, first_.acceleration},
-                  first_index_});
+  append(pieces,
+         {{0, from.position, from.velocity, from.acceleration},
+          {first_.time_ns, first_.position, first_.velocity, first_.acceleration},
+          first_index_},
+         most_acceleration_);
   return pieces;
 }
 

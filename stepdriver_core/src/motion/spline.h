@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -26,6 +27,10 @@ constexpr double kFarthest = 140737488355328.0;  // 2^47
 /// [microsteps] The largest deviation of the cubics from their quintic segment.
 constexpr double kQuinticError = 0.01;
 
+/// The part of a limit by which the acceleration of the cubics may exceed it, if that of their
+/// quintic doesn't.
+constexpr double kQuinticAccelerationError = 0.0025;
+
 /// [microsteps] Where a trajectory comes to rest if its last waypoint is at `position`: on the
 /// nearest whole microstep, halves to even.
 inline std::int64_t restingCount(double position) { return std::llround(std::nearbyint(position)); }
@@ -46,7 +51,8 @@ inline std::int64_t restingCount(double position) { return std::llround(std::nea
 /// that makes this kQuinticError or less; apart from this, a step comes when the curve crosses a
 /// half-step line. Position and velocity are continuous; the velocity is off by at most sqrt(3)
 /// h^3/216 max|p''''|, the acceleration by h^2/12 max|p''''| <= 32 kQuinticError/h^2, and between
-/// two of the cubics it jumps by h^3/15 |p'''''|.
+/// two of the cubics it jumps by h^3/15 |p'''''|. If that takes a cubic above `most_acceleration`,
+/// n is doubled until it doesn't, or until h^2/12 max|p''''| is kQuinticAccelerationError of it.
 ///
 /// Each segment starts from its waypoint as given, so that errors don't accumulate: where two
 /// pieces meet, the positions differ by less than 2^-52 of the piece's distance.
@@ -56,12 +62,14 @@ inline std::int64_t restingCount(double position) { return std::llround(std::nea
 ///
 /// @param from finite; its position is within kFarthest of 0.
 /// @param waypoints at least one, at increasing times from 0 on, all numbers finite.
+/// @param most_acceleration [microsteps/s^2] the limit of the axis.
 /// @throw std::invalid_argument if these conditions don't hold, naming the waypoint (the first is
 ///   0), the value and what is allowed; and if velocities and accelerations lead a curve out of
 ///   2^53 microsteps.
 /// @throw std::range_error if it takes Profile::kLongest or longer.
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
-                   const std::vector<Waypoint>& waypoints);
+                   const std::vector<Waypoint>& waypoints,
+                   double most_acceleration = std::numeric_limits<double>::infinity());
 
 /// The demands of a trajectory on a motor with a jerk limit.
 struct SplineJerk {
@@ -82,7 +90,8 @@ SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& wayp
 class SplineTail {
  public:
   /// @throw as planSpline().
-  explicit SplineTail(const std::vector<Waypoint>& waypoints);
+  explicit SplineTail(const std::vector<Waypoint>& waypoints,
+                      double most_acceleration = std::numeric_limits<double>::infinity());
 
   /// When the tail begins [s], after the trajectory's start. If there is only one segment, it ends
   /// here.
@@ -99,6 +108,7 @@ class SplineTail {
   SplineJerk headJerk(const MotionState& from) const;
 
  private:
+  double most_acceleration_;
   Waypoint first_;                   // the end of the first segment
   std::size_t first_index_ = 0;      // of it
   double begin_acceleration_ = 0.0;  // of the tail [microsteps/s^2]

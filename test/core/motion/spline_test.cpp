@@ -212,6 +212,33 @@ TEST(Spline, OfASegmentFromRestToRestHasThePeaksOfTheTextbook) {
   }
 }
 
+// From rest up to an acceleration of 1000, which the quintic doesn't exceed: 1000 (3 u^2 - 2 u^3).
+TEST(Spline, KeepsTheAccelerationThatItsQuinticKeeps) {
+  constexpr double kMost = 1000.0;
+  constexpr double kTime = 0.01;
+  const std::vector<Waypoint> waypoints = {
+      {0, 0.0, 0.0, 0.0},
+      {10'000'000, 0.15 * kMost * kTime * kTime, 0.5 * kMost * kTime, kMost},
+      {kSecond, 100.0, 0.0, 0.0}};
+  const auto first = [&](double most) {
+    const Profile curve = planSpline(0, {}, waypoints, most);
+    std::vector<Piece> pieces;
+    for (const Piece& piece : curve.pieces()) {
+      if (piece.p0.value() < waypoints[1].position) pieces.push_back(piece);
+    }
+    return pieces;
+  };
+  const auto last = [](const Piece& piece) { return piece.a + piece.j * piece.duration.value(); };
+  const std::vector<Piece> unbounded = first(std::numeric_limits<double>::infinity());
+  ASSERT_EQ(unbounded.size(), 1U);
+  EXPECT_NEAR(last(unbounded.back()), 1.1 * kMost, 1e-6);
+  const std::vector<Piece> bounded = first(kMost);
+  EXPECT_LE(last(bounded.back()), (1.0 + kQuinticAccelerationError) * kMost);
+  EXPECT_LE(bounded.size(), 32U);
+  EXPECT_EQ(first(1.2 * kMost).size(), 1U) << "it is divided only if it exceeds the limit";
+  EXPECT_LE(first(1e-6 * kMost).size(), 64U) << "what exceeds it itself isn't divided without end";
+}
+
 TEST(Spline, StaysOnItsWaypointsOver10000) {
   std::mt19937_64 random(7);
   const auto waypoints = randomWaypoints(random, 10000);
