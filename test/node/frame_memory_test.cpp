@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <deque>
 #include <string>
 
@@ -20,6 +21,8 @@ namespace {
 class FrameMemory : public testing::Test {
  protected:
   FrameMemory() : service(node.full("x/reset")) {
+    // Otherwise glibc reserves 64 MB or more for each thread that finds the others' heaps in use.
+    setenv("MALLOC_ARENA_MAX", "1", 1);
     node.start();
     before = reserved();
   }

@@ -468,21 +468,21 @@ ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>
     knots.make(speed);
     if (!divideLong(kMostDeviation * contour.resolution(), grid, speed, knots)) break;
   }
-  const int most_plans = begin.speed > 0.0 ? kMostPlansFromSpeed : kMostPlans;
+  // From a speed, what still exceeds the limits isn't slowed down afterwards.
+  const bool from_speed = begin.speed > 0.0;
+  const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
+  const double poor_later = from_speed ? 1.0 : kPoorLowered;
   for (int plans = 1;; ++plans) {
     speed.plan();
     knots.make(speed);
     const bool first = plans == 1;
     const Excess excess = lowerLimits(first ? kLowerFirstBy : kLowerBy,
-                                      first               ? kPoorCubic
-                                      : begin.speed > 0.0 ? 1.0
-                                                          : kPoorLowered,
-                                      grid, speed, knots);
+                                      first ? kPoorCubic : poor_later, grid, speed, knots);
     const double most = std::max(excess.acceleration, excess.speed);
     if (most > 1.0 + kSmallExcess && plans < most_plans) continue;
     double factor = std::max(std::sqrt(excess.acceleration), excess.speed);
     ContourPlan plan;
-    if (begin.speed > 0.0) {
+    if (from_speed) {
       plan.excess = most;
       factor = 1.0;
     }
