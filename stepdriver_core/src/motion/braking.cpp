@@ -45,14 +45,14 @@ bool keep(const std::vector<BoundCourse>& courses, const Piece& piece) {
 double steepestSlope(const std::vector<BoundCourse>& courses, DoubleDouble place, DoubleDouble rate,
                      double slice) {
   double slope = kSteepestSlope;
-  const auto limitAt = [&](DoubleDouble there, double rate_there) {
+  const auto limit_at = [&](DoubleDouble there, double rate_there) {
     for (const BoundCourse& course : courses) {
       slope = std::min(slope, steepestAt(course, there, rate_there));
     }
   };
-  limitAt(place, rate.value());
+  limit_at(place, rate.value());
   const Piece first = slowing(place, rate, slope, slice);
-  limitAt(first.positionAt(first.duration), first.velocityAt(first.duration).value());
+  limit_at(first.positionAt(first.duration), first.velocityAt(first.duration).value());
   for (int i = 0; i < kSlopeTries; ++i, slope *= kGentlerSlope) {
     if (keep(courses, slowing(place, rate, slope, slice))) return slope;
   }

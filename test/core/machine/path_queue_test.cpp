@@ -72,6 +72,24 @@ class PathQueue : public test::PathBench {
     return machine().wait(move_);
   }
 
+  /// A path of 100 segments, which comes to rest after 30 and 60 of them.
+  void starveTwice(const PathRequest& path) {
+    begin(path, 30);
+    awaitRest();
+    advance(1.0);
+    EXPECT_FALSE(machine().result(move_)) << "it isn't the end";
+    EXPECT_NEAR(state("x").position, path.segments[29].end[0], kMicrostep);
+    EXPECT_EQ(ahead().segments, 0U);
+    EXPECT_EQ(ahead().time, 0.0);
+    feed(30);
+    EXPECT_TRUE(state("x").moving);
+    awaitRest();
+    EXPECT_FALSE(machine().result(move_));
+    feed(40);
+    const CoordinatedResult result = machine().wait(move_);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  }
+
   // The longest time between two pulses of either axis, after the first and before the last [s].
   double longestPause() {
     std::vector<double> times;
@@ -162,23 +180,9 @@ TEST_F(PathQueue, IsFedAtTheLastMoment) {
 }
 
 TEST_F(PathQueue, RestsOnThePathWhileItIsStarvedAndContinues) {
-  const PathRequest path = test::circle();
-  begin(path, 30);
-  awaitRest();
-  advance(1.0);
-  EXPECT_FALSE(machine().result(move_)) << "it isn't the end";
-  EXPECT_NEAR(state("x").position, path.segments[29].end[0], kMicrostep);
-  EXPECT_EQ(ahead().segments, 0U);
-  EXPECT_EQ(ahead().time, 0.0);
-  feed(30);
-  EXPECT_TRUE(state("x").moving);
-  awaitRest();
-  EXPECT_FALSE(machine().result(move_));
-  feed(40);
-  const CoordinatedResult result = machine().wait(move_);
-  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  starveTwice(test::circle());
   EXPECT_EQ(bench->pulses("x"), 0);
-  expectOnPath(path);
+  expectOnPath(whole_);
   expectLimits();
 }
 
@@ -531,21 +535,9 @@ TEST_F(SmoothPathQueue, OfRandomLinesKeepsLimitsAndTolerance) {
 }
 
 TEST_F(SmoothPathQueue, RestsOnThePathWhileItIsStarvedAndContinues) {
-  const PathRequest path = test::circle();
-  begin(path, 30);
-  awaitRest();
-  advance(1.0);
-  EXPECT_FALSE(machine().result(move_)) << "it isn't the end";
-  EXPECT_NEAR(state("x").position, path.segments[29].end[0], kMicrostep);
-  feed(30);
-  EXPECT_TRUE(state("x").moving);
-  awaitRest();
-  EXPECT_FALSE(machine().result(move_));
-  feed(40);
-  const CoordinatedResult result = machine().wait(move_);
-  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  starveTwice(test::circle());
   EXPECT_EQ(bench->pulses("x"), 0);
-  expectOnPath(path);
+  expectOnPath(whole_);
   expectSmooth();
 }
 
