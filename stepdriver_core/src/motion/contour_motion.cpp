@@ -98,14 +98,8 @@ class Knots {
 
   void make(const ContourSpeed& speed) {
     time_ = 0.0;
-    times_.clear();
-    places_.clear();
-    intervals_.clear();
-    rests_.clear();
-    positions_.clear();
-    velocities_.clear();
-    parameters_.clear();
-    speeds_.clear();
+    knots_.clear();
+    joints_.clear();
     double begin = std::sqrt(speed.square(0));
     appendPlace(0, 0.0, begin, 0);
     for (std::size_t i = 0; i < grid_.size(); ++i) {
@@ -131,34 +125,36 @@ class Knots {
   /// Whether setFollows() has been called for its cubic.
   bool follows(std::size_t interval) const { return kept_[interval].follows; }
   void setFollows(std::size_t interval) { kept_[interval].follows = true; }
-  std::size_t size() const { return times_.size(); }
-  double time(std::size_t knot) const { return times_[knot]; }
-  std::size_t interval(std::size_t knot) const { return intervals_[knot]; }
+  std::size_t size() const { return knots_.size(); }
+  double time(std::size_t knot) const { return knots_[knot].time; }
+  std::size_t interval(std::size_t knot) const { return knots_[knot].interval; }
   double position(std::size_t knot, std::size_t axis) const {
-    return positions_[knot * axes_ + axis];
+    return joints_[knot * axes_ + axis].position;
   }
   double velocity(std::size_t knot, std::size_t axis) const {
-    return velocities_[knot * axes_ + axis];
+    return joints_[knot * axes_ + axis].velocity;
   }
-  double parameter(std::size_t knot) const { return parameters_[knot]; }
-  double speed(std::size_t knot) const { return speeds_[knot]; }
+  double parameter(std::size_t knot) const { return knots_[knot].parameter; }
+  double speed(std::size_t knot) const { return knots_[knot].speed; }
   /// On the way from the knot before it.
   bool isStraight(std::size_t knot) const {
-    const std::size_t last = intervals_[knot];
-    const std::size_t first = intervals_[knot - 1];
-    const bool whole = first + 1 == last && parameters_[knot - 1] == grid_[first].to;
+    const std::size_t last = interval(knot);
+    const std::size_t first = interval(knot - 1);
+    const bool whole = first + 1 == last && parameter(knot - 1) == grid_[first].to;
     return grid_[last].straight && (first == last || whole);
   }
   /// [s] Of the last knot that isn't after a place.
   double timeAt(std::size_t place) const {
-    const auto later = std::lower_bound(intervals_.begin() + 1, intervals_.end(), place);
-    return times_[static_cast<std::size_t>(later - intervals_.begin()) - 1];
+    const auto later = std::lower_bound(
+        knots_.begin() + 1, knots_.end(), place,
+        [](const Knot& knot, std::size_t wanted) { return knot.interval < wanted; });
+    return (later - 1)->time;
   }
 
   /// Of the cubic that ends at a knot.
   Demand demand(std::size_t knot) {
-    const std::size_t place = places_[knot];
-    const bool whole = place != kNoPlace && places_[knot - 1] + 1 == place;
+    const std::size_t place = knots_[knot].place;
+    const bool whole = place != kNoPlace && knots_[knot - 1].place + 1 == place;
     if (!whole || grid_[place - 1].straight) return cubicDemand(knot);
     std::optional<Demand>& kept = kept_[place - 1].demand;
     if (!kept) kept = cubicDemand(knot);
@@ -175,6 +171,18 @@ class Knots {
     double duration = 0.0;  // s
     std::optional<Demand> demand;
     bool follows = false;
+  };
+  struct Knot {
+    double time;
+    std::size_t interval;  // of the grid, which ends at the knot or contains it
+    std::size_t place;     // or kNoPlace, within a straight part
+    double parameter;
+    double speed;
+    bool rests;
+  };
+  struct Joint {
+    double position;
+    double velocity;
   };
 
   Demand cubicDemand(std::size_t knot) const {
@@ -246,12 +254,11 @@ class Knots {
     const double* from = grid_.position(interval);
     const double* direction = grid_.firstAtBegin(interval);
     for (std::size_t j = 0; j < axes_; ++j) {
-      positions_.push_back(from[j] + direction[j] * way);
-      velocities_.push_back(direction[j] * speed);
+      joints_.push_back({from[j] + direction[j] * way, direction[j] * speed});
     }
     const ContourGrid::Interval& of = grid_[interval];
     const double part = std::min(1.0, way / of.length);
-    append(time, interval, kNoPlace, of.from + part * (of.to - of.from), speed, false);
+    knots_.push_back({time, interval, kNoPlace, of.from + part * (of.to - of.from), speed, false});
   }
 
   void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
@@ -260,35 +267,19 @@ class Knots {
     const double* position = grid_.position(place);
     const double* direction = place == 0 ? grid_.firstAtBegin(0) : grid_.firstAtEnd(place - 1);
     for (std::size_t j = 0; j < axes_; ++j) {
-      positions_.push_back(position[j]);
-      velocities_.push_back(direction[j] * speed);
+      joints_.push_back({position[j], direction[j] * speed});
     }
-    append(time, interval, place, place == 0 ? grid_[0].from : grid_[interval].to, speed, rests);
+    knots_.push_back(
+        {time, interval, place, place == 0 ? grid_[0].from : grid_[interval].to, speed, rests});
   }
 
   // Of two knots that are too close to each other, one at rest stays, or else the earlier one.
   bool makeRoom(double time, bool rests) {
-    if (times_.empty() || time - times_.back() >= kShortestPiece) return true;
-    if (!rests || rests_.back()) return rests;
-    times_.pop_back();
-    intervals_.pop_back();
-    places_.pop_back();
-    parameters_.pop_back();
-    speeds_.pop_back();
-    rests_.pop_back();
-    positions_.resize(positions_.size() - axes_);
-    velocities_.resize(velocities_.size() - axes_);
+    if (knots_.empty() || time - knots_.back().time >= kShortestPiece) return true;
+    if (!rests || knots_.back().rests) return rests;
+    knots_.pop_back();
+    joints_.resize(joints_.size() - axes_);
     return true;
-  }
-
-  void append(double time, std::size_t interval, std::size_t place, double parameter, double speed,
-              bool rests) {
-    times_.push_back(time);
-    intervals_.push_back(interval);
-    places_.push_back(place);
-    parameters_.push_back(parameter);
-    speeds_.push_back(speed);
-    rests_.push_back(rests);
   }
 
   const ContourGrid& grid_;
@@ -296,14 +287,8 @@ class Knots {
   std::size_t axes_;
   double time_ = 0.0;
   std::vector<Kept> kept_;  // of each interval
-  std::vector<double> times_;
-  std::vector<std::size_t> intervals_;  // of the grid, which end at the knot or contain it
-  std::vector<std::size_t> places_;     // or kNoPlace, within a straight part
-  std::vector<double> parameters_;
-  std::vector<double> speeds_;
-  std::vector<bool> rests_;
-  std::vector<double> positions_;
-  std::vector<double> velocities_;
+  std::vector<Knot> knots_;
+  std::vector<Joint> joints_;  // of each knot, one for each axis
 };
 
 // By what factor limits are exceeded; 1 if they aren't.

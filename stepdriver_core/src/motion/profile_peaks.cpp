@@ -17,11 +17,19 @@ void takePosition(ProfilePeaks& peaks, double position, double time_s) {
   if (position > peaks.highest.value) peaks.highest = {position, time_s};
 }
 
+// In doubles: peaks are compared with limits, which a rounding doesn't matter for.
+double positionAt(const Piece& piece, double t) {
+  return piece.p0.value() + t * (piece.v0 + t * (piece.a / 2.0 + t * piece.j / 6.0));
+}
+double velocityAt(const Piece& piece, double t) {
+  return piece.v0 + t * (piece.a + t * piece.j / 2.0);
+}
+
 // At a velocity of 0 inside the piece, the position may have an extremum.
 void takeTurns(ProfilePeaks& peaks, const Piece& piece, double start) {
   const double end = piece.duration.value();
   const auto consider = [&](double t) {
-    if (t > 0.0 && t < end) takePosition(peaks, piece.positionAt(t).value(), start + t);
+    if (t > 0.0 && t < end) takePosition(peaks, positionAt(piece, t), start + t);
   };
   if (piece.j == 0.0) {
     if (piece.a != 0.0) consider(-piece.v0 / piece.a);
@@ -39,14 +47,14 @@ void takePiece(ProfilePeaks& peaks, const Piece& piece, double start) {
   const double end = piece.duration.value();
   takePosition(peaks, piece.p0.value(), start);
   takeTurns(peaks, piece, start);
-  takePosition(peaks, piece.positionAt(piece.duration).value(), start + end);
+  takePosition(peaks, positionAt(piece, end), start + end);
 
   takeFurthest(peaks.velocity, piece.v0, start);
   const double middle = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
   if (middle > 0.0 && middle < end) {
-    takeFurthest(peaks.velocity, piece.velocityAt(middle).value(), start + middle);
+    takeFurthest(peaks.velocity, velocityAt(piece, middle), start + middle);
   }
-  takeFurthest(peaks.velocity, piece.velocityAt(piece.duration).value(), start + end);
+  takeFurthest(peaks.velocity, velocityAt(piece, end), start + end);
 
   takeFurthest(peaks.acceleration, piece.a, start);
   takeFurthest(peaks.acceleration, piece.a + piece.j * end, start + end);
@@ -67,7 +75,7 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double
     const double start = profile.pieceStart(index).value();
     takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
     takePiece(peaks, piece, start);
-    velocity = piece.velocityAt(piece.duration).value();
+    velocity = velocityAt(piece, piece.duration.value());
   }
   takeFurthest(peaks.velocity_jump, velocity_after - velocity, profile.duration().value());
   return peaks;
