@@ -95,7 +95,8 @@ INSTANTIATE_TEST_SUITE_P(How, Ending,
 TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
   NodeUnderTest node;
   node.set("simulation/speed", 1.0);
-  node.set("axes/x/deceleration_mm_s2", 25.0);  // four seconds to stop
+  node.set("axes/x/max_speed_mm_s", 50.0);
+  node.set("axes/x/deceleration_mm_s2", 12.5);  // four seconds to stop
   node.set("axes/y/driver", "tb6600");
   node.set("axes/y/pins/step", "y_step");
   node.set("axes/y/pins/dir", "y_dir");
@@ -179,7 +180,8 @@ TEST(EndingForAnother, IsAskedOfByOneThatThenFindsTheStateFileInUse) {
   const TemporaryFile lock(".state.lock");
   node.set("state_file", state.path());
   node.set("simulation/speed", 1.0);
-  node.set("axes/x/deceleration_mm_s2", 25.0);  // four seconds to stop
+  node.set("axes/x/max_speed_mm_s", 50.0);
+  node.set("axes/x/deceleration_mm_s2", 12.5);  // four seconds to stop
   node.start();
   EXPECT_TRUE(node.moveTo(0.2, false).success);
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > 1000; }));
