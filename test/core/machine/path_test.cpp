@@ -148,6 +148,29 @@ TEST_F(Path, IsHeldOnThePathAndResumed) {
             kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
 }
 
+// Also in the rounded corner, where both axes are at the limits of their accelerations.
+TEST_F(Path, ComesToRestSoonWhereverItIsHeld) {
+  const double ramp = 0.1 / 1.0;  // s, from the highest speed to rest
+  double longest = 0.0;
+  for (double after = 0.15; after < 0.65; after += 0.02) {
+    SetUp();
+    const PathRequest corner{
+        {"x", "y"}, {lineTo({0.03, 0.0}), lineTo({0.03, 0.03})}, false, 0.0, 0.002};
+    followPath(corner);
+    advance(after);
+    machine().hold();
+    double time = 0.0;
+    for (; state("x").moving || state("y").moving; time += 1e-3) advance(1e-3);
+    longest = std::max(longest, time);
+    EXPECT_LE(farthest(pulsePlaces(), corners(corner)), 0.002 + kHalfMicrosteps) << after;
+    for (const std::string name : {"x", "y"}) {
+      EXPECT_LE(differences(name, 0.004).acceleration, 1.0 / kMicrostep * 1.02) << after;
+    }
+  }
+  EXPECT_GE(longest, ramp);
+  EXPECT_LE(longest, 1.6 * ramp);
+}
+
 TEST_F(Path, StopsOnThePath) {
   stopOnTheWay();
   EXPECT_LE(farthest(pulsePlaces(), corners(circle())),

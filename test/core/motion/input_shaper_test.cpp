@@ -88,6 +88,13 @@ TEST(InputShaper, LittleOfTheOscillationIsLeft) {
   EXPECT_GT(worst(InputShaper::zv(42.0, 0.0), 42.0, 0.0, 0.1), 0.15);
 }
 
+// They trade what is left near their frequency for a wider range of it.
+TEST(InputShaper, EiLeavesTheFivePercentThatItAllows) {
+  EXPECT_NEAR(residual(InputShaper::ei(42.0, 0.0), 42.0, 0.0), 0.05, 1e-6);
+  EXPECT_LT(residual(InputShaper::twoHumpEi(42.0, 0.0), 42.0, 0.0), 1e-6);
+  EXPECT_NEAR(worst(InputShaper::twoHumpEi(42.0, 0.0), 42.0, 0.0, 0.3), 0.05, 1e-4);
+}
+
 TEST(InputShaper, OneForTwoOscillationsStopsBoth) {
   const InputShaper both = InputShaper::zv(30.0, 0.02).with(InputShaper::mzv(71.0, 0.1));
   EXPECT_EQ(both.impulses().size(), 6U);
