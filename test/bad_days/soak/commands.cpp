@@ -1,5 +1,6 @@
 #include "commands.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <utility>
@@ -64,7 +65,25 @@ void RandomCommands::appendToPath() {
   machine_.appendPath(append);
 }
 
+bool RandomCommands::isAtRest() const {
+  return std::none_of(names_.begin(), names_.end(), [this](const std::string& name) {
+    return machine_.axis(name).state().moving;
+  });
+}
+
+// A path begins at rest, which chance alone rarely finds.
 std::string RandomCommands::choose() {
+  if (path_is_due_ && isAtRest()) {
+    path_is_due_ = false;
+    return "path";
+  }
+  const std::string kind = chooseKind();
+  if (kind != "path" || isAtRest()) return kind;
+  path_is_due_ = true;
+  return "stop all";
+}
+
+std::string RandomCommands::chooseKind() {
   struct Weighted {
     const char* name;
     std::int64_t weight;
@@ -99,6 +118,12 @@ std::string RandomCommands::choose() {
 }
 
 void RandomCommands::send() {
+  const std::string kind = choose();
+  if (!send(kind) || kind != "path") return;
+  for (std::int64_t left = random_.whole(0, 4); left > 0; --left) send("append");
+}
+
+bool RandomCommands::send(const std::string& kind) {
   axis::Axis& axis = anyAxis();
   const std::map<std::string, std::function<void()>> commands{
       {"move", [&] { axis.moveTo(place(), false, velocity(axis)); }},
@@ -131,12 +156,13 @@ void RandomCommands::send() {
       {"emergency stop", [&] { machine_.emergencyStop(); }},
       {"recover", [&] { machine_.recover(); }},
   };
-  const std::string kind = choose();
   try {
     commands.at(kind)();
     ++counts_[kind].accepted;
+    return true;
   } catch (const Refused&) {
     ++counts_[kind].refused;
+    return false;
   }
 }
 

@@ -27,14 +27,18 @@ class RandomCommands {
   RandomCommands(machine::Machine& machine, std::vector<std::string> axes, unsigned seed)
       : machine_(machine), names_(std::move(axes)), random_(seed) {}
 
-  /// Sends one. A refusal is an answer like any other. @throw Error of any other kind
+  /// Sends one, or a path and what is appended to it. A refusal is an answer like any other. @throw
+  /// Error of any other kind
   void send();
 
   const Counts& counts() const { return counts_; }
   motion::Random& random() { return random_; }
 
  private:
+  bool send(const std::string& kind);  ///< @return whether it was accepted
   std::string choose();
+  std::string chooseKind();
+  bool isAtRest() const;
   double place() { return random_.within(-kReach, kReach); }
   double velocity(const axis::Axis& axis);
   axis::Axis& anyAxis();
@@ -48,6 +52,7 @@ class RandomCommands {
   motion::Random random_;
   Counts counts_;
   std::uint64_t path_ = 0;  // the last one; 0: there was none
+  bool path_is_due_ = false;
 };
 
 }  // namespace stepdriver::soak
