@@ -148,7 +148,7 @@ TEST_F(Path, IsHeldOnThePathAndResumed) {
             kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
 }
 
-// Also in the rounded corner, where both axes are at the limits of their accelerations.
+// Also in the rounded corner: both axes are at the limits of their accelerations there.
 TEST_F(Path, ComesToRestSoonWhereverItIsHeld) {
   const double ramp = 0.1 / 1.0;  // s, from the highest speed to rest
   double longest = 0.0;
