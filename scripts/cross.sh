@@ -55,33 +55,8 @@ cross=$build/cross-$arch
 
 # ---- the libraries of the other processor ----
 
-# Gives apt lists of its own in the folder $1, and sets own_lists, which are its options.
-use_own_lists() {
-  mkdir -p "$1"/{lists,cache/archives}/partial
-  : >"$1/status"
-  own_lists=(-o APT::Architecture="$arch" -o APT::Architectures::="$arch" -o Dir::State="$1"
-    -o Dir::State::lists="$1/lists" -o Dir::State::status="$1/status" -o Dir::Cache="$1/cache")
-  # apt's own user couldn't read the caller's folder.
-  (($(id -u) != 0)) || own_lists+=(-o APT::Sandbox::User=root)
-  # Some of the lists may be enough.
-  apt-get "${own_lists[@]}" -q update || true
-}
-unpack_libraries() {
-  local sysroot=$1 work=$1/work file package
-  use_own_lists "$work"
-  apt-get "${own_lists[@]}" -q -y --no-install-recommends --download-only install \
-    libc6-dev libfmt-dev libgpiod-dev libgtest-dev libstdc++6 libyaml-cpp-dev || return
-  for package in "$work"/cache/archives/*.deb; do dpkg-deb -x "$package" "$sysroot" || return; done
-  # As in an installed system, /lib is /usr/lib, and no link leads out of the folder.
-  if [[ ! -L $sysroot/lib ]]; then
-    cp -a "$sysroot/lib/." "$sysroot/usr/lib/" && rm -r "${sysroot:?}/lib" &&
-      ln -s usr/lib "$sysroot/lib" || return
-  fi
-  find "$sysroot" -type l -lname '/*' -print0 | while IFS= read -r -d '' file; do
-    ln -sfn "$(realpath -ms --relative-to="${file%/*}" "$sysroot$(readlink "$file")")" "$file"
-  done
-  rm -rf "$work"
-}
+# shellcheck source=scripts/sysroots.sh
+source "$root/scripts/sysroots.sh"
 # The kernel without its modules, and a shell.
 unpack_board() {
   local work=$1/work package
@@ -93,28 +68,8 @@ unpack_board() {
     done
   [[ -x $1/bin/busybox && -n $(find "$1/boot" -name 'vmlinuz*') ]] && rm -rf "$work"
 }
-
-cache=${XDG_CACHE_HOME:-${HOME:?}/.cache}/stepdriver/cross
-mkdir -p "$cache"
-cache=$(cd "$cache" && pwd -P)
-# shellcheck disable=SC1091
-release=$(. /etc/os-release && printf '%s' "${VERSION_CODENAME:-$ID}")
-# keep FOLDER FUNCTION: fills the folder by the function, unless it is there already.
-keep() {
-  local folder=$1
-  [[ ! -d $folder ]] || return 0
-  say "Unpacking packages of $arch into $folder"
-  new=$(mktemp -d "$cache/.new.XXXXXX")
-  run "$2" "$new" >"$build/log/cross-unpack.log" 2>&1
-  ((run_status == 0)) || missing "packages can't be downloaded:" \
-    "$(grep -m 1 '^[EW]:' "$build/log/cross-unpack.log" || tail -n 1 "$build/log/cross-unpack.log")"
-  # If another run was faster, its folder is kept.
-  mv -T "$new" "$folder" 2>/dev/null || rm -rf "$new"
-}
-remove_new() { [[ -z ${new:-} ]] || rm -rf "$new"; }
-at_exit remove_new
-sysroot=$cache/$release-$arch
-keep "$sysroot" unpack_libraries
+keep "$arch" unpack_packages libc6-dev libfmt-dev libgpiod-dev libgtest-dev libstdc++6 libyaml-cpp-dev
+sysroot=$unpacked
 
 # ---- the builds ----
 
@@ -200,8 +155,8 @@ count_pulses() {
     END { print pulses + 0 " pulses" }' "$cross/board/lines.log"
 }
 if [[ $only == board ]]; then
-  kernel=$cache/$release-$arch-board
-  keep "$kernel" unpack_board
+  keep "$arch-board" unpack_board
+  kernel=$unpacked
   quietly "board-$arch-files" make_board "$cross/board"
   boot_board | tee "$build/log/board-$arch.log"
   grep -qF 'x is at 0.0500 m' "$build/log/board-$arch.log" || die "the move failed there"
