@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/package.sh [--twice] [--try]
+usage: scripts/package.sh [--twice] [--try | --arch arm64]
 
 Installs what the build needs, makes the Debian packages of this checkout, shows lintian's findings, and
 leaves the packages in the folder packages of the build folder:
@@ -21,25 +21,71 @@ leaves the packages in the folder packages of the build folder:
   --try    also installs them, runs the tests of debian/tests, and installs a newer version; then removes
            and purges them: nothing may be left. It changes this system, so use it in one that you can
            throw away: scripts/test_in_root.sh bookworm --packages
+  --arch arm64  makes the packages of a Raspberry Pi with 64 bits by Debian's cross compiler, in the folder
+           packages-arm64. The other packages are for any processor: make them without this option. The
+           libraries for arm64 are unpacked as scripts/cross.sh does it, and are in their places only for
+           this build, in a mount namespace: nothing of them is installed
 
 Exit code 0: all went well, and lintian had no error and no warning.
 END
 }
 
-twice='' try=''
-for argument; do
-  case $argument in
+twice='' try='' arch=''
+while (($# > 0)); do
+  case $1 in
     --twice) twice=1 ;;
     --try) try=1 ;;
+    --arch)
+      [[ ${2:-} == arm64 ]] || { usage >&2 && exit 2; }
+      arch=$2
+      shift
+      ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
+  shift
 done
+[[ -z $try || -z $arch ]] || { usage >&2 && exit 2; }
 [[ -z $try ]] || (($(id -u) == 0)) || die "--try needs root"
 
 choose_build_folder
-install_packages core ros package
-packages=$build/packages
+install_packages core ros package ${arch:+"cross-$arch"}
+packages=$build/packages${arch:+-$arch}
+builder=(dpkg-buildpackage --no-sign --build=binary --jobs="$jobs")
+
+# ---- the libraries of the other processor ----
+
+# catkin and ros-message-generation aren't marked as usable for another processor, so apt can't install what
+# the build needs for it. Overlays add the libraries to /usr and to dpkg's database. Of two files with one
+# name, this system's own is seen.
+if [[ -n $arch ]]; then
+  missing() { die "$arch: $*"; }
+  # shellcheck source=scripts/sysroots.sh
+  source "$root/scripts/sysroots.sh"
+  namespace=(unshare --mount)
+  (($(id -u) == 0)) || namespace+=(--map-root-user)
+  "${namespace[@]}" true 2>/dev/null || die "$arch: mount namespaces aren't allowed here"
+  mapfile -t libraries < <(list_packages core ros | grep '^lib.*-dev$')
+  keep "$arch-packages" unpack_packages "${libraries[@]}"
+  triplet=$(dpkg-architecture -a "$arch" -q DEB_HOST_GNU_TYPE 2>/dev/null)
+  overlay=$build/overlay-$arch
+  mkdir -p "$overlay"/{usr/bin,dpkg}
+  cat >"$overlay/usr/bin/$triplet-pkg-config" <<END
+#!/bin/sh
+PKG_CONFIG_LIBDIR=/usr/lib/$triplet/pkgconfig:/usr/share/pkgconfig exec pkg-config "\$@"
+END
+  chmod +x "$overlay/usr/bin/$triplet-pkg-config"
+  cat /var/lib/dpkg/status "$unpacked/var/lib/dpkg/status" >"$overlay/dpkg/status"
+  printf '%s\n' "$(dpkg --print-architecture)" "$arch" >"$overlay/dpkg/arch"
+  # shellcheck disable=SC2016
+  builder=("${namespace[@]}" bash -c '
+    mount -t overlay -o "lowerdir=$1/usr:/usr:$2/usr" overlay /usr &&
+      mount -t overlay -o "lowerdir=$1/dpkg:/var/lib/dpkg:$2/var/lib/dpkg" overlay /var/lib/dpkg &&
+      exec "${@:3}"' with_libraries "$overlay" "$unpacked" "${builder[@]/--build=binary/--build=any}"
+    --host-arch="$arch" --no-check-builddeps)
+fi
+
+# ---- the packages ----
 
 # make_packages FOLDER: from a copy, because dpkg-buildpackage writes next to the sources.
 make_packages() {
@@ -47,7 +93,7 @@ make_packages() {
   rm -rf "$1"
   mkdir -p "$copy"
   tar -C "$root" --exclude=./build --exclude=./.git -c . | tar -C "$copy" --no-same-owner -x
-  (cd "$copy" && dpkg-buildpackage --no-sign --build=binary --jobs="$jobs")
+  (cd "$copy" && "${builder[@]}")
 }
 # A .deb has no path of the machine that made it, and no time but that of debian/changelog.
 sums() { (cd "$1" && sha256sum -- *.deb); }
