@@ -154,7 +154,7 @@ try_packages() {
     mkdir -p "$copy"
     dpkg-deb --raw-extract "$file" "$copy"
     sed -i -e 's/^Version: .*/&+newer/' -e 's/\(stepdriver[a-z-]* (= [0-9.]*\))/\1+newer)/g' "$copy/DEBIAN/control"
-    dpkg-deb --root-owner-group --build "$copy" "$copy.deb"
+    dpkg-deb --root-owner-group -Znone --build "$copy" "$copy.deb"
   done >"$build/log/package-newer.log"
   mkdir -p /etc/stepdriver /var/lib/stepdriver
   printf '# mine\n' >/etc/stepdriver/axes.yaml
