@@ -15,8 +15,7 @@ namespace {
 
 using motion::DoubleDouble;
 
-constexpr double kSteepest = 1000.0;  // 1/s: from full rate to 0 in a millisecond
-constexpr double kSteepestJerk = kSteepest * kSteepest;  // 1/s^2
+constexpr double kSteepestJerk = motion::kSteepestSlope * motion::kSteepestSlope;  // 1/s^2
 constexpr double kGentler = 0.8;
 constexpr int kTries = 60;             // down to a millionth of the steepest
 constexpr double kFirstDelay = 0.010;  // s
@@ -139,7 +138,7 @@ motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::Mot
 motion::RateLimits TrajectoryPath::steepest(const motion::MotionState& from, double delay,
                                             Bounds bounds) const {
   const DoubleDouble place = from.position + DoubleDouble(delay * from.velocity);
-  motion::RateLimits limits{kSteepest, 0.0};
+  motion::RateLimits limits{motion::kSteepestSlope, 0.0};
   for (std::size_t member = 0; member < members_.size(); ++member) {
     const auto state = members_[member].curve->stateAt(motion::splitNanoseconds(place).whole);
     const double speed = std::abs(state.velocity);

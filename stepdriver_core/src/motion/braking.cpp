@@ -5,12 +5,11 @@
 #include <utility>
 
 #include "motion/double_double.h"
+#include "motion/rate.h"
 
 namespace stepdriver::motion {
 namespace {
 
-// [1/s] From full rate to 0 in a millisecond.
-constexpr double kSteepestSlope = 1000.0;
 constexpr double kGentlerSlope = 0.9;
 constexpr int kSlopeTries = 20;
 

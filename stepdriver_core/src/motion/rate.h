@@ -6,6 +6,9 @@
 
 namespace stepdriver::motion {
 
+/// [1/s] No rate changes faster, however slow the motors are: from full rate to 0 in a millisecond.
+constexpr double kSteepestSlope = 1000.0;
+
 /// The limits for changes of the rate along a course.
 struct RateLimits {
   double slope = 0.0;  ///< [1/s]
