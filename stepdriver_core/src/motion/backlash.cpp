@@ -351,7 +351,7 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
 }
 
 std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::int64_t backlash) {
-  constexpr std::size_t kMostPieces = 500;
+  constexpr std::size_t kMostLookedAt = 500;
   const double most = static_cast<double>(backlash);
   if (backlash == 0) return 0.0;
   if (motor.pieceCount() == 0) return std::nullopt;
@@ -368,7 +368,7 @@ std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::i
   };
   std::size_t index = motor.pieceAt(time);
   for (std::size_t pieces = 0; highest - lowest < most; --index, ++pieces) {
-    if (pieces == kMostPieces) return std::nullopt;
+    if (pieces == kMostLookedAt) return std::nullopt;
     const Piece piece = motor.piece(index);
     const double until = std::min((time - motor.pieceStart(index)).value(), piece.duration.value());
     std::vector<double> own;
