@@ -62,6 +62,7 @@ void LineWriters::write(std::uint64_t id, const LineWrite& write) {
     const int error = shared_->lines->write(&write, 1);
     if (error == 0 && shared_->written) shared_->written(write);
     shared_->done.push_back({id, error});
+    shared_->told();
     return;
   }
   const std::size_t number = shared_->lines->outputChip(write.output);

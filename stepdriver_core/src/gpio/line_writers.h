@@ -28,7 +28,7 @@ class LineWriters {
 
   /// @param threaded false: write() writes at once.
   /// @param timeout_ns on the steady clock: a write that takes longer counts as failed.
-  /// @param told called from a writing thread when there is something to collect.
+  /// @param told called from the thread that has written when there is something to collect.
   /// @param written called after each write that succeeded, also after its timeout: one call at a
   ///   time, from any writing thread. May be empty.
   LineWriters(std::shared_ptr<Lines> lines, bool threaded, std::int64_t timeout_ns,

@@ -76,7 +76,9 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
           }),
       told_levels_(inputs),
       snapshot_(controller.snapshot()),
-      posted_(engine.channels()) {
+      posted_(engine.channels()),
+      due_(controller.due()),
+      watches_(controller.watchesInputs()) {
   engine_.listen(*this);
   queue(readInputs());
   if (!threaded_) return;
@@ -173,7 +175,7 @@ void Shell::wait(const std::function<bool()>& ready, bool often) {
     const std::uint64_t turns = turns_;
     if (ready()) return;
     if (turns != turns_) continue;  // it has made a request itself
-    const pulse::Nanoseconds due = std::min(engine_due_, controller_.due());
+    const pulse::Nanoseconds due = std::min(engine_due_, due_);
     if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
     clock_.waitUntil(often ? std::min(due, clock_.now() + kOften) : due);
   }
@@ -190,7 +192,7 @@ void Shell::advance(pulse::Nanoseconds time) {
   const pulse::Nanoseconds end = clock_.now() + time;
   for (;;) {
     settle();
-    const pulse::Nanoseconds due = std::min(engine_due_, controller_.due());
+    const pulse::Nanoseconds due = std::min(engine_due_, due_);
     if (due > end && clock_.now() >= end) return;
     clock_.waitUntil(std::min(due, end));
   }
@@ -292,7 +294,7 @@ void Shell::run() {
   bool holding = false;
   for (;;) {
     std::int64_t until = writers_.deadline().value_or(pulse::kNever);
-    if (clock_.realtime()) until = std::min(until, controller_.due());
+    if (clock_.realtime()) until = std::min(until, due_);
     if (mustWatchPulses()) until = std::min(until, next_look_ns_);
     {
       std::unique_lock<std::mutex> lock(mutex_);
@@ -362,19 +364,27 @@ void Shell::watchPulses() {
 // When virtual time must stand still for the controller. The thread that watches the inputs takes
 // real time, in which virtual time could run far past the change of a switch.
 pulse::Nanoseconds Shell::alarm() const {
-  const pulse::Nanoseconds due = controller_.due();
-  return controller_.watchesInputs() ? std::min(due, clock_.now() + kVirtualInputPeriod) : due;
+  return watches_ ? std::min(due_, clock_.now() + kVirtualInputPeriod) : due_;
 }
 
-// Without threads.
+// Without threads. This runs for each edge, and few edges concern the controller.
 void Shell::settle() {
   bool fed = false;
   do {
-    while (turn()) {
+    if (isAwaited()) {
+      while (turn()) {
+      }
     }
     engine_due_ = engine_.serve();
-    fed = controller_.watchesInputs() && feedInputs();
+    fed = watches_ && feedInputs();
   } while (fed || news_.load(std::memory_order_acquire) || !reads_.empty());
+}
+
+// Whether there may be anything to do in a turn.
+bool Shell::isAwaited() {
+  if (news_.load(std::memory_order_acquire) || clock_.now() >= due_) return true;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(woken_, false) || !reads_.empty();
 }
 
 // @return whether the controller was told anything.
@@ -416,7 +426,7 @@ bool Shell::turn() {
     any = true;
   }
   feedWhatIsWatched();
-  if (threaded_ && !clock_.realtime() && controller_.watchesInputs()) feedInputs();
+  if (threaded_ && !clock_.realtime() && watches_) feedInputs();
   std::optional<Item> item;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -429,7 +439,7 @@ bool Shell::turn() {
     handle(Requested{item->call, std::move(item->request)});
     any = true;
   }
-  if (clock_.now() >= controller_.due()) {
+  if (clock_.now() >= due_) {
     handle(TimerDue{});
     any = true;
   }
@@ -460,6 +470,8 @@ void Shell::handle(decltype(Input::what) what) {
   input.what = std::move(what);
   if (recorder_ != nullptr) recorder_->addInput(input);
   controller_.handle(input, out);
+  due_ = controller_.due();
+  watches_ = controller_.watchesInputs();
   carryOut(input, out);
 }
 

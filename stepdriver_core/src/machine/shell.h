@@ -109,6 +109,7 @@ class Shell : public pulse::NewsListener {
   bool ordersAreOpen() const;
   pulse::Nanoseconds alarm() const;
   void settle();
+  bool isAwaited();
   bool mustWatchPulses() const;
   void watchPulses();
   void answer(activity::CallId call, activity::Reply reply);
@@ -158,6 +159,9 @@ class Shell : public pulse::NewsListener {
   std::int64_t looks_in_vain_ = 0;  // since it has begun or ended a pass
   std::int64_t next_look_ns_ = 0;
   pulse::Nanoseconds engine_due_ = 0;
+  // Of the controller, which changes only when it handles an input.
+  pulse::Nanoseconds due_;
+  bool watches_;  // the inputs
 
   std::optional<pulse::PulseThread> pulse_thread_;
   std::thread watcher_;

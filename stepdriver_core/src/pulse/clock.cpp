@@ -78,7 +78,8 @@ VirtualClock::VirtualClock(double speed) : speed_(speed), started_(steadyNow()) 
 // The time of the clock according to its pace, but never later than the awaited event.
 Nanoseconds VirtualClock::current() const {
   if (!waiting_ || holds_ > 0 || speed_ == 0.0) return now_;
-  return std::clamp(paced(), now_, std::max(now_, awaited_));
+  const Nanoseconds now = now_;
+  return std::clamp(paced(), now, std::max(now, awaited_));
 }
 
 Nanoseconds VirtualClock::paced() const { return atPace(steadyNow() - started_); }
@@ -88,6 +89,7 @@ Nanoseconds VirtualClock::atPace(Nanoseconds real) const {
 }
 
 Nanoseconds VirtualClock::now() {
+  if (speed_ == 0.0) return now_.load(std::memory_order_acquire);
   const std::lock_guard<std::mutex> lock(mutex_);
   return current();
 }
@@ -103,7 +105,7 @@ void VirtualClock::waitUntil(Nanoseconds time) {
     } else if (holds_ > 0 || (time == kNever && speed_ == 0.0)) {
       changed_.wait(lock);
     } else if (speed_ == 0.0) {
-      now_ = time;
+      now_.store(time, std::memory_order_release);
     } else {
       now_ = current();
       if (now_ >= time) break;

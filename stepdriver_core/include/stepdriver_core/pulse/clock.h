@@ -120,7 +120,8 @@ class VirtualClock : public Clock {
   const Nanoseconds started_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  Nanoseconds now_ = 0;
+  // Changed only with the mutex. Without a speed it can be read at any time.
+  std::atomic<Nanoseconds> now_{0};
   Nanoseconds awaited_ = kNever;
   Nanoseconds lag_ = 0;  // behind its pace, at the end of the last wait
   bool waiting_ = false;
