@@ -316,7 +316,7 @@ TEST_F(TrajectoryActionTest, EndsAbortedOutsideTheGoalTolerance) {
 TEST_F(TrajectoryActionTest, GoesOnAfterAHoldAndTellsWhereThatTookTooLong) {
   start(1.0);
   const Recorder<AxisStates> states(node.full("axis_states"));
-  Goal goal = there(0.06, 1.5);
+  Goal goal = there(0.06, 4.0);
   goal.goal_time_tolerance = ros::Duration(0.0);
   const auto hold_on_the_way = [&](std::int64_t pulses) {
     ASSERT_TRUE(waitUntil([&] { return node.pulses() > pulses; }));
@@ -331,7 +331,7 @@ TEST_F(TrajectoryActionTest, GoesOnAfterAHoldAndTellsWhereThatTookTooLong) {
   EXPECT_EQ(await(), State::SUCCEEDED) << said();
   EXPECT_EQ(node.pulses(), 7200);
 
-  goal = goalOf({{1.5, {0.0, 0.0}, {0.0, 0.0}}});
+  goal = goalOf({{4.0, {0.0, 0.0}, {0.0, 0.0}}});
   goal.goal_time_tolerance = ros::Duration(0.001);
   send(goal);
   hold_on_the_way(7200 + 1000);
