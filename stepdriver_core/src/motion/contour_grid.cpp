@@ -60,17 +60,20 @@ void ContourGrid::divide(std::size_t segment, double from, double to, int parts)
   ahead.reserve(2 * static_cast<std::size_t>(parts));
   for (int i = 0; i < parts; ++i) ahead.push_back(to + (from - to) * i / parts);
   Place middle;
-  while (!ahead.empty()) {
-    const double half = (begin.parameter + ahead.back()) / 2.0;
+  evaluate(segment, ahead.back(), end);
+  while (true) {
+    const double half = (begin.parameter + end.parameter) / 2.0;
     evaluate(segment, half, middle);
-    evaluate(segment, ahead.back(), end);
-    if (ahead.back() - begin.parameter > kShortest && tooLong(begin, middle, end)) {
+    if (end.parameter - begin.parameter > kShortest && tooLong(begin, middle, end)) {
       ahead.push_back(half);
+      std::swap(end, middle);
       continue;
     }
     append(segment, begin, end, lengthOf(begin, middle, end), false);
-    std::swap(begin, end);
     ahead.pop_back();
+    if (ahead.empty()) break;
+    std::swap(begin, end);
+    evaluate(segment, ahead.back(), end);
   }
 }
 

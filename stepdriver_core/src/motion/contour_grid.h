@@ -57,10 +57,12 @@ class ContourGrid {
   const double* position(std::size_t place) const { return &positions_[place * axes_]; }
   /// At a corner, and at the end.
   bool stopsAt(std::size_t place) const { return stops_[place]; }
-  /// The point at the middle parameter of an interval.
-  void evaluateMiddle(std::size_t interval, ContourPoint& point) const {
+  /// The point at the middle parameter of an interval, until another one is evaluated.
+  const ContourPoint& evaluateMiddle(std::size_t interval) const {
     const Interval& of = intervals_[interval];
-    contour_.evaluate(of.segment, (of.from + of.to) / 2.0, point);
+    ContourPoint& middle = scratch_.front().point;
+    contour_.evaluate(of.segment, (of.from + of.to) / 2.0, middle);
+    return middle;
   }
 
   /// The point at a distance from the begin of an interval, with the derivatives with respect to s;

@@ -7,6 +7,7 @@
 
 #include "give_way.h"
 #include "hermite.h"
+#include "rough_piece.h"
 #include "spline_refusals.h"
 #include "spline_segment.h"
 
@@ -48,8 +49,8 @@ void appendCubics(std::vector<Piece>& pieces, const Segment& segment, const Quin
 bool exceeds(std::vector<Piece>::const_iterator piece, std::vector<Piece>::const_iterator end,
              double acceleration) {
   return std::any_of(piece, end, [&](const Piece& cubic) {
-    const double last = cubic.a + cubic.j * cubic.duration.value();
-    return std::max(std::abs(cubic.a), std::abs(last)) > acceleration;
+    const RoughPiece rough(cubic);
+    return rough.highestAcceleration(0.0, rough.duration) > acceleration;
   });
 }
 
