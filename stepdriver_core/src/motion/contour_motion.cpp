@@ -9,6 +9,7 @@
 
 #include "contour_grid.h"
 #include "contour_speed.h"
+#include "give_way.h"
 #include "motion/profile.h"
 
 namespace stepdriver::motion {
@@ -25,12 +26,11 @@ constexpr int kMostPlansFromSpeed = 12;
 constexpr double kSmallExcess = 1e-3;
 // Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
 // right, makes fewer plans.
-constexpr double kLowerFirstBy = 1.0005;
-constexpr double kLowerBy = 1.005;
+constexpr double kLowerBy = 1.002;
 
 // An interval is divided if it isn't at a limit to this part, unless it takes less than a small
 // part of its segment's time.
-constexpr double kFullUse = 0.94;
+constexpr double kFullUse = 0.92;
 constexpr double kMostSquareRatio = 1.5;
 constexpr double kSmallPart = 0.005;
 // If both ends of an interval are checked, and that lowers the speed by so much, it is divided,
@@ -40,7 +40,6 @@ constexpr double kSmallestPart = 1e-4;
 // Of a limit: if a cubic exceeds it by so much, both ends of its interval are checked, and it is
 // divided if that is still possible.
 constexpr double kPoorCubic = 1.01;
-constexpr double kPoorLowered = 1.003;
 // Of the duration of an interval with constant acceleration along it.
 constexpr double kMostStretch = 0.1;
 constexpr double kMostDeviation = 0.02;  // of the resolution
@@ -90,12 +89,10 @@ class Knots {
 
   /// After ContourGrid::divideEach(): its result, and what was divided.
   void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided) {
-    std::vector<Kept> kept;
-    kept.reserve(origins.size());
-    for (const std::size_t origin : origins) {
-      kept.push_back(divided[origin] ? Kept{} : kept_[origin]);
+    kept_.resize(origins.size());
+    for (std::size_t i = origins.size(); i-- > 0;) {
+      kept_[i] = divided[origins[i]] ? Kept{} : kept_[origins[i]];
     }
-    kept_ = std::move(kept);
   }
 
   void findDurations(const ContourSpeed& speed) {
@@ -119,6 +116,9 @@ class Knots {
     findDurations(speed);
     knots_.clear();
     joints_.clear();
+    // A straight part may have two more.
+    knots_.reserve(2 * grid_.size());
+    joints_.reserve(2 * grid_.size() * axes_);
     appendPlace(0, 0.0, kept_[0].begin, 0);
     double time = 0.0;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
@@ -183,8 +183,7 @@ class Knots {
     const bool whole = place != kNoPlace && knots_[knot - 1].place + 1 == place;
     if (whole && !grid_[place - 1].straight) return demandOf(place - 1);
     return cubicDemand(
-        time(knot) - time(knot - 1),
-        [&](std::size_t j) { return joints_[(knot - 1) * axes_ + j]; },
+        time(knot) - time(knot - 1), [&](std::size_t j) { return joints_[(knot - 1) * axes_ + j]; },
         [&](std::size_t j) { return joints_[knot * axes_ + j]; });
   }
 
@@ -470,7 +469,7 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
 
 ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                         const ContourBegin& begin) {
-  ContourGrid grid(contour, begin.parameter, ContourGrid::kTurnOfEvenAcceleration);
+  ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
   ContourSpeed speed(contour, grid, limits, begin.speed * begin.speed, CheckedAcceleration::kMean);
   Knots knots(grid, limits);
   for (int i = 0; i < kMostDivisions; ++i) {
@@ -481,13 +480,12 @@ ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>
   // From a speed, what still exceeds the limits isn't slowed down afterwards.
   const bool from_speed = begin.speed > 0.0;
   const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
-  const double poor_later = from_speed ? 1.0 : kPoorLowered;
   for (int plans = 1;; ++plans) {
     speed.plan();
     knots.make(speed);
     const bool first = plans == 1;
-    const Excess excess = lowerLimits(first ? kLowerFirstBy : kLowerBy,
-                                      first ? kPoorCubic : poor_later, grid, speed, knots);
+    const double poor = from_speed && !first ? 1.0 : kPoorCubic;
+    const Excess excess = lowerLimits(first ? 1.0 : kLowerBy, poor, grid, speed, knots);
     const double most = std::max(excess.acceleration, excess.speed);
     if (most > 1.0 + kSmallExcess && plans < most_plans) continue;
     double factor = std::max(std::sqrt(excess.acceleration), excess.speed);

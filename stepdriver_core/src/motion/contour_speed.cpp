@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
+
+#include "give_way.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -30,6 +31,7 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
       allowed_(grid.size()),
       controllable_(grid.size() + 1, kUnbounded),
       squares_(grid.size() + 1, kUnbounded) {
+  bands_.reserve(2 * grid.size() * limits.size());
   controllable_.back() = 0.0;
   squares_.front() = begin;
 }
@@ -72,21 +74,22 @@ double ContourSpeed::lossOfBothEnds(std::size_t interval) {
 
 void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
                           const std::vector<bool>& divided) {
-  const auto spread = [&](auto& values) {
-    std::decay_t<decltype(values)> made;
-    made.reserve(origins.size() + 1);
-    for (const std::size_t origin : origins) made.push_back(values[origin]);
-    if (values.size() > divided.size()) made.push_back(values.back());  // of the last place
-    values = std::move(made);
+  const auto grow = [&](auto& values) {
+    const bool of_places = values.size() > divided.size();
+    const auto last = values.back();
+    values.resize(origins.size());
+    // No origin is after its interval: from the end on, nothing is replaced before it is copied.
+    for (std::size_t i = origins.size(); i-- > 0;) values[i] = values[origins[i]];
+    if (of_places) values.push_back(last);
   };
-  spread(acceleration_shares_);
-  spread(speed_shares_);
-  spread(most_squares_);
-  spread(most_accelerations_);
-  spread(checked_);
-  spread(allowed_);
-  spread(controllable_);
-  spread(squares_);
+  grow(acceleration_shares_);
+  grow(speed_shares_);
+  grow(most_squares_);
+  grow(most_accelerations_);
+  grow(checked_);
+  grow(allowed_);
+  grow(controllable_);
+  grow(squares_);
   stale_.clear();
   for (const std::size_t origin : origins) stale_.push_back(divided[origin]);
 }

@@ -62,7 +62,7 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double
   peaks.highest.value = first;
   double velocity = velocity_before;
   for (std::size_t index = 0; index < profile.pieces().size(); ++index) {
-    giveWay(index);
+    giveWayAt(index);
     const RoughPiece piece(profile.piece(index));
     const double start = profile.pieceStart(index).value();
     takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);

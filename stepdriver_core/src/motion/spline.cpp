@@ -107,9 +107,9 @@ Ends takeJerk(SplineJerk& worst, const Segment& segment, const Piece* made = nul
   };
   if (segment.kind() == SegmentKind::kLine) return {};
   if (segment.kind() == SegmentKind::kCubic) {
-    const Piece piece = made != nullptr ? *made : cubicOf(segment);
+    const RoughPiece piece(made != nullptr ? *made : cubicOf(segment));
     take(piece.j, start);
-    return {piece.a, piece.accelerationAt(piece.duration).value()};
+    return {piece.a, piece.acceleration(duration)};
   }
   const Quintic curve = segment.quintic();
   const auto consider = [&](double u) {
@@ -190,7 +190,7 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, double most_accel
   begin_acceleration_ = accelerationAtBegin(segments.at(1));
   JerkMeter meter(begin_acceleration_);
   for (std::size_t i = 1; i < segments.size(); ++i) {
-    giveWay(i);
+    giveWayAt(i);
     const Segment segment = segments.at(i);
     append(pieces, segment, most_acceleration);
     meter.take(segment, &pieces.back());
