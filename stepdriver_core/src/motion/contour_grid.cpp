@@ -18,7 +18,7 @@ constexpr double kNoLength = 1e-14;          // of the length of an interval
 constexpr int kPartsOfCorner = 5;            // at least, of each half
 constexpr double kGentleTurn = 0.1;          // [rad] of half of a corner
 constexpr int kPartsOfCurve = 4;             // at least
-constexpr std::size_t kUsualParts = 24;      // of a segment or fewer
+constexpr std::size_t kUsualParts = 24;      // of a segment
 
 }  // namespace
 

@@ -377,20 +377,15 @@ double middleDeviation(const ContourGrid& grid, std::size_t interval, double beg
 // Whether an interval wastes time, unless it takes only a small part of its segment's, or deviates.
 bool isLong(std::size_t interval, double part, double deviation, const ContourGrid& grid,
             ContourSpeed& speed, Knots& knots) {
-  const Demand& demand = knots.demandOf(interval);
-  if (demand.acceleration() > kPoorCubic) {
-    speed.checkBothEnds(interval);
-    return true;
-  }
   if (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) return true;
-  if (part >= kSmallPart && wastesTime(speed, interval, demand)) return true;
+  if (part >= kSmallPart && wastesTime(speed, interval, knots.demandOf(interval))) return true;
   const double begin = knots.beginSpeed(interval);
   const double end = knots.endSpeed(interval);
   return evenDeviation(grid, interval, begin, end) > deviation ||
          middleDeviation(grid, interval, begin, end, knots.duration(interval)) > deviation;
 }
 
-// Divides the intervals that are too long.
+// Divides the intervals that are too long, and those whose cubics are poor.
 bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots& knots) {
   std::vector<bool> divided(grid.size(), false);
   std::vector<double> times(grid[grid.size() - 1].segment + 1, 0.0);  // of the segments
@@ -399,7 +394,10 @@ bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots&
   for (std::size_t i = 0; i < grid.size(); ++i) {
     giveWayAt(i);
     if (grid[i].straight || knots.isSettled(i)) continue;
-    if (isLong(i, knots.duration(i) / times[grid[i].segment], deviation, grid, speed, knots)) {
+    const bool poor = knots.demandOf(i).acceleration() > kPoorCubic;
+    if (poor) speed.checkBothEnds(i);
+    const double part = knots.duration(i) / times[grid[i].segment];
+    if (poor || isLong(i, part, deviation, grid, speed, knots)) {
       divided[i] = any = true;
     } else {
       knots.settle(i);

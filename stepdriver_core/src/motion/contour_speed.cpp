@@ -96,24 +96,24 @@ void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
 
 void ContourSpeed::plan() {
   const std::size_t size = grid_.size();
-  for (std::size_t i = 0; i < size; ++i) {
-    giveWayAt(i);
-    if (stale_[i]) findAllowed(i);
-  }
-  std::vector<bool> changed(size + 1, false);  // at each place, what is controllable
+  if (stale_.back()) findAllowed(size - 1);
+  bool changed = false;  // what is controllable at the end of the interval
   for (std::size_t i = size; i-- > 0;) {
     giveWayAt(i);
+    const bool stale = stale_[i];
+    const bool stale_before = i > 0 && stale_[i - 1];
+    if (stale_before) findAllowed(i - 1);
     // The speeds of an interval also limit x at its end.
-    const bool due = stale_[i] || changed[i + 1] || (i > 0 && stale_[i - 1]);
-    if (!due) continue;
+    if (!stale && !changed && !stale_before) continue;
+    stale_[i] = stale || changed;  // for the second pass
     const double x = grid_.stopsAt(i) ? 0.0 : largestBefore(i, controllable_[i + 1]);
-    changed[i] = x != controllable_[i];
+    changed = x != controllable_[i];
     controllable_[i] = x;
   }
   bool moved = false;  // x at the begin of the interval
   for (std::size_t i = 0; i < size; ++i) {
     giveWayAt(i);
-    if (!(moved || stale_[i] || changed[i + 1])) continue;
+    if (!moved && !stale_[i]) continue;
     const double x = largestAfter(i, squares_[i], controllable_[i + 1]);
     moved = x != squares_[i + 1];
     squares_[i + 1] = x;
