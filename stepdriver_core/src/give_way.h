@@ -14,4 +14,11 @@ inline void giveWay(std::size_t index) {
   if (index % kEvery == kEvery - 1) std::this_thread::yield();
 }
 
+/// The same for items that take a fraction of that: the places of a path, the points of a
+/// trajectory.
+inline void giveWayAt(std::size_t place) {
+  constexpr std::size_t kPlaces = 8;  // as long as an item
+  if (place % kPlaces == 0) giveWay(place / kPlaces);
+}
+
 }  // namespace stepdriver

@@ -204,12 +204,12 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
   std::vector<motion::Waypoint> waypoints;
   waypoints.reserve(source.points.size());
   for (std::size_t i = 0; i < source.points.size(); ++i) {
-    giveWay(i);
+    giveWayAt(i);
     waypoints.push_back(waypointOf(member, i, source.points[i], waypoints));
   }
   if (source.slowdown > 1.0) {
     for (std::size_t i = 0; i < waypoints.size(); ++i) {
-      giveWay(i);
+      giveWayAt(i);
       motion::Waypoint& waypoint = waypoints[i];
       waypoint.time_ns = nanoseconds(source.slowdown * source.points[i].time);
       if (waypoint.velocity) *waypoint.velocity /= source.slowdown;

@@ -194,7 +194,7 @@ struct MotorTail::Plan {
   explicit Plan(const Profile& joint) : peaks(joint) {
     Turns all(joint.startPosition());
     for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
-      giveWay(i);
+      giveWayAt(i);
       all.take(joint.piece(i), joint.pieceStart(i).value());
       if (all.found().empty()) moves_after = i + 1;
     }

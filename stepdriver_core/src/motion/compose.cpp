@@ -9,6 +9,7 @@
 #include "hermite.h"
 #include "no_time.h"
 #include "root.h"
+#include "rough_piece.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -36,19 +37,16 @@ struct Part {
 
 // An upper bound of the absolute value for q(s(t)).
 double largestFourthDerivative(const Part& part) {
-  const auto largest = [](double a, double b) { return std::max(std::abs(a), std::abs(b)); };
-  const Piece& path = part.path;
-  double rate = largest(path.velocityAt(part.begin).value(), path.velocityAt(part.end).value());
-  const double level = path.j != 0.0 ? -path.a / path.j : 0.0;
-  if (part.begin.value() < level && level < part.end.value()) {
-    rate = std::max(rate, std::abs(path.velocityAt(level).value()));
-  }
-  const double slope =
-      largest(path.accelerationAt(part.begin).value(), path.accelerationAt(part.end).value());
-  const double acceleration = largest(part.course.accelerationAt(part.from).value(),
-                                      part.course.accelerationAt(part.from + part.length).value());
+  const RoughPiece path(part.path);
+  const RoughPiece course(part.course);
+  const double begin = part.begin.value();
+  const double end = part.end.value();
+  const double rate = path.highestSpeed(begin, end);
+  const double slope = path.highestAcceleration(begin, end);
+  const double acceleration =
+      course.highestAcceleration(part.from.value(), (part.from + part.length).value());
   return acceleration * (3.0 * slope * slope + 4.0 * rate * std::abs(path.j)) +
-         6.0 * std::abs(part.course.j) * slope * rate * rate;
+         6.0 * std::abs(course.j) * slope * rate * rate;
 }
 
 void appendCubics(std::vector<Piece>& pieces, const Part& part) {
@@ -69,22 +67,12 @@ void appendCubics(std::vector<Piece>& pieces, const Part& part) {
   }
 }
 
-// A cubic in doubles, which are precise enough to check a motor's limits.
-struct Rough {
-  double v0, a, j;
-
-  explicit Rough(const Piece& piece) : v0(piece.v0), a(piece.a), j(piece.j) {}
-  double way(double t) const { return t * (v0 + t * (a / 2.0 + t * (j / 6.0))); }
-  double velocity(double t) const { return v0 + t * (a + t * (j / 2.0)); }
-  double acceleration(double t) const { return a + t * j; }
-};
-
 // The time at which a piece of the path has covered a distance, to a double's precision. The path
 // only goes forwards: Newton's steps, kept inside a bracket.
-double roughTimeTo(const Rough& path, double way, double duration) {
+double roughTimeTo(const RoughPiece& path, double way) {
   double low = 0.0;
-  double high = duration;
-  double t = path.v0 > 0.0 ? std::min(duration, way / path.v0) : duration / 2.0;
+  double high = path.duration;
+  double t = path.v0 > 0.0 ? std::min(high, way / path.v0) : high / 2.0;
   for (int i = 0; i < 100; ++i) {
     const double error = path.way(t) - way;
     if (error == 0.0) return t;
@@ -101,8 +89,8 @@ double roughTimeTo(const Rough& path, double way, double duration) {
 DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
   if (path.j != 0.0) {
     // Two of Newton's steps give all bits, unless the path is nearly at rest there.
-    const Rough rough(path);
-    const double near = roughTimeTo(rough, way.value(), path.duration.value());
+    const RoughPiece rough(path);
+    const double near = roughTimeTo(rough, way.value());
     if (rough.velocity(near) > 1e-3) {
       DoubleDouble t = near;
       for (int i = 0; i < 2; ++i) {
@@ -143,20 +131,12 @@ std::vector<Piece> cubicsAlong(const Profile& course, const Piece& stretch) {
   return pieces;
 }
 
-double largest(double a, double b) { return std::max(std::abs(a), std::abs(b)); }
-
-double highestSpeed(const Rough& cubic, double from, double to) {
-  const double level = cubic.j != 0.0 ? -cubic.a / cubic.j : from;
-  const double ends = largest(cubic.velocity(from), cubic.velocity(to));
-  return level > from && level < to ? largest(ends, cubic.velocity(level)) : ends;
-}
-
 // The same parts, for checking the limits.
 struct RoughPart {
-  Rough course;
+  RoughPiece course;
   double from;
   double length;
-  Rough path;
+  RoughPiece path;
   double begin;
   double end;
 
@@ -172,10 +152,10 @@ struct RoughPart {
   // Uses the largest value of each factor anywhere in the part.
   bool surelyKeeps(const MotorBounds& bounds) const {
     const double to = from + length;
-    const double q1 = highestSpeed(course, from, to);
-    const double q2 = largest(course.acceleration(from), course.acceleration(to));
-    const double s1 = highestSpeed(path, begin, end);
-    const double s2 = largest(path.acceleration(begin), path.acceleration(end));
+    const double q1 = course.highestSpeed(from, to);
+    const double q2 = course.highestAcceleration(from, to);
+    const double s1 = path.highestSpeed(begin, end);
+    const double s2 = path.highestAcceleration(begin, end);
     if (q2 * s1 * s1 + q1 * s2 > bounds.acceleration) return false;
     const double jerk =
         std::abs(course.j) * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * std::abs(path.j);
@@ -196,8 +176,7 @@ struct RoughPart {
 };
 
 bool staysWithin(const Profile& course, const Piece& stretch, const MotorBounds& bounds) {
-  const Rough path(stretch);
-  const double duration = stretch.duration.value();
+  const RoughPiece path(stretch);
   const double length = (stretch.positionAt(stretch.duration) - stretch.p0).value();
   double t = 0.0;
   double way = 0.0;  // along the path, from the beginning of the stretch
@@ -207,9 +186,9 @@ bool staysWithin(const Profile& course, const Piece& stretch, const MotorBounds&
     const bool ends_here = last || !(knot < length);
     if (!ends_here && knot - way <= kNoTime) continue;
     const double next = ends_here ? length : knot;
-    const double until = ends_here ? duration : roughTimeTo(path, next, duration);
+    const double until = ends_here ? path.duration : roughTimeTo(path, next);
     const double from = way + (stretch.p0 - course.pieceStart(index)).value();
-    const RoughPart part{Rough(course.piece(index)), from, next - way, path, t, until};
+    const RoughPart part{RoughPiece(course.piece(index)), from, next - way, path, t, until};
     if (!part.keeps(bounds)) return false;
     if (ends_here) return true;
     way = next;

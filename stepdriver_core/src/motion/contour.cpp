@@ -563,6 +563,10 @@ void Contour::blend(const End& end, double distance, double sign, ContourPoint& 
 
 std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) const {
   const Segment& segment = segments_[index];
+  if (isLine(index)) {
+    const double* c = &segment.powers[2 * axis];
+    return std::minmax({c[0], c[0] + c[1]});
+  }
   ContourPoint point;
   evaluateGiven(index, 0.0, point);
   double low = point.position[axis];

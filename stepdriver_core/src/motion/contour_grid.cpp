@@ -16,24 +16,27 @@ constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
 constexpr double kNoLength = 1e-14;          // of the length of an interval
 constexpr int kPartsOfCorner = 5;            // at least, of each half
+constexpr double kGentleTurn = 0.1;          // [rad] of half of a corner
 constexpr int kPartsOfCurve = 4;             // at least
+constexpr std::size_t kUsualParts = 24;      // of a segment
 
 }  // namespace
 
-ContourGrid::ContourGrid(const Contour& contour, double begin, double most_turn)
-    : contour_(contour), most_turn_(most_turn), axes_(contour.axes()) {
+ContourGrid::ContourGrid(const Contour& contour, double begin, const Fineness& fineness)
+    : contour_(contour), fineness_(fineness), axes_(contour.axes()) {
+  reserve(kUsualParts * contour.size());
   ContourPoint start;
   contour.evaluate(0, begin, start);
-  positions_ = std::move(start.position);
+  positions_.assign(start.position.begin(), start.position.end());
   stops_.push_back(false);
   for (std::size_t i = 0; i < contour.size(); ++i) {
     giveWay(i);
     const double from = i == 0 ? begin : 0.0;
     const double first = std::max(from, contour.roundedUntil(i));
     const double last = std::max(from, contour.roundedFrom(i));
-    if (first > from) divide(i, from, first, kPartsOfCorner);
+    if (first > from) divide(i, from, first, partsOfCorner(i, from, first));
     if (last - first > kLeastPart) divide(i, first, last, contour.isLine(i) ? 1 : kPartsOfCurve);
-    if (last < 1.0) divide(i, last, 1.0, kPartsOfCorner);
+    if (last < 1.0) divide(i, last, 1.0, partsOfCorner(i, last, 1.0));
     stops_.back() = contour.stopsAfter(i);
   }
 }
@@ -44,6 +47,13 @@ void ContourGrid::evaluate(std::size_t segment, double parameter, Place& place) 
   double sum = 0.0;
   for (const double x : place.point.first) sum += x * x;
   place.rate = std::sqrt(sum);
+}
+
+int ContourGrid::partsOfCorner(std::size_t segment, double from, double to) {
+  auto& [begin, middle, end] = scratch_;
+  evaluate(segment, from, begin);
+  evaluate(segment, to, end);
+  return turnOf(begin, end) < kGentleTurn ? fineness_.parts_of_gentle_half : kPartsOfCorner;
 }
 
 // Into `parts` intervals, or more if they would be too long; one part is straight.
@@ -60,60 +70,76 @@ void ContourGrid::divide(std::size_t segment, double from, double to, int parts)
   ahead.reserve(2 * static_cast<std::size_t>(parts));
   for (int i = 0; i < parts; ++i) ahead.push_back(to + (from - to) * i / parts);
   Place middle;
-  while (!ahead.empty()) {
-    const double half = (begin.parameter + ahead.back()) / 2.0;
+  evaluate(segment, ahead.back(), end);
+  while (true) {
+    const double half = (begin.parameter + end.parameter) / 2.0;
     evaluate(segment, half, middle);
-    evaluate(segment, ahead.back(), end);
-    if (ahead.back() - begin.parameter > kShortest && tooLong(begin, middle, end)) {
+    if (end.parameter - begin.parameter > kShortest && tooLong(begin, middle, end)) {
       ahead.push_back(half);
+      std::swap(end, middle);
       continue;
     }
     append(segment, begin, end, lengthOf(begin, middle, end), false);
-    std::swap(begin, end);
     ahead.pop_back();
+    if (ahead.empty()) break;
+    std::swap(begin, end);
+    evaluate(segment, ahead.back(), end);
   }
 }
 
 std::vector<std::size_t> ContourGrid::divideEach(const std::vector<bool>& which,
                                                  std::size_t parts) {
-  const ContourGrid before = std::move(*this);
-  axes_ = before.axes_;
-  const auto more =
-      (parts - 1) * static_cast<std::size_t>(std::count(which.begin(), which.end(), true));
-  intervals_.clear();
-  derivatives_.clear();
-  intervals_.reserve(before.size() + more);
-  derivatives_.reserve(before.derivatives_.size() + 4 * axes_ * more);
-  positions_.reserve(before.positions_.size() + axes_ * more);
-  positions_.assign(before.position(0), before.position(0) + axes_);
-  stops_.assign(1, false);
-  std::vector<std::size_t> origins;
-  origins.reserve(before.size() + more);
+  const std::size_t before = size();
+  std::size_t made = before;
+  for (std::size_t i = 0; i < before; ++i)
+    made += which[i] && !intervals_[i].straight ? parts - 1 : 0;
+  resize(made);
+  std::vector<std::size_t> origins(made);
   std::vector<Place> places(2 * parts + 1);  // with the middles of the parts
-  for (std::size_t i = 0; i < before.size(); ++i) {
+  // From the end on, nothing is replaced before it is copied.
+  for (std::size_t i = before; i-- > 0;) {
     giveWayAt(i);
-    const Interval& interval = before[i];
-    if (which[i] && !interval.straight) {
-      for (std::size_t k = 0; k < places.size(); ++k) {
-        const double part = static_cast<double>(k) / static_cast<double>(places.size() - 1);
-        evaluate(interval.segment, interval.from + part * (interval.to - interval.from), places[k]);
-      }
-      for (std::size_t k = 0; k + 2 < places.size(); k += 2) {
-        append(interval.segment, places[k], places[k + 2],
-               lengthOf(places[k], places[k + 1], places[k + 2]), false);
-        origins.push_back(i);
-      }
-    } else {
-      intervals_.push_back(interval);
-      derivatives_.insert(derivatives_.end(), before.firstAtBegin(i),
-                          before.firstAtBegin(i) + 4 * axes_);
-      positions_.insert(positions_.end(), before.position(i + 1), before.position(i + 1) + axes_);
-      stops_.push_back(false);
-      origins.push_back(i);
+    if (!which[i] || intervals_[i].straight) {
+      origins[--made] = i;
+      if (made != i) move(i, made);
+      continue;
     }
-    stops_.back() = before.stopsAt(i + 1);
+    const Interval interval = intervals_[i];
+    const bool stops = stops_[i + 1];
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      const double part = static_cast<double>(k) / static_cast<double>(places.size() - 1);
+      evaluate(interval.segment, interval.from + part * (interval.to - interval.from), places[k]);
+    }
+    for (std::size_t k = parts; k-- > 0;) {
+      const Place* begin = &places[2 * k];
+      origins[--made] = i;
+      put(made, interval.segment, begin[0], begin[2], lengthOf(begin[0], begin[1], begin[2]),
+          false);
+      stops_[made + 1] = k + 1 == parts && stops;
+    }
   }
   return origins;
+}
+
+void ContourGrid::resize(std::size_t intervals) {
+  intervals_.resize(intervals);
+  derivatives_.resize(4 * axes_ * intervals);
+  positions_.resize(axes_ * (intervals + 1));
+  stops_.resize(intervals + 1);
+}
+
+void ContourGrid::reserve(std::size_t intervals) {
+  intervals_.reserve(intervals);
+  derivatives_.reserve(4 * axes_ * intervals);
+  positions_.reserve(axes_ * (intervals + 1));
+}
+
+// An interval, and the place at its end.
+void ContourGrid::move(std::size_t from, std::size_t to) {
+  intervals_[to] = intervals_[from];
+  std::copy_n(firstAtBegin(from), 4 * axes_, &derivatives_[4 * axes_ * to]);
+  std::copy_n(position(from + 1), axes_, &positions_[axes_ * (to + 1)]);
+  stops_[to + 1] = stops_[from + 1];
 }
 
 ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
@@ -211,20 +237,21 @@ double ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoi
   return parameter;
 }
 
+// [rad] Nearly.
+double ContourGrid::turnOf(const Place& begin, const Place& end) const {
+  double square = 0.0;
+  for (std::size_t i = 0; i < axes_; ++i) {
+    const double change = end.point.first[i] / end.rate - begin.point.first[i] / begin.rate;
+    square += change * change;
+  }
+  return std::sqrt(square);
+}
+
 bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {
   const auto [least, most] = std::minmax({begin.rate, middle.rate, end.rate});
   if (most > kMostRateRatio * least) return true;
-  double first = 0.0;
-  double second = 0.0;
-  for (std::size_t i = 0; i < axes_; ++i) {
-    const double a = begin.point.first[i] / begin.rate;
-    const double b = middle.point.first[i] / middle.rate;
-    const double c = end.point.first[i] / end.rate;
-    first += (b - a) * (b - a);
-    second += (c - b) * (c - b);
-  }
-  const double turn = std::sqrt(first) + std::sqrt(second);
-  if (turn > most_turn_) return true;
+  const double turn = turnOf(begin, middle) + turnOf(middle, end);
+  if (turn > fineness_.most_turn) return true;
   // Of a cubic from an arc of this length and turn, at a constant speed.
   const double length = middle.rate * (end.parameter - begin.parameter);
   return length * turn * turn * turn / 384.0 > kMostArcDeviation * contour_.resolution();
@@ -244,17 +271,18 @@ double ContourGrid::lengthOf(const Place& begin, const Place& middle, const Plac
 
 void ContourGrid::append(std::size_t segment, const Place& begin, const Place& end, double length,
                          bool straight) {
-  intervals_.push_back({length, segment, straight, begin.parameter, end.parameter});
-  appendDerivatives(begin);
-  appendDerivatives(end);
-  positions_.insert(positions_.end(), end.point.position.begin(), end.point.position.end());
-  stops_.push_back(false);
+  resize(size() + 1);
+  put(size() - 1, segment, begin, end, length, straight);
 }
 
-void ContourGrid::appendDerivatives(const Place& place) {
-  derivatives_.resize(derivatives_.size() + 2 * axes_);
-  double* first = &derivatives_[derivatives_.size() - 2 * axes_];
-  withRespectToLength(place, first, first + axes_);
+void ContourGrid::put(std::size_t index, std::size_t segment, const Place& begin, const Place& end,
+                      double length, bool straight) {
+  intervals_[index] = {length, segment, straight, begin.parameter, end.parameter};
+  double* derivatives = &derivatives_[4 * axes_ * index];
+  withRespectToLength(begin, derivatives, derivatives + axes_);
+  withRespectToLength(end, derivatives + 2 * axes_, derivatives + 3 * axes_);
+  std::copy_n(end.point.position.data(), axes_, &positions_[axes_ * (index + 1)]);
+  stops_[index + 1] = false;
 }
 
 void ContourGrid::withRespectToLength(const Place& place, double* first, double* second) const {

@@ -4,31 +4,28 @@
 #include <cstddef>
 #include <vector>
 
-#include "give_way.h"
 #include "motion/contour.h"
 
 namespace stepdriver::motion {
-
-/// giveWay() for a loop over the places of a grid, each of which takes a fraction of what it
-/// counts.
-inline void giveWayAt(std::size_t place) {
-  constexpr std::size_t kPlaces = 16;
-  if (place % kPlaces == 0) giveWay(place / kPlaces);
-}
 
 /// A contour divided into short intervals of its length s, each from one place to the next. A
 /// straight part is one interval. Only one thread uses it at a time.
 class ContourGrid {
  public:
-  /// @name [rad] By how much an interval turns at most, for the acceleration along it
+  /// How finely a contour is divided.
+  struct Fineness {
+    double most_turn;          ///< [rad] of an interval
+    int parts_of_gentle_half;  ///< at least, of half a corner that hardly turns
+  };
+  /// @name If this is even along each interval
   /// @{
-  static constexpr double kTurnOfEvenSpeed = 0.12;        ///< constant
-  static constexpr double kTurnOfEvenAcceleration = 0.2;  ///< such that those of the axes are
+  static constexpr Fineness kForSpeed{0.12, 5};
+  static constexpr Fineness kForAcceleration{0.28, 3};  ///< that of each axis
   /// @}
 
   /// @param begin the parameter of the first segment at which it begins.
   explicit ContourGrid(const Contour& contour, double begin = 0.0,
-                       double most_turn = kTurnOfEvenSpeed);
+                       const Fineness& fineness = kForSpeed);
 
   struct Interval {
     double length = 0.0;  ///< [unit]
@@ -57,10 +54,12 @@ class ContourGrid {
   const double* position(std::size_t place) const { return &positions_[place * axes_]; }
   /// At a corner, and at the end.
   bool stopsAt(std::size_t place) const { return stops_[place]; }
-  /// The point at the middle parameter of an interval.
-  void evaluateMiddle(std::size_t interval, ContourPoint& point) const {
+  /// The point at the middle parameter of an interval, until another one is evaluated.
+  const ContourPoint& evaluateMiddle(std::size_t interval) const {
     const Interval& of = intervals_[interval];
-    contour_.evaluate(of.segment, (of.from + of.to) / 2.0, point);
+    ContourPoint& middle = scratch_.front().point;
+    contour_.evaluate(of.segment, (of.from + of.to) / 2.0, middle);
+    return middle;
   }
 
   /// The point at a distance from the begin of an interval, with the derivatives with respect to s;
@@ -91,15 +90,21 @@ class ContourGrid {
   }
   void evaluate(std::size_t segment, double parameter, Place& place) const;
   void divide(std::size_t segment, double from, double to, int parts);
+  int partsOfCorner(std::size_t segment, double from, double to);
+  double turnOf(const Place& begin, const Place& end) const;
   bool tooLong(const Place& begin, const Place& middle, const Place& end) const;
   double lengthOf(const Place& begin, const Place& middle, const Place& end) const;
   void append(std::size_t segment, const Place& begin, const Place& end, double length,
               bool straight);
-  void appendDerivatives(const Place& place);
+  void put(std::size_t index, std::size_t segment, const Place& begin, const Place& end,
+           double length, bool straight);
+  void move(std::size_t from, std::size_t to);
+  void resize(std::size_t intervals);
+  void reserve(std::size_t intervals);
   void withRespectToLength(const Place& place, double* first, double* second) const;
 
   const Contour& contour_;
-  double most_turn_;
+  Fineness fineness_;
   std::size_t axes_;
   std::vector<Interval> intervals_;
   std::vector<double> positions_;

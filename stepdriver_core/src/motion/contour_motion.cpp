@@ -9,6 +9,7 @@
 
 #include "contour_grid.h"
 #include "contour_speed.h"
+#include "give_way.h"
 #include "motion/profile.h"
 
 namespace stepdriver::motion {
@@ -25,12 +26,11 @@ constexpr int kMostPlansFromSpeed = 12;
 constexpr double kSmallExcess = 1e-3;
 // Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
 // right, makes fewer plans.
-constexpr double kLowerFirstBy = 1.0005;
-constexpr double kLowerBy = 1.005;
+constexpr double kLowerBy = 1.002;
 
 // An interval is divided if it isn't at a limit to this part, unless it takes less than a small
 // part of its segment's time.
-constexpr double kFullUse = 0.94;
+constexpr double kFullUse = 0.92;
 constexpr double kMostSquareRatio = 1.5;
 constexpr double kSmallPart = 0.005;
 // If both ends of an interval are checked, and that lowers the speed by so much, it is divided,
@@ -40,7 +40,6 @@ constexpr double kSmallestPart = 1e-4;
 // Of a limit: if a cubic exceeds it by so much, both ends of its interval are checked, and it is
 // divided if that is still possible.
 constexpr double kPoorCubic = 1.01;
-constexpr double kPoorLowered = 1.003;
 // Of the duration of an interval with constant acceleration along it.
 constexpr double kMostStretch = 0.1;
 constexpr double kMostDeviation = 0.02;  // of the resolution
@@ -55,6 +54,8 @@ struct Trapezoid {
   double way_cruise = 0.0;
   double ramp_down = 0.0;  // s
   double peak = 0.0;       // unit/s
+
+  double duration() const { return ramp_up + cruise + ramp_down; }
 };
 
 Trapezoid trapezoidOf(double length, double begin_square, double end_square,
@@ -79,8 +80,8 @@ struct Demand {
   double acceleration() const { return std::max(acceleration_at_begin, acceleration_at_end); }
 };
 
-// The knots of a planned speed. What follows from the speeds at both ends of an interval is kept
-// until they change.
+// The motion at a planned speed: the durations of the intervals, and its knots. What follows from
+// the speeds at both ends of an interval is kept until they change.
 class Knots {
  public:
   Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits)
@@ -88,43 +89,68 @@ class Knots {
 
   /// After ContourGrid::divideEach(): its result, and what was divided.
   void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided) {
-    std::vector<Kept> kept;
-    kept.reserve(origins.size());
-    for (const std::size_t origin : origins) {
-      kept.push_back(divided[origin] ? Kept{} : kept_[origin]);
+    kept_.resize(origins.size());
+    for (std::size_t i = origins.size(); i-- > 0;) {
+      kept_[i] = divided[origins[i]] ? Kept{} : kept_[origins[i]];
     }
-    kept_ = std::move(kept);
   }
 
-  void make(const ContourSpeed& speed) {
-    time_ = 0.0;
-    knots_.clear();
-    joints_.clear();
+  void findDurations(const ContourSpeed& speed) {
     double begin = std::sqrt(speed.square(0));
-    appendPlace(0, 0.0, begin, 0);
     for (std::size_t i = 0; i < grid_.size(); ++i) {
       giveWayAt(i);
       const double end = std::sqrt(speed.square(i + 1));
+      Kept& kept = kept_[i];
+      const bool changed = begin != kept.begin || end != kept.end;
+      if (changed) kept = {begin, end};
       if (grid_[i].straight) {
-        appendStraight(i, speed);
-      } else {
-        if (begin != kept_[i].begin || end != kept_[i].end) {
-          kept_[i] = {begin, end, durationOf(i, begin, end), {}, false};
-        }
-        time_ += kept_[i].duration;
+        kept.duration = trapezoid(i, speed).duration();
+      } else if (changed) {
+        kept.duration = durationOf(i, begin, end);
       }
-      appendPlace(i + 1, time_, end, i);
       begin = end;
     }
   }
 
-  /// Of an interval that isn't straight.
+  void make(const ContourSpeed& speed) {
+    findDurations(speed);
+    knots_.clear();
+    joints_.clear();
+    // A straight part may have two more.
+    knots_.reserve(2 * grid_.size());
+    joints_.reserve(2 * grid_.size() * axes_);
+    appendPlace(0, 0.0, kept_[0].begin, 0);
+    double time = 0.0;
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      giveWayAt(i);
+      if (grid_[i].straight) appendStraight(i, speed, time);
+      time += kept_[i].duration;
+      appendPlace(i + 1, time, kept_[i].end, i);
+    }
+  }
+
   double beginSpeed(std::size_t interval) const { return kept_[interval].begin; }
   double endSpeed(std::size_t interval) const { return kept_[interval].end; }
   double duration(std::size_t interval) const { return kept_[interval].duration; }  ///< [s]
-  /// Whether setFollows() has been called for its cubic.
-  bool follows(std::size_t interval) const { return kept_[interval].follows; }
-  void setFollows(std::size_t interval) { kept_[interval].follows = true; }
+  /// Whether settle() has been called since the speeds of an interval changed.
+  bool isSettled(std::size_t interval) const { return kept_[interval].settled; }
+  void settle(std::size_t interval) { kept_[interval].settled = true; }
+  /// Of the cubic of an interval that isn't straight.
+  const Demand& demandOf(std::size_t interval) {
+    Kept& kept = kept_[interval];
+    if (!kept.demand) {
+      kept.demand = cubicDemand(
+          kept.duration,
+          [&](std::size_t j) -> Joint {
+            return {grid_.position(interval)[j], grid_.firstAtBegin(interval)[j] * kept.begin};
+          },
+          [&](std::size_t j) -> Joint {
+            return {grid_.position(interval + 1)[j], grid_.firstAtEnd(interval)[j] * kept.end};
+          });
+    }
+    return *kept.demand;
+  }
+
   std::size_t size() const { return knots_.size(); }
   double time(std::size_t knot) const { return knots_[knot].time; }
   std::size_t interval(std::size_t knot) const { return knots_[knot].interval; }
@@ -152,25 +178,25 @@ class Knots {
   }
 
   /// Of the cubic that ends at a knot.
-  Demand demand(std::size_t knot) {
+  Demand demandBefore(std::size_t knot) {
     const std::size_t place = knots_[knot].place;
     const bool whole = place != kNoPlace && knots_[knot - 1].place + 1 == place;
-    if (!whole || grid_[place - 1].straight) return cubicDemand(knot);
-    std::optional<Demand>& kept = kept_[place - 1].demand;
-    if (!kept) kept = cubicDemand(knot);
-    return *kept;
+    if (whole && !grid_[place - 1].straight) return demandOf(place - 1);
+    return cubicDemand(
+        time(knot) - time(knot - 1), [&](std::size_t j) { return joints_[(knot - 1) * axes_ + j]; },
+        [&](std::size_t j) { return joints_[knot * axes_ + j]; });
   }
 
  private:
   static constexpr std::size_t kNoPlace = std::numeric_limits<std::size_t>::max();
 
-  // Of an interval, if it isn't straight.
+  // Of an interval.
   struct Kept {
     double begin = -1.0;  // unit/s
     double end = -1.0;
     double duration = 0.0;  // s
-    std::optional<Demand> demand;
-    bool follows = false;
+    std::optional<Demand> demand = {};
+    bool settled = false;
   };
   struct Knot {
     double time;
@@ -185,14 +211,14 @@ class Knots {
     double velocity;
   };
 
-  Demand cubicDemand(std::size_t knot) const {
-    const double duration = time(knot) - time(knot - 1);
+  // @param from, to return the joint of an axis at the begin and at the end.
+  template <typename From, typename To>
+  Demand cubicDemand(double duration, const From& from, const To& to) const {
     Demand demand;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
-      const double way = position(knot, j) - position(knot - 1, j);
-      const double v0 = velocity(knot - 1, j);
-      const double v1 = velocity(knot, j);
-      const double mean = way / duration;
+      const auto [p0, v0] = from(j);
+      const auto [p1, v1] = to(j);
+      const double mean = (p1 - p0) / duration;
       const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / duration;
       const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / duration;
       const int direction = directionOf(v0, v1);
@@ -239,14 +265,16 @@ class Knots {
     return even * (1.0 + std::clamp(stretch, -kMostStretch, kMostStretch));
   }
 
-  void appendStraight(std::size_t interval, const ContourSpeed& speed) {
-    const Trapezoid made =
-        trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
-                    speed.ramp(interval), speed.peakSquare(interval));
-    appendOnLine(interval, time_ + made.ramp_up, made.way_up, made.peak);
-    appendOnLine(interval, time_ + made.ramp_up + made.cruise, made.way_up + made.way_cruise,
+  Trapezoid trapezoid(std::size_t interval, const ContourSpeed& speed) const {
+    return trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
+                       speed.ramp(interval), speed.peakSquare(interval));
+  }
+
+  void appendStraight(std::size_t interval, const ContourSpeed& speed, double time) {
+    const Trapezoid made = trapezoid(interval, speed);
+    appendOnLine(interval, time + made.ramp_up, made.way_up, made.peak);
+    appendOnLine(interval, time + made.ramp_up + made.cruise, made.way_up + made.way_cruise,
                  made.peak);
-    time_ += made.ramp_up + made.cruise + made.ramp_down;
   }
 
   void appendOnLine(std::size_t interval, double time, double way, double speed) {
@@ -285,7 +313,6 @@ class Knots {
   const ContourGrid& grid_;
   const std::vector<ContourLimits>& limits_;
   std::size_t axes_;
-  double time_ = 0.0;
   std::vector<Kept> kept_;  // of each interval
   std::vector<Knot> knots_;
   std::vector<Joint> joints_;  // of each knot, one for each axis
@@ -329,8 +356,8 @@ double evenDeviation(const ContourGrid& grid, std::size_t interval, double begin
 // How far the middle of that cubic is from the contour [unit], at a right angle to the contour's
 // direction in the middle of the interval.
 double middleDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end,
-                       double duration, ContourPoint& middle) {
-  grid.evaluateMiddle(interval, middle);
+                       double duration) {
+  const ContourPoint& middle = grid.evaluateMiddle(interval);
   const double eighth = duration / 8.0;
   double off_square = 0.0;
   double along = 0.0;
@@ -347,38 +374,33 @@ double middleDeviation(const ContourGrid& grid, std::size_t interval, double beg
   return std::sqrt(std::max(0.0, off_square - along * along / rate_square));
 }
 
-// Divides the intervals that deviate, and those that waste time, unless they take only a small part
-// of their segment's.
+// Whether an interval wastes time, unless it takes only a small part of its segment's, or deviates.
+bool isLong(std::size_t interval, double part, double deviation, const ContourGrid& grid,
+            ContourSpeed& speed, Knots& knots) {
+  if (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) return true;
+  if (part >= kSmallPart && wastesTime(speed, interval, knots.demandOf(interval))) return true;
+  const double begin = knots.beginSpeed(interval);
+  const double end = knots.endSpeed(interval);
+  return evenDeviation(grid, interval, begin, end) > deviation ||
+         middleDeviation(grid, interval, begin, end, knots.duration(interval)) > deviation;
+}
+
+// Divides the intervals that are too long, and those whose cubics are poor.
 bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots& knots) {
   std::vector<bool> divided(grid.size(), false);
-  std::vector<double> times;  // of the segments
-  for (std::size_t i = 1; i < knots.size(); ++i) {
-    times.resize(grid[knots.interval(i)].segment + 1, 0.0);
-    times.back() += knots.time(i) - knots.time(i - 1);
-  }
+  std::vector<double> times(grid[grid.size() - 1].segment + 1, 0.0);  // of the segments
+  for (std::size_t i = 0; i < grid.size(); ++i) times[grid[i].segment] += knots.duration(i);
   bool any = false;
-  for (std::size_t i = 1; i < knots.size(); ++i) {
-    const std::size_t interval = knots.interval(i);
-    if (grid[interval].straight) continue;
-    const double part = (knots.time(i) - knots.time(i - 1)) / times[grid[interval].segment];
-    const Demand demand = knots.demand(i);
-    const bool poor = demand.acceleration() > kPoorCubic;
-    if (poor) speed.checkBothEnds(interval);
-    if (poor || (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) ||
-        (part >= kSmallPart && wastesTime(speed, interval, demand))) {
-      divided[interval] = any = true;
-    }
-  }
-  ContourPoint middle;
   for (std::size_t i = 0; i < grid.size(); ++i) {
-    if (grid[i].straight || divided[i] || knots.follows(i)) continue;
-    const double begin = knots.beginSpeed(i);
-    const double end = knots.endSpeed(i);
-    if (evenDeviation(grid, i, begin, end) > deviation ||
-        middleDeviation(grid, i, begin, end, knots.duration(i), middle) > deviation) {
+    giveWayAt(i);
+    if (grid[i].straight || knots.isSettled(i)) continue;
+    const bool poor = knots.demandOf(i).acceleration() > kPoorCubic;
+    if (poor) speed.checkBothEnds(i);
+    const double part = knots.duration(i) / times[grid[i].segment];
+    if (poor || isLong(i, part, deviation, grid, speed, knots)) {
       divided[i] = any = true;
     } else {
-      knots.setFollows(i);
+      knots.settle(i);
     }
   }
   if (!any) return false;
@@ -394,7 +416,7 @@ Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, Contour
                    Knots& knots) {
   Excess worst;
   for (std::size_t i = 1; i < knots.size(); ++i) {
-    const Demand demand = knots.demand(i);
+    const Demand demand = knots.demandBefore(i);
     const Excess excess{std::max(1.0, demand.acceleration()), std::max(1.0, demand.speed)};
     worst.acceleration = std::max(worst.acceleration, excess.acceleration);
     worst.speed = std::max(worst.speed, excess.speed);
@@ -445,24 +467,23 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
 
 ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                         const ContourBegin& begin) {
-  ContourGrid grid(contour, begin.parameter, ContourGrid::kTurnOfEvenAcceleration);
+  ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
   ContourSpeed speed(contour, grid, limits, begin.speed * begin.speed, CheckedAcceleration::kMean);
   Knots knots(grid, limits);
   for (int i = 0; i < kMostDivisions; ++i) {
     speed.plan();
-    knots.make(speed);
+    knots.findDurations(speed);
     if (!divideLong(kMostDeviation * contour.resolution(), grid, speed, knots)) break;
   }
   // From a speed, what still exceeds the limits isn't slowed down afterwards.
   const bool from_speed = begin.speed > 0.0;
   const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
-  const double poor_later = from_speed ? 1.0 : kPoorLowered;
   for (int plans = 1;; ++plans) {
     speed.plan();
     knots.make(speed);
     const bool first = plans == 1;
-    const Excess excess = lowerLimits(first ? kLowerFirstBy : kLowerBy,
-                                      first ? kPoorCubic : poor_later, grid, speed, knots);
+    const double poor = from_speed && !first ? 1.0 : kPoorCubic;
+    const Excess excess = lowerLimits(first ? 1.0 : kLowerBy, poor, grid, speed, knots);
     const double most = std::max(excess.acceleration, excess.speed);
     if (most > 1.0 + kSmallExcess && plans < most_plans) continue;
     double factor = std::max(std::sqrt(excess.acceleration), excess.speed);

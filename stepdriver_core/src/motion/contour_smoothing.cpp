@@ -6,7 +6,7 @@
 #include <queue>
 #include <utility>
 
-#include "contour_grid.h"
+#include "give_way.h"
 
 namespace stepdriver::motion {
 namespace {

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
+
+#include "give_way.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -12,24 +13,6 @@ namespace {
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr double kNegligible = 1e-12;  // of a derivative with respect to the length, which is 1
 constexpr int kMostSteps = 100;        // of the search for the largest x
-
-template <typename Bounds>
-typename Bounds::value_type lowestAt(const Bounds& bounds, double x) {
-  auto found = bounds.front();
-  for (const auto& bound : bounds) {
-    if (bound.at(x) < found.at(x)) found = bound;
-  }
-  return found;
-}
-
-template <typename Bounds>
-typename Bounds::value_type highestAt(const Bounds& bounds, double x) {
-  auto found = bounds.front();
-  for (const auto& bound : bounds) {
-    if (bound.at(x) > found.at(x)) found = bound;
-  }
-  return found;
-}
 
 }  // namespace
 
@@ -45,8 +28,10 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
       most_accelerations_(grid.size(), kUnbounded),
       checked_(grid.size(), checked),
       stale_(grid.size(), true),
+      allowed_(grid.size()),
       controllable_(grid.size() + 1, kUnbounded),
       squares_(grid.size() + 1, kUnbounded) {
+  bands_.reserve(2 * grid.size() * limits.size());
   controllable_.back() = 0.0;
   squares_.front() = begin;
 }
@@ -76,48 +61,59 @@ double ContourSpeed::lossOfBothEnds(std::size_t interval) {
   const bool counts = checked_[interval] == CheckedAcceleration::kAtBothEnds && most > 0.0 &&
                       squares_[interval] >= most * (1.0 - kRounding);
   if (!counts) return 1.0;
+  const Allowed checked = allowed_[interval];
+  const std::size_t bands = bands_.size();
   checked_[interval] = CheckedAcceleration::kMean;
+  findAllowed(interval);
   const double higher = largestBefore(interval, controllable_[interval + 1]);
   checked_[interval] = CheckedAcceleration::kAtBothEnds;
+  allowed_[interval] = checked;
+  bands_.resize(bands);
   return higher / most;
 }
 
 void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
                           const std::vector<bool>& divided) {
-  const auto spread = [&](auto& values) {
-    std::decay_t<decltype(values)> made;
-    made.reserve(origins.size() + 1);
-    for (const std::size_t origin : origins) made.push_back(values[origin]);
-    if (values.size() > divided.size()) made.push_back(values.back());  // of the last place
-    values = std::move(made);
+  const auto grow = [&](auto& values) {
+    const bool of_places = values.size() > divided.size();
+    const auto last = values.back();
+    values.resize(origins.size());
+    // No origin is after its interval: from the end on, nothing is replaced before it is copied.
+    for (std::size_t i = origins.size(); i-- > 0;) values[i] = values[origins[i]];
+    if (of_places) values.push_back(last);
   };
-  spread(acceleration_shares_);
-  spread(speed_shares_);
-  spread(most_squares_);
-  spread(most_accelerations_);
-  spread(checked_);
-  spread(controllable_);
-  spread(squares_);
+  grow(acceleration_shares_);
+  grow(speed_shares_);
+  grow(most_squares_);
+  grow(most_accelerations_);
+  grow(checked_);
+  grow(allowed_);
+  grow(controllable_);
+  grow(squares_);
   stale_.clear();
   for (const std::size_t origin : origins) stale_.push_back(divided[origin]);
 }
 
 void ContourSpeed::plan() {
   const std::size_t size = grid_.size();
-  std::vector<bool> changed(size + 1, false);  // at each place, what is controllable
+  if (stale_.back()) findAllowed(size - 1);
+  bool changed = false;  // what is controllable at the end of the interval
   for (std::size_t i = size; i-- > 0;) {
     giveWayAt(i);
+    const bool stale = stale_[i];
+    const bool stale_before = i > 0 && stale_[i - 1];
+    if (stale_before) findAllowed(i - 1);
     // The speeds of an interval also limit x at its end.
-    const bool due = stale_[i] || changed[i + 1] || (i > 0 && stale_[i - 1]);
-    if (!due) continue;
+    if (!stale && !changed && !stale_before) continue;
+    stale_[i] = stale || changed;  // for the second pass
     const double x = grid_.stopsAt(i) ? 0.0 : largestBefore(i, controllable_[i + 1]);
-    changed[i] = x != controllable_[i];
+    changed = x != controllable_[i];
     controllable_[i] = x;
   }
   bool moved = false;  // x at the begin of the interval
   for (std::size_t i = 0; i < size; ++i) {
     giveWayAt(i);
-    if (!(moved || stale_[i] || changed[i + 1])) continue;
+    if (!moved && !stale_[i]) continue;
     const double x = largestAfter(i, squares_[i], controllable_[i + 1]);
     moved = x != squares_[i + 1];
     squares_[i + 1] = x;
@@ -164,43 +160,47 @@ double ContourSpeed::capAt(std::size_t interval, const double* first) const {
 
 // The speeds on both sides of a place; before an interval.
 double ContourSpeed::capBefore(std::size_t place) const {
-  const double after = capAt(place, grid_.firstAtBegin(place));
-  return place == 0 ? after : std::min(after, capAt(place - 1, grid_.firstAtEnd(place - 1)));
+  const double after = allowed_[place].cap_at_begin;
+  return place == 0 ? after : std::min(after, allowed_[place - 1].cap_at_end);
 }
 
-ContourSpeed::Ramp ContourSpeed::ramp(std::size_t interval) const {
-  const double* first = grid_.firstAtBegin(interval);
-  Ramp ramp{kUnbounded, kUnbounded};
-  for (std::size_t j = 0; j < limits_.size(); ++j) {
-    const double part = std::abs(first[j]);
-    if (!(part > 0.0)) continue;
-    ramp.up = std::min(ramp.up, limits_[j].acceleration / part);
-    ramp.down = std::min(ramp.down, limits_[j].deceleration / part);
+void ContourSpeed::findAllowed(std::size_t interval) {
+  Allowed& allowed = allowed_[interval];
+  allowed.cap_at_begin = capAtBegin(interval);
+  allowed.cap_at_end = capAtEnd(interval);
+  if (!grid_[interval].straight) {
+    collectBands(interval, allowed);
+    return;
   }
-  ramp.up *= acceleration_shares_[interval];
-  ramp.down *= acceleration_shares_[interval];
-  ramp.up = std::min(ramp.up, most_accelerations_[interval]);
-  ramp.down = std::min(ramp.down, most_accelerations_[interval]);
-  return ramp;
+  allowed.ramp = {kUnbounded, kUnbounded};
+  const double share = acceleration_shares_[interval];
+  for (std::size_t j = 0; j < limits_.size(); ++j) {
+    const double part = std::abs(grid_.firstAtBegin(interval)[j]);
+    if (!(part > 0.0)) continue;
+    allowed.ramp.up = std::min(allowed.ramp.up, share * limits_[j].acceleration / part);
+    allowed.ramp.down = std::min(allowed.ramp.down, share * limits_[j].deceleration / part);
+  }
+  allowed.ramp.up = std::min(allowed.ramp.up, most_accelerations_[interval]);
+  allowed.ramp.down = std::min(allowed.ramp.down, most_accelerations_[interval]);
 }
 
 double ContourSpeed::peakSquare(std::size_t interval) const {
   const double begin = squares_[interval];
   const double end = squares_[interval + 1];
-  const Ramp along = ramp(interval);
+  const Ramp& along = ramp(interval);
   const double meeting =
       (2.0 * grid_[interval].length * along.up * along.down + begin * along.down + end * along.up) /
       (along.up + along.down);
-  return std::max({std::min(meeting, capAtBegin(interval)), begin, end});
+  return std::max({std::min(meeting, allowed_[interval].cap_at_begin), begin, end});
 }
 
 // What the accelerations of the axes in an interval allow, with x and u at its begin: at its end x
 // is x + 2 length u = e^2. With b^2 = x, the mean of an acceleration is
 // (q1' e - q0' b) (b + e)/(2 length), and b e is (b^2 + e^2)/2 but for (e - b)^2/2.
-void ContourSpeed::collectBounds(std::size_t interval) {
-  above_.clear();
-  below_.clear();
-  most_x_ = kUnbounded;
+void ContourSpeed::collectBands(std::size_t interval, Allowed& allowed) {
+  allowed.most_x = kUnbounded;
+  allowed.first_band = bands_.size();
+  allowed.bands = 0;
   const double twice = 2.0 * grid_[interval].length;
   const double* first_begin = grid_.firstAtBegin(interval);
   const double* first_end = grid_.firstAtEnd(interval);
@@ -213,65 +213,77 @@ void ContourSpeed::collectBounds(std::size_t interval) {
     const double least = -share * accelerationTowards(limits_[j], direction, -1);
     if (checked_[interval] == CheckedAcceleration::kMean) {
       const double change = first_end[j] - first_begin[j];
-      addBounds(first_end[j] + change / 2.0, 2.0 * change / twice, least, most);
+      addBand(allowed, first_end[j] + change / 2.0, 2.0 * change / twice, least, most);
     } else {
-      addBounds(first_begin[j], second_begin[j], least, most);
-      addBounds(first_end[j] + twice * second_end[j], second_end[j], least, most);
+      addBand(allowed, first_begin[j], second_begin[j], least, most);
+      addBand(allowed, first_end[j] + twice * second_end[j], second_end[j], least, most);
     }
   }
   const double along = most_accelerations_[interval];
-  if (along == kUnbounded) return;
-  above_.push_back({along, 0.0});
-  below_.push_back({-along, 0.0});
+  if (along < kUnbounded) addBand(allowed, 1.0, 0.0, -along, along);
 }
 
 // least <= u_factor u + x_factor x <= most
-void ContourSpeed::addBounds(double u_factor, double x_factor, double least, double most) {
+void ContourSpeed::addBand(Allowed& allowed, double u_factor, double x_factor, double least,
+                           double most) {
   if (std::abs(u_factor) < kNegligible) {
-    if (x_factor > 0.0) most_x_ = std::min(most_x_, most / x_factor);
-    if (x_factor < 0.0) most_x_ = std::min(most_x_, least / x_factor);
+    if (x_factor > 0.0) allowed.most_x = std::min(allowed.most_x, most / x_factor);
+    if (x_factor < 0.0) allowed.most_x = std::min(allowed.most_x, least / x_factor);
     return;
   }
-  const double slope = -x_factor / u_factor;
-  above_.push_back({(u_factor > 0.0 ? most : least) / u_factor, slope});
-  below_.push_back({(u_factor > 0.0 ? least : most) / u_factor, slope});
+  const auto [low, high] = std::minmax({least / u_factor, most / u_factor});
+  bands_.push_back({low, high, -x_factor / u_factor});
+  ++allowed.bands;
 }
 
-// x at the end of the interval is from 0 to `end`.
-void ContourSpeed::capEnd(std::size_t interval, double end) {
+// The lowest and the highest u at an x, if x at the end of the interval is from 0 to `end`.
+std::pair<ContourSpeed::Bound, ContourSpeed::Bound> ContourSpeed::tightestAt(std::size_t interval,
+                                                                             double end,
+                                                                             double x) const {
   const double twice = 2.0 * grid_[interval].length;
-  above_.push_back({end / twice, -1.0 / twice});
-  below_.push_back({0.0, -1.0 / twice});
+  Bound low{0.0, -1.0 / twice};
+  Bound high{end / twice, -1.0 / twice};
+  double least = low.at(x);
+  double most = high.at(x);
+  const Allowed& allowed = allowed_[interval];
+  for (std::size_t k = 0; k < allowed.bands; ++k) {
+    const Band& band = bands_[allowed.first_band + k];
+    const double shift = band.slope * x;
+    if (band.least + shift > least) {
+      least = band.least + shift;
+      low = {band.least, band.slope};
+    }
+    if (band.most + shift < most) {
+      most = band.most + shift;
+      high = {band.most, band.slope};
+    }
+  }
+  return {low, high};
 }
 
 // The largest x at the begin of an interval from which x at its end can be `end` or less. The
 // feasible (x, u) are convex and contain (0, 0): from an x that is too large, the two tightest
 // bounds of u meet at an x that is smaller, but not smaller than the solution.
-double ContourSpeed::largestBefore(std::size_t interval, double end) {
+double ContourSpeed::largestBefore(std::size_t interval, double end) const {
   if (grid_[interval].straight) {
     return std::min(capBefore(interval), end + 2.0 * grid_[interval].length * ramp(interval).down);
   }
-  collectBounds(interval);
-  capEnd(interval, end);
-  double x = std::min(capBefore(interval), most_x_);
-  if (x == kUnbounded) x = end + 2.0 * grid_[interval].length * ramp(interval).down;
+  double x = std::min(capBefore(interval), allowed_[interval].most_x);
   for (int i = 0; i < kMostSteps; ++i) {
-    const Bound above = lowestAt(above_, x);
-    const Bound below = highestAt(below_, x);
-    if (above.at(x) >= below.at(x)) break;
-    const double meet = (above.offset - below.offset) / (below.slope - above.slope);
+    const auto [low, high] = tightestAt(interval, end, x);
+    if (high.at(x) >= low.at(x)) break;
+    const double meet = (high.offset - low.offset) / (low.slope - high.slope);
     if (!(meet < x)) break;  // rounding
     x = std::max(meet, 0.0);
   }
   return x;
 }
 
-double ContourSpeed::largestAfter(std::size_t interval, double begin, double end) {
+double ContourSpeed::largestAfter(std::size_t interval, double begin, double end) const {
   const double twice = 2.0 * grid_[interval].length;
   if (grid_[interval].straight) return std::min(end, begin + twice * ramp(interval).up);
-  collectBounds(interval);
-  capEnd(interval, end);
-  return std::clamp(begin + twice * lowestAt(above_, begin).at(begin), 0.0, end);
+  const Bound high = tightestAt(interval, end, begin).second;
+  return std::clamp(begin + twice * high.at(begin), 0.0, end);
 }
 
 }  // namespace stepdriver::motion

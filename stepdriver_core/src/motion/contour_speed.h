@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "motion/contour.h"
@@ -69,25 +70,41 @@ class ContourSpeed {
     double up = 0.0;
     double down = 0.0;
   };
-  Ramp ramp(std::size_t interval) const;
+  const Ramp& ramp(std::size_t interval) const { return allowed_[interval].ramp; }
   /// [unit^2/s^2] The highest square of the speed in a straight interval.
   double peakSquare(std::size_t interval) const;
 
  private:
-  // u = s'' is at least, or at most, offset + slope x.
+  // A bound of u = s'' for x = s'^2: offset + slope x.
   struct Bound {
     double offset = 0.0;
     double slope = 0.0;
     double at(double x) const { return offset + slope * x; }
   };
+  // u is from least + slope x to most + slope x.
+  struct Band {
+    double least = 0.0;
+    double most = 0.0;
+    double slope = 0.0;
+  };
+  // What the limits allow in an interval: a ramp if it is straight, or else bands.
+  struct Allowed {
+    double cap_at_begin = 0.0;  // of x
+    double cap_at_end = 0.0;
+    Ramp ramp;
+    double most_x = 0.0;
+    std::size_t first_band = 0;
+    std::size_t bands = 0;
+  };
 
   double capAt(std::size_t interval, const double* first) const;
   double capBefore(std::size_t place) const;
-  void collectBounds(std::size_t interval);
-  void addBounds(double u_factor, double x_factor, double least, double most);
-  void capEnd(std::size_t interval, double end);
-  double largestBefore(std::size_t interval, double end);
-  double largestAfter(std::size_t interval, double begin, double end);
+  void findAllowed(std::size_t interval);
+  void collectBands(std::size_t interval, Allowed& allowed);
+  void addBand(Allowed& allowed, double u_factor, double x_factor, double least, double most);
+  std::pair<Bound, Bound> tightestAt(std::size_t interval, double end, double x) const;
+  double largestBefore(std::size_t interval, double end) const;
+  double largestAfter(std::size_t interval, double begin, double end) const;
 
   const Contour& contour_;
   const ContourGrid& grid_;
@@ -97,13 +114,11 @@ class ContourSpeed {
   std::vector<double> most_squares_;
   std::vector<double> most_accelerations_;
   std::vector<CheckedAcceleration> checked_;
-  std::vector<bool> stale_;           // each interval that has changed since the last plan
+  std::vector<bool> stale_;  // each interval that has changed since the last plan
+  std::vector<Allowed> allowed_;
+  std::vector<Band> bands_;           // of the intervals
   std::vector<double> controllable_;  // the largest x at each place from which it can slow down
   std::vector<double> squares_;       // x at each place
-  // Of the interval that is being planned.
-  std::vector<Bound> above_;
-  std::vector<Bound> below_;
-  double most_x_ = 0.0;
 };
 
 /// The sign of the motion of an axis in an interval that begins and ends with these velocities; 0:

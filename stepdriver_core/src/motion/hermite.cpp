@@ -6,13 +6,11 @@
 namespace stepdriver::motion {
 
 Piece cubic(DoubleDouble duration, DoubleDouble from, double v0, DoubleDouble to, double v1) {
-  const DoubleDouble mean = (to - from) / duration;
-  const DoubleDouble twice_v0 = 2.0 * v0;
-  const DoubleDouble a =
-      DoubleDouble(2.0) * (DoubleDouble(3.0) * mean - twice_v0 - DoubleDouble(v1)) / duration;
-  const DoubleDouble rest = mean - DoubleDouble(v0) - duration * DoubleDouble(a.value() / 2.0);
-  const DoubleDouble j = DoubleDouble(6.0) * rest / (duration * duration);
-  return {duration, from, v0, a.value(), j.value()};
+  const DoubleDouble way = to - from;
+  const double time = duration.value();
+  const double a = (6.0 * (way.value() / time) - 4.0 * v0 - 2.0 * v1) / time;
+  const DoubleDouble rest = way - duration * (duration * (0.5 * a) + v0);
+  return {duration, from, v0, a, 6.0 * rest.value() / (time * time * time)};
 }
 
 double cubicsFor(double duration, double fourth_derivative, double error) {

@@ -139,7 +139,7 @@ std::vector<Waypoint> interpolate(const MotionState& from, std::vector<Waypoint>
   Derivatives value_before{from.velocity, from.acceleration};
   Matrix next_before;
   for (std::size_t i = first; i < waypoints.size(); ++i) {
-    giveWay(i);
+    giveWayAt(i);
     const Condition condition = knots.conditionAt(i, smoothness);
     const Matrix pivot = inverse(condition.own - condition.before * next_before);
     value[i] = pivot * (condition.right - condition.before * value_before);

@@ -6,20 +6,9 @@
 #include <utility>
 
 #include "no_time.h"
+#include "rough_piece.h"
 
 namespace stepdriver::motion {
-namespace {
-
-double peakSpeedOf(const Piece& piece) {
-  const auto speed = [&piece](double t) {
-    return std::abs(piece.v0 + t * (piece.a + t * (0.5 * piece.j)));
-  };
-  const double ends = std::max(std::abs(piece.v0), speed(piece.duration.hi));
-  const double level = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
-  return level > 0.0 && level < piece.duration.hi ? std::max(ends, speed(level)) : ends;
-}
-
-}  // namespace
 
 DoubleDouble Piece::positionAt(DoubleDouble t) const {
   // Horner's method without zero terms: most pieces have no jerk, and many have no acceleration.
@@ -96,7 +85,8 @@ void Profile::add(std::vector<Piece> pieces) {
   for (const Piece& piece : pieces) {
     starts_.push_back(duration_);
     duration_ = duration_ + piece.duration;
-    peak_speed_ = std::max(peak_speed_, peakSpeedOf(piece));
+    const RoughPiece rough(piece);
+    peak_speed_ = std::max(peak_speed_, rough.highestSpeed(0.0, rough.duration));
   }
   piece_count_ += pieces.size();
   if (pieces_.empty()) {

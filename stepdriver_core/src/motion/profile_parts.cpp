@@ -76,7 +76,7 @@ Profile sum(const Profile& a, const Profile& b) {
     const DoubleDouble duration = !of_b.moves()   ? of_a.left()
                                   : !of_a.moves() ? of_b.left()
                                                   : std::min(of_a.left(), of_b.left());
-    giveWay(pieces.size());
+    giveWayAt(pieces.size());
     pieces.push_back(sumOf(of_a.take(duration), of_b.take(duration)));
   }
   if (pieces.empty()) return {a.startNs(), a.endPosition() + b.endPosition()};

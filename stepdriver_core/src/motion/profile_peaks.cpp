@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "give_way.h"
+#include "rough_piece.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -17,19 +18,10 @@ void takePosition(ProfilePeaks& peaks, double position, double time_s) {
   if (position > peaks.highest.value) peaks.highest = {position, time_s};
 }
 
-// In doubles: peaks are compared with limits, which a rounding doesn't matter for.
-double positionAt(const Piece& piece, double t) {
-  return piece.p0.value() + t * (piece.v0 + t * (piece.a / 2.0 + t * piece.j / 6.0));
-}
-double velocityAt(const Piece& piece, double t) {
-  return piece.v0 + t * (piece.a + t * piece.j / 2.0);
-}
-
 // At a velocity of 0 inside the piece, the position may have an extremum.
-void takeTurns(ProfilePeaks& peaks, const Piece& piece, double start) {
-  const double end = piece.duration.value();
+void takeTurns(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
   const auto consider = [&](double t) {
-    if (t > 0.0 && t < end) takePosition(peaks, positionAt(piece, t), start + t);
+    if (t > 0.0 && t < piece.duration) takePosition(peaks, piece.p0 + piece.way(t), start + t);
   };
   if (piece.j == 0.0) {
     if (piece.a != 0.0) consider(-piece.v0 / piece.a);
@@ -43,21 +35,21 @@ void takeTurns(ProfilePeaks& peaks, const Piece& piece, double start) {
   if (q != 0.0) consider(2.0 * piece.v0 / q);
 }
 
-void takePiece(ProfilePeaks& peaks, const Piece& piece, double start) {
-  const double end = piece.duration.value();
-  takePosition(peaks, piece.p0.value(), start);
+void takePiece(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
+  const double end = piece.duration;
+  takePosition(peaks, piece.p0, start);
   takeTurns(peaks, piece, start);
-  takePosition(peaks, positionAt(piece, end), start + end);
+  takePosition(peaks, piece.p0 + piece.way(end), start + end);
 
   takeFurthest(peaks.velocity, piece.v0, start);
   const double middle = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
   if (middle > 0.0 && middle < end) {
-    takeFurthest(peaks.velocity, velocityAt(piece, middle), start + middle);
+    takeFurthest(peaks.velocity, piece.velocity(middle), start + middle);
   }
-  takeFurthest(peaks.velocity, velocityAt(piece, end), start + end);
+  takeFurthest(peaks.velocity, piece.velocity(end), start + end);
 
   takeFurthest(peaks.acceleration, piece.a, start);
-  takeFurthest(peaks.acceleration, piece.a + piece.j * end, start + end);
+  takeFurthest(peaks.acceleration, piece.acceleration(end), start + end);
 }
 
 }  // namespace
@@ -70,12 +62,12 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double
   peaks.highest.value = first;
   double velocity = velocity_before;
   for (std::size_t index = 0; index < profile.pieces().size(); ++index) {
-    giveWay(index);
-    const Piece piece = profile.piece(index);
+    giveWayAt(index);
+    const RoughPiece piece(profile.piece(index));
     const double start = profile.pieceStart(index).value();
     takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
     takePiece(peaks, piece, start);
-    velocity = velocityAt(piece, piece.duration.value());
+    velocity = piece.velocity(piece.duration);
   }
   takeFurthest(peaks.velocity_jump, velocity_after - velocity, profile.duration().value());
   return peaks;

@@ -13,6 +13,7 @@
 #include "contour_grid.h"
 #include "contour_smoothing.h"
 #include "contour_speed.h"
+#include "give_way.h"
 #include "motion/profile.h"
 
 namespace stepdriver::motion {

@@ -7,6 +7,7 @@
 
 #include "give_way.h"
 #include "hermite.h"
+#include "rough_piece.h"
 #include "spline_refusals.h"
 #include "spline_segment.h"
 
@@ -48,8 +49,8 @@ void appendCubics(std::vector<Piece>& pieces, const Segment& segment, const Quin
 bool exceeds(std::vector<Piece>::const_iterator piece, std::vector<Piece>::const_iterator end,
              double acceleration) {
   return std::any_of(piece, end, [&](const Piece& cubic) {
-    const double last = cubic.a + cubic.j * cubic.duration.value();
-    return std::max(std::abs(cubic.a), std::abs(last)) > acceleration;
+    const RoughPiece rough(cubic);
+    return rough.highestAcceleration(0.0, rough.duration) > acceleration;
   });
 }
 
@@ -106,9 +107,9 @@ Ends takeJerk(SplineJerk& worst, const Segment& segment, const Piece* made = nul
   };
   if (segment.kind() == SegmentKind::kLine) return {};
   if (segment.kind() == SegmentKind::kCubic) {
-    const Piece piece = made != nullptr ? *made : cubicOf(segment);
+    const RoughPiece piece(made != nullptr ? *made : cubicOf(segment));
     take(piece.j, start);
-    return {piece.a, piece.accelerationAt(piece.duration).value()};
+    return {piece.a, piece.acceleration(duration)};
   }
   const Quintic curve = segment.quintic();
   const auto consider = [&](double u) {
@@ -189,7 +190,7 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, double most_accel
   begin_acceleration_ = accelerationAtBegin(segments.at(1));
   JerkMeter meter(begin_acceleration_);
   for (std::size_t i = 1; i < segments.size(); ++i) {
-    giveWay(i);
+    giveWayAt(i);
     const Segment segment = segments.at(i);
     append(pieces, segment, most_acceleration);
     meter.take(segment, &pieces.back());

@@ -70,7 +70,7 @@ void requireWaypoints(const std::vector<Waypoint>& waypoints) {
   if (waypoints.empty()) refuse("The trajectory has 0 waypoints; it needs at least 1.");
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
     const Waypoint& waypoint = waypoints[index];
-    giveWay(index);
+    giveWayAt(index);
     const auto owner = [index] { return fmt::format("waypoint {}", index); };
     requireTime(waypoints, index);
     requireFinite(owner, "position", waypoint.position);

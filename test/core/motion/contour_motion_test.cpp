@@ -249,7 +249,7 @@ TEST(ContourMotion, IsNearlyTimeOptimalWithFewKnots) {
   const Contour contour({0.0, 0.0, 0.0}, segments, 1.0);
   const std::vector<ContourLimits> limits(3, {8000.0, 80'000.0, 80'000.0});
   const std::vector<ContourKnot> knots = motion::planContour(contour, limits).knots;
-  EXPECT_LE(knots.size(), 21 * segments.size());
+  EXPECT_LE(knots.size(), 18 * segments.size());
   EXPECT_LE(durationOf(knots), 1.004 * FineGrid(contour, limits).shortestTime());
 }
 
