@@ -91,8 +91,9 @@ std::vector<std::size_t> ContourGrid::divideEach(const std::vector<bool>& which,
                                                  std::size_t parts) {
   const std::size_t before = size();
   std::size_t made = before;
-  for (std::size_t i = 0; i < before; ++i)
-    made += which[i] && !intervals_[i].straight ? parts - 1 : 0;
+  for (std::size_t i = 0; i < before; ++i) {
+    if (which[i] && !intervals_[i].straight) made += parts - 1;
+  }
   resize(made);
   std::vector<std::size_t> origins(made);
   std::vector<Place> places(2 * parts + 1);  // with the middles of the parts
