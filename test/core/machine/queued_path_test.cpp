@@ -202,9 +202,9 @@ TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
 INSTANTIATE_TEST_SUITE_P(Axes, RandomQueue,
                          testing::Values(Axes{0, false}, Axes{7, false}, Axes{0, true},
                                          Axes{7, true}),
-                         [](const testing::TestParamInfo<Axes>& info) {
-                           return std::string(info.param.backlash > 0 ? "Backlash" : "NoBacklash") +
-                                  (info.param.jerk ? "Jerk" : "NoJerk");
+                         [](const testing::TestParamInfo<Axes>& axes) {
+                           return std::string(axes.param.backlash > 0 ? "Backlash" : "NoBacklash") +
+                                  (axes.param.jerk ? "Jerk" : "NoJerk");
                          });
 
 TEST(RandomLines, WithAJerkLimitKeepTheAccelerationAndAreNotRefused) {
