@@ -214,7 +214,8 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale) {
 Profile composeAlong(const std::shared_ptr<const Profile>& course, const Profile& path) {
   Sections sections;
   for (const Piece& stretch : path.pieces()) {
-    if (hasConstantRate(stretch)) {
+    // A rest on the path has a duration that isn't that of any part of the course.
+    if (hasConstantRate(stretch) && stretch.v0 > 0.0) {
       const DoubleDouble end = stretch.positionAt(stretch.duration);
       sections.add(Excerpt{course, stretch.p0, end, velocityOf(stretch)});
     } else {

@@ -86,6 +86,23 @@ TEST(Compose, GoesFromOneCurveToTheNextWhereTheSlopeOfTheRateChanges) {
   EXPECT_LT(longest, 1e-9);
 }
 
+TEST(Compose, RestsWhereThePathRests) {
+  const motion::Profile curve = bend();
+  const double seconds = 0.25;
+  const motion::Profile path(
+      5, {motion::Piece{1.0, 0.5, 1.0, -1.0, 0.0}, motion::Piece{seconds, 1.0, 0.0, 0.0, 0.0},
+          motion::Piece{1.0, 1.0, 0.0, 1.0, 0.0}});
+  const motion::Profile run = compose(curve, path);
+  EXPECT_NEAR(run.duration().value(), 2.0 + seconds, 1e-12);
+  const double place = curve.stateAt(1'000'000'000).position.value();
+  for (std::int64_t t = 0; t <= 250'000'000; t += 25'000'000) {
+    const motion::MotionState seen = run.stateAt(1'000'000'005 + t);
+    EXPECT_NEAR(seen.position.value(), place, 1e-5) << t;
+    EXPECT_NEAR(seen.velocity, 0.0, 1e-3) << t;
+  }
+  EXPECT_NEAR(run.endPosition().value(), curve.stateAt(1'500'000'000).position.value(), 1e-5);
+}
+
 TEST(Compose, TellsWhetherAMotorMayDoIt) {
   const motion::Profile curve = bend();
   const motion::Piece slowing{0.4, 1.2, 1.0, -0.5, -1.0};
