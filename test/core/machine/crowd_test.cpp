@@ -143,6 +143,7 @@ class Crowd : public testing::Test {
       // A line that waits for its axes is answered when the hold is over.
       while (end.wait_for(20ms) != std::future_status::ready) bench.machine->resume();
     }
+    for (std::future<void>& end : ends) end.get();  // it throws what a client didn't expect
     return clients;
   }
 
