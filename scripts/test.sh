@@ -173,31 +173,36 @@ check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 # Checks each file with the compile commands of the build that compiles it. Only the adapter for the
 # installed version of libgpiod is compiled.
 tidy_all() {
-  local status=0
-  # A file of several includes .cpp files, and lies in another folder.
-  local together=("--config-file=$src/.clang-tidy" --checks=-bugprone-suspicious-include)
+  local status=0 together=--checks=-bugprone-suspicious-include  # a file of several includes .cpp files
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel|test/bad_days/soak)/' |
     compiled_alone_by core | tidy core || status=1
   own_files '*.cpp' | grep -E '^(stepdriver_ros|test/node|test/check|test/console|test/joystick|test/base|test/docs)/|^test/bad_days/[^/]*$' |
     compiled_alone_by catkin | tidy catkin || status=1
-  compiled_together_by core | tidy core "${together[@]}" || status=1
-  compiled_together_by catkin | grep -vF /catkin/stepdriver_core/ | tidy catkin "${together[@]}" || status=1
+  compiled_together_by core | tidy core "$together" || status=1
+  compiled_together_by catkin | grep -vF /catkin/stepdriver_core/ | tidy catkin "$together" || status=1
   return "$status"
 }
-# Several files of the product are read as one, which takes half the time. clang can't read the headers
+# Several files are read as one, as most of the time goes to the headers. clang can't read the headers
 # that gcc has precompiled.
 configure_tidy() {
-  local options=("$strict" -DCMAKE_UNITY_BUILD=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
+  local options=("$strict" -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12
+    -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
   configure "$src/stepdriver_core" "$build/tidy/core" "${options[@]}" -DSTEPDRIVER_BENCH=ON &&
     configure "$src" "$build/tidy/catkin" "${options[@]}" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
-    cmake --build "$build/tidy/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp
+    cmake --build "$build/tidy/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp &&
+    cp "$src/.clang-tidy" "$build/tidy/" &&
+    cp "$src/test/.clang-tidy" "$build/tidy/core/test/" &&
+    cp "$src/test/.clang-tidy" "$build/tidy/catkin/test/"
 }
 check_tidy_setup() { quietly tidy-configure configure_tidy; }
-# Those of the files on standard input.
+# Those of the files on standard input that no other file includes.
 compiled_alone_by() {
   local name
   while IFS= read -r name; do
-    if grep -qF "\"file\": \"$src/$name\"" "$build/tidy/$1/compile_commands.json"; then say "$src/$name"; fi
+    if grep -qF "\"file\": \"$src/$name\"" "$build/tidy/$1/compile_commands.json" &&
+      ! compiled_together_by "$1" | xargs -d '\n' grep -qF "#include \"$src/$name\""; then
+      say "$src/$name"
+    fi
   done
 }
 compiled_together_by() {

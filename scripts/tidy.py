@@ -5,7 +5,7 @@ usage: scripts/tidy.py BUILD [OPTION...]    the files on standard input, one a l
 
 BUILD is a build folder with compile_commands.json. A file without findings is not read again until
 something changes that its result depends on: the contents of all files that it includes, its compile
-command, the options, the version of clang-tidy or .clang-tidy. That is kept in ~/.cache/stepdriver/tidy
+command, the options, the version of clang-tidy or a .clang-tidy. That is kept in ~/.cache/stepdriver/tidy
 (or $XDG_CACHE_HOME/stepdriver/tidy), for every checkout of this user; what was of no use for 60 days is
 removed. Exit code 0: no file has a finding.
 """
@@ -31,7 +31,8 @@ class Tidy:
         commands = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
         self._compile = {entry["file"]: entry for entry in commands}
         version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True).stdout
-        self._common = [version, (ROOT / ".clang-tidy").read_bytes(), self._portable(" ".join(options).encode())]
+        configurations = [(ROOT / folder / ".clang-tidy").read_bytes() for folder in (".", "test")]
+        self._common = [version, *configurations, self._portable(" ".join(options).encode())]
         self._digests = {}
 
     def check(self, path):

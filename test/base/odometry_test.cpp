@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "support/constants.h"
 #include "support/vehicles.h"
 
 namespace stepdriver::base {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using test::kPi;
+
 // The wheel of the STM32 example: a circumference of 0.1 pi m in 1600 microsteps.
 constexpr double kStep = 0.1 * kPi / 1600.0;  // [m]
 constexpr double kSeparation = 0.3;           // [m]

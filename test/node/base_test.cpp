@@ -33,9 +33,8 @@ namespace {
 using nav_msgs::Odometry;
 using sensor_msgs::JointState;
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kStep = 0.1 * kPi / 3200.0;  // [m] of a wheel of 100 mm at 3200 steps
-constexpr double kSeparation = 0.3;           // [m]
+constexpr double kWheelStep = 0.1 * kPi / 3200.0;  // [m] of a wheel of 100 mm at 3200 steps
+constexpr double kSeparation = 0.3;                // [m]
 
 double yawOf(const Odometry& odometry) {
   return 2.0 * std::atan2(odometry.pose.pose.orientation.z, odometry.pose.pose.orientation.w);
@@ -184,11 +183,11 @@ TEST_F(BaseTest, DrivesASquareWhosePoseIsThatOfTheCounts) {
   ASSERT_EQ(rig.name, (std::vector<std::string>{"left", "right"}));
   EXPECT_EQ(rig.violations, (std::vector<std::int64_t>{0, 0}));
   const auto counts = [&](std::size_t wheel) {
-    return static_cast<double>(rig.pulses_forward[wheel] - rig.pulses_backward[wheel]) * kStep;
+    return static_cast<double>(rig.pulses_forward[wheel] - rig.pulses_backward[wheel]) * kWheelStep;
   };
   ASSERT_TRUE(waitUntil([&] {
-    return std::abs(joints->messages().back().position[0] - counts(0)) < kStep / 2.0 &&
-           std::abs(joints->messages().back().position[1] - counts(1)) < kStep / 2.0;
+    return std::abs(joints->messages().back().position[0] - counts(0)) < kWheelStep / 2.0 &&
+           std::abs(joints->messages().back().position[1] - counts(1)) < kWheelStep / 2.0;
   }));
   const auto last = joints->messages().back().header.stamp;
   ASSERT_TRUE(odom->waitForLatest([&](const Odometry& m) { return m.header.stamp >= last; }));
@@ -197,7 +196,8 @@ TEST_F(BaseTest, DrivesASquareWhosePoseIsThatOfTheCounts) {
   // The pose from all the counts that were published, on circles instead of chords. Whole steps:
   // the quotient below needs an angle of 0 or one that is much larger than the rounding.
   const auto travel = [](double from, double to) {
-    return static_cast<double>(std::llround(to / kStep) - std::llround(from / kStep)) * kStep;
+    return static_cast<double>(std::llround(to / kWheelStep) - std::llround(from / kWheelStep)) *
+           kWheelStep;
   };
   double x = 0.0;
   double y = 0.0;

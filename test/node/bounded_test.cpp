@@ -80,7 +80,7 @@ namespace stepdriver::node_test {
 namespace {
 
 using ros_node::Bounded;
-using Goal = FollowJointTrajectoryActionGoal;
+using ActionGoal = FollowJointTrajectoryActionGoal;
 
 constexpr long kMegabyte = 1024;  // in the unit of ru_maxrss
 
@@ -111,8 +111,8 @@ const std::string kGoalId = bytesOf(std_msgs::Header()) + bytesOf(actionlib_msgs
 /// What precedes the names of the joints of a trajectory's goal.
 const std::string kGoalHeaders = kGoalId + bytesOf(std_msgs::Header());
 
-Goal goal() {
-  Goal goal;
+ActionGoal goal() {
+  ActionGoal goal;
   goal.header.frame_id = "frame";
   goal.goal_id.id = "goal";
   goal.goal.trajectory.joint_names = {"x_joint", "y_joint"};
@@ -130,13 +130,13 @@ Goal goal() {
 
 TEST(BoundedMessage, IsReadAsRoscppReadsIt) {
   const std::string bytes = bytesOf(goal());
-  EXPECT_EQ(bytesOf<Goal>(read<Bounded<Goal>>(bytes)), bytes);
+  EXPECT_EQ(bytesOf<ActionGoal>(read<Bounded<ActionGoal>>(bytes)), bytes);
 }
 
 TEST(BoundedMessage, ThatEndsTooEarlyIsRefusedWhereverItEnds) {
   const std::string bytes = bytesOf(goal());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_ANY_THROW(read<Bounded<Goal>>(bytes.substr(0, size))) << size;
+    EXPECT_ANY_THROW(read<Bounded<ActionGoal>>(bytes.substr(0, size))) << size;
   }
 }
 
@@ -154,9 +154,9 @@ TEST(BoundedMessage, ThatClaimsMoreThanItHasCostsNoMemory) {
       Refused);
   EXPECT_THROW(read<Bounded<FollowPathActionGoal>>(kGoalId + many), Refused);
   const std::string names = kGoalHeaders + number(0);
-  EXPECT_THROW(read<Bounded<Goal>>(kGoalHeaders + many), Refused);
-  EXPECT_THROW(read<Bounded<Goal>>(names + many), Refused) << "points";
-  EXPECT_THROW(read<Bounded<Goal>>(names + number(1) + many + bytesOf(goal())), Refused)
+  EXPECT_THROW(read<Bounded<ActionGoal>>(kGoalHeaders + many), Refused);
+  EXPECT_THROW(read<Bounded<ActionGoal>>(names + many), Refused) << "points";
+  EXPECT_THROW(read<Bounded<ActionGoal>>(names + number(1) + many + bytesOf(goal())), Refused)
       << "positions of a point";
   EXPECT_LT(mostMemory() - before, 20 * kMegabyte);
 }
@@ -169,7 +169,7 @@ TEST(BoundedMessage, OfRandomBytesCostsNoMemory) {
     std::string bytes(random() % 5000, '\0');
     for (char& byte : bytes) byte = static_cast<char>(random() % 4 == 0 ? random() : 0);
     try {
-      read<Bounded<Goal>>(bytes);
+      read<Bounded<ActionGoal>>(bytes);
     } catch (const std::exception&) {
       ++refused;
     }
@@ -247,7 +247,7 @@ TEST_F(LyingClient, OfAPathActionIsRefused) {
   publish<FollowPathActionGoal>("follow_path/goal", kGoalId + kLie);
 }
 TEST_F(LyingClient, OfATrajectoryActionIsRefused) {
-  publish<Goal>("follow_joint_trajectory/goal", kGoalHeaders + kLie);
+  publish<ActionGoal>("follow_joint_trajectory/goal", kGoalHeaders + kLie);
 }
 
 }  // namespace

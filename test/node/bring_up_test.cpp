@@ -16,9 +16,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 struct BadBringUp {
   std::string name;
   std::function<void(NodeUnderTest&)> spoil;
@@ -90,7 +87,7 @@ const std::vector<BadBringUp> kBadBringUps = {
      {"true or false"}},
     {"FractionalMicrosteps", setting("axes/x/microsteps", 16.5), "axes/x/microsteps", {"16.5"}},
     {"UnknownMicrosteps", setting("axes/x/microsteps", 32), "axes/x/microsteps", {"32", "16"}},
-    {"NotANumber", setting("axes/x/max_speed_mm_s", kNaN), "axes/x/max_speed_mm_s", {"finite"}},
+    {"NotANumber", setting("axes/x/max_speed_mm_s", kNan), "axes/x/max_speed_mm_s", {"finite"}},
     {"Infinite",
      setting("axes/x/acceleration_mm_s2", kInfinity),
      "axes/x/acceleration_mm_s2",
@@ -275,7 +272,7 @@ TEST(BringUpWithAStatusFrequency, OutOfItsRangeIsRefused) {
            {-1.0, "is -1.0, but must be from 0 to 1000"},
            {1e-9, "is 1e-09, but must be 0, so that no status is published, or at least 0.01"},
            {kInfinity, "but must be a finite number from 0 to 1000"},
-           {kNaN, "but must be a finite number from 0 to 1000"}}) {
+           {kNan, "but must be a finite number from 0 to 1000"}}) {
     SCOPED_TRACE(frequency);
     NodeUnderTest node;
     ros::param::set(node.beside(key), frequency);

@@ -19,9 +19,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 std_srvs::SetBool::Response setBool(NodeUnderTest& node, const std::string& service, bool data) {
   std_srvs::SetBool::Request request;
   request.data = data;
@@ -328,7 +325,7 @@ TEST(ChipServices, DeclaresThePositionAndMovesFromThere) {
 TEST(ChipServices, RefusesPositionsThatCannotBe) {
   NodeUnderTest node;
   node.start();
-  for (const double bad : {kNaN, kInfinity, -kInfinity, -0.01, 0.3}) {
+  for (const double bad : {kNan, kInfinity, -kInfinity, -0.01, 0.3}) {
     const auto answer = setPosition(node, bad);
     EXPECT_FALSE(answer.success) << bad;
     EXPECT_FALSE(answer.message.empty());

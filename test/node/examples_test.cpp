@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "support/call_service.h"
+#include "support/constants.h"
 #include "support/program.h"
 #include "support/recorder.h"
 #include "support/says.h"
@@ -31,8 +32,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
+using test::kPi;
 using Counts = std::vector<std::int64_t>;
 
 MoveTo::Response moveBy(const std::string& axis, double distance, bool wait = true) {

@@ -23,8 +23,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kHalfStep = 0.5 / 80000.0;  // [m]
-
 /// A node whose axis x has its trigger point at the min switch of the rig, at -2 mm. It is at 2 mm
 /// when its homing begins.
 class Homing : public testing::Test {

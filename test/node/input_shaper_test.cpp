@@ -20,7 +20,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFrequency = 22.5;  // Hz
 constexpr double kHalfPeriod = 0.5 / kFrequency;
 

@@ -21,8 +21,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kHalfStep = 0.5 / 80000.0;  // [m]
-
 class LinesTest : public testing::Test {
  protected:
   LinesTest() { addSecondAxis(node); }

@@ -24,8 +24,6 @@ namespace {
 
 using MoveClient = MotionClient<MoveAction>;
 
-constexpr double kStep = 1.0 / 80000.0;  // [m]
-
 MoveGoal goalTo(double position, double velocity = 0.0, bool relative = false) {
   MoveGoal goal;
   goal.position = position;

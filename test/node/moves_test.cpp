@@ -17,10 +17,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kHalfStep = 0.5 / 80000.0;  // [m]
-
 MoveRounds::Request rounds(double count, double velocity = 0.0) {
   MoveRounds::Request request;
   request.rounds = count;
@@ -120,9 +116,9 @@ TEST(Moves, RefusesBadNumbersWithoutAPulse) {
   NodeUnderTest node;
   node.start();
   const std::vector<BadMove> moves = {
-      {kNaN, 0.0, "finite"},       {kInfinity, 0.0, "finite"},    {-kInfinity, 0.0, "finite"},
+      {kNan, 0.0, "finite"},       {kInfinity, 0.0, "finite"},    {-kInfinity, 0.0, "finite"},
       {0.25, 0.0, "max_position"}, {-0.01, 0.0, "min_position"},  {1e300, 0.0, "max_position"},
-      {0.01, kNaN, "velocity"},    {0.01, kInfinity, "velocity"}, {0.01, -0.05, "velocity"},
+      {0.01, kNan, "velocity"},    {0.01, kInfinity, "velocity"}, {0.01, -0.05, "velocity"},
       {0.01, 0.2, "maximum"},
   };
   for (const BadMove& move : moves) {
@@ -132,7 +128,7 @@ TEST(Moves, RefusesBadNumbersWithoutAPulse) {
     EXPECT_EQ(answer.position, 0.0);
     EXPECT_EQ(answer.duration, 0.0);
   }
-  for (const double bad : {kNaN, kInfinity, -1.0, 1e300}) {
+  for (const double bad : {kNan, kInfinity, -1.0, 1e300}) {
     const auto answer = node.call<MoveRounds>("x/move_rounds", rounds(bad));
     EXPECT_FALSE(answer.success) << bad;
     EXPECT_FALSE(answer.message.empty());

@@ -28,8 +28,6 @@
 namespace stepdriver::node_test {
 namespace {
 
-constexpr double kHalfStep = 0.5 / 80000.0;  // [m]
-
 PathSegment line(const std::vector<double>& end) {
   PathSegment segment;
   segment.end = end;

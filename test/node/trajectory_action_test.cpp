@@ -27,9 +27,6 @@ using Result = action_msgs::FollowJointTrajectoryResult;
 using Feedback = action_msgs::FollowJointTrajectoryActionFeedback;
 using State = actionlib::SimpleClientGoalState;
 
-constexpr double kStep = 1.0 / 80000.0;  // [m]
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 struct Point {
   double time;
   std::vector<double> positions;
@@ -170,7 +167,7 @@ TEST_F(TrajectoryActionTest, RejectsWhatIsNoTrajectoryForItsAxes) {
                  Result::INVALID_GOAL, "has 1 positions, but must have 2");
   expectRejected(changed([](Goal& g) { g.trajectory.points[1].velocities.push_back(0.0); }),
                  Result::INVALID_GOAL, "has 3 velocities");
-  expectRejected(changed([](Goal& g) { g.trajectory.points[1].positions[0] = kNaN; }),
+  expectRejected(changed([](Goal& g) { g.trajectory.points[1].positions[0] = kNan; }),
                  Result::INVALID_GOAL, "finite");
   expectRejected(changed([](Goal& g) { g.trajectory.points[1].time_from_start = {}; }),
                  Result::INVALID_GOAL, "must be later than the one before it");

@@ -20,7 +20,7 @@
 namespace stepdriver::node_test {
 namespace {
 
-const std::string kConsole = std::string(STEPDRIVER_PROGRAMS) + "/console";
+const std::string kWizard = std::string(STEPDRIVER_PROGRAMS) + "/console";
 
 /// `console --wizard` with a machine that differs from its configuration: its direction is
 /// inverted, it has 100 steps/mm, its switches are swapped, and the one at the max end has the
@@ -49,7 +49,7 @@ class WizardTest : public testing::Test {
 
   void open(const std::string& more = {}) {
     node.start();
-    terminal.type(kConsole + " --wizard --driver " + node.name() + " --output " + file.path() +
+    terminal.type(kWizard + " --wizard --driver " + node.name() + " --output " + file.path() +
                   more + "; echo ended $?");
     ASSERT_TRUE(terminal.waitFor("switch at the minus end"));
   }
@@ -231,15 +231,15 @@ TEST_F(WizardTest, WrapsItsLinesInANarrowWindow) {
 TEST_F(WizardTest, ReplacesNoFileWithoutBeingTold) {
   std::ofstream(file.path()) << "mine\n";
   node.start();
-  terminal.type(kConsole + " --wizard --driver " + node.name() + " --output " + file.path() +
+  terminal.type(kWizard + " --wizard --driver " + node.name() + " --output " + file.path() +
                 "; echo ended $?");
   EXPECT_TRUE(terminal.waitFor("exists already: --overwrite replaces it"));
   EXPECT_TRUE(terminal.waitFor("ended 1"));
   EXPECT_EQ(file.text(), "mine\n");
 
   // Without a terminal, with lines from a pipe.
-  terminal.type("clear; printf '\\n\\nn\\n\\n' | " + kConsole + " --wizard --driver " +
-                node.name() + " --overwrite --output " + file.path() + "; echo ended $?");
+  terminal.type("clear; printf '\\n\\nn\\n\\n' | " + kWizard + " --wizard --driver " + node.name() +
+                " --overwrite --output " + file.path() + "; echo ended $?");
   EXPECT_TRUE(terminal.waitFor("ended 0"));
   EXPECT_EQ(node.pulses(), 0);
   expectSays(file.text(), "Nothing had to be changed");

@@ -9,6 +9,7 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/refusal.h"
 
 namespace stepdriver {
@@ -16,13 +17,13 @@ namespace {
 
 using config::IdleAction;
 using test::Bench;
+using test::kMillisecond;
 using test::violationsOf;
 
-constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kRelease = 60 * kMillisecond;
 constexpr std::int64_t kEngage = 30 * kMillisecond;
-constexpr double kFalls = 50.0;        // [mm/s]
-constexpr double kMicrostep = 0.0125;  // [mm]
+constexpr double kFalls = 50.0;  // [mm/s]
+constexpr double kMicrostepMm = 0.0125;
 
 config::AxisConfig verticalAxis(IdleAction action = IdleAction::kDisable,
                                 const std::string& name = "z") {
@@ -174,7 +175,7 @@ TEST(Brake, LetsTheLoadDropBy0MicrostepsInEveryOrderOfThreeCommands) {
           EXPECT_EQ(violations, "") << first.name << ", " << second.name << ", " << third.name;
         }
       }
-      fallen_without += fallDuring(withoutBrake(config), {&first}, 0.04) > kMicrostep ? 1 : 0;
+      fallen_without += fallDuring(withoutBrake(config), {&first}, 0.04) > kMicrostepMm ? 1 : 0;
     }
   }
   EXPECT_EQ(fallen_without, static_cast<int>(2 * acts().size()))

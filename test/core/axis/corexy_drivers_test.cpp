@@ -20,9 +20,8 @@ namespace {
 using axis::MoveEnd;
 using test::Bench;
 using test::coreXyAxes;
+using test::kStep;
 using test::violationsOf;
-
-constexpr double kStep = 1.0 / 80'000.0;  // [m]
 
 std::unique_ptr<Bench> benchOf(const std::vector<config::AxisConfig>& axes) {
   auto bench = std::make_unique<Bench>(axes);

@@ -17,12 +17,12 @@ namespace {
 using axis::MoveEnd;
 using test::Bench;
 
-constexpr double kScale = 80'370.0;  // [microsteps/m]
-constexpr double kMicrostep = 1.0 / kScale;
+constexpr double kUnevenScale = 80'370.0;  // [microsteps/m]
+constexpr double kMicrostep = 1.0 / kUnevenScale;
 
 config::AxisConfig axisNamed(const char* name, double backlash = 0.0) {
   config::AxisConfig config = test::linearAxis(name);
-  config.steps_per_unit = kScale;
+  config.steps_per_unit = kUnevenScale;
   config.backlash = backlash;
   return config;
 }
@@ -41,7 +41,7 @@ class RelativeMoves : public testing::Test {
 
   axis::Axis& x() { return bench->axis(); }
   /// [microsteps]
-  double position() { return x().state().position * kScale; }
+  double position() { return x().state().position * kUnevenScale; }
   void move(double way) {
     const axis::MoveResult result = x().wait(x().moveTo(way, true));
     ASSERT_EQ(result.end, MoveEnd::kReached) << result.message;

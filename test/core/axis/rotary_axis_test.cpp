@@ -5,6 +5,7 @@
 
 #include "stepdriver_core/axis/axis.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/refusal.h"
 
 // Axes that turn without end: a rotary one without soft limits, and a wheel.
@@ -14,10 +15,10 @@ namespace {
 
 using axis::MoveEnd;
 using test::Bench;
+using test::kPi;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kRound = 2.0 * kPi;
 
 /// Full steps, without endstops and soft limits, 10 rounds/s.

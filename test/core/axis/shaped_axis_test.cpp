@@ -18,6 +18,7 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/corexy_bench.h"
 #include "support/differences.h"
 #include "support/gantry_bench.h"
@@ -31,13 +32,13 @@ namespace {
 
 using axis::MoveEnd;
 using test::Bench;
+using test::kSecond;
 using test::linearAxis;
 using test::violationsOf;
 
 constexpr double kFrequency = 20.0;
 constexpr double kDamping = 0.05;
 constexpr double kScale = 400'000.0;  // steps/m
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 /// 100,000 steps/s within 13 ms.
 config::AxisConfig plain(const std::string& name = "x") {

@@ -7,14 +7,13 @@
 #include <locale>
 
 #include "support/config_map.h"
+#include "support/constants.h"
 
 namespace stepdriver::config {
 namespace {
 
-using Lines = std::vector<std::string>;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
+using test::kNan;
 
 /// A reader of one key, `key` of `/n`.
 class OneKey {

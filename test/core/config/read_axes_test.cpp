@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
 #include "support/axis_config.h"
+#include "support/constants.h"
 
 namespace stepdriver::config {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using test::kPi;
+
 const std::string kDrivers =
     "a4988, drv8825, tb6600, tmc2208, tmc2209, tmc2130, drv8434, lv8729, tb6560, dm542, dm556, "
     "cl57t or step_dir";

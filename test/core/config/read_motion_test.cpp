@@ -3,12 +3,13 @@
 #include <limits>
 
 #include "support/axis_config.h"
+#include "support/constants.h"
 
 namespace stepdriver::config {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
+using test::kPi;
 
 TEST(ReadMotion, ChecksEachNumberOfTheMotion) {
   for (const std::string key : {"steps_per_mm", "max_speed_mm_s", "acceleration_mm_s2",

@@ -10,6 +10,7 @@
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "support/constants.h"
 #include "support/test_board.h"
 
 // Tests for every backend. The simulated backend is always tested, libgpiod only if the kernel has
@@ -19,9 +20,9 @@ namespace stepdriver::gpio {
 namespace {
 
 using test::Driven;
+using test::kMillisecond;
 using test::TestBoardKind;
 
-constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kLong = 20'000 * kMillisecond;
 
 constexpr const char* kNoTrace = "this kernel doesn't trace its lines";

@@ -30,7 +30,7 @@ using test::within;
 constexpr unsigned kClients = 4;
 constexpr unsigned kRounds = 150;
 constexpr int kRequests = 12;  // of each client, in a round
-constexpr double kSpeed = 10.0;
+constexpr double kCrowdSpeed = 10.0;
 const std::vector<std::string> kNames = {"x", "y", "z"};
 
 std::vector<config::AxisConfig> axes() {
@@ -162,7 +162,7 @@ class Crowd : public testing::Test {
     EXPECT_EQ(test::violationsOf(bench.report(name)), "") << name;
   }
 
-  Bench bench{axes(), true, kSpeed};
+  Bench bench{axes(), true, kCrowdSpeed};
 };
 
 TEST_F(Crowd, NothingMovesAfterAnAnsweredStopAndAllAreTold) {

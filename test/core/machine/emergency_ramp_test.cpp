@@ -10,6 +10,7 @@
 #include "pulse/pulse_engine.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/recording_lines.h"
 #include "support/refusal.h"
 
@@ -18,10 +19,10 @@ namespace {
 
 using machine::EmergencyDisable;
 using test::Bench;
+using test::kMillisecond;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kEngage = 40 * kMillisecond;
 /// From 100 mm/s at 1000 mm/s^2.
 constexpr double kRamp = 0.1;

@@ -26,11 +26,11 @@ using test::Bench;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr const char* kLine = "stop";
+constexpr const char* kStopLine = "stop";
 
 machine::MachineOptions withInput(bool active_level) {
   machine::MachineOptions options;
-  options.emergency_stop = config::InputSwitch{kLine, active_level, Bias::kPullUp};
+  options.emergency_stop = config::InputSwitch{kStopLine, active_level, Bias::kPullUp};
   return options;
 }
 
@@ -42,7 +42,7 @@ class EmergencyStopInput : public testing::Test {
     bench = std::make_unique<Bench>(axes, Bench::rigAxes(axes), threaded, speed, withInput(true));
   }
 
-  void press(bool pressed) { bench->rig.setInput(kLine, pressed, bench->clock.now()); }
+  void press(bool pressed) { bench->rig.setInput(kStopLine, pressed, bench->clock.now()); }
 
   /// Whether the machine has accepted it.
   bool recovers() {
@@ -130,7 +130,7 @@ TEST(EmergencyStopInputAtStart, FindsEveryAxisAtFaultAndEnergizesNone) {
     gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
     machine::MachineOptions options = withInput(active_level);
     options.threaded = false;
-    rig.setInput(kLine, active_level, 0);
+    rig.setInput(kStopLine, active_level, 0);
     machine::Machine machine(axes, backend, clock, options);
     for (const auto& axis : machine.axes()) {
       EXPECT_EQ(axis->state().fault, "emergency stop input");
@@ -138,7 +138,7 @@ TEST(EmergencyStopInputAtStart, FindsEveryAxisAtFaultAndEnergizesNone) {
       EXPECT_REFUSED(axis->enable(true), "emergency stop input");
     }
     EXPECT_REFUSED(machine.recover(), "is active");
-    rig.setInput(kLine, !active_level, clock.now());
+    rig.setInput(kStopLine, !active_level, clock.now());
     machine.recover();
     axis::Axis& x = machine.axis("x");
     EXPECT_REFUSED(x.moveTo(0.001), "disabled");
@@ -177,7 +177,7 @@ TEST_F(EmergencyStopInput, IsNeverLostToARecoverThatComesAtTheSameTime) {
 }
 
 /// Lines that can keep the pulse thread in a write.
-class GatedLines : public test::PassingLines {
+class PausableLines : public test::PassingLines {
  public:
   using PassingLines::PassingLines;
 
@@ -210,16 +210,16 @@ class GatedLines : public test::PassingLines {
   bool blocked_ = false;
 };
 
-class GatedBackend : public gpio::Backend {
+class PausableBackend : public gpio::Backend {
  public:
-  explicit GatedBackend(gpio::Backend& backend) : backend_(backend) {}
+  explicit PausableBackend(gpio::Backend& backend) : backend_(backend) {}
   std::unique_ptr<gpio::Lines> request(const std::vector<gpio::OutputRequest>& outputs,
                                        const std::vector<gpio::InputRequest>& inputs) override {
-    auto gated = std::make_unique<GatedLines>(backend_.request(outputs, inputs));
+    auto gated = std::make_unique<PausableLines>(backend_.request(outputs, inputs));
     lines = gated.get();
     return gated;
   }
-  GatedLines* lines = nullptr;
+  PausableLines* lines = nullptr;
 
  private:
   gpio::Backend& backend_;
@@ -232,7 +232,7 @@ TEST(EmergencyStop, IsNotLostIfARecoverComesBeforeItWasCarriedOut) {
   sim::Rig rig(Bench::rigAxes(axes));
   pulse::VirtualClock clock(1.0);
   gpio::SimulatedBackend simulated(rig, [&clock] { return clock.now(); });
-  GatedBackend backend(simulated);
+  PausableBackend backend(simulated);
   machine::Machine machine(axes, backend, clock);
   axis::Axis& x = machine.axis("x");
   const axis::Move move = x.moveTo(0.08);  // 6400 steps
@@ -279,9 +279,9 @@ TEST(EmergencyStop, HasEndedAllPulsesWhenItAnswers) {
 
 /// Two axes whose motors lose their current at an emergency stop; both have a load that falls, and
 /// a brake.
-class EmergencyDisable : public testing::Test {
+class EmergencyDisableOff : public testing::Test {
  protected:
-  EmergencyDisable() {
+  EmergencyDisableOff() {
     machine::MachineOptions options = withInput(true);
     options.emergency_disable = machine::EmergencyDisable::kOff;
     std::vector<config::AxisConfig> axes = {linearAxis("x", "drv8825"), linearAxis("y")};
@@ -309,7 +309,7 @@ class EmergencyDisable : public testing::Test {
   std::unique_ptr<Bench> bench;
 };
 
-TEST_F(EmergencyDisable, TakesTheCurrentFromEveryMotorOnceItsBrakeHolds) {
+TEST_F(EmergencyDisableOff, TakesTheCurrentFromEveryMotorOnceItsBrakeHolds) {
   axis::Axis& x = bench->axis("x");
   const axis::Move move = x.moveTo(0.08);
   bench->machine->advance(0.3);
@@ -322,7 +322,7 @@ TEST_F(EmergencyDisable, TakesTheCurrentFromEveryMotorOnceItsBrakeHolds) {
   EXPECT_EQ(x.state().fault, "emergency stop");
 }
 
-TEST_F(EmergencyDisable, LastsBeyondARecoverUntilTheAxisIsEnabled) {
+TEST_F(EmergencyDisableOff, LastsBeyondARecoverUntilTheAxisIsEnabled) {
   axis::Axis& x = bench->axis("x");
   bench->machine->emergencyStop();
   bench->machine->recover();
@@ -333,18 +333,18 @@ TEST_F(EmergencyDisable, LastsBeyondARecoverUntilTheAxisIsEnabled) {
   EXPECT_EQ(bench->report().fell, 0.0);
 }
 
-TEST_F(EmergencyDisable, ComesAgainWithEachEmergencyStop) {
+TEST_F(EmergencyDisableOff, ComesAgainWithEachEmergencyStop) {
   for (int i = 0; i < 3; ++i) {
-    bench->rig.setInput(kLine, true, bench->clock.now());
+    bench->rig.setInput(kStopLine, true, bench->clock.now());
     expectOff();
-    bench->rig.setInput(kLine, false, bench->clock.now());
+    bench->rig.setInput(kStopLine, false, bench->clock.now());
     bench->machine->recover();
     for (const char* name : {"x", "y"}) bench->axis(name).enable(true);
     EXPECT_TRUE(bench->report().energized);
   }
 }
 
-TEST_F(EmergencyDisable, AlsoSwitchesOffAnAxisThatIsAtFaultAlready) {
+TEST_F(EmergencyDisableOff, AlsoSwitchesOffAnAxisThatIsAtFaultAlready) {
   axis::Axis& x = bench->axis("x");
   sim::RigFaults faults;
   faults.chip_fault_after = 20;

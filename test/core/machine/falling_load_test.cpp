@@ -9,6 +9,7 @@
 
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/constants.h"
 
 // A load on a vertical axis, which sinks whenever nothing holds it, over the orders of everything
 // that brings the motor's current or takes it away.
@@ -17,14 +18,14 @@ namespace {
 
 using machine::EmergencyDisable;
 using test::Bench;
+using test::kMillisecond;
 using test::violationsOf;
 
-constexpr std::int64_t kMillisecond = 1'000'000;
-constexpr std::int64_t kEngage = 30 * kMillisecond;
+constexpr std::int64_t kEngageOfLoad = 30 * kMillisecond;
 constexpr double kFalls = 50.0;  // [mm/s]
 /// [mm] At an alarm the driver's outputs are off at once, and the brake takes its time; the margin
 /// is for the times of the controller.
-constexpr double kFallsAtAlarm = kFalls * 1e-9 * (kEngage + 2 * kMillisecond);
+constexpr double kFallsAtAlarm = kFalls * 1e-9 * (kEngageOfLoad + 2 * kMillisecond);
 
 struct Variant {
   EmergencyDisable disable = EmergencyDisable::kHold;
@@ -36,7 +37,7 @@ class LoadedMachine {
  public:
   explicit LoadedMachine(const Variant& variant) {
     config::AxisConfig config = test::linearAxis("z", "drv8825");
-    if (variant.brake) config.brake = config::BrakeConfig{"brake", true, 60'000'000, kEngage};
+    if (variant.brake) config.brake = config::BrakeConfig{"brake", true, 60'000'000, kEngageOfLoad};
     config.fault = config::FaultPin{"fault"};
     config.idle_timeout = 2.0;
     machine::MachineOptions options;

@@ -17,7 +17,7 @@ using machine::Recording;
 using test::Bench;
 using test::linearAxis;
 
-constexpr const char* kLine = "heartbeat";
+constexpr const char* kHeartbeatLine = "heartbeat";
 constexpr std::int64_t kInterval = 5'000'000;  // ns, at the default rate
 
 class MachineHeartbeat : public testing::Test {
@@ -26,7 +26,7 @@ class MachineHeartbeat : public testing::Test {
     const std::vector<config::AxisConfig> axes{linearAxis("x"), linearAxis("y")};
     machine::MachineOptions options;
     options.record_seconds = 60.0;
-    options.heartbeat = machine::HeartbeatConfig{kLine};
+    options.heartbeat = machine::HeartbeatConfig{kHeartbeatLine};
     bench = std::make_unique<Bench>(axes, Bench::rigAxes(axes), false, 0.0, options);
   }
 
@@ -64,14 +64,14 @@ TEST_F(MachineHeartbeat, ThatCantBeWrittenIsAFaultOfEveryAxisAndNamesItsLine) {
   axis::Axis& x = bench->axis("x");
   const axis::Move move = x.moveTo(0.05);
   bench->machine->advance(0.1);
-  bench->rig.failWrites(kLine, 0, EIO);
+  bench->rig.failWrites(kHeartbeatLine, 0, EIO);
   bench->machine->advance(1.0);
   EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kFault);
   for (const auto& axis : bench->machine->axes()) {
-    EXPECT_NE(axis->state().fault.find(kLine), std::string::npos) << axis->state().fault;
+    EXPECT_NE(axis->state().fault.find(kHeartbeatLine), std::string::npos) << axis->state().fault;
     EXPECT_FALSE(axis->state().position_valid);
   }
-  bench->rig.clearWriteFault(kLine);
+  bench->rig.clearWriteFault(kHeartbeatLine);
   bench->machine->advance(0.1);
   const std::size_t before = beats().size();
   bench->machine->recover();

@@ -9,6 +9,7 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/recording.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/refusal.h"
 
 namespace stepdriver {
@@ -16,34 +17,34 @@ namespace {
 
 using machine::EmergencyDisable;
 using test::Bench;
+using test::kMillisecond;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr std::int64_t kMillisecond = 1'000'000;
-constexpr const char* kLine = "power";
+constexpr const char* kPowerLine = "power";
 constexpr const char* kFeedback = "power.feedback";
 constexpr std::int64_t kOn = 200 * kMillisecond;
 constexpr std::int64_t kOffDelay = 300 * kMillisecond;
-constexpr std::int64_t kTimeout = 500 * kMillisecond;
-constexpr std::int64_t kEngage = 40 * kMillisecond;
+constexpr std::int64_t kFeedbackTimeout = 500 * kMillisecond;
+constexpr std::int64_t kBrakeEngage = 40 * kMillisecond;
 
 /// x carries a load that falls, and has a brake; y has neither.
 class MotorPower : public testing::Test {
  protected:
   MotorPower() {
     axes = {linearAxis("x", "drv8825"), linearAxis("y")};
-    axes[0].brake = config::BrakeConfig{"x.brake", true, 30 * kMillisecond, kEngage};
+    axes[0].brake = config::BrakeConfig{"x.brake", true, 30 * kMillisecond, kBrakeEngage};
     options.emergency_stop = config::InputSwitch{"button", true};
     options.record_seconds = 60.0;
     options.motor_power = config::MotorPowerConfig{};
-    options.motor_power->line = kLine;
+    options.motor_power->line = kPowerLine;
     options.motor_power->on_ns = kOn;
     options.motor_power->off_delay_ns = kOffDelay;
   }
 
   void addFeedback() {
     options.motor_power->feedback = config::InputSwitch{kFeedback, false};
-    options.motor_power->feedback_timeout_ns = kTimeout;
+    options.motor_power->feedback_timeout_ns = kFeedbackTimeout;
   }
 
   void begin() {
@@ -125,7 +126,7 @@ TEST_F(MotorPower, GoesAtAnEmergencyStopAfterItsDelayAndTheBrakeAndStaysOffUntil
     bench->machine->advance(1.0);
     ASSERT_EQ(switched(false).size(), 1U);
     const std::int64_t off = switched(false).front();
-    EXPECT_EQ(off, std::max(before + delay, last("brake", false) + kEngage));
+    EXPECT_EQ(off, std::max(before + delay, last("brake", false) + kBrakeEngage));
     EXPECT_FALSE(bench->report("x").energized);
     EXPECT_FALSE(bench->report("y").energized);
     EXPECT_FALSE(bench->axis("y").state().enabled);
@@ -150,7 +151,7 @@ TEST_F(MotorPower, WithDisableOffGoesWhenEachMotorIsDisabledAndComesWithTheFirst
   bench->machine->emergencyStop();
   bench->machine->advance(1.0);
   ASSERT_EQ(switched(false).size(), 1U);
-  EXPECT_EQ(last("enable", true), last("brake", false) + kEngage);
+  EXPECT_EQ(last("enable", true), last("brake", false) + kBrakeEngage);
   EXPECT_GE(switched(false).front(), last("enable", true));
   bench->machine->recover();
   EXPECT_EQ(fault(), "");
@@ -213,7 +214,7 @@ TEST_F(MotorPower, GoesLastAtTheEnd) {
   moveX(0.002);
   bench->machine->shutdown();
   ASSERT_EQ(switched(false).size(), 1U);
-  EXPECT_EQ(last("enable", true), last("brake", false) + kEngage);
+  EXPECT_EQ(last("enable", true), last("brake", false) + kBrakeEngage);
   EXPECT_GE(switched(false).front(), last("enable", true));
   EXPECT_FALSE(bench->report("y").energized);
   bench->machine->advance(1.0);
@@ -230,7 +231,7 @@ TEST_F(MotorPower, WaitsForItsFeedback) {
   bench->rig.stickMotorPower(false, bench->clock.now());
   const std::int64_t begun = bench->clock.now();
   EXPECT_THROW(bench->axis("x").enable(true), GpioError);
-  EXPECT_GE(bench->clock.now(), begun + kTimeout);
+  EXPECT_GE(bench->clock.now(), begun + kFeedbackTimeout);
   for (const char* name : {"x", "y"}) {
     EXPECT_EQ(fault(name),
               "the motor power isn't there: its feedback line power.feedback was still inactive "
@@ -331,17 +332,17 @@ TEST_F(MotorPower, ThatStaysAfterItWasSwitchedOffIsAFaultAndIsNotSwitchedOnAgain
 TEST_F(MotorPower, WhoseLineCantBeWrittenIsAFaultThatNamesIt) {
   axes[0].enable_on_start = axes[1].enable_on_start = false;
   begin();
-  bench->rig.failWrites(kLine, 0, EIO);
+  bench->rig.failWrites(kPowerLine, 0, EIO);
   EXPECT_THROW(bench->axis("x").enable(true), GpioError);
   EXPECT_NE(fault("y").find("the motor power line power can't be written"), std::string::npos)
       << fault("y");
   EXPECT_FALSE(bench->report("x").energized);
-  bench->rig.clearWriteFault(kLine);
+  bench->rig.clearWriteFault(kPowerLine);
   bench->machine->advance(0.1);
   bench->machine->recover();
   bench->axis("x").enable(true);
   EXPECT_EQ(moveX(0.001), axis::MoveEnd::kReached);
-  bench->rig.failWrites(kLine, 0, EIO);
+  bench->rig.failWrites(kPowerLine, 0, EIO);
   EXPECT_THROW(bench->machine->shutdown(), GpioError);
 }
 
@@ -349,13 +350,13 @@ TEST_F(MotorPower, ThatCouldNotBeSwitchedOffIsSwitchedOffBeforeItComesAgain) {
   addFeedback();
   options.motor_power->off_delay_ns = 0;
   begin();
-  bench->rig.failWrites(kLine, 0, EIO);
+  bench->rig.failWrites(kPowerLine, 0, EIO);
   bench->machine->emergencyStop();
   bench->machine->advance(1.0);
   EXPECT_NE(fault("y").find("the motor power line power can't be written"), std::string::npos)
       << fault("y");
   EXPECT_TRUE(switched(false).empty());
-  bench->rig.clearWriteFault(kLine);
+  bench->rig.clearWriteFault(kPowerLine);
   bench->machine->recover();
   EXPECT_EQ(switched(false).size(), 1U);
   EXPECT_EQ(switched(true).size(), 2U);

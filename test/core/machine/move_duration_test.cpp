@@ -11,6 +11,8 @@
 namespace stepdriver {
 namespace {
 
+using test::kStep;
+
 /// A machine of x and y. Every 50th write takes longer than a step, so the timeline slides.
 class LateMove : public testing::Test {
  protected:
@@ -41,9 +43,8 @@ class LateMove : public testing::Test {
   std::optional<machine::Machine> machine;
 };
 
-constexpr double kStep = 1.0 / 80'000.0;  // [m]
 // From the beginning to the first edge, from the last edge to the end, and one late write.
-constexpr double kTolerance = 1.2e-3;  // [s]
+constexpr double kLatestEnd = 1.2e-3;  // [s]
 
 TEST_F(LateMove, LastsAsLongAsItsEdges) {
   axis::Axis& x = machine->axis("x");
@@ -52,7 +53,7 @@ TEST_F(LateMove, LastsAsLongAsItsEdges) {
   ASSERT_EQ(result.end, axis::MoveEnd::kReached) << result.message;
   EXPECT_GT(machine->figures().slips, 50U);
   EXPECT_GT(result.duration, move.duration + 0.05);
-  EXPECT_NEAR(result.duration, timeOfEdges("x.step"), kTolerance);
+  EXPECT_NEAR(result.duration, timeOfEdges("x.step"), kLatestEnd);
 }
 
 TEST_F(LateMove, DoesNotCountWhatSlidBeforeIt) {
@@ -68,7 +69,7 @@ TEST_F(LateMove, OfALineLastsAsLongAsItsEdges) {
   const machine::CoordinatedResult result = machine->wait(line);
   ASSERT_EQ(result.end, axis::MoveEnd::kReached) << result.message;
   EXPECT_GT(result.duration, line.duration + 0.05);
-  EXPECT_NEAR(result.duration, timeOfEdges("x.step"), kTolerance);
+  EXPECT_NEAR(result.duration, timeOfEdges("x.step"), kLatestEnd);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
 #include "support/path_bench.h"
 #include "support/refusal.h"
 
@@ -27,6 +28,7 @@ using test::CoordinatedMove;
 using test::CoordinatedResult;
 using test::kHalfMicrosteps;
 using test::kMicrostep;
+using test::kNan;
 using test::kTolerance;
 using test::lineTo;
 using test::PathRequest;
@@ -436,7 +438,6 @@ TEST_F(PathQueue, RefusesAWrongSegmentAndGoesOn) {
   const PathRequest path = test::circle();
   begin(path, 20);
   advance(0.1);
-  const double kNan = std::numeric_limits<double>::quiet_NaN();
   const auto end = path.segments[19].end;
   EXPECT_REFUSED(append({lineTo({0.0, 0.01}), lineTo({0.0, kNan})}),
                  "y: segment 1 of the path has nan among its positions");

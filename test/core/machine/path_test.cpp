@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
 #include "support/path_bench.h"
 #include "support/refusal.h"
 
@@ -20,6 +21,7 @@ namespace {
 
 using namespace test;  // NOLINT(google-build-using-namespace)
 using axis::MoveEnd;
+using test::kNan;
 using Shape = PathSegment::Shape;
 
 class Path : public PathBench {
@@ -217,7 +219,6 @@ TEST_F(Path, BeginsOnlyAtRest) {
 }
 
 TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
-  const double kNan = std::numeric_limits<double>::quiet_NaN();
   const double kInfinity = std::numeric_limits<double>::infinity();
   const auto with = [](auto change) {
     PathRequest request = mixed();

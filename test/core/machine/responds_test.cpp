@@ -16,18 +16,18 @@ using namespace std::chrono_literals;
 using test::Bench;
 using test::linearAxis;
 
-constexpr std::chrono::seconds kBound{20};
+constexpr std::chrono::seconds kLongestResponse{20};
 
 TEST(Responds, IsTrueAtRestInMotionAndAtAFault) {
   Bench bench({linearAxis("x")}, true, 1.0);
-  EXPECT_TRUE(bench.machine->responds(kBound));
+  EXPECT_TRUE(bench.machine->responds(kLongestResponse));
   const axis::Move move = bench.axis("x").moveTo(0.01);
-  EXPECT_TRUE(bench.machine->responds(kBound));
+  EXPECT_TRUE(bench.machine->responds(kLongestResponse));
   bench.machine->emergencyStop();
   bench.axis("x").wait(move);
-  for (int i = 0; i < 100; ++i) EXPECT_TRUE(bench.machine->responds(kBound));
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(bench.machine->responds(kLongestResponse));
   bench.machine->shutdown();
-  EXPECT_TRUE(bench.machine->responds(kBound));
+  EXPECT_TRUE(bench.machine->responds(kLongestResponse));
 }
 
 TEST(Responds, IsTrueWithoutThreads) {
@@ -51,7 +51,7 @@ TEST(Responds, IsFalseWhileTheThreadThatAllWaitForHangs) {
   EXPECT_FALSE(bench.machine->responds(50ms));
   EXPECT_FALSE(bench.machine->responds(50ms));
   released.set_value();
-  EXPECT_TRUE(bench.machine->responds(kBound));
+  EXPECT_TRUE(bench.machine->responds(kLongestResponse));
   stop.wait();
 }
 

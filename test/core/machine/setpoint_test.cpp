@@ -12,6 +12,7 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/differences.h"
 #include "support/refusal.h"
 
@@ -26,10 +27,10 @@ using machine::StreamMessage;
 using test::Bench;
 using test::Crossing;
 using test::Differences;
+using test::kPi;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kScale = 100'000.0;  // microsteps/m
 constexpr double kTimeout = 0.1;      // s
 

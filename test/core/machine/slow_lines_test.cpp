@@ -30,7 +30,7 @@ using test::Bench;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr std::chrono::seconds kBound{60};
+constexpr std::chrono::seconds kLongestWait{60};
 
 /// Writes of a line wait until the test releases them.
 class Gate {
@@ -128,7 +128,7 @@ class SlowLines : public testing::Test {
       return "it succeeded";
     };
     std::future<std::string>& answer = calls_.emplace_back(std::async(std::launch::async, run));
-    return answer.wait_for(kBound) == std::future_status::ready ? answer.get() : "no answer";
+    return answer.wait_for(kLongestWait) == std::future_status::ready ? answer.get() : "no answer";
   }
 
   std::vector<config::AxisConfig> axes_;
@@ -162,9 +162,9 @@ TEST_F(SlowLines, AHungWriteIsAFaultThatNamesTheLineAndDelaysNoOtherAxis) {
     machine_->setSpeedOverride(0.5);
     return result.end;
   });
-  ASSERT_EQ(others.wait_for(kBound), std::future_status::ready);
+  ASSERT_EQ(others.wait_for(kLongestWait), std::future_status::ready);
   EXPECT_EQ(others.get(), MoveEnd::kReached);
-  ASSERT_EQ(disabled.wait_for(kBound), std::future_status::ready);
+  ASSERT_EQ(disabled.wait_for(kLongestWait), std::future_status::ready);
   EXPECT_EQ(
       disabled.get(),
       "y: the ENABLE line y.enable can't be written: ETIMEDOUT, the chip doesn't answer; check "
@@ -194,7 +194,7 @@ TEST_F(SlowLines, AnEmergencyStopIsServedWhileAWriteHangs) {
   const axis::Move move = axis("x").moveTo(0.08);
   machine_->emergencyStop();
   EXPECT_EQ(axis("x").wait(move).end, MoveEnd::kEmergencyStop);
-  ASSERT_EQ(disabled.wait_for(kBound), std::future_status::ready);
+  ASSERT_EQ(disabled.wait_for(kLongestWait), std::future_status::ready);
   EXPECT_FALSE(disabled.get());
 }
 
@@ -204,7 +204,7 @@ TEST_F(SlowLines, AHungWriteOfStepIsToldToAllWhoWaitAndNothingMovesWhenItReturns
   while (axis("x").state().position < 0.002) std::this_thread::yield();
   gate_.close("x.step");
   waiting_ = std::async(std::launch::async, [this, move] { return axis("x").wait(move); });
-  ASSERT_EQ(waiting_.wait_for(kBound), std::future_status::ready);
+  ASSERT_EQ(waiting_.wait_for(kLongestWait), std::future_status::ready);
   const axis::MoveResult result = waiting_.get();
   EXPECT_EQ(result.end, MoveEnd::kFault);
   const std::string why =
@@ -228,7 +228,7 @@ TEST_F(SlowLines, AHungWriteOfStepIsToldToAllWhoWaitAndNothingMovesWhenItReturns
   while (!machine_->whyHung().empty()) std::this_thread::yield();
   EXPECT_NE(axis("x").state().fault, "") << "only recover ends it";
   // It is refused until the pulse thread has ended all motions.
-  const auto end = std::chrono::steady_clock::now() + kBound;
+  const auto end = std::chrono::steady_clock::now() + kLongestWait;
   while (!recovers()) ASSERT_LT(std::chrono::steady_clock::now(), end);
   EXPECT_FALSE(axis("x").state().moving);
   EXPECT_FALSE(axis("x").state().position_valid);

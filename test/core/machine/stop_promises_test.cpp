@@ -28,13 +28,13 @@ using test::Bench;
 using test::linearAxis;
 using test::violationsOf;
 
-constexpr std::chrono::seconds kBound{60};
-constexpr double kBacklash = 0.008;  // m, backlash of y
+constexpr std::chrono::seconds kLongestAnswer{60};
+constexpr double kBacklashOfY = 0.008;  // m
 constexpr std::int64_t kBacklashSteps = 320;
 
 /// @return whether the condition was met within the bound.
 bool await(const std::function<bool()>& met) {
-  const auto end = std::chrono::steady_clock::now() + kBound;
+  const auto end = std::chrono::steady_clock::now() + kLongestAnswer;
   while (!met()) {
     if (std::chrono::steady_clock::now() > end) return false;
     std::this_thread::sleep_for(std::chrono::microseconds(100));
@@ -82,7 +82,7 @@ class StopPromises : public testing::Test {
 
   /// The result of the line, once all axes are at rest.
   std::string whatBecameOfIt() {
-    if (line_.wait_for(kBound) != std::future_status::ready) return "it has no answer";
+    if (line_.wait_for(kLongestAnswer) != std::future_status::ready) return "it has no answer";
     const bool rests = await([this] {
       return !axis("x").state().moving && !axis("y").state().moving && !axis("z").state().moving;
     });
@@ -91,7 +91,7 @@ class StopPromises : public testing::Test {
 
   /// Requests a line while the clock is held, after y has begun to take up its backlash.
   void openWindow() {
-    build(0.0, kBacklash);
+    build(0.0, kBacklashOfY);
     held_.emplace(bench->clock);
     askForLine();
     ASSERT_TRUE(await([this] { return axis("y").state().moving; }));
@@ -155,7 +155,7 @@ TEST_F(StopPromises, NoStepGoesIntoAMotorThatIsDisabledBeforeTheLine) {
   std::future<void> disabled = std::async(std::launch::async, [this] { axis("y").enable(false); });
   ASSERT_TRUE(await([this] { return !isAccepted([this] { axis("y").plan(0.01); }); }));
   closeWindow();
-  ASSERT_EQ(disabled.wait_for(kBound), std::future_status::ready);
+  ASSERT_EQ(disabled.wait_for(kLongestAnswer), std::future_status::ready);
   const std::int64_t pulses = bench->pulses("y");
   expectNothingBegan(whatBecameOfIt(), "it was disabled");
   EXPECT_EQ(bench->pulses("y"), pulses);

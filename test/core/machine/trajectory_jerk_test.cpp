@@ -8,6 +8,7 @@
 
 #include "motion/spline.h"
 #include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
@@ -20,9 +21,10 @@ using axis::MoveEnd;
 using axis::TrajectoryPoint;
 using machine::CoordinatedMove;
 using machine::TrajectoryRequest;
+using test::kSecond;
 using test::trajectoryAxis;
 
-constexpr double kJerk = 40.0;  // m/s^3
+constexpr double kJerkLimit = 40.0;  // m/s^3
 
 // The quintic from rest to rest, d (10 u^3 - 15 u^4 + 6 u^5), has a jerk of 60 d/T^3 at its ends.
 TrajectoryRequest quintic(double distance, double time) {
@@ -33,7 +35,7 @@ class TrajectoryWithJerkLimit : public test::TrajectoryBench {
  protected:
   void SetUp() override {
     std::vector<config::AxisConfig> axes{trajectoryAxis("x"), trajectoryAxis("y")};
-    for (config::AxisConfig& axis : axes) axis.jerk = kJerk;
+    for (config::AxisConfig& axis : axes) axis.jerk = kJerkLimit;
     build(axes);
   }
 
@@ -82,7 +84,7 @@ TEST_F(TrajectoryWithJerkLimit, IsHeldAndResumedWithinIt) {
   machine().resume();
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("x"), 600);
-  expectJerkWithin(kJerk);
+  expectJerkWithin(kJerkLimit);
   expectClean();
 }
 
@@ -95,7 +97,7 @@ TEST_F(TrajectoryWithJerkLimit, IsResumedWhileItSlowsDown) {
   machine().resume();
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("x"), 600);
-  expectJerkWithin(kJerk);
+  expectJerkWithin(kJerkLimit);
   expectClean();
 }
 
@@ -108,7 +110,7 @@ TEST_F(TrajectoryWithJerkLimit, StopsAndChangesItsSpeedWithinIt) {
   bench->axis("y").stop();
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kStopped);
   EXPECT_NEAR(state("y").position, -0.5 * state("x").position, 0.0016);
-  expectJerkWithin(kJerk);
+  expectJerkWithin(kJerkLimit);
   expectClean();
 }
 
@@ -146,8 +148,6 @@ TEST_F(TrajectoryAtItsLimits, SlowsDownAsSoonAsTheyLeaveRoom) {
   EXPECT_LE(differences("x", 0.02).acceleration, 10.0 * 1000.0 * 1.02);
   expectClean();
 }
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 TEST(SplineJerk, IsThatOfTheCurves) {
   const motion::SplineJerk of_quintic = motion::splineJerk({}, {{kSecond, 100.0, 0.0, 0.0}});

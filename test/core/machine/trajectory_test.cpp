@@ -8,6 +8,7 @@
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
@@ -20,6 +21,7 @@ using axis::MoveEnd;
 using machine::CoordinatedMove;
 using machine::CoordinatedResult;
 using machine::TrajectoryRequest;
+using test::kNan;
 using test::refusal;
 using test::trajectoryAxis;
 
@@ -145,7 +147,6 @@ TEST_F(Trajectory, MayJumpToRestFromTheStartSpeed) {
 }
 
 TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const auto why = [&](const std::vector<axis::TrajectoryPoint>& points) {
     return refusal([&] { follow({{"x", "y"}, points}); });
   };

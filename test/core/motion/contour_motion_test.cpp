@@ -12,6 +12,8 @@
 
 #include "motion/profile_peaks.h"
 #include "motion/spline.h"
+#include "support/constants.h"
+#include "support/contour_line.h"
 #include "support/random_contour.h"
 
 // The motion along a path: within all limits, and as fast as they allow. A unit is a microstep.
@@ -25,8 +27,8 @@ using motion::ContourLimits;
 using motion::ContourPoint;
 using motion::ContourSegment;
 using motion::Profile;
-
-const double kPi = std::acos(-1.0);
+using test::kPi;
+using test::lineTo;
 
 // What the engine follows on one axis.
 Profile profileOf(const Contour& contour, const std::vector<ContourKnot>& knots, std::size_t axis) {
@@ -183,13 +185,6 @@ double distanceToLine(const std::vector<double>& point, const std::vector<double
     sum += away * away;
   }
   return std::sqrt(sum);
-}
-
-ContourSegment lineTo(std::vector<double> end, double tolerance) {
-  ContourSegment segment;
-  segment.end = std::move(end);
-  segment.tolerance = tolerance;
-  return segment;
 }
 
 TEST(ContourMotion, OfALineIsATrapezoid) {

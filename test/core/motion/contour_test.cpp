@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "support/constants.h"
+#include "support/contour_line.h"
 #include "support/random_contour.h"
 
 // The geometry of paths: what rounds a corner, and how far it is from the corner.
@@ -20,20 +22,13 @@ using motion::Continuity;
 using motion::Contour;
 using motion::ContourPoint;
 using motion::ContourSegment;
-
-const double kPi = std::acos(-1.0);
+using test::kPi;
+using test::lineTo;
 
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
   return std::sqrt(sum);
-}
-
-ContourSegment lineTo(std::vector<double> end, double tolerance) {
-  ContourSegment segment;
-  segment.end = std::move(end);
-  segment.tolerance = tolerance;
-  return segment;
 }
 
 // The direction and the curvature of a contour at a place.

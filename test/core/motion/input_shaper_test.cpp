@@ -7,10 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "support/constants.h"
+
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using test::kPi;
 
 /// What remains of an oscillation after the last impulse, as a part of that after one impulse at
 /// the end: the closed form of Singer and Seering.

@@ -7,10 +7,12 @@
 #include <random>
 #include <vector>
 
+#include "support/constants.h"
+
 namespace stepdriver::motion {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
+using test::kSecond;
 
 std::vector<Waypoint> randomPositions(std::mt19937& random, int count) {
   std::uniform_int_distribution<std::int64_t> duration(kSecond / 20, 3 * kSecond);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
-#include <random>
 #include <utility>
 #include <vector>
 
@@ -12,6 +11,8 @@
 #include "motion/profile_peaks.h"
 #include "motion/spline.h"
 #include "motion/step_finder.h"
+#include "support/random_motion.h"
+#include "support/steps_of.h"
 
 // A trajectory whose tail is prepared before its head is known is the same as a trajectory that is
 // planned at once.
@@ -23,41 +24,21 @@ constexpr std::int64_t kBacklash = 20;
 constexpr MotionLimits kLimits{0.0, 4'000.0, 60'000.0, 60'000.0, 0.0};
 constexpr MotionLimits kJerkLimits{0.0, 4'000.0, 60'000.0, 60'000.0, 4e6};
 
-class Random {
- public:
-  explicit Random(unsigned seed) : engine_(seed) {}
-  double within(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine_);
-  }
-  int below(int end) { return std::uniform_int_distribution<int>(0, end - 1)(engine_); }
-
- private:
-  std::mt19937 engine_;
-};
-
 /// Waypoints every 0.2 s; at some of them the joint stays where it is, or nearly.
 std::vector<Waypoint> randomWaypoints(Random& random, int count) {
   std::vector<Waypoint> waypoints;
   double position = 0.0;
   for (int i = 1; i <= count; ++i) {
-    const bool rests = random.below(4) == 0;
+    const bool rests = random.whole(0, 3) == 0;
     position += rests ? random.within(-0.4, 0.4) : random.within(-60.0, 60.0);
     const double velocity = rests ? 0.0 : random.within(-200.0, 200.0);
     Waypoint waypoint{i * std::int64_t{200'000'000}, position, velocity, {}};
-    if (random.below(2) == 0) waypoint.acceleration = random.within(-500.0, 500.0);
+    if (random.whole(0, 1) == 0) waypoint.acceleration = random.within(-500.0, 500.0);
     waypoints.push_back(waypoint);
   }
   waypoints.back().velocity = 0.0;
   waypoints.back().acceleration = 0.0;
   return waypoints;
-}
-
-std::vector<std::pair<std::int64_t, int>> stepsOf(const Profile& profile) {
-  const DoubleDouble start = profile.stateAt(profile.startNs()).position;
-  StepFinder finder(profile, std::llround(start.value()));
-  std::vector<std::pair<std::int64_t, int>> steps;
-  for (Step step; finder.next(step);) steps.emplace_back(step.time_ns, step.direction);
-  return steps;
 }
 
 void expectSameSteps(const Profile& seen, const Profile& wanted) {
@@ -84,21 +65,21 @@ std::shared_ptr<const Profile> joined(const SplineTail& tail, const MotionState&
 }
 
 MotionState randomState(Random& random) {
-  if (random.below(2) == 0) return {random.within(-5.0, 5.0), 0.0, 0.0};
+  if (random.whole(0, 1) == 0) return {random.within(-5.0, 5.0), 0.0, 0.0};
   return {random.within(-5.0, 5.0), random.within(-200.0, 200.0), random.within(-500.0, 500.0)};
 }
 
 double randomSlack(Random& random) {
   const double some = random.within(0.0, static_cast<double>(kBacklash));
   const double all[] = {0.0, static_cast<double>(kBacklash), std::round(some), some};
-  return all[random.below(4)];
+  return all[random.whole(0, 3)];
 }
 
 TEST(SplineTail, IsTheTrajectoryWithItsHead) {
   Random random(1);
   for (int i = 0; i < 200; ++i) {
     SCOPED_TRACE(i);
-    const auto waypoints = randomWaypoints(random, 1 + random.below(20));
+    const auto waypoints = randomWaypoints(random, 1 + random.whole(0, 19));
     const MotionState from = randomState(random);
     const SplineTail tail(waypoints);
     DoubleDouble begin;
@@ -123,9 +104,9 @@ TEST(MotorTail, TakesUpTheBacklashAsIfPlannedAtOnce) {
   int prepared = 0;
   for (int i = 0; i < 500; ++i) {
     SCOPED_TRACE(i);
-    const auto waypoints = randomWaypoints(random, 2 + random.below(20));
+    const auto waypoints = randomWaypoints(random, 2 + random.whole(0, 19));
     const SplineTail tail(waypoints);
-    const MotionLimits limits = random.below(2) == 0 ? kLimits : kJerkLimits;
+    const MotionLimits limits = random.whole(0, 1) == 0 ? kLimits : kJerkLimits;
     const auto motor = std::make_shared<const MotorTail>(*tail.profile(), kBacklash, limits);
     const MotionState from = randomState(random);
     const double slack = randomSlack(random);

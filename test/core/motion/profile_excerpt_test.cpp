@@ -12,6 +12,7 @@
 #include "motion/rate.h"
 #include "motion/spline.h"
 #include "motion/step_finder.h"
+#include "support/steps_of.h"
 
 // Excerpts compute their pieces on demand. Here the same pieces are made in advance.
 
@@ -60,14 +61,6 @@ Profile composedBeforehand(const Shared& course, const Profile& path) {
     }
   }
   return {path.startNs(), pieces};
-}
-
-std::vector<std::pair<std::int64_t, int>> stepsOf(const Profile& profile) {
-  const DoubleDouble start = profile.stateAt(profile.startNs()).position;
-  StepFinder finder(profile, std::llround(start.value()));
-  std::vector<std::pair<std::int64_t, int>> steps;
-  for (Step step; finder.next(step);) steps.emplace_back(step.time_ns, step.direction);
-  return steps;
 }
 
 void expectSame(const Profile& seen, const Profile& wanted) {

@@ -10,7 +10,7 @@
 namespace stepdriver::motion {
 namespace {
 
-MotionLimits limitsOf(double jerk) {
+MotionLimits pursuitLimits(double jerk) {
   MotionLimits limits;
   limits.max_speed = 1000.0;
   limits.acceleration = 2000.0;
@@ -55,7 +55,7 @@ TEST(Pursuit, EndsAtThePointAndWithItsVelocityFromAnyState) {
     return std::uniform_real_distribution<double>(-most, most)(random);
   };
   for (int i = 0; i < 20'000; ++i) {
-    const MotionLimits limits = limitsOf(i % 2 == 0 ? 0.0 : 50'000.0);
+    const MotionLimits limits = pursuitLimits(i % 2 == 0 ? 0.0 : 50'000.0);
     MotionState from;
     from.position = DoubleDouble(any(1e6));
     // Not beyond the limits a moment later.
@@ -78,15 +78,15 @@ TEST(Pursuit, EndsAtThePointAndWithItsVelocityFromAnyState) {
 
 TEST(Pursuit, TakesTheClosedFormToCatchUp) {
   // 10 microsteps behind at the same velocity: up and down by 2000/s^2, 2 sqrt(10/2000).
-  const std::vector<Piece> pieces =
-      joinPoint({DoubleDouble(0.0), 500.0, 0.0}, {DoubleDouble(10.0), 500.0}, limitsOf(0.0), 0.0);
+  const std::vector<Piece> pieces = joinPoint({DoubleDouble(0.0), 500.0, 0.0},
+                                              {DoubleDouble(10.0), 500.0}, pursuitLimits(0.0), 0.0);
   EXPECT_NEAR(durationOf(pieces), 2.0 * std::sqrt(10.0 / 2000.0), 1e-9);
 }
 
 TEST(Pursuit, MakesASmallCorrectionSlowly) {
   const MotionState from{DoubleDouble(0.0), 500.0, 0.0};
   const std::vector<Piece> pieces =
-      joinPoint(from, {DoubleDouble(0.02), 500.0}, limitsOf(0.0), 0.02);
+      joinPoint(from, {DoubleDouble(0.02), 500.0}, pursuitLimits(0.0), 0.02);
   EXPECT_GT(durationOf(pieces), 0.008);
   EXPECT_LE(durationOf(pieces), 0.02 + 1e-9);
   for (const Piece& piece : pieces) EXPECT_LE(std::abs(piece.a), 1000.0);
@@ -94,13 +94,13 @@ TEST(Pursuit, MakesASmallCorrectionSlowly) {
 
 TEST(Pursuit, NeedsNothingOnThePoint) {
   const MotionState from{DoubleDouble(3.0), 500.0, 0.0};
-  EXPECT_TRUE(joinPoint(from, {DoubleDouble(3.0), 500.0}, limitsOf(0.0), 0.01).empty());
+  EXPECT_TRUE(joinPoint(from, {DoubleDouble(3.0), 500.0}, pursuitLimits(0.0), 0.01).empty());
 }
 
 TEST(Pursuit, TheFirstPartEndsAtItsTime) {
   const MotionState from{DoubleDouble(0.0), 0.0, 0.0};
   const std::vector<Piece> pieces =
-      joinPoint(from, {DoubleDouble(10.0), 500.0}, limitsOf(0.0), 0.0);
+      joinPoint(from, {DoubleDouble(10.0), 500.0}, pursuitLimits(0.0), 0.0);
   const double half = 0.5 * durationOf(pieces);
   const std::vector<Piece> first = firstPart(pieces, half);
   EXPECT_NEAR(durationOf(first), half, 1e-15);

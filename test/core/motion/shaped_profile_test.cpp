@@ -15,11 +15,13 @@
 #include "motion/profile_sum.h"
 #include "motion/step_finder.h"
 #include "sim/spring_mass.h"
+#include "support/constants.h"
 
 namespace stepdriver::motion {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
+using test::kSecond;
+
 const MotionLimits kTrapezoid{0.0, 20'000.0, 300'000.0, 300'000.0, 0.0};
 const MotionLimits kSmooth{0.0, 20'000.0, 300'000.0, 200'000.0, 9e6};
 

@@ -6,6 +6,7 @@
 
 #include "motion/backlash.h"
 #include "motion/profile.h"
+#include "support/constants.h"
 #include "support/random_motion.h"
 
 // How much of a backlash is taken up at a time of a motor's motion.
@@ -13,7 +14,7 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
+using test::kSecond;
 
 /// A second for each way [microsteps], at a constant speed.
 Profile ways(const std::vector<double>& lengths) {

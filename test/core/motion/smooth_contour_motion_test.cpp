@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "motion/contour_grid.h"
+#include "support/constants.h"
+#include "support/contour_line.h"
 #include "support/random_contour.h"
 #include "support/smooth_optimum.h"
 
@@ -27,15 +29,8 @@ using motion::ContourKnot;
 using motion::ContourLimits;
 using motion::ContourPoint;
 using motion::ContourSegment;
-
-const double kPi = std::acos(-1.0);
-
-ContourSegment straightTo(std::vector<double> end, double tolerance) {
-  ContourSegment segment;
-  segment.end = std::move(end);
-  segment.tolerance = tolerance;
-  return segment;
-}
+using test::kPi;
+using test::lineTo;
 
 double secondsOf(const std::vector<ContourKnot>& knots) {
   return static_cast<double>(knots.back().time_ns) * 1e-9;
@@ -133,7 +128,7 @@ class NearContour {
 
 TEST(SmoothContourMotion, OfALineHasTheSevenPhasesOfTheFastest) {
   const auto duration = [](double length, const ContourLimits& limits) {
-    const Contour contour({0.0}, {straightTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    const Contour contour({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
     return secondsOf(motion::planSmoothContour(contour, {limits}).knots);
   };
   // 1000/1000 + 1000/5000 + 5000/50000
@@ -150,8 +145,7 @@ TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
   std::vector<ContourSegment> segments;
   for (int i = 1; i <= 100; ++i) {
     const double angle = 2.0 * kPi * i / 100.0;
-    segments.push_back(
-        straightTo({1600.0 * std::cos(angle) - 1600.0, 1600.0 * std::sin(angle)}, 1.6));
+    segments.push_back(lineTo({1600.0 * std::cos(angle) - 1600.0, 1600.0 * std::sin(angle)}, 1.6));
   }
   const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
   const Contour contour({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
@@ -325,7 +319,7 @@ double optimumOf(const Contour& section, const std::vector<ContourLimits>& limit
 
 TEST(SmoothContourMotion, HasAKnownOptimumOnALine) {
   const auto durations = [](double length, const ContourLimits& limit) {
-    const Contour contour({0.0}, {straightTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    const Contour contour({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
     const std::vector<ContourLimits> limits{limit};
     const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
     return std::pair(secondsOf(knots), optimumOf(contour, limits, knots, 400));
@@ -400,7 +394,7 @@ TEST(SmoothContourMotion, KeepsTheJerkAtExtremes) {
     std::vector<double> end = path.segments.back().end;
     for (const double length : {0.001, 1e6}) {
       end[0] += length;
-      path.segments.push_back(straightTo(end, 0.1));
+      path.segments.push_back(lineTo(end, 0.1));
     }
     for (ContourLimits& limits : path.limits) {
       limits.jerk = limits.acceleration * std::pow(10.0, number(-1.0, 5.0));

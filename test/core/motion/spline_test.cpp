@@ -13,18 +13,19 @@
 
 #include "motion/profile_peaks.h"
 #include "motion/step_finder.h"
+#include "support/constants.h"
 
 namespace stepdriver::motion {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
+using test::kSecond;
 
 // The textbook's polynomial of one segment over t/T, in long double.
-struct Textbook {
+struct TextbookSpline {
   long double duration;
   long double c[6] = {};
 
-  Textbook(const Waypoint& begin, const Waypoint& end)
+  TextbookSpline(const Waypoint& begin, const Waypoint& end)
       : duration((end.time_ns - begin.time_ns) / 1e9L) {
     const long double way = static_cast<long double>(end.position) - begin.position;
     c[0] = begin.position;
@@ -56,7 +57,7 @@ struct Textbook {
 };
 
 /// The first time after `low` at which the textbook's motion is on a half-step line [s].
-long double crossing(const Textbook& textbook, long double line, long double low,
+long double crossing(const TextbookSpline& textbook, long double line, long double low,
                      long double high) {
   for (int i = 0; i < 100; ++i) {
     const long double middle = (low + high) / 2.0L;
@@ -73,7 +74,7 @@ void expectTextbook(const Profile& profile, Waypoint begin, std::vector<Waypoint
   waypoints.back().position = std::nearbyint(waypoints.back().position);
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
     const Waypoint& end = waypoints[index];
-    const Textbook textbook(begin, end);
+    const TextbookSpline textbook(begin, end);
     const double allowed = textbook.quintic() ? kQuinticError + 1e-9 : 1e-9;
     for (std::int64_t k = 0; k <= 40; ++k) {
       const std::int64_t time = (end.time_ns - begin.time_ns) / 40 * k;
@@ -132,7 +133,7 @@ TEST(Spline, FollowsRandomTrajectoriesLikeTheTextbook) {
 
 TEST(Spline, StepsOfACubicComeWithinANanosecond) {
   const std::vector<Waypoint> waypoints{{2 * kSecond, 10000.0, 0.0, std::nullopt}};
-  const Textbook textbook({0, 0.0, 0.0, std::nullopt}, waypoints[0]);
+  const TextbookSpline textbook({0, 0.0, 0.0, std::nullopt}, waypoints[0]);
   const Profile profile = planSpline(0, restAt(0.0), waypoints);
   StepFinder finder(profile, 0);
   Step step;
@@ -147,7 +148,7 @@ TEST(Spline, StepsOfACubicComeWithinANanosecond) {
 // Compares positions rather than times, because the axis hardly moves at the ends.
 TEST(Spline, StepsOfAQuinticComeWhereThePolynomialIsWithinAHundredthOfAStep) {
   const std::vector<Waypoint> waypoints{{2 * kSecond, 10000.0, 0.0, 0.0}};
-  const Textbook textbook({0, 0.0, 0.0, 0.0}, waypoints[0]);
+  const TextbookSpline textbook({0, 0.0, 0.0, 0.0}, waypoints[0]);
   ASSERT_TRUE(textbook.quintic());
   const Profile profile = planSpline(0, restAt(0.0), waypoints);
   StepFinder finder(profile, 0);

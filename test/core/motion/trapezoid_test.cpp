@@ -12,10 +12,10 @@ namespace stepdriver::motion {
 namespace {
 
 // The textbook motion in long double, built in another way: from times, not from pieces.
-struct Textbook {
+struct TextbookTrapezoid {
   long double start, peak, up_time, cruise_time, down_time, up, cruise, length, a, d;
 
-  Textbook(std::int64_t steps, const MotionLimits& limits) {
+  TextbookTrapezoid(std::int64_t steps, const MotionLimits& limits) {
     length = std::abs(static_cast<long double>(steps));
     a = limits.acceleration;
     d = limits.deceleration;
@@ -51,7 +51,7 @@ void expectTextbook(std::int64_t from, std::int64_t to, const MotionLimits& limi
   const std::int64_t start_ns = 123'456'789;
   const Profile profile = planFromRest(start_ns, from, to, limits);
   const std::int64_t length = std::abs(to - from);
-  const Textbook textbook(length, limits);
+  const TextbookTrapezoid textbook(length, limits);
   StepFinder finder(profile, from);
   Step step;
   std::int64_t last = 0;

@@ -9,15 +9,17 @@
 #include <vector>
 
 #include "pulse/pulse_engine.h"
+#include "support/constants.h"
 #include "support/plan_from_rest.h"
 #include "support/recording_lines.h"
 
 namespace stepdriver::pulse {
 namespace {
 
+using test::kMillisecond;
+using test::kSecond;
+
 constexpr Nanoseconds kMicrosecond = 1'000;
-constexpr Nanoseconds kMillisecond = 1'000'000;
-constexpr Nanoseconds kSecond = 1'000'000'000;
 
 TEST(GuardLearner, ComesToTheNinetyNinthPercentileOfTheSleeps) {
   std::mt19937_64 random(1);

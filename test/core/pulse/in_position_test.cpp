@@ -3,12 +3,14 @@
 #include <cerrno>
 #include <vector>
 
+#include "support/constants.h"
 #include "support/pulse_engine_bench.h"
 
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kMillisecond = 1'000'000;
+using test::kMillisecond;
+
 constexpr int kInPosition = 0;
 
 /// Two channels; the first has an in-position input that is active high, and waits 100 ms for it.

@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "pulse/lateness_record.h"
+#include "support/constants.h"
 
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kSecond = 1'000'000'000;
+using test::kSecond;
 
 TEST(LatenessHistogram, HasPercentilesWithinASixteenthAboveTheExactOnes) {
   std::mt19937_64 random(7);

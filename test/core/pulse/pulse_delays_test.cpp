@@ -9,12 +9,14 @@
 
 #include "motion/compose.h"
 #include "motion/step_finder.h"
+#include "support/constants.h"
 #include "support/pulse_engine_bench.h"
 
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kMillisecond = 1'000'000;
+using test::kMillisecond;
+
 constexpr Nanoseconds kMaxLateness = 5 * kMillisecond;
 // The ratios of a line's axes to its path, and so their speeds.
 constexpr double kScales[] = {1.0, -0.61, 0.083};

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "support/constants.h"
 #include "support/pulse_engine_bench.h"
 
 // Effects of a late pulse and a slow write on the other channels, and what remains of them later.
@@ -10,7 +11,7 @@
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kMillisecond = 1'000'000;
+using test::kMillisecond;
 
 class PulseSlides : public PulseEngineTest {
  protected:

@@ -1,13 +1,13 @@
 #include <gtest/gtest.h>
 
+#include "support/constants.h"
 #include "support/hand_rig.h"
 
 namespace stepdriver::sim {
 namespace {
 
 using test::HandRig;
-
-constexpr std::int64_t kMillisecond = 1'000'000;
+using test::kMillisecond;
 
 /// A load that falls at 20 mm/s, and a brake that a high level releases.
 RigAxisSpec verticalAxis(bool with_brake = true) {

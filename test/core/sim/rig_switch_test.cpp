@@ -10,9 +10,8 @@ namespace stepdriver::sim {
 namespace {
 
 using test::HandRig;
+using test::kTravel;
 using test::plainAxis;
-
-constexpr double kTravel = 0.2;  // [mm] a full step, as in plainAxis()
 
 /// A max switch at 1 mm and a min switch at -1 mm: 5 full steps in either direction.
 RigAxisSpec axisWithSwitches() {

@@ -14,9 +14,8 @@ namespace stepdriver::sim {
 namespace {
 
 using test::HandRig;
+using test::kTravel;
 using test::plainAxis;
-
-constexpr double kTravel = 0.2;  // [mm] a full step, as in plainAxis()
 
 TEST(Rig, CarriageFollowsTheStepsThatGoOut) {
   HandRig bench("a4988");

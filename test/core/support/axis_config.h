@@ -11,8 +11,6 @@
 
 namespace stepdriver::config {
 
-using Lines = std::vector<std::string>;
-
 /// The minimum that a linear axis needs.
 inline ConfigValue linearAxis(const std::string& chip = "gpiochip0") {
   return mapOf({{"driver", "a4988"},

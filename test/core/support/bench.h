@@ -12,6 +12,8 @@
 
 namespace stepdriver::test {
 
+inline constexpr double kStep = 1.0 / 80'000.0;  // m, of linearAxis()
+
 /// A linear axis with every pin wired, two endstops, 1/16 microsteps, 80 microsteps/mm, 100 mm/s,
 /// 1000 mm/s^2, enabled on start.
 inline config::AxisConfig linearAxis(const std::string& name,

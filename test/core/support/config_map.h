@@ -38,8 +38,10 @@ inline void drop(ConfigValue& root, const std::string& path) {
   mapAt(root, path, last).erase(last);
 }
 
+using Lines = std::vector<std::string>;
+
 /// The issues as lines `key: message`.
-inline std::vector<std::string> linesOf(const std::vector<ConfigIssue>& issues) {
+inline Lines linesOf(const std::vector<ConfigIssue>& issues) {
   std::vector<std::string> lines;
   lines.reserve(issues.size());
   for (const ConfigIssue& issue : issues) lines.push_back(issue.key + ": " + issue.message);

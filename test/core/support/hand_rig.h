@@ -12,6 +12,8 @@
 
 namespace stepdriver::test {
 
+inline constexpr double kTravel = 0.2;  // mm, of a full step of plainAxis()
+
 /// An axis `x` with every pin that its chip has, without inversion, 0.2 mm for a full step, no
 /// switches.
 inline sim::RigAxisSpec plainAxis(const std::string& model, const std::string& name = "x") {

@@ -12,8 +12,6 @@
 
 namespace stepdriver::test {
 
-inline constexpr double kStep = 1.0 / 80'000.0;  // [m]
-
 /// On the rig with its switches at -100 mm and 100 mm: approaches min at 50 mm/s, latches at 5
 /// mm/s, and backs off 2 mm from the trigger point, which is at -0.1 m.
 inline config::AxisConfig homingAxis(const std::string& name = "x") {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
 #include "support/trajectory_bench.h"
 
 // Paths of several axes, as the pins show them. The axes are the plotter's: 80 microsteps/mm,
@@ -28,7 +29,6 @@ using machine::PathSegment;
 inline constexpr double kRadius = 0.020;       // m
 inline constexpr double kTolerance = 20e-6;    // m
 inline constexpr double kMicrostep = 12.5e-6;  // m
-inline const double kPi = std::acos(-1.0);
 
 using Place = std::array<double, 2>;
 

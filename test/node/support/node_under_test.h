@@ -10,10 +10,19 @@
 #include <string>
 
 #include "support/call_service.h"
+#include "support/constants.h"
 #include "support/node_process.h"
 #include "support/temporary_file.h"
 
 namespace stepdriver::node_test {
+
+using test::kInfinity;
+using test::kNan;
+using test::kPi;
+
+/// Of the axis x below.
+inline constexpr double kStep = 1.0 / 80'000.0;  // m, a microstep
+inline constexpr double kHalfStep = kStep / 2.0;
 
 /// A stepdriver_node for one test, in a namespace with the test's name, on the simulated rig.
 ///
