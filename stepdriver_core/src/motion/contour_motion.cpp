@@ -229,12 +229,13 @@ class Knots {
   template <typename From, typename To>
   Demand cubicDemand(double duration, const From& from, const To& to) const {
     Demand demand;
+    const double rate = 1.0 / duration;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
       const auto [p0, v0] = from(j);
       const auto [p1, v1] = to(j);
-      const double mean = (p1 - p0) / duration;
-      const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / duration;
-      const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / duration;
+      const double mean = (p1 - p0) * rate;
+      const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) * rate;
+      const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) * rate;
       const int direction = directionOf(v0, v1);
       const auto part = [&](double a) {
         return std::abs(a) / accelerationTowards(limits_[j], direction, a > 0.0 ? 1 : -1);
@@ -242,8 +243,8 @@ class Knots {
       demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
       demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
       double speed = std::max(std::abs(v0), std::abs(v1));
-      const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
-      if (turn > 0.0 && turn < 1.0) {
+      if (begin * end < 0.0) {
+        const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
         speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
       }
       demand.speed = std::max(demand.speed, speed / limits_[j].speed);
@@ -257,23 +258,25 @@ class Knots {
   // excess is the same at both limits.
   double durationOf(std::size_t interval, double begin, double end) const {
     const double even = 2.0 * grid_[interval].length / (begin + end);
+    const double rate = 1.0 / even;
     double least = -kMostStretch;
     double most = kMostStretch;
     for (std::size_t j = 0; j < axes_; ++j) {
       const double way = grid_.position(interval + 1)[j] - grid_.position(interval)[j];
       const double v0 = grid_.firstAtBegin(interval)[j] * begin;
       const double v1 = grid_.firstAtEnd(interval)[j] * end;
-      const double slope = 6.0 * way / (even * even);
-      const double at_begin = slope - (4.0 * v0 + 2.0 * v1) / even;
-      const double at_end = (2.0 * v0 + 4.0 * v1) / even - slope;
+      const double slope = 6.0 * way * rate * rate;
+      const double at_begin = slope - (4.0 * v0 + 2.0 * v1) * rate;
+      const double at_end = (2.0 * v0 + 4.0 * v1) * rate - slope;
       const int direction = directionOf(v0, v1);
       const double up = accelerationTowards(limits_[j], direction, 1);
       const double down = -accelerationTowards(limits_[j], direction, -1);
       if (std::abs(slope) * kMostStretch < kSmallExcess * up) continue;
       const double with = slope > 0.0 ? up : down;
       const double against = slope > 0.0 ? down : up;
-      least = std::max({least, (at_begin - with) / slope, (against - at_end) / slope});
-      most = std::min({most, (at_begin - against) / slope, (with - at_end) / slope});
+      const double by = 1.0 / slope;
+      least = std::max(least, std::max((at_begin - with) * by, (against - at_end) * by));
+      most = std::min(most, std::min((at_begin - against) * by, (with - at_end) * by));
     }
     const double stretch = least > most ? (least + most) / 2.0 : std::clamp(0.0, least, most);
     return even * (1.0 + std::clamp(stretch, -kMostStretch, kMostStretch));
