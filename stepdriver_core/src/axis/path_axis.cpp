@@ -11,9 +11,6 @@
 namespace stepdriver::axis {
 namespace {
 
-// Longest distance of one move: doubles represent every count and half count on it exactly.
-constexpr double kFarthest = 1099511627776.0;  // 2^40
-
 auto tied(const motion::MotionLimits& limits) {
   return std::tie(limits.start_speed, limits.max_speed, limits.acceleration, limits.deceleration,
                   limits.jerk);
@@ -51,17 +48,15 @@ std::string PathAxis::showLimit(double value, config::LimitSource source, const 
 void PathAxis::refuse(const std::string& why) const { throw Refused(name + ": " + why); }
 
 std::string PathAxis::whyBeyondLimits(double position, const std::string& what) const {
-  // Half a step of tolerance: a position that rounds to the limit is at the limit.
-  const double tolerance = 0.5 / steps_per_unit;
-  if (min_position && position < *min_position - tolerance) {
+  if (isBelow(position)) {
     return fmt::format("{} {} is below the soft limit min_position {}", what, show(position),
                        showLimit(*min_position, min_position_source));
   }
-  if (max_position && position > *max_position + tolerance) {
+  if (isAbove(position)) {
     return fmt::format("{} {} is above the soft limit max_position {}", what, show(position),
                        showLimit(*max_position, max_position_source));
   }
-  if (std::abs(countOf(position)) > kFarthest) {
+  if (isTooFar(position)) {
     return fmt::format("{} {} is more than 2^40 steps away", what, show(position));
   }
   return "";

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -58,8 +59,24 @@ struct PathAxis {
   template <typename What>
   std::enable_if_t<std::is_invocable_v<What>> refuseBeyondLimits(double position,
                                                                  const What& what) const {
-    if (!whyBeyondLimits(position, {}).empty()) refuseBeyondLimits(position, std::string(what()));
+    if (isBelow(position) || isAbove(position) || isTooFar(position)) {
+      refuseBeyondLimits(position, std::string(what()));
+    }
   }
+
+ private:
+  // Longest distance of one move [microsteps]: doubles represent every count and half count on it
+  // exactly.
+  static constexpr double kFarthest = 1099511627776.0;  // 2^40
+
+  // Half a step of tolerance: a position that rounds to the limit is at the limit.
+  bool isBelow(double position) const {
+    return min_position && position < *min_position - 0.5 / steps_per_unit;
+  }
+  bool isAbove(double position) const {
+    return max_position && position > *max_position + 0.5 / steps_per_unit;
+  }
+  bool isTooFar(double position) const { return std::abs(countOf(position)) > kFarthest; }
 };
 
 /// The state of an axis at the beginning of a path.

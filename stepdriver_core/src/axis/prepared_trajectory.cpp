@@ -43,6 +43,10 @@ constexpr double kShareForBacklash = 0.2;
 // planning the trajectory, so it is called only for a refusal.
 using Remedy = std::function<std::string()>;
 
+std::string pointText(std::size_t index) {
+  return fmt::format("point {} of the trajectory", index);
+}
+
 std::string at(double seconds) { return roughText(seconds) + " s after its start"; }
 
 Peak later(Peak peak, double seconds) {
@@ -163,6 +167,7 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        bool allow_slower)
     : axes_(std::move(axes)), allow_slower_(allow_slower) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
+  requirePoints(points);
   lone_position_ = points.size() == 1 && points.front().velocities.empty();
   Source source{points, expected};
   const bool moves = std::any_of(expected.begin(), expected.end(),
@@ -198,22 +203,61 @@ std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
   return std::nullopt;
 }
 
+// Refuses points whose sizes or times are wrong, which is the same for all axes.
+void PreparedTrajectory::requirePoints(const std::vector<TrajectoryPoint>& points) const {
+  const PathAxis& axis = axes_.front();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    giveWayAt(i);
+    const TrajectoryPoint& point = points[i];
+    const auto check = [&](std::size_t size, const char* what, bool optional) {
+      if (size == axes_.size() || (optional && size == 0)) return;
+      axis.refuse(fmt::format("{} has {} {}, but must have {}{}", pointText(i), size, what,
+                              axes_.size(), optional ? " or none" : ""));
+    };
+    check(point.positions.size(), "positions", false);
+    check(point.velocities.size(), "velocities", true);
+    check(point.accelerations.size(), "accelerations", true);
+    constexpr double kLongest = Profile::kLongest;
+    if (!(point.time >= 0.0 && point.time < kLongest)) {
+      axis.refuse(fmt::format("{} is at {} s, but must be from 0 s to {} s", pointText(i),
+                              numberText(point.time), numberText(kLongest)));
+    }
+    if (i > 0 && nanoseconds(point.time) <= nanoseconds(points[i - 1].time)) {
+      axis.refuse(
+          fmt::format("{} is at {} s, but must be later than the one before it, at {} s",
+                      pointText(i), numberText(point.time),
+                      roughText(static_cast<double>(nanoseconds(points[i - 1].time)) * 1e-9)));
+    }
+  }
+}
+
 std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
                                                               const Source& source) const {
   const PathAxis& axis = axes_[member];
-  std::vector<motion::Waypoint> waypoints;
-  waypoints.reserve(source.points.size());
-  for (std::size_t i = 0; i < source.points.size(); ++i) {
+  std::vector<motion::Waypoint> waypoints(source.points.size());
+  for (std::size_t i = 0; i < waypoints.size(); ++i) {
     giveWayAt(i);
-    waypoints.push_back(waypointOf(member, i, source.points[i], waypoints));
-  }
-  if (source.slowdown > 1.0) {
-    for (std::size_t i = 0; i < waypoints.size(); ++i) {
-      giveWayAt(i);
-      motion::Waypoint& waypoint = waypoints[i];
-      waypoint.time_ns = nanoseconds(source.slowdown * source.points[i].time);
-      if (waypoint.velocity) *waypoint.velocity /= source.slowdown;
-      if (waypoint.acceleration) *waypoint.acceleration /= source.slowdown * source.slowdown;
+    const TrajectoryPoint& point = source.points[i];
+    const auto take = [&](const std::vector<double>& numbers, const char* what) {
+      const double number = numbers[member];
+      if (!std::isfinite(number)) {
+        axis.refuse(fmt::format("{} has {} among its {}, but they must be finite", pointText(i),
+                                numberText(number), what));
+      }
+      return number;
+    };
+    motion::Waypoint& waypoint = waypoints[i];
+    waypoint.time_ns = nanoseconds(source.slowdown * point.time);
+    const double position = take(point.positions, "positions");
+    axis.refuseBeyondLimits(position, [&] { return pointText(i) + " at"; });
+    waypoint.position = axis.countOf(position);
+    if (!point.velocities.empty()) {
+      waypoint.velocity =
+          take(point.velocities, "velocities") * axis.steps_per_unit / source.slowdown;
+    }
+    if (!point.accelerations.empty()) {
+      waypoint.acceleration = take(point.accelerations, "accelerations") * axis.steps_per_unit /
+                              (source.slowdown * source.slowdown);
     }
   }
   try {
@@ -224,49 +268,6 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
   return motion::interpolate(
       source.expected[member], std::move(waypoints),
       axis.limits.jerk > 0.0 ? motion::Smoothness::kJerk : motion::Smoothness::kAcceleration);
-}
-
-motion::Waypoint PreparedTrajectory::waypointOf(std::size_t member, std::size_t index,
-                                                const TrajectoryPoint& point,
-                                                const std::vector<motion::Waypoint>& before) const {
-  const PathAxis& axis = axes_[member];
-  // Called only for a refusal, because there are many points.
-  const auto name = [&] { return fmt::format("point {} of the trajectory", index); };
-  const auto check = [&](const std::vector<double>& numbers, const char* what, bool optional) {
-    if (optional && numbers.empty()) return;
-    if (numbers.size() != axes_.size()) {
-      axis.refuse(fmt::format("{} has {} {}, but must have {}{}", name(), numbers.size(), what,
-                              axes_.size(), optional ? " or none" : ""));
-    }
-    if (!std::isfinite(numbers[member])) {
-      axis.refuse(fmt::format("{} has {} among its {}, but they must be finite", name(),
-                              numberText(numbers[member]), what));
-    }
-  };
-  check(point.positions, "positions", false);
-  check(point.velocities, "velocities", true);
-  check(point.accelerations, "accelerations", true);
-  constexpr double kLongest = Profile::kLongest;
-  if (!(point.time >= 0.0 && point.time < kLongest)) {
-    axis.refuse(fmt::format("{} is at {} s, but must be from 0 s to {} s", name(),
-                            numberText(point.time), numberText(kLongest)));
-  }
-  motion::Waypoint waypoint;
-  waypoint.time_ns = nanoseconds(point.time);
-  if (!before.empty() && waypoint.time_ns <= before.back().time_ns) {
-    axis.refuse(fmt::format("{} is at {} s, but must be later than the one before it, at {} s",
-                            name(), numberText(point.time),
-                            roughText(static_cast<double>(before.back().time_ns) * 1e-9)));
-  }
-  axis.refuseBeyondLimits(point.positions[member], [&] { return name() + " at"; });
-  waypoint.position = axis.countOf(point.positions[member]);
-  if (!point.velocities.empty()) {
-    waypoint.velocity = point.velocities[member] * axis.steps_per_unit;
-  }
-  if (!point.accelerations.empty()) {
-    waypoint.acceleration = point.accelerations[member] * axis.steps_per_unit;
-  }
-  return waypoint;
 }
 
 motion::MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {

@@ -93,9 +93,8 @@ class PreparedTrajectory {
   ///   does.
   std::optional<double> slowdownFor(Source source) const;
   Part prepare(std::size_t member, const Source& source) const;
+  void requirePoints(const std::vector<TrajectoryPoint>& points) const;
   std::vector<motion::Waypoint> waypointsOf(std::size_t member, const Source& source) const;
-  motion::Waypoint waypointOf(std::size_t member, std::size_t index, const TrajectoryPoint& point,
-                              const std::vector<motion::Waypoint>& before) const;
   double wantedDuration() const;  // [s]
   Head headOf(std::size_t member, const PathStart& start) const;
   /// The fastest motion to rest at the last point.

@@ -34,9 +34,14 @@ ContourGrid::ContourGrid(const Contour& contour, double begin, const Fineness& f
     const double from = i == 0 ? begin : 0.0;
     const double first = std::max(from, contour.roundedUntil(i));
     const double last = std::max(from, contour.roundedFrom(i));
-    if (first > from) divide(i, from, first, partsOfCorner(i, from, first));
-    if (last - first > kLeastPart) divide(i, first, last, contour.isLine(i) ? 1 : kPartsOfCurve);
-    if (last < 1.0) divide(i, last, 1.0, partsOfCorner(i, last, 1.0));
+    evaluate(i, from, scratch_.front());
+    if (first > from) divide(i, first, partsOfCorner(i, first));
+    if (last - first > kLeastPart) divide(i, last, contour.isLine(i) ? 1 : kPartsOfCurve);
+    if (last < 1.0) {
+      // A part that is too short is left out.
+      if (scratch_.front().parameter != last) evaluate(i, last, scratch_.front());
+      divide(i, 1.0, partsOfCorner(i, 1.0));
+    }
     stops_.back() = contour.stopsAfter(i);
   }
 }
@@ -49,98 +54,77 @@ void ContourGrid::evaluate(std::size_t segment, double parameter, Place& place) 
   place.rate = std::sqrt(sum);
 }
 
-int ContourGrid::partsOfCorner(std::size_t segment, double from, double to) {
-  auto& [begin, middle, end] = scratch_;
-  evaluate(segment, from, begin);
+int ContourGrid::partsOfCorner(std::size_t segment, double to) {
+  const Place& begin = scratch_.front();
+  Place& end = scratch_.back();
   evaluate(segment, to, end);
   return turnOf(begin, end) < kGentleTurn ? fineness_.parts_of_gentle_half : kPartsOfCorner;
 }
 
-// Into `parts` intervals, or more if they would be too long; one part is straight.
-void ContourGrid::divide(std::size_t segment, double from, double to, int parts) {
-  Place begin;
-  Place end;
-  evaluate(segment, from, begin);
+// The part of a segment from the first place in scratch_ on, which is then that of `to`: into
+// `parts` intervals, or more if they would be too long; one part is straight.
+void ContourGrid::divide(std::size_t segment, double to, int parts) {
+  auto& [begin, middle, end] = scratch_;
+  const double from = begin.parameter;
   if (parts == 1) {
     evaluate(segment, to, end);
     append(segment, begin, end, begin.rate * (to - from), true);
+    std::swap(begin, end);
     return;
   }
-  std::vector<double> ahead;  // parameters of places, the next one last
-  ahead.reserve(2 * static_cast<std::size_t>(parts));
-  for (int i = 0; i < parts; ++i) ahead.push_back(to + (from - to) * i / parts);
-  Place middle;
-  evaluate(segment, ahead.back(), end);
+  // Parameters of places, the next one last.
+  for (int i = 0; i < parts; ++i) ahead_.push_back(to + (from - to) * i / parts);
+  evaluate(segment, ahead_.back(), end);
   while (true) {
     const double half = (begin.parameter + end.parameter) / 2.0;
     evaluate(segment, half, middle);
     if (end.parameter - begin.parameter > kShortest && tooLong(begin, middle, end)) {
-      ahead.push_back(half);
+      ahead_.push_back(half);
       std::swap(end, middle);
       continue;
     }
     append(segment, begin, end, lengthOf(begin, middle, end), false);
-    ahead.pop_back();
-    if (ahead.empty()) break;
     std::swap(begin, end);
-    evaluate(segment, ahead.back(), end);
+    ahead_.pop_back();
+    if (ahead_.empty()) break;
+    evaluate(segment, ahead_.back(), end);
   }
 }
 
-std::vector<std::size_t> ContourGrid::divideEach(const std::vector<bool>& which,
-                                                 std::size_t parts) {
-  const std::size_t before = size();
-  std::size_t made = before;
-  for (std::size_t i = 0; i < before; ++i) {
-    if (which[i] && !intervals_[i].straight) made += parts - 1;
+Division ContourGrid::divideEach(const std::vector<bool>& which, std::size_t parts) {
+  Division division{{}, parts};
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (which[i] && !intervals_[i].straight) division.intervals.push_back(i);
   }
-  resize(made);
-  std::vector<std::size_t> origins(made);
+  division.spread(intervals_);
+  division.spread(derivatives_, 4 * axes_);
+  division.spread(positions_, axes_);
+  division.spread(stops_);
   std::vector<Place> places(2 * parts + 1);  // with the middles of the parts
-  // From the end on, nothing is replaced before it is copied.
-  for (std::size_t i = before; i-- > 0;) {
+  for (std::size_t i = 0; i < division.intervals.size(); ++i) {
     giveWayAt(i);
-    if (!which[i] || intervals_[i].straight) {
-      origins[--made] = i;
-      if (made != i) move(i, made);
-      continue;
-    }
-    const Interval interval = intervals_[i];
-    const bool stops = stops_[i + 1];
+    const std::size_t first = division.firstPartOf(i);
+    const Interval interval = intervals_[first];
+    const char stops = stops_[first + parts];
     for (std::size_t k = 0; k < places.size(); ++k) {
       const double part = static_cast<double>(k) / static_cast<double>(places.size() - 1);
       evaluate(interval.segment, interval.from + part * (interval.to - interval.from), places[k]);
     }
-    for (std::size_t k = parts; k-- > 0;) {
+    for (std::size_t k = 0; k < parts; ++k) {
       const Place* begin = &places[2 * k];
-      origins[--made] = i;
-      put(made, interval.segment, begin[0], begin[2], lengthOf(begin[0], begin[1], begin[2]),
+      put(first + k, interval.segment, begin[0], begin[2], lengthOf(begin[0], begin[1], begin[2]),
           false);
-      stops_[made + 1] = k + 1 == parts && stops;
     }
+    stops_[first + parts] = stops;
   }
-  return origins;
-}
-
-void ContourGrid::resize(std::size_t intervals) {
-  intervals_.resize(intervals);
-  derivatives_.resize(4 * axes_ * intervals);
-  positions_.resize(axes_ * (intervals + 1));
-  stops_.resize(intervals + 1);
+  return division;
 }
 
 void ContourGrid::reserve(std::size_t intervals) {
   intervals_.reserve(intervals);
   derivatives_.reserve(4 * axes_ * intervals);
   positions_.reserve(axes_ * (intervals + 1));
-}
-
-// An interval, and the place at its end.
-void ContourGrid::move(std::size_t from, std::size_t to) {
-  intervals_[to] = intervals_[from];
-  std::copy_n(firstAtBegin(from), 4 * axes_, &derivatives_[4 * axes_ * to]);
-  std::copy_n(position(from + 1), axes_, &positions_[axes_ * (to + 1)]);
-  stops_[to + 1] = stops_[from + 1];
+  stops_.reserve(intervals + 1);
 }
 
 ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
@@ -249,7 +233,8 @@ double ContourGrid::turnOf(const Place& begin, const Place& end) const {
 }
 
 bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {
-  const auto [least, most] = std::minmax({begin.rate, middle.rate, end.rate});
+  const double least = std::min({begin.rate, middle.rate, end.rate});
+  const double most = std::max({begin.rate, middle.rate, end.rate});
   if (most > kMostRateRatio * least) return true;
   const double turn = turnOf(begin, middle) + turnOf(middle, end);
   if (turn > fineness_.most_turn) return true;
@@ -272,7 +257,10 @@ double ContourGrid::lengthOf(const Place& begin, const Place& middle, const Plac
 
 void ContourGrid::append(std::size_t segment, const Place& begin, const Place& end, double length,
                          bool straight) {
-  resize(size() + 1);
+  intervals_.emplace_back();
+  derivatives_.resize(derivatives_.size() + 4 * axes_);
+  positions_.resize(positions_.size() + axes_);
+  stops_.push_back(false);
   put(size() - 1, segment, begin, end, length, straight);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <vector>
@@ -7,6 +8,39 @@
 #include "motion/contour.h"
 
 namespace stepdriver::motion {
+
+/// Which intervals of a grid have been divided, each into the same number of parts.
+struct Division {
+  std::vector<std::size_t> intervals;  ///< their former indices, in increasing order
+  std::size_t parts = 1;
+
+  /// The index of the first part of one of `intervals`.
+  std::size_t firstPartOf(std::size_t which) const {
+    return intervals[which] + which * (parts - 1);
+  }
+
+  /// Gives each part the values of the interval that was divided.
+  ///
+  /// @param values `width` of them for each interval, or for each place.
+  template <typename Value>
+  void spread(std::vector<Value>& values, std::size_t width = 1) const {
+    const auto at = [&](std::size_t index) {
+      return values.begin() + static_cast<std::ptrdiff_t>(index * width);
+    };
+    std::size_t end = values.size() / width;  // of what hasn't been moved yet
+    values.resize(values.size() + intervals.size() * (parts - 1) * width);
+    // From the end on, nothing is replaced before it is moved.
+    for (std::size_t which = intervals.size(); which-- > 0;) {
+      const std::size_t begin = intervals[which];
+      const std::size_t first = firstPartOf(which);
+      std::move_backward(at(begin + 1), at(end), at(first + parts + end - begin - 1));
+      for (std::size_t k = parts; k-- > 0;) {
+        if (first + k != begin) std::copy(at(begin), at(begin + 1), at(first + k));
+      }
+      end = begin;
+    }
+  }
+};
 
 /// A contour divided into short intervals of its length s, each from one place to the next. A
 /// straight part is one interval. Only one thread uses it at a time.
@@ -36,9 +70,7 @@ class ContourGrid {
   };
 
   /// Divides some of the intervals that aren't straight, each into this many.
-  ///
-  /// @return the former index of each interval.
-  std::vector<std::size_t> divideEach(const std::vector<bool>& which, std::size_t parts);
+  Division divideEach(const std::vector<bool>& which, std::size_t parts);
 
   /// With straight intervals divided at some distances from the start.
   ///
@@ -49,11 +81,13 @@ class ContourGrid {
 
   std::size_t axes() const { return axes_; }
   std::size_t size() const { return intervals_.size(); }
+  /// How many intervals it may have without needing more memory.
+  std::size_t capacity() const { return intervals_.capacity(); }
   const Interval& operator[](std::size_t index) const { return intervals_[index]; }
   /// Of the place before an interval; with the index size(), of the end.
   const double* position(std::size_t place) const { return &positions_[place * axes_]; }
   /// At a corner, and at the end.
-  bool stopsAt(std::size_t place) const { return stops_[place]; }
+  bool stopsAt(std::size_t place) const { return stops_[place] != 0; }
   /// The point at the middle parameter of an interval, until another one is evaluated.
   const ContourPoint& evaluateMiddle(std::size_t interval) const {
     const Interval& of = intervals_[interval];
@@ -89,8 +123,8 @@ class ContourGrid {
     return &derivatives_[(4 * interval + which) * axes_];
   }
   void evaluate(std::size_t segment, double parameter, Place& place) const;
-  void divide(std::size_t segment, double from, double to, int parts);
-  int partsOfCorner(std::size_t segment, double from, double to);
+  void divide(std::size_t segment, double to, int parts);
+  int partsOfCorner(std::size_t segment, double to);
   double turnOf(const Place& begin, const Place& end) const;
   bool tooLong(const Place& begin, const Place& middle, const Place& end) const;
   double lengthOf(const Place& begin, const Place& middle, const Place& end) const;
@@ -98,8 +132,6 @@ class ContourGrid {
               bool straight);
   void put(std::size_t index, std::size_t segment, const Place& begin, const Place& end,
            double length, bool straight);
-  void move(std::size_t from, std::size_t to);
-  void resize(std::size_t intervals);
   void reserve(std::size_t intervals);
   void withRespectToLength(const Place& place, double* first, double* second) const;
 
@@ -109,8 +141,9 @@ class ContourGrid {
   std::vector<Interval> intervals_;
   std::vector<double> positions_;
   std::vector<double> derivatives_;  // four of each interval
-  std::vector<bool> stops_;
-  mutable std::array<Place, 3> scratch_;  // of evaluateAt()
+  std::vector<char> stops_;          // whether, of each place
+  mutable std::array<Place, 3> scratch_;
+  std::vector<double> ahead_;  // of divide()
 };
 
 }  // namespace stepdriver::motion

@@ -85,40 +85,40 @@ struct Demand {
 class Knots {
  public:
   Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits)
-      : grid_(grid), limits_(limits), axes_(grid.axes()), kept_(grid.size()) {}
+      : grid_(grid), limits_(limits), axes_(grid.axes()) {
+    kept_.reserve(grid.capacity());
+    kept_.resize(grid.size());
+  }
 
-  /// After ContourGrid::divideEach(): its result, and what was divided.
-  void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided) {
-    kept_.resize(origins.size());
-    for (std::size_t i = origins.size(); i-- > 0;) {
-      kept_[i] = divided[origins[i]] ? Kept{} : kept_[origins[i]];
+  /// After ContourGrid::divideEach().
+  void regrid(const Division& division) {
+    division.spread(kept_);
+    for (std::size_t i = 0; i < division.intervals.size(); ++i) {
+      for (std::size_t k = 0; k < division.parts; ++k) kept_[division.firstPartOf(i) + k] = {};
     }
   }
 
   void findDurations(const ContourSpeed& speed) {
-    double begin = std::sqrt(speed.square(0));
     for (std::size_t i = 0; i < grid_.size(); ++i) {
       giveWayAt(i);
-      const double end = std::sqrt(speed.square(i + 1));
+      const double begin = speed.square(i);
+      const double end = speed.square(i + 1);
       Kept& kept = kept_[i];
-      const bool changed = begin != kept.begin || end != kept.end;
-      if (changed) kept = {begin, end};
+      const bool changed = begin != kept.begin_square || end != kept.end_square;
+      if (changed) kept = {begin, end, std::sqrt(begin), std::sqrt(end)};
       if (grid_[i].straight) {
         kept.duration = trapezoid(i, speed).duration();
       } else if (changed) {
-        kept.duration = durationOf(i, begin, end);
+        kept.duration = durationOf(i, kept.begin, kept.end);
       }
-      begin = end;
     }
   }
 
   void make(const ContourSpeed& speed) {
     findDurations(speed);
     knots_.clear();
-    joints_.clear();
     // A straight part may have two more.
     knots_.reserve(2 * grid_.size());
-    joints_.reserve(2 * grid_.size() * axes_);
     appendPlace(0, 0.0, kept_[0].begin, 0);
     double time = 0.0;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
@@ -155,10 +155,17 @@ class Knots {
   double time(std::size_t knot) const { return knots_[knot].time; }
   std::size_t interval(std::size_t knot) const { return knots_[knot].interval; }
   double position(std::size_t knot, std::size_t axis) const {
-    return joints_[knot * axes_ + axis].position;
+    const Knot& of = knots_[knot];
+    return of.place == kNoPlace
+               ? grid_.position(of.interval)[axis] + grid_.firstAtBegin(of.interval)[axis] * of.way
+               : grid_.position(of.place)[axis];
   }
   double velocity(std::size_t knot, std::size_t axis) const {
-    return joints_[knot * axes_ + axis].velocity;
+    const Knot& of = knots_[knot];
+    const bool at_end = of.place != kNoPlace && of.place > 0;
+    const double* direction =
+        at_end ? grid_.firstAtEnd(of.interval) : grid_.firstAtBegin(of.interval);
+    return direction[axis] * of.speed;
   }
   double parameter(std::size_t knot) const { return knots_[knot].parameter; }
   double speed(std::size_t knot) const { return knots_[knot].speed; }
@@ -183,8 +190,13 @@ class Knots {
     const bool whole = place != kNoPlace && knots_[knot - 1].place + 1 == place;
     if (whole && !grid_[place - 1].straight) return demandOf(place - 1);
     return cubicDemand(
-        time(knot) - time(knot - 1), [&](std::size_t j) { return joints_[(knot - 1) * axes_ + j]; },
-        [&](std::size_t j) { return joints_[knot * axes_ + j]; });
+        time(knot) - time(knot - 1),
+        [&](std::size_t j) -> Joint {
+          return {position(knot - 1, j), velocity(knot - 1, j)};
+        },
+        [&](std::size_t j) -> Joint {
+          return {position(knot, j), velocity(knot, j)};
+        });
   }
 
  private:
@@ -192,8 +204,10 @@ class Knots {
 
   // Of an interval.
   struct Kept {
-    double begin = -1.0;  // unit/s
-    double end = -1.0;
+    double begin_square = -1.0;  // unit^2/s^2
+    double end_square = -1.0;
+    double begin = 0.0;  // unit/s
+    double end = 0.0;
     double duration = 0.0;  // s
     std::optional<Demand> demand = {};
     bool settled = false;
@@ -202,9 +216,9 @@ class Knots {
     double time;
     std::size_t interval;  // of the grid, which ends at the knot or contains it
     std::size_t place;     // or kNoPlace, within a straight part
+    double way;            // unit, from the begin of the straight part
     double parameter;
     double speed;
-    bool rests;
   };
   struct Joint {
     double position;
@@ -215,12 +229,13 @@ class Knots {
   template <typename From, typename To>
   Demand cubicDemand(double duration, const From& from, const To& to) const {
     Demand demand;
+    const double rate = 1.0 / duration;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
       const auto [p0, v0] = from(j);
       const auto [p1, v1] = to(j);
-      const double mean = (p1 - p0) / duration;
-      const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / duration;
-      const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / duration;
+      const double mean = (p1 - p0) * rate;
+      const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) * rate;
+      const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) * rate;
       const int direction = directionOf(v0, v1);
       const auto part = [&](double a) {
         return std::abs(a) / accelerationTowards(limits_[j], direction, a > 0.0 ? 1 : -1);
@@ -228,8 +243,8 @@ class Knots {
       demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
       demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
       double speed = std::max(std::abs(v0), std::abs(v1));
-      const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
-      if (turn > 0.0 && turn < 1.0) {
+      if (begin * end < 0.0) {
+        const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
         speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
       }
       demand.speed = std::max(demand.speed, speed / limits_[j].speed);
@@ -243,23 +258,25 @@ class Knots {
   // excess is the same at both limits.
   double durationOf(std::size_t interval, double begin, double end) const {
     const double even = 2.0 * grid_[interval].length / (begin + end);
+    const double rate = 1.0 / even;
     double least = -kMostStretch;
     double most = kMostStretch;
     for (std::size_t j = 0; j < axes_; ++j) {
       const double way = grid_.position(interval + 1)[j] - grid_.position(interval)[j];
       const double v0 = grid_.firstAtBegin(interval)[j] * begin;
       const double v1 = grid_.firstAtEnd(interval)[j] * end;
-      const double slope = 6.0 * way / (even * even);
-      const double at_begin = slope - (4.0 * v0 + 2.0 * v1) / even;
-      const double at_end = (2.0 * v0 + 4.0 * v1) / even - slope;
+      const double slope = 6.0 * way * rate * rate;
+      const double at_begin = slope - (4.0 * v0 + 2.0 * v1) * rate;
+      const double at_end = (2.0 * v0 + 4.0 * v1) * rate - slope;
       const int direction = directionOf(v0, v1);
       const double up = accelerationTowards(limits_[j], direction, 1);
       const double down = -accelerationTowards(limits_[j], direction, -1);
       if (std::abs(slope) * kMostStretch < kSmallExcess * up) continue;
-      const auto by_begin = std::minmax({(at_begin - up) / slope, (at_begin - down) / slope});
-      const auto by_end = std::minmax({(down - at_end) / slope, (up - at_end) / slope});
-      least = std::max({least, by_begin.first, by_end.first});
-      most = std::min({most, by_begin.second, by_end.second});
+      const double with = slope > 0.0 ? up : down;
+      const double against = slope > 0.0 ? down : up;
+      const double by = 1.0 / slope;
+      least = std::max(least, std::max((at_begin - with) * by, (against - at_end) * by));
+      most = std::min(most, std::min((at_begin - against) * by, (with - at_end) * by));
     }
     const double stretch = least > most ? (least + most) / 2.0 : std::clamp(0.0, least, most);
     return even * (1.0 + std::clamp(stretch, -kMostStretch, kMostStretch));
@@ -279,34 +296,22 @@ class Knots {
 
   void appendOnLine(std::size_t interval, double time, double way, double speed) {
     if (!makeRoom(time, false)) return;
-    const double* from = grid_.position(interval);
-    const double* direction = grid_.firstAtBegin(interval);
-    for (std::size_t j = 0; j < axes_; ++j) {
-      joints_.push_back({from[j] + direction[j] * way, direction[j] * speed});
-    }
     const ContourGrid::Interval& of = grid_[interval];
     const double part = std::min(1.0, way / of.length);
-    knots_.push_back({time, interval, kNoPlace, of.from + part * (of.to - of.from), speed, false});
+    knots_.push_back({time, interval, kNoPlace, way, of.from + part * (of.to - of.from), speed});
   }
 
   void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
-    const bool rests = speed == 0.0;
-    if (!makeRoom(time, rests)) return;
-    const double* position = grid_.position(place);
-    const double* direction = place == 0 ? grid_.firstAtBegin(0) : grid_.firstAtEnd(place - 1);
-    for (std::size_t j = 0; j < axes_; ++j) {
-      joints_.push_back({position[j], direction[j] * speed});
-    }
-    knots_.push_back(
-        {time, interval, place, place == 0 ? grid_[0].from : grid_[interval].to, speed, rests});
+    if (!makeRoom(time, speed == 0.0)) return;
+    const double parameter = place == 0 ? grid_[0].from : grid_[interval].to;
+    knots_.push_back({time, interval, place, 0.0, parameter, speed});
   }
 
   // Of two knots that are too close to each other, one at rest stays, or else the earlier one.
   bool makeRoom(double time, bool rests) {
     if (knots_.empty() || time - knots_.back().time >= kShortestPiece) return true;
-    if (!rests || knots_.back().rests) return rests;
+    if (!rests || knots_.back().speed == 0.0) return rests;
     knots_.pop_back();
-    joints_.resize(joints_.size() - axes_);
     return true;
   }
 
@@ -315,7 +320,6 @@ class Knots {
   std::size_t axes_;
   std::vector<Kept> kept_;  // of each interval
   std::vector<Knot> knots_;
-  std::vector<Joint> joints_;  // of each knot, one for each axis
 };
 
 // By what factor limits are exceeded; 1 if they aren't.
@@ -404,9 +408,9 @@ bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots&
     }
   }
   if (!any) return false;
-  const std::vector<std::size_t> origins = grid.divideEach(divided, kPartsOfDivided);
-  speed.regrid(origins, divided);
-  knots.regrid(origins, divided);
+  const Division division = grid.divideEach(divided, kPartsOfDivided);
+  speed.regrid(division);
+  knots.regrid(division);
   return true;
 }
 
@@ -443,7 +447,7 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
   made.reserve(knots.size());
   for (std::size_t i = 0; i < knots.size(); ++i) {
     const double time = knots.time(i) * factor - ago;
-    ContourKnot knot;
+    ContourKnot& knot = made.emplace_back();
     knot.time_ns = std::llround(time * 1e9);
     const double later = static_cast<double>(knot.time_ns) * 1e-9 - time;
     knot.segment = grid[knots.interval(i)].segment;
@@ -451,32 +455,35 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
     knot.speed = knots.speed(i) / factor;
     knot.may_begin = knot.parameter >= contour.roundedUntil(knot.segment);
     knot.straight = i + 1 < knots.size() && knots.isStraight(i + 1);
-    knot.positions.reserve(grid.axes());
-    knot.velocities.reserve(grid.axes());
+    knot.positions.resize(grid.axes());
+    knot.velocities.resize(grid.axes());
     for (std::size_t j = 0; j < grid.axes(); ++j) {
       const double velocity = knots.velocity(i, j) / factor;
-      knot.positions.push_back(knots.position(i, j) + velocity * later);
-      knot.velocities.push_back(velocity);
+      knot.positions[j] = knots.position(i, j) + velocity * later;
+      knot.velocities[j] = velocity;
     }
-    made.push_back(std::move(knot));
   }
   return made;
 }
 
-}  // namespace
+// The largest part of a limit that the motion uses if that is more than 1, and the factor by which
+// it has to be slowed down as a whole for that.
+struct Outcome {
+  double excess = 1.0;
+  double slowdown = 1.0;
+  double settled = 0.0;  // [s] see ContourPlan, of the motion that isn't slowed down
+};
 
-ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
-                        const ContourBegin& begin) {
-  ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
-  ContourSpeed speed(contour, grid, limits, begin.speed * begin.speed, CheckedAcceleration::kMean);
-  Knots knots(grid, limits);
+Outcome planKnots(const Contour& contour, const std::vector<ContourLimits>& limits,
+                  double begin_speed, ContourGrid& grid, Knots& knots) {
+  ContourSpeed speed(contour, grid, limits, begin_speed * begin_speed, CheckedAcceleration::kMean);
   for (int i = 0; i < kMostDivisions; ++i) {
     speed.plan();
     knots.findDurations(speed);
     if (!divideLong(kMostDeviation * contour.resolution(), grid, speed, knots)) break;
   }
   // From a speed, what still exceeds the limits isn't slowed down afterwards.
-  const bool from_speed = begin.speed > 0.0;
+  const bool from_speed = begin_speed > 0.0;
   const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
   for (int plans = 1;; ++plans) {
     speed.plan();
@@ -484,18 +491,26 @@ ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>
     const bool first = plans == 1;
     const double poor = from_speed && !first ? 1.0 : kPoorCubic;
     const Excess excess = lowerLimits(first ? 1.0 : kLowerBy, poor, grid, speed, knots);
-    const double most = std::max(excess.acceleration, excess.speed);
-    if (most > 1.0 + kSmallExcess && plans < most_plans) continue;
-    double factor = std::max(std::sqrt(excess.acceleration), excess.speed);
-    ContourPlan plan;
-    if (from_speed) {
-      plan.excess = most;
-      factor = 1.0;
-    }
-    plan.settled_ns = std::llround(knots.timeAt(speed.settledUntil()) * factor * 1e9);
-    plan.knots = slowedDown(knots, contour, grid, factor, begin.ago);
-    return plan;
+    Outcome outcome{std::max(excess.acceleration, excess.speed)};
+    if (outcome.excess > 1.0 + kSmallExcess && plans < most_plans) continue;
+    if (!from_speed) outcome.slowdown = std::max(std::sqrt(excess.acceleration), excess.speed);
+    outcome.settled = knots.timeAt(speed.settledUntil());
+    return outcome;
   }
+}
+
+}  // namespace
+
+ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                        const ContourBegin& begin) {
+  ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
+  Knots knots(grid, limits);
+  const Outcome outcome = planKnots(contour, limits, begin.speed, grid, knots);
+  ContourPlan plan;
+  if (begin.speed > 0.0) plan.excess = outcome.excess;
+  plan.settled_ns = std::llround(outcome.settled * outcome.slowdown * 1e9);
+  plan.knots = slowedDown(knots, contour, grid, outcome.slowdown, begin.ago);
+  return plan;
 }
 
 }  // namespace stepdriver::motion

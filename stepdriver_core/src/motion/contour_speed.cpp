@@ -19,19 +19,22 @@ constexpr int kMostSteps = 100;        // of the search for the largest x
 ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
                            const std::vector<ContourLimits>& limits, double begin,
                            CheckedAcceleration checked)
-    : contour_(contour),
-      grid_(grid),
-      limits_(limits),
-      acceleration_shares_(grid.size(), 1.0),
-      speed_shares_(grid.size(), 1.0),
-      most_squares_(grid.size(), kUnbounded),
-      most_accelerations_(grid.size(), kUnbounded),
-      checked_(grid.size(), checked),
-      stale_(grid.size(), true),
-      allowed_(grid.size()),
-      controllable_(grid.size() + 1, kUnbounded),
-      squares_(grid.size() + 1, kUnbounded) {
-  bands_.reserve(2 * grid.size() * limits.size());
+    : contour_(contour), grid_(grid), limits_(limits) {
+  // With room for all that the grid has room for.
+  const auto fill = [&](auto& values, std::size_t more, auto value) {
+    values.reserve(grid.capacity() + more);
+    values.assign(grid.size() + more, value);
+  };
+  fill(acceleration_shares_, 0, 1.0);
+  fill(speed_shares_, 0, 1.0);
+  fill(most_squares_, 0, kUnbounded);
+  fill(most_accelerations_, 0, kUnbounded);
+  fill(checked_, 0, checked);
+  fill(stale_, 0, true);
+  fill(allowed_, 0, Allowed{});
+  fill(controllable_, 1, kUnbounded);
+  fill(squares_, 1, kUnbounded);
+  bands_.reserve(2 * grid.capacity() * limits.size());
   controllable_.back() = 0.0;
   squares_.front() = begin;
 }
@@ -61,37 +64,35 @@ double ContourSpeed::lossOfBothEnds(std::size_t interval) {
   const bool counts = checked_[interval] == CheckedAcceleration::kAtBothEnds && most > 0.0 &&
                       squares_[interval] >= most * (1.0 - kRounding);
   if (!counts) return 1.0;
-  const Allowed checked = allowed_[interval];
+  Allowed& allowed = allowed_[interval];
+  const Allowed checked = allowed;
   const std::size_t bands = bands_.size();
   checked_[interval] = CheckedAcceleration::kMean;
-  findAllowed(interval);
+  allowed.most_bands = 0;
+  collectBands(interval, allowed);
   const double higher = largestBefore(interval, controllable_[interval + 1]);
   checked_[interval] = CheckedAcceleration::kAtBothEnds;
-  allowed_[interval] = checked;
+  allowed = checked;
   bands_.resize(bands);
   return higher / most;
 }
 
-void ContourSpeed::regrid(const std::vector<std::size_t>& origins,
-                          const std::vector<bool>& divided) {
-  const auto grow = [&](auto& values) {
-    const bool of_places = values.size() > divided.size();
-    const auto last = values.back();
-    values.resize(origins.size());
-    // No origin is after its interval: from the end on, nothing is replaced before it is copied.
-    for (std::size_t i = origins.size(); i-- > 0;) values[i] = values[origins[i]];
-    if (of_places) values.push_back(last);
-  };
-  grow(acceleration_shares_);
-  grow(speed_shares_);
-  grow(most_squares_);
-  grow(most_accelerations_);
-  grow(checked_);
-  grow(allowed_);
-  grow(controllable_);
-  grow(squares_);
-  stale_.clear();
-  for (const std::size_t origin : origins) stale_.push_back(divided[origin]);
+void ContourSpeed::regrid(const Division& division) {
+  division.spread(acceleration_shares_);
+  division.spread(speed_shares_);
+  division.spread(most_squares_);
+  division.spread(most_accelerations_);
+  division.spread(checked_);
+  division.spread(allowed_);
+  division.spread(controllable_);
+  division.spread(squares_);
+  stale_.assign(grid_.size(), false);
+  for (std::size_t i = 0; i < division.intervals.size(); ++i) {
+    for (std::size_t k = 0; k < division.parts; ++k) {
+      stale_[division.firstPartOf(i) + k] = true;
+      allowed_[division.firstPartOf(i) + k].most_bands = 0;
+    }
+  }
 }
 
 void ContourSpeed::plan() {
@@ -100,8 +101,8 @@ void ContourSpeed::plan() {
   bool changed = false;  // what is controllable at the end of the interval
   for (std::size_t i = size; i-- > 0;) {
     giveWayAt(i);
-    const bool stale = stale_[i];
-    const bool stale_before = i > 0 && stale_[i - 1];
+    const bool stale = stale_[i] != 0;
+    const bool stale_before = i > 0 && stale_[i - 1] != 0;
     if (stale_before) findAllowed(i - 1);
     // The speeds of an interval also limit x at its end.
     if (!stale && !changed && !stale_before) continue;
@@ -113,7 +114,7 @@ void ContourSpeed::plan() {
   bool moved = false;  // x at the begin of the interval
   for (std::size_t i = 0; i < size; ++i) {
     giveWayAt(i);
-    if (!moved && !stale_[i]) continue;
+    if (!moved && stale_[i] == 0) continue;
     const double x = largestAfter(i, squares_[i], controllable_[i + 1]);
     moved = x != squares_[i + 1];
     squares_[i + 1] = x;
@@ -166,8 +167,8 @@ double ContourSpeed::capBefore(std::size_t place) const {
 
 void ContourSpeed::findAllowed(std::size_t interval) {
   Allowed& allowed = allowed_[interval];
-  allowed.cap_at_begin = capAtBegin(interval);
-  allowed.cap_at_end = capAtEnd(interval);
+  allowed.cap_at_begin = capAt(interval, grid_.firstAtBegin(interval));
+  allowed.cap_at_end = capAt(interval, grid_.firstAtEnd(interval));
   if (!grid_[interval].straight) {
     collectBands(interval, allowed);
     return;
@@ -199,8 +200,25 @@ double ContourSpeed::peakSquare(std::size_t interval) const {
 // (q1' e - q0' b) (b + e)/(2 length), and b e is (b^2 + e^2)/2 but for (e - b)^2/2.
 void ContourSpeed::collectBands(std::size_t interval, Allowed& allowed) {
   allowed.most_x = kUnbounded;
-  allowed.first_band = bands_.size();
-  allowed.bands = 0;
+  const bool mean = checked_[interval] == CheckedAcceleration::kMean;
+  const double along = most_accelerations_[interval];
+  const std::size_t needed = (mean ? 1 : 2) * limits_.size() + (along < kUnbounded ? 1 : 0);
+  if (needed > allowed.most_bands) {
+    allowed.first_band = bands_.size();
+    allowed.most_bands = needed;
+    bands_.resize(bands_.size() + needed);
+  }
+  Band* next = &bands_[allowed.first_band];
+  // least <= u_factor u + x_factor x <= most
+  const auto add = [&](double u_factor, double x_factor, double least, double most) {
+    if (std::abs(u_factor) < kNegligible) {
+      if (x_factor > 0.0) allowed.most_x = std::min(allowed.most_x, most / x_factor);
+      if (x_factor < 0.0) allowed.most_x = std::min(allowed.most_x, least / x_factor);
+      return;
+    }
+    if (u_factor < 0.0) std::swap(least, most);
+    *next++ = {least / u_factor, most / u_factor, -x_factor / u_factor};
+  };
   const double twice = 2.0 * grid_[interval].length;
   const double* first_begin = grid_.firstAtBegin(interval);
   const double* first_end = grid_.firstAtEnd(interval);
@@ -211,53 +229,43 @@ void ContourSpeed::collectBands(std::size_t interval, Allowed& allowed) {
     const int direction = directionOf(first_begin[j], first_end[j]);
     const double most = share * accelerationTowards(limits_[j], direction, 1);
     const double least = -share * accelerationTowards(limits_[j], direction, -1);
-    if (checked_[interval] == CheckedAcceleration::kMean) {
+    if (mean) {
       const double change = first_end[j] - first_begin[j];
-      addBand(allowed, first_end[j] + change / 2.0, 2.0 * change / twice, least, most);
+      add(first_end[j] + change / 2.0, 2.0 * change / twice, least, most);
     } else {
-      addBand(allowed, first_begin[j], second_begin[j], least, most);
-      addBand(allowed, first_end[j] + twice * second_end[j], second_end[j], least, most);
+      add(first_begin[j], second_begin[j], least, most);
+      add(first_end[j] + twice * second_end[j], second_end[j], least, most);
     }
   }
-  const double along = most_accelerations_[interval];
-  if (along < kUnbounded) addBand(allowed, 1.0, 0.0, -along, along);
+  if (along < kUnbounded) add(1.0, 0.0, -along, along);
+  allowed.bands = static_cast<std::size_t>(next - &bands_[allowed.first_band]);
 }
 
-// least <= u_factor u + x_factor x <= most
-void ContourSpeed::addBand(Allowed& allowed, double u_factor, double x_factor, double least,
-                           double most) {
-  if (std::abs(u_factor) < kNegligible) {
-    if (x_factor > 0.0) allowed.most_x = std::min(allowed.most_x, most / x_factor);
-    if (x_factor < 0.0) allowed.most_x = std::min(allowed.most_x, least / x_factor);
-    return;
-  }
-  const auto [low, high] = std::minmax({least / u_factor, most / u_factor});
-  bands_.push_back({low, high, -x_factor / u_factor});
-  ++allowed.bands;
-}
-
-// The lowest and the highest u at an x, if x at the end of the interval is from 0 to `end`.
-std::pair<ContourSpeed::Bound, ContourSpeed::Bound> ContourSpeed::tightestAt(std::size_t interval,
-                                                                             double end,
-                                                                             double x) const {
+// If x at the end of the interval is from 0 to `end`.
+ContourSpeed::Range ContourSpeed::tightestAt(std::size_t interval, double end, double x) const {
   const double twice = 2.0 * grid_[interval].length;
   Bound low{0.0, -1.0 / twice};
   Bound high{end / twice, -1.0 / twice};
   double least = low.at(x);
   double most = high.at(x);
   const Allowed& allowed = allowed_[interval];
-  for (std::size_t k = 0; k < allowed.bands; ++k) {
-    const Band& band = bands_[allowed.first_band + k];
-    const double shift = band.slope * x;
-    if (band.least + shift > least) {
-      least = band.least + shift;
-      low = {band.least, band.slope};
+  const Band* const first = bands_.data() + allowed.first_band;
+  const Band* const last = first + allowed.bands;
+  const Band* lowest = nullptr;
+  const Band* highest = nullptr;
+  for (const Band* band = first; band != last; ++band) {
+    const double shift = band->slope * x;
+    if (band->least + shift > least) {
+      least = band->least + shift;
+      lowest = band;
     }
-    if (band.most + shift < most) {
-      most = band.most + shift;
-      high = {band.most, band.slope};
+    if (band->most + shift < most) {
+      most = band->most + shift;
+      highest = band;
     }
   }
+  if (lowest != nullptr) low = {lowest->least, lowest->slope};
+  if (highest != nullptr) high = {highest->most, highest->slope};
   return {low, high};
 }
 
@@ -282,8 +290,13 @@ double ContourSpeed::largestBefore(std::size_t interval, double end) const {
 double ContourSpeed::largestAfter(std::size_t interval, double begin, double end) const {
   const double twice = 2.0 * grid_[interval].length;
   if (grid_[interval].straight) return std::min(end, begin + twice * ramp(interval).up);
-  const Bound high = tightestAt(interval, end, begin).second;
-  return std::clamp(begin + twice * high.at(begin), 0.0, end);
+  double most = end / twice + (-1.0 / twice) * begin;  // of u
+  const Allowed& allowed = allowed_[interval];
+  for (std::size_t k = 0; k < allowed.bands; ++k) {
+    const Band& band = bands_[allowed.first_band + k];
+    most = std::min(most, band.most + band.slope * begin);
+  }
+  return std::clamp(begin + twice * most, 0.0, end);
 }
 
 }  // namespace stepdriver::motion

@@ -41,17 +41,19 @@ class ContourSpeed {
   /// By what factor the square of the speed before an interval would be higher if only the mean of
   /// its accelerations counted; 1 if it is lower anyway. Call it after plan().
   double lossOfBothEnds(std::size_t interval);
-  /// After ContourGrid::divideEach(): its result, and what was divided.
-  void regrid(const std::vector<std::size_t>& origins, const std::vector<bool>& divided);
+  /// After ContourGrid::divideEach().
+  void regrid(const Division& division);
   /// Plans everything the first time, then only what has changed since.
   void plan();
 
   /// [unit^2/s^2] The highest that the speeds alone allow before an interval and at its end.
   double capAtBegin(std::size_t interval) const {
-    return capAt(interval, grid_.firstAtBegin(interval));
+    return stale_[interval] ? capAt(interval, grid_.firstAtBegin(interval))
+                            : allowed_[interval].cap_at_begin;
   }
   double capAtEnd(std::size_t interval) const {
-    return capAt(interval, grid_.firstAtEnd(interval));
+    return stale_[interval] ? capAt(interval, grid_.firstAtEnd(interval))
+                            : allowed_[interval].cap_at_end;
   }
 
   /// [unit^2/s^2] @param place from 0 to the size of the grid.
@@ -95,14 +97,19 @@ class ContourSpeed {
     double most_x = 0.0;
     std::size_t first_band = 0;
     std::size_t bands = 0;
+    std::size_t most_bands = 0;  // that have room from first_band on
+  };
+  // The lowest and the highest u at an x.
+  struct Range {
+    Bound low;
+    Bound high;
   };
 
   double capAt(std::size_t interval, const double* first) const;
   double capBefore(std::size_t place) const;
   void findAllowed(std::size_t interval);
   void collectBands(std::size_t interval, Allowed& allowed);
-  void addBand(Allowed& allowed, double u_factor, double x_factor, double least, double most);
-  std::pair<Bound, Bound> tightestAt(std::size_t interval, double end, double x) const;
+  Range tightestAt(std::size_t interval, double end, double x) const;
   double largestBefore(std::size_t interval, double end) const;
   double largestAfter(std::size_t interval, double begin, double end) const;
 
@@ -114,7 +121,7 @@ class ContourSpeed {
   std::vector<double> most_squares_;
   std::vector<double> most_accelerations_;
   std::vector<CheckedAcceleration> checked_;
-  std::vector<bool> stale_;  // each interval that has changed since the last plan
+  std::vector<char> stale_;  // whether each interval has changed since the last plan
   std::vector<Allowed> allowed_;
   std::vector<Band> bands_;           // of the intervals
   std::vector<double> controllable_;  // the largest x at each place from which it can slow down

@@ -1,5 +1,6 @@
 #include "motion/profile_peaks.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -18,7 +19,7 @@ void takePosition(ProfilePeaks& peaks, double position, double time_s) {
   if (position > peaks.highest.value) peaks.highest = {position, time_s};
 }
 
-// At a velocity of 0 inside the piece, the position may have an extremum.
+// At a velocity of 0 inside the piece, the position has an extremum.
 void takeTurns(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
   const auto consider = [&](double t) {
     if (t > 0.0 && t < piece.duration) takePosition(peaks, piece.p0 + piece.way(t), start + t);
@@ -38,15 +39,21 @@ void takeTurns(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
 void takePiece(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
   const double end = piece.duration;
   takePosition(peaks, piece.p0, start);
-  takeTurns(peaks, piece, start);
   takePosition(peaks, piece.p0 + piece.way(end), start + end);
 
+  const double last = piece.velocity(end);
+  double lowest = std::min(piece.v0, last);
+  double highest = std::max(piece.v0, last);
   takeFurthest(peaks.velocity, piece.v0, start);
   const double middle = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
   if (middle > 0.0 && middle < end) {
-    takeFurthest(peaks.velocity, piece.velocity(middle), start + middle);
+    const double velocity = piece.velocity(middle);
+    lowest = std::min(lowest, velocity);
+    highest = std::max(highest, velocity);
+    takeFurthest(peaks.velocity, velocity, start + middle);
   }
-  takeFurthest(peaks.velocity, piece.velocity(end), start + end);
+  takeFurthest(peaks.velocity, last, start + end);
+  if (lowest <= 0.0 && highest >= 0.0) takeTurns(peaks, piece, start);
 
   takeFurthest(peaks.acceleration, piece.a, start);
   takeFurthest(peaks.acceleration, piece.acceleration(end), start + end);

@@ -101,7 +101,6 @@ struct Ends {
 
 Ends takeJerk(SplineJerk& worst, const Segment& segment, const Piece* made = nullptr) {
   const double start = static_cast<double>(segment.begin.time_ns) * 1e-9;
-  const double duration = segment.duration().value();
   const auto take = [&](double jerk, double time_s) {
     if (std::abs(jerk) > std::abs(worst.jerk.value)) worst.jerk = {jerk, time_s};
   };
@@ -109,8 +108,9 @@ Ends takeJerk(SplineJerk& worst, const Segment& segment, const Piece* made = nul
   if (segment.kind() == SegmentKind::kCubic) {
     const RoughPiece piece(made != nullptr ? *made : cubicOf(segment));
     take(piece.j, start);
-    return {piece.a, piece.acceleration(duration)};
+    return {piece.a, piece.acceleration(piece.duration)};
   }
+  const double duration = segment.duration().value();
   const Quintic curve = segment.quintic();
   const auto consider = [&](double u) {
     take(curve.thirdDerivativeAt(u) / (duration * duration * duration), start + u * duration);
@@ -180,10 +180,10 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, double most_accel
     : most_acceleration_(most_acceleration) {
   requireWaypoints(waypoints);
   const Segments segments(waypoints);
-  const Segment first = segments.first({});
-  first_index_ = first.index;
-  first_ = waypoints[first.index];
-  first_.position = first.end.position.value();
+  Segment segment = segments.first({});
+  first_index_ = segment.index;
+  first_ = waypoints[segment.index];
+  first_.position = segment.end.position.value();
   if (segments.size() == 1) return;
   std::vector<Piece> pieces;
   pieces.reserve(waypoints.size());
@@ -191,7 +191,7 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, double most_accel
   JerkMeter meter(begin_acceleration_);
   for (std::size_t i = 1; i < segments.size(); ++i) {
     giveWayAt(i);
-    const Segment segment = segments.at(i);
+    segments.advance(segment);
     append(pieces, segment, most_acceleration);
     meter.take(segment, &pieces.back());
   }

@@ -14,13 +14,15 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument(why); }
 
+[[noreturn]] void refuseNumber(const std::string& owner, const char* quantity, double value) {
+  refuse(
+      fmt::format("The {} of {} is {}; only finite numbers are allowed.", quantity, owner, value));
+}
+
 // An owner is a function that returns a name, "waypoint 3" or "the motion's start", for a refusal.
 template <typename Owner>
 void requireFinite(const Owner& owner, const char* quantity, double value) {
-  if (!std::isfinite(value)) {
-    refuse(fmt::format("The {} of {} is {}; only finite numbers are allowed.", quantity, owner(),
-                       value));
-  }
+  if (!std::isfinite(value)) refuseNumber(owner(), quantity, value);
 }
 
 template <typename Owner>
@@ -31,6 +33,8 @@ void requireNear(const Owner& owner, double position) {
         owner(), position, kFarthest));
   }
 }
+
+std::string waypointText(std::size_t index) { return fmt::format("waypoint {}", index); }
 
 void requireTime(const std::vector<Waypoint>& waypoints, std::size_t index) {
   const std::int64_t time = waypoints[index].time_ns;
@@ -71,7 +75,7 @@ void requireWaypoints(const std::vector<Waypoint>& waypoints) {
   for (std::size_t index = 0; index < waypoints.size(); ++index) {
     const Waypoint& waypoint = waypoints[index];
     giveWayAt(index);
-    const auto owner = [index] { return fmt::format("waypoint {}", index); };
+    const auto owner = [index] { return waypointText(index); };
     requireTime(waypoints, index);
     requireFinite(owner, "position", waypoint.position);
     requireNear(owner, waypoint.position);

@@ -64,6 +64,11 @@ Segment Segments::at(std::size_t index) const {
   return {knot(to - 1), knot(to), to};
 }
 
+void Segments::advance(Segment& segment) const {
+  segment.begin = segment.end;
+  segment.end = knot(++segment.index);
+}
+
 Knot Segments::knot(std::size_t index) const {
   const Waypoint& waypoint = waypoints_[index];
   const bool last = index + 1 == waypoints_.size();

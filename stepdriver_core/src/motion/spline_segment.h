@@ -55,6 +55,8 @@ class Segments {
   Segment first(const MotionState& from) const;
   /// @pre index > 0
   Segment at(std::size_t index) const;
+  /// From a segment to the next one.
+  void advance(Segment& segment) const;
 
  private:
   Knot knot(std::size_t waypoint) const;
