@@ -107,6 +107,37 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
   return rest;
 }
 
+// Where the first segment begins, and the way there from where the axes are at rest.
+struct BeginOfPath {
+  std::vector<double> rest;  // [unit]
+  std::vector<double> place;
+  std::int64_t delay_ns = 0;
+};
+
+// A line or a Bezier begins where the axes are at rest. An arc begins at the commanded position, to
+// which its centre belongs: half a microstep beside it, it would be another arc.
+BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
+                    const std::vector<PathOrigin>& origins, bool smooth) {
+  constexpr double kRounding = 1e-6;     // microsteps
+  constexpr double kBeforeStep = 0.499;  // microsteps: the way there makes no step
+  const bool arc = first.shape == PathSegment::Shape::kArcAround ||
+                   first.shape == PathSegment::Shape::kArcThrough;
+  BeginOfPath begin;
+  double duration = 0.0;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const double rest = origins[k].rest;
+    const double away = axes[k].countOf(origins[k].commanded) - rest;
+    begin.rest.push_back(axes[k].positionOf(rest));
+    begin.place.push_back(begin.rest.back());
+    if (!arc || std::abs(away) < kRounding || std::abs(away) > 0.5 + kRounding) continue;
+    const double way = std::clamp(away, -kBeforeStep, kBeforeStep);
+    begin.place.back() = axes[k].positionOf(rest + way);
+    duration = std::max(duration, restTime(std::abs(way), axes[k], smooth));
+  }
+  begin.delay_ns = static_cast<std::int64_t>(std::ceil(duration * 1e9));
+  return begin;
+}
+
 std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
                                       const std::vector<PathAxis>& axes, std::size_t first) {
   std::vector<TrajectoryPoint> points;
@@ -155,8 +186,9 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
   PathWindow window;
   window.frame = {request.names, {}, request.velocity, request.tolerance};
   window.axes = axes;
+  const BeginOfPath begin = beginOf(request.segments.front(), axes, origins, smooth);
+  window.start = begin.place;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    window.start.push_back(axes[i].positionOf(origins[i].rest));
     window.frame.zero.push_back(request.relative ? origins[i].commanded : 0.0);
   }
   PathReader reader(window.frame, axes, window.start);
@@ -176,6 +208,8 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
     } else {
       planned = motion::planContour(contour, limits);
     }
+    for (motion::ContourKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
+    planned.settled_ns += begin.delay_ns;
     PathPlan plan;
     for (std::size_t k = 0; k < axes.size(); ++k) {
       plan.targets.push_back(axes[k].countOf(window.segments.back().end[k]));
@@ -187,6 +221,12 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       plan.window = std::make_shared<const PathWindow>(std::move(window));
     }
     plan.points = pointsOf(std::move(planned.knots), axes, 0);
+    if (begin.delay_ns > 0) {
+      TrajectoryPoint first = plan.points.front();
+      first.time = 0.0;
+      first.positions = begin.rest;
+      plan.points.insert(plan.points.begin(), std::move(first));
+    }
     return plan;
   } catch (const std::invalid_argument& error) {
     throw Refused(error.what());
