@@ -139,7 +139,8 @@ BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
 }
 
 std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
-                                      const std::vector<PathAxis>& axes, std::size_t first) {
+                                      const std::vector<PathAxis>& axes,
+                                      const std::vector<double>& end, std::size_t first) {
   std::vector<TrajectoryPoint> points;
   points.reserve(knots.size() + 1);
   for (motion::ContourKnot& knot : knots) {
@@ -151,7 +152,7 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
     points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),
                       std::move(knot.velocities), std::move(knot.accelerations)});
   }
-  RestOfPath rest = restOf(axes, points.back().positions, !points.back().accelerations.empty());
+  RestOfPath rest = restOf(axes, end, !points.back().accelerations.empty());
   if (rest.duration > 0.0) {
     TrajectoryPoint last = points.back();
     last.time = std::ceil((last.time + rest.duration) * 1e9) * 1e-9;
@@ -210,9 +211,10 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
     }
     for (motion::ContourKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
     planned.settled_ns += begin.delay_ns;
+    const std::vector<double> end = window.segments.back().end;
     PathPlan plan;
     for (std::size_t k = 0; k < axes.size(); ++k) {
-      plan.targets.push_back(axes[k].countOf(window.segments.back().end[k]));
+      plan.targets.push_back(axes[k].countOf(end[k]));
     }
     if (request.more_follows) {
       if (smooth) setBlends(window.segments, contour, 0);
@@ -220,7 +222,7 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       appendKnots(window.knots, planned.knots, 0, 0);
       plan.window = std::make_shared<const PathWindow>(std::move(window));
     }
-    plan.points = pointsOf(std::move(planned.knots), axes, 0);
+    plan.points = pointsOf(std::move(planned.knots), axes, end, 0);
     if (begin.delay_ns > 0) {
       TrajectoryPoint first = plan.points.front();
       first.time = 0.0;

@@ -211,6 +211,30 @@ TEST_F(Path, CountsRelativePositionsFromTheCommandedOnes) {
   EXPECT_EQ(bench->pulses("x"), 3 * 80 + 1);
 }
 
+// As after a homing whose switch is there: all round numbers are in the middle between two
+// microsteps.
+TEST_F(Path, ReachesEndsInTheMiddleBetweenTwoMicrosteps) {
+  for (const double jerk : {0.0, 20.0}) {
+    for (int i = 1; i <= 40; ++i) {
+      std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+      for (config::AxisConfig& axis : axes) axis.jerk = jerk;
+      if (jerk > 0.0) axes[0].start_speed = axes[1].start_speed = 0.0;
+      build(axes);
+      for (const std::string name : {"x", "y"}) bench->axis(name).setPosition(kMicrostep / 2.0);
+      const double way = 0.0005 * i;
+      const bool fed = i % 2 == 0;
+      const CoordinatedMove move = followPath(
+          {{"x", "y"}, {lineTo({way, 0.03}), lineTo({-way, 0.01})}, false, 0.0, 1e-4, fed});
+      if (fed) {
+        advance(i % 4 == 0 ? 0.1 : 3.0);
+        machine().appendPath({move.id(), {lineTo({0.0075, way})}, false});
+      }
+      const CoordinatedResult result = machine().wait(move);
+      EXPECT_EQ(result.end, MoveEnd::kReached) << i << ", jerk " << jerk << ": " << result.message;
+    }
+  }
+}
+
 TEST_F(Path, IsHeldOnThePathAndResumed) {
   holdAndResume();
   EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
