@@ -163,8 +163,15 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        bool allow_slower)
     : axes_(std::move(axes)), allow_slower_(allow_slower) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
-  lone_position_ = points.size() == 1 && points.front().velocities.empty();
-  Source source{points, expected};
+  lone_position_ = onlyPositionsCount(points);
+  std::vector<TrajectoryPoint> positions;
+  if (lone_position_ && !points.front().velocities.empty()) {
+    for (std::size_t member = 0; member < axes_.size(); ++member) {
+      waypointOf(member, 0, points.front(), {});  // refuses what isn't a number
+    }
+    positions.push_back({points.front().time, points.front().positions, {}, {}});
+  }
+  Source source{positions.empty() ? points : positions, expected};
   const bool moves = std::any_of(expected.begin(), expected.end(),
                                  [](const auto& state) { return state.velocity != 0.0; });
   // These have only a way from the start, which join() plans.
@@ -174,6 +181,20 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
   for (std::size_t member = 0; member < axes_.size(); ++member) {
     parts_.push_back(prepare(member, source));
   }
+}
+
+// A stream of single points with velocities, as MoveIt Servo sends them: the axes don't keep the
+// velocity, because they come to rest if no other point follows. A cubic would make the
+// acceleration jump.
+bool PreparedTrajectory::onlyPositionsCount(const std::vector<TrajectoryPoint>& points) const {
+  if (points.size() > 1) return false;
+  const TrajectoryPoint& point = points.front();
+  if (point.velocities.empty()) return true;
+  if (!allow_slower_) return false;
+  const auto is_smooth = [](const PathAxis& axis) { return axis.limits.jerk > 0.0; };
+  return std::any_of(point.velocities.begin(), point.velocities.end(),
+                     [](double velocity) { return velocity != 0.0; }) ||
+         (point.accelerations.empty() && std::any_of(axes_.begin(), axes_.end(), is_smooth));
 }
 
 std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
