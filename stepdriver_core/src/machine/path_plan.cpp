@@ -107,15 +107,15 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
   return rest;
 }
 
-// Where the first segment begins, and the way there from where the axes are at rest.
+// The begin of the first segment, and the way to it from the place of the axes at rest.
 struct BeginOfPath {
   std::vector<double> rest;  // [unit]
   std::vector<double> place;
   std::int64_t delay_ns = 0;
 };
 
-// A line or a Bezier begins where the axes are at rest. An arc begins at the commanded position, to
-// which its centre belongs: half a microstep beside it, it would be another arc.
+// A line or a Bezier begins at the place of the axes. An arc begins at the commanded position, to
+// which its centre belongs: from half a microstep away it would be another arc.
 BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
                     const std::vector<PathOrigin>& origins, bool smooth) {
   constexpr double kRounding = 1e-6;     // microsteps

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kShortestSegment = 1e-3;  // microsteps of one of its axes
 // [microsteps] The ends of an arc are the same if they differ by this in each axis of its plane:
-// senders calculate them. A path may also begin that much beside its place, see planPath().
+// senders calculate them. A path may also begin that far from its place, see planPath().
 constexpr double kSameEnds = 2e-3;
 constexpr double kHalfTurn = 3.14159265358979323846;  // rad
 
@@ -144,8 +144,8 @@ void PathReader::requireCircle(const PathAxis& axis, bool clockwise,
     refuse(fmt::format("is an arc with a radius of {}, but it must be a microstep or more",
                        axis.show(std::min(begin, end))));
   }
-  // The centre is moved along the chord. On an arc of more than half a turn that is the deviation
-  // of the far side; on a smaller one, the ends deviate the most.
+  // The centre is moved along the chord. The far side of an arc of more than half a turn deviates
+  // by as much; a smaller arc deviates the most at its ends.
   const double chord = std::hypot(to[0] - from[0], to[1] - from[1]);
   const double moved = chord > 0.0 ? std::abs(begin - end) * (begin + end) / (2.0 * chord) : 0.0;
   const bool large = moved > kArcMismatch && isLargeArc(from, centre, to, clockwise);

@@ -136,8 +136,8 @@ TEST_F(Path, TakesAnArcThroughAPointAndAHelix) {
   EXPECT_EQ(bench->pulses("z"), 800);
 }
 
-// The axes rest up to half a microstep beside that place. From there it would be another circle, of
-// which nothing or twice as much may be left.
+// The axes rest up to half a microstep away from that place. From there it would be another circle,
+// of which nothing or twice as much may be left.
 TEST_F(Path, BeginsAnArcAtTheCommandedPositions) {
   for (const double at : {0.010003, 0.0100061, 0.00999375, 0.01001}) {
     for (const bool relative : {false, true}) {
