@@ -138,6 +138,17 @@ void requireStart(const PathAxis& axis, const motion::Waypoint& first, const Pat
       axis.showPlace(axis.positionOf(first.position)), axis.showPlace(axis.positionOf(count))));
 }
 
+// The number of an axis in a point.
+double finiteOf(const PathAxis& axis, std::size_t member, std::size_t point,
+                const std::vector<double>& numbers, const char* what) {
+  const double number = numbers[member];
+  if (!std::isfinite(number)) {
+    axis.refuse(fmt::format("{} has {} among its {}, but they must be finite", pointText(point),
+                            numberText(number), what));
+  }
+  return number;
+}
+
 double jerkOf(const Profile& profile) {
   double jerk = 0.0;
   for (const motion::Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
@@ -168,8 +179,19 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
     : axes_(std::move(axes)), allow_slower_(allow_slower) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   requirePoints(points);
-  lone_position_ = points.size() == 1 && points.front().velocities.empty();
-  Source source{points, expected};
+  lone_position_ = onlyPositionsCount(points);
+  std::vector<TrajectoryPoint> positions;
+  if (lone_position_ && !points.front().velocities.empty()) {
+    const TrajectoryPoint& point = points.front();
+    for (std::size_t member = 0; member < axes_.size(); ++member) {
+      finiteOf(axes_[member], member, 0, point.velocities, "velocities");
+      if (!point.accelerations.empty()) {
+        finiteOf(axes_[member], member, 0, point.accelerations, "accelerations");
+      }
+    }
+    positions.push_back({point.time, point.positions, {}, {}});
+  }
+  Source source{positions.empty() ? points : positions, expected};
   const bool moves = std::any_of(expected.begin(), expected.end(),
                                  [](const auto& state) { return state.velocity != 0.0; });
   // These have only a way from the start, which join() plans.
@@ -179,6 +201,20 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
   for (std::size_t member = 0; member < axes_.size(); ++member) {
     parts_.push_back(prepare(member, source));
   }
+}
+
+// A stream of single points with velocities, as MoveIt Servo sends them: the axes don't keep the
+// velocity, because they come to rest if no other point follows. A cubic would make the
+// acceleration jump.
+bool PreparedTrajectory::onlyPositionsCount(const std::vector<TrajectoryPoint>& points) const {
+  if (points.size() > 1) return false;
+  const TrajectoryPoint& point = points.front();
+  if (point.velocities.empty()) return true;
+  if (!allow_slower_) return false;
+  const auto is_smooth = [](const PathAxis& axis) { return axis.limits.jerk > 0.0; };
+  return std::any_of(point.velocities.begin(), point.velocities.end(),
+                     [](double velocity) { return velocity != 0.0; }) ||
+         (point.accelerations.empty() && std::any_of(axes_.begin(), axes_.end(), is_smooth));
 }
 
 std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
@@ -239,12 +275,7 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
     giveWayAt(i);
     const TrajectoryPoint& point = source.points[i];
     const auto take = [&](const std::vector<double>& numbers, const char* what) {
-      const double number = numbers[member];
-      if (!std::isfinite(number)) {
-        axis.refuse(fmt::format("{} has {} among its {}, but they must be finite", pointText(i),
-                                numberText(number), what));
-      }
-      return number;
+      return finiteOf(axis, member, i, numbers, what);
     };
     motion::Waypoint& waypoint = waypoints[i];
     waypoint.time_ns = nanoseconds(source.slowdown * point.time);

@@ -79,6 +79,7 @@ class PreparedTrajectory {
 
     double duration() const { return slowdown * points.back().time; }
   };
+  bool onlyPositionsCount(const std::vector<TrajectoryPoint>& points) const;
   // The way to the first point.
   struct Head {
     std::vector<motion::Piece> pieces;
@@ -109,7 +110,7 @@ class PreparedTrajectory {
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
-  bool lone_position_ = false;  // its only point gives no velocities
+  bool lone_position_ = false;  // of its only point, only the positions count
   bool allow_slower_ = false;
 };
 

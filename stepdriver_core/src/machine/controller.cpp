@@ -80,6 +80,12 @@ std::string whyNoPin(const config::AxisConfig& axis,
   return fmt::format("pins/{} isn't configured", pin);
 }
 
+// A velocity of a stream; 0 if it is lower than any that can be configured: it would make no step
+// in a quarter of an hour, and might take longer to a soft limit than a motion can.
+double velocityOrRest(const axis::AxisModel& axis, double velocity) {
+  return std::abs(velocity) * axis.stepsPerUnit() < config::kLowestRate ? 0.0 : velocity;
+}
+
 }  // namespace
 
 Controller::Controller(const std::vector<config::AxisConfig>& axes,
@@ -493,9 +499,10 @@ void Controller::limitVelocity(Goal& goal, const axis::AxisModel& axis, const ch
 Controller::MayBegin Controller::goalOf(const Jog& wanted, const Ack& call) {
   axis::AxisModel& moved = axis(wanted.axis);
   moved.refuseUnlessFinite("velocity", wanted.velocity, "/s");
+  const double velocity = velocityOrRest(moved, wanted.velocity);
   const Goal* current = streamedGoal(moved);
   const bool jogs = current != nullptr && current->kind == Goal::Kind::kJog;
-  if (wanted.velocity == 0.0) {
+  if (velocity == 0.0) {
     const bool waits = !moved.moving();
     for (Activity* at : {activities_.heir(moved), activities_.owner(moved)}) {
       if (at != nullptr && at->isStreamed() && (jogs || waits)) {
@@ -508,13 +515,12 @@ Controller::MayBegin Controller::goalOf(const Jog& wanted, const Ack& call) {
     moved.refuse("the jog was stopped; let it pause or send 0 before it begins again");
   }
   refuseUnlessReadyToMove(moved);
-  moved.refuseTooFast(std::abs(wanted.velocity));
+  moved.refuseTooFast(std::abs(velocity));
   Goal goal;
   goal.kind = Goal::Kind::kJog;
-  goal.velocity = wanted.velocity;
+  goal.velocity = velocity;
   limitVelocity(goal, moved, "jogs");
-  if (jogs && !activities_.owner(moved)->motion()->slowsDown() &&
-      current->velocity == wanted.velocity) {
+  if (jogs && !activities_.owner(moved)->motion()->slowsDown() && current->velocity == velocity) {
     return std::nullopt;  // it does that already
   }
   return goalWithOutcome(goal);
@@ -557,15 +563,16 @@ Controller::MayBegin Controller::positionGoal(const Setpoint& wanted, double tim
 Controller::MayBegin Controller::velocityGoal(const Setpoint& wanted, double timeout) {
   axis::AxisModel& moved = axis(wanted.axis);
   moved.refuseTooFast(std::abs(wanted.value));
+  const double velocity = velocityOrRest(moved, wanted.value);
   // As with a jog, 0 leaves other motions alone.
   const Goal* current = streamedGoal(moved);
   const bool follows = current != nullptr && current->kind == Goal::Kind::kSetpoint;
-  if (wanted.value == 0.0 && !follows) return std::nullopt;
+  if (velocity == 0.0 && !follows) return std::nullopt;
   Goal goal;
   goal.kind = Goal::Kind::kSetpoint;
-  goal.velocity = wanted.value;
+  goal.velocity = velocity;
   goal.setpoint.until_ns = context_.motionNow() + nanoseconds(timeout);
-  if (wanted.value != 0.0) limitVelocity(goal, moved, "moves");
+  if (velocity != 0.0) limitVelocity(goal, moved, "moves");
   return goal;
 }
 

@@ -107,8 +107,40 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
   return rest;
 }
 
+// The begin of the first segment, and the way to it from the place of the axes at rest.
+struct BeginOfPath {
+  std::vector<double> rest;  // [unit]
+  std::vector<double> place;
+  std::int64_t delay_ns = 0;
+};
+
+// A line or a Bezier begins at the place of the axes. An arc begins at the commanded position, to
+// which its centre belongs: from half a microstep away it would be another arc.
+BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
+                    const std::vector<PathOrigin>& origins, bool smooth) {
+  constexpr double kRounding = 1e-6;     // microsteps
+  constexpr double kBeforeStep = 0.499;  // microsteps: the way there makes no step
+  const bool arc = first.shape == PathSegment::Shape::kArcAround ||
+                   first.shape == PathSegment::Shape::kArcThrough;
+  BeginOfPath begin;
+  double duration = 0.0;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const double rest = origins[k].rest;
+    const double away = axes[k].countOf(origins[k].commanded) - rest;
+    begin.rest.push_back(axes[k].positionOf(rest));
+    begin.place.push_back(begin.rest.back());
+    if (!arc || std::abs(away) < kRounding || std::abs(away) > 0.5 + kRounding) continue;
+    const double way = std::clamp(away, -kBeforeStep, kBeforeStep);
+    begin.place.back() = axes[k].positionOf(rest + way);
+    duration = std::max(duration, restTime(std::abs(way), axes[k], smooth));
+  }
+  begin.delay_ns = static_cast<std::int64_t>(std::ceil(duration * 1e9));
+  return begin;
+}
+
 std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
-                                      const std::vector<PathAxis>& axes, std::size_t first) {
+                                      const std::vector<PathAxis>& axes,
+                                      const std::vector<double>& end, std::size_t first) {
   std::vector<TrajectoryPoint> points;
   points.reserve(knots.size() + 1);
   for (motion::ContourKnot& knot : knots) {
@@ -120,7 +152,7 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
     points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),
                       std::move(knot.velocities), std::move(knot.accelerations)});
   }
-  RestOfPath rest = restOf(axes, points.back().positions, !points.back().accelerations.empty());
+  RestOfPath rest = restOf(axes, end, !points.back().accelerations.empty());
   if (rest.duration > 0.0) {
     TrajectoryPoint last = points.back();
     last.time = std::ceil((last.time + rest.duration) * 1e9) * 1e-9;
@@ -155,8 +187,9 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
   PathWindow window;
   window.frame = {request.names, {}, request.velocity, request.tolerance};
   window.axes = axes;
+  const BeginOfPath begin = beginOf(request.segments.front(), axes, origins, smooth);
+  window.start = begin.place;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    window.start.push_back(axes[i].positionOf(origins[i].rest));
     window.frame.zero.push_back(request.relative ? origins[i].commanded : 0.0);
   }
   PathReader reader(window.frame, axes, window.start);
@@ -176,9 +209,12 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
     } else {
       planned = motion::planContour(contour, limits);
     }
+    for (motion::ContourKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
+    planned.settled_ns += begin.delay_ns;
+    const std::vector<double> end = window.segments.back().end;
     PathPlan plan;
     for (std::size_t k = 0; k < axes.size(); ++k) {
-      plan.targets.push_back(axes[k].countOf(window.segments.back().end[k]));
+      plan.targets.push_back(axes[k].countOf(end[k]));
     }
     if (request.more_follows) {
       if (smooth) setBlends(window.segments, contour, 0);
@@ -186,7 +222,13 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       appendKnots(window.knots, planned.knots, 0, 0);
       plan.window = std::make_shared<const PathWindow>(std::move(window));
     }
-    plan.points = pointsOf(std::move(planned.knots), axes, 0);
+    plan.points = pointsOf(std::move(planned.knots), axes, end, 0);
+    if (begin.delay_ns > 0) {
+      TrajectoryPoint first = plan.points.front();
+      first.time = 0.0;
+      first.positions = begin.rest;
+      plan.points.insert(plan.points.begin(), std::move(first));
+    }
     return plan;
   } catch (const std::invalid_argument& error) {
     throw Refused(error.what());

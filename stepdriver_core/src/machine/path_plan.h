@@ -55,11 +55,15 @@ struct RestOfPath {
 RestOfPath restOf(const std::vector<axis::PathAxis>& axes, const std::vector<double>& end,
                   bool smooth);
 
-/// The points of a trajectory along a path, to rest. @param first the number of the first segment.
+/// The points of a trajectory along a path, to rest.
+///
+/// @param end [unit] of the path, as given: the last knot is there to within rounding, which would
+///   decide between two microsteps if the end is in their middle.
+/// @param first the number of the first segment.
 /// @throw Refused if a rounded corner leads beyond a soft limit.
 std::vector<axis::TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
                                             const std::vector<axis::PathAxis>& axes,
-                                            std::size_t first);
+                                            const std::vector<double>& end, std::size_t first);
 
 /// Sets how far the corners of segments are rounded. @param first the number of the first of them
 ///   in the contour.

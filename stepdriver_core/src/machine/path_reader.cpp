@@ -18,6 +18,20 @@ using Shape = PathSegment::Shape;
 namespace {
 
 constexpr double kShortestSegment = 1e-3;  // microsteps of one of its axes
+// [microsteps] The ends of an arc are the same if they differ by this in each axis of its plane:
+// senders calculate them. A path may also begin that far from its place, see planPath().
+constexpr double kSameEnds = 2e-3;
+constexpr double kHalfTurn = 3.14159265358979323846;  // rad
+
+// More than half a turn.
+bool isLargeArc(const std::array<double, 2>& from, const std::array<double, 2>& centre,
+                const std::array<double, 2>& to, bool clockwise) {
+  const double begin = std::atan2(from[1] - centre[1], from[0] - centre[0]);
+  const double end = std::atan2(to[1] - centre[1], to[0] - centre[0]);
+  double turn = clockwise ? begin - end : end - begin;
+  if (turn <= 0.0) turn += 2.0 * kHalfTurn;
+  return turn > kHalfTurn;
+}
 
 }  // namespace
 
@@ -89,6 +103,10 @@ void PathReader::readArc(const PathSegment& given, ContourSegment& segment) cons
     to[k] = segment.end[axis];
     point[k] = place(axis, given.point[k], "numbers in point");
   }
+  if (areSame(segment.plane, from, to)) {
+    to = from;
+    for (std::size_t k = 0; k < 2; ++k) segment.end[segment.plane[k]] = from[k];
+  }
   const auto [a, b] = segment.plane;
   if (a == b || axes_[a].kind != axes_[b].kind) {
     refuse(
@@ -97,7 +115,7 @@ void PathReader::readArc(const PathSegment& given, ContourSegment& segment) cons
                     given.plane[0], given.plane[1]));
   }
   const bool around = given.shape == Shape::kArcAround;
-  if (around) requireCircle(axes_[a], from, point, to);
+  if (around) requireCircle(axes_[a], given.clockwise, from, point, to);
   const motion::Arc arc = around ? motion::arcAround(from, point, to, given.clockwise)
                                  : motion::arcThrough(from, point, to);
   if (arc.angle == 0.0) {
@@ -116,7 +134,8 @@ std::size_t PathReader::axisOf(const std::string& name) const {
                      listText(frame_.names, "and")));
 }
 
-void PathReader::requireCircle(const PathAxis& axis, const std::array<double, 2>& from,
+void PathReader::requireCircle(const PathAxis& axis, bool clockwise,
+                               const std::array<double, 2>& from,
                                const std::array<double, 2>& centre,
                                const std::array<double, 2>& to) const {
   const double begin = std::hypot(from[0] - centre[0], from[1] - centre[1]);
@@ -125,11 +144,29 @@ void PathReader::requireCircle(const PathAxis& axis, const std::array<double, 2>
     refuse(fmt::format("is an arc with a radius of {}, but it must be a microstep or more",
                        axis.show(std::min(begin, end))));
   }
-  if (std::abs(begin - end) <= kArcMismatch) return;
-  refuse(
-      fmt::format("is an arc that begins {} from its centre and ends {} from it; these may "
-                  "differ by {}",
-                  axis.show(begin), axis.show(end), axis.show(kArcMismatch)));
+  // The centre is moved along the chord. The far side of an arc of more than half a turn deviates
+  // by as much; a smaller arc deviates the most at its ends.
+  const double chord = std::hypot(to[0] - from[0], to[1] - from[1]);
+  const double moved = chord > 0.0 ? std::abs(begin - end) * (begin + end) / (2.0 * chord) : 0.0;
+  const bool large = moved > kArcMismatch && isLargeArc(from, centre, to, clockwise);
+  const double most =
+      large ? std::min(kArcMismatch, 2.0 * kArcMismatch * chord / (begin + end)) : kArcMismatch;
+  if (std::abs(begin - end) <= most) return;
+  refuse(fmt::format(
+      "is an arc that begins {} from its centre and ends {} from it; these may differ by {}{}",
+      axis.show(begin), axis.show(end), axis.show(most),
+      large ? fmt::format(", because it turns by more than half a round, and its ends are only {} "
+                          "apart",
+                          axis.show(chord))
+            : ""));
+}
+
+bool PathReader::areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
+                         const std::array<double, 2>& to) const {
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (std::abs(to[k] - from[k]) * axes_[plane[k]].steps_per_unit > kSameEnds) return false;
+  }
+  return true;
 }
 
 void PathReader::requireLength(const PathSegment& given, const ContourSegment& segment) const {

@@ -37,8 +37,10 @@ class PathReader {
   void requirePositive(const char* what, double value) const;
   void readArc(const PathSegment& given, motion::ContourSegment& segment) const;
   std::size_t axisOf(const std::string& name) const;
-  void requireCircle(const axis::PathAxis& axis, const std::array<double, 2>& from,
+  void requireCircle(const axis::PathAxis& axis, bool clockwise, const std::array<double, 2>& from,
                      const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
+  bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
+               const std::array<double, 2>& to) const;
   void requireLength(const PathSegment& given, const motion::ContourSegment& segment) const;
   void readSpeed(const PathSegment& given, motion::ContourSegment& segment) const;
   bool isLinear(std::size_t axis) const { return axes_[axis].kind == config::Kind::kLinear; }

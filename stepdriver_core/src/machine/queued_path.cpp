@@ -479,7 +479,7 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
     knot.segment -= std::min(knot.segment, old);
   }
   const std::vector<TrajectoryPoint> points =
-      pointsOf(std::move(continuation.plan.knots), window_->axes, 0);
+      pointsOf(std::move(continuation.plan.knots), window_->axes, window.segments.back().end, 0);
   continuation.plan.knots.clear();
   auto motion = joined(start, continuation, points, passed_ns);
   if (!motion) return {};

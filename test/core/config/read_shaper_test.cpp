@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "stepdriver_core/setup/simulation_config.h"
 #include "support/axis_config.h"
 
 namespace stepdriver::config {
@@ -13,6 +14,12 @@ ConfigValue axisWith(ConfigValue input_shaper) {
   ConfigValue axis = linearAxis();
   put(axis, "input_shaper", std::move(input_shaper));
   return axis;
+}
+
+// With another damping than the shaper expects, a spring of the rig would ring although only the
+// frequency was given, and it is right.
+TEST(ReadShaper, ExpectsTheDampingOfASpringOfTheRig) {
+  EXPECT_EQ(ShaperConfig{}.damping, setup::SimulatedAxis{}.spring_damping);
 }
 
 TEST(ReadShaper, ReadsOneOrAList) {

@@ -51,6 +51,32 @@ class Path : public PathBench {
     EXPECT_GT(std::abs(state("x").position), 0.01);
   }
 
+  /// Moves both axes to a place and follows a full circle around (-20 mm, 0) from there. The pulses
+  /// must be on the circle around the place that was commanded.
+  void followCircleFrom(double at, bool relative, bool clockwise) {
+    bench->move(at, "x");
+    bench->move(at, "y");
+    const double begin = relative ? 0.0 : at;
+    PathRequest request{
+        {"x", "y"}, {arcTo({begin, begin}, {begin - kRadius, begin})}, relative, 0.0, 0.0};
+    request.segments.front().clockwise = clockwise;
+    const std::size_t before = pulsePlaces().size();
+    const CoordinatedResult result = finish(request);
+    ASSERT_EQ(result.end, MoveEnd::kReached) << result.message;
+    const std::vector<Place> places = pulsePlaces();
+    EXPECT_NEAR(static_cast<double>(places.size() - before), 12'800.0, 20.0);
+    double worst = 0.0;
+    for (std::size_t i = before; i < places.size(); ++i) {
+      const double radius = std::hypot(places[i][0] - (at - kRadius), places[i][1] - at);
+      worst = std::max(worst, std::abs(radius - kRadius));
+    }
+    EXPECT_LE(worst, kHalfMicrosteps + 0.05 * kMicrostep);
+    for (const std::string name : {"x", "y"}) {
+      EXPECT_EQ(static_cast<double>(bench->pulses(name)), std::round(at / kMicrostep)) << name;
+    }
+    expectAtRest();
+  }
+
   void expectNextPathBeginsThere() {
     EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
     EXPECT_EQ(bench->pulses("x"), 0);
@@ -112,6 +138,49 @@ TEST_F(Path, TakesAnArcThroughAPointAndAHelix) {
   EXPECT_EQ(bench->pulses("z"), 800);
 }
 
+// The axes rest up to half a microstep away from that place. From there it would be another circle,
+// of which nothing or twice as much may be left.
+TEST_F(Path, BeginsAnArcAtTheCommandedPositions) {
+  for (const double at : {0.010003, 0.0100061, 0.00999375, 0.01001}) {
+    for (const bool relative : {false, true}) {
+      for (const bool clockwise : {false, true}) {
+        SCOPED_TRACE(std::to_string(at * 1e6) + " um" + (relative ? ", relative" : "") +
+                     (clockwise ? ", clockwise" : ""));
+        SetUp();
+        followCircleFrom(at, relative, clockwise);
+      }
+    }
+  }
+}
+
+// Relative moves that are circles don't lose what is less than a microstep.
+TEST_F(Path, KeepsTheCommandedPositionsOverACircle) {
+  const double third = kMicrostep / 3.0;
+  const PathRequest request{
+      {"x", "y"}, {arcTo({0.0, 0.0}, {-0.001, 0.0}), lineTo({0.001 + third, 0.0})}, true, 0.0, 0.0};
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(finish(request).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 3 * 80 + 1);
+}
+
+TEST_F(Path, TakesEndsThatDifferByRoundingForAFullTurn) {
+  for (const double off : {1e-18, 1e-15, -1e-12, 1e-9}) {
+    for (const std::size_t axis : {0U, 1U}) {
+      for (const bool clockwise : {false, true}) {
+        SCOPED_TRACE(std::to_string(off * 1e12) + " pm of axis " + std::to_string(axis));
+        SetUp();
+        PathRequest request{{"x", "y"}, {arcTo({0.0, 0.0}, {-kRadius, 0.0})}, false, 0.0, 0.0};
+        request.segments.front().end[axis] = off;
+        request.segments.front().clockwise = clockwise;
+        EXPECT_EQ(finish(request).end, MoveEnd::kReached);
+        EXPECT_NEAR(static_cast<double>(pulsePlaces().size()), 12'800.0, 20.0);
+        std::vector<Place> given;
+        for (int i = 0; i <= 2000; ++i) given.push_back(onCircle(i / 2000.0));
+        EXPECT_LE(farthest(pulsePlaces(), given), kHalfMicrosteps + 0.03 * kMicrostep);
+      }
+    }
+  }
+}
+
 TEST_F(Path, StopsAtCornersWithoutATolerance) {
   PathRequest request = mixed();
   request.tolerance = 0.0;
@@ -142,6 +211,30 @@ TEST_F(Path, CountsRelativePositionsFromTheCommandedOnes) {
   PathRequest request{{"x", "y"}, {lineTo({0.001 + kMicrostep / 3.0, 0.0})}, true, 0.0, 0.0};
   for (int i = 0; i < 3; ++i) EXPECT_EQ(finish(request).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("x"), 3 * 80 + 1);
+}
+
+// As after a homing whose switch is there: all round numbers are in the middle between two
+// microsteps.
+TEST_F(Path, ReachesEndsInTheMiddleBetweenTwoMicrosteps) {
+  for (const double jerk : {0.0, 20.0}) {
+    for (int i = 1; i <= 40; ++i) {
+      std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+      for (config::AxisConfig& axis : axes) axis.jerk = jerk;
+      if (jerk > 0.0) axes[0].start_speed = axes[1].start_speed = 0.0;
+      build(axes);
+      for (const std::string name : {"x", "y"}) bench->axis(name).setPosition(kMicrostep / 2.0);
+      const double way = 0.0005 * i;
+      const bool fed = i % 2 == 0;
+      const CoordinatedMove move = followPath(
+          {{"x", "y"}, {lineTo({way, 0.03}), lineTo({-way, 0.01})}, false, 0.0, 1e-4, fed});
+      if (fed) {
+        advance(i % 4 == 0 ? 0.1 : 3.0);
+        machine().appendPath({move.id(), {lineTo({0.0075, way})}, false});
+      }
+      const CoordinatedResult result = machine().wait(move);
+      EXPECT_EQ(result.end, MoveEnd::kReached) << i << ", jerk " << jerk << ": " << result.message;
+    }
+  }
 }
 
 TEST_F(Path, IsHeldOnThePathAndResumed) {
@@ -292,6 +385,11 @@ TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
                                       given.control2 = {0.0, 0.030};
                                     })),
                  "segment 3 is a Bezier with a cusp");
+  // No circle that is near the given one has both ends.
+  EXPECT_REFUSED(followPath({{"x", "y"}, {arcTo({4e-6, 0.0}, {-0.02, 0.0})}, false, 0.0, 0.0}),
+                 "segment 0 of the path is an arc that begins 0.02 m from its centre and ends "
+                 "0.020004 m from it; these may differ by 9.9990001e-10 m, because it turns by "
+                 "more than half a round, and its ends are only 4e-06 m apart");
   // The arc's farthest point, not its end.
   EXPECT_REFUSED(followPath({{"x", "y"}, {arcTo({0.0, 0.0}, {-0.06, 0.0})}, false, 0.0, 0.0}),
                  "x: segment 0 of the path leads to -0.12 m");
@@ -365,6 +463,15 @@ TEST_F(SmoothPath, OfALineTakesTheSevenPhasesOfAMove) {
   // 20 mm at 0.1 m/s, 1 m/s^2 and 20 m/s^3
   EXPECT_NEAR(finish({{"x", "y"}, {lineTo({0.02, 0.0})}, false, 0.0, 0.0}).duration,
               0.02 / 0.1 + 0.1 / 1.0 + 1.0 / 20.0, 1e-6);
+}
+
+TEST_F(SmoothPath, BeginsAnArcAtTheCommandedPositions) {
+  for (const double at : {0.010003, 0.0100061, 0.00999375}) {
+    SCOPED_TRACE(std::to_string(at * 1e6) + " um");
+    SetUp();
+    followCircleFrom(at, true, false);
+    expectLimits(20.0, 10.0);
+  }
 }
 
 TEST_F(SmoothPath, IsHeldOnThePathAndResumed) {

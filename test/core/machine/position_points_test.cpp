@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -195,12 +196,20 @@ TEST_F(PositionPoints, TakeUpTheBacklash) {
 // comes while the axes still follow the one before it.
 class StreamedPoints : public PositionPoints {
  protected:
+  // Of the points.
+  enum class Velocities { kNone, kZero, kOfTheStream };
+
   // The set point moves along a sine of 0.2 m and 0.25 Hz.
-  void stream(double period, double time_from_start, bool velocities) {
+  void stream(double period, double time_from_start, Velocities velocities) {
+    const double rate = std::acos(-1.0) / 2.0;
     for (double time = period; time < 4.0; time += period) {
-      const double place = 0.2 * std::sin(std::acos(-1.0) / 2.0 * time);
+      const double place = 0.2 * std::sin(rate * time);
+      const double speed = 0.2 * rate * std::cos(rate * time);
       TrajectoryRequest request{{"x", "y"}, {{time_from_start, {place, -place / 2.0}, {}, {}}}};
-      if (velocities) request.points[0].velocities = {0.0, 0.0};
+      if (velocities == Velocities::kZero) request.points[0].velocities = {0.0, 0.0};
+      if (velocities == Velocities::kOfTheStream) {
+        request.points[0].velocities = {speed, -speed / 2.0};
+      }
       request.allow_slower = true;
       last = follow(request);
       farthest = std::max(farthest, std::abs(state("x").position - place));
@@ -217,10 +226,10 @@ TEST_F(StreamedPoints, AreFollowedWithinTheLimits) {
   for (const double jerk : {0.0, 200.0}) {
     for (const double backlash : {0.0, 0.005}) {
       for (const double period : {0.1, 0.05, 0.03, 0.01}) {
-        for (const bool velocities : {false, true}) {
-          if (velocities && jerk > 0.0) continue;  // cubics: the acceleration would jump
+        for (const Velocities velocities :
+             {Velocities::kNone, Velocities::kZero, Velocities::kOfTheStream}) {
           SCOPED_TRACE(fmt::format("jerk {} backlash {} period {} velocities {}", jerk, backlash,
-                                   period, velocities));
+                                   period, static_cast<int>(velocities)));
           buildWith(jerk, backlash);
           farthest = 0.0;
           stream(period, period, velocities);
@@ -242,6 +251,15 @@ TEST_F(StreamedPoints, AreRefusedWithTheShortestTimeIfTheyMustNotBeSlower) {
   EXPECT_NE(why.find("with allow_slower it takes 0."), std::string::npos) << why;
   EXPECT_NE(why.find("instead of 0.05 s"), std::string::npos) << why;
   EXPECT_NEAR(state("x").velocity, 2.0, 1e-3) << "it continues";
+}
+
+TEST_F(StreamedPoints, AreRefusedIfTheirVelocitiesAreNoNumbers) {
+  const double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_REFUSED(follow({{"x", "y"}, {{0.05, {0.1, 0.1}, {1.0, kNan}, {}}}, true}),
+                 "y: point 0 of the trajectory has nan among its velocities");
+  EXPECT_REFUSED(follow({{"x", "y"}, {{0.05, {0.1, 0.1}, {1.0}, {}}}, true}),
+                 "x: point 0 of the trajectory has 1 velocities, but must have 2 or none");
+  EXPECT_EQ(bench->pulses("x"), 0);
 }
 
 TEST_F(StreamedPoints, BehindTheAxisAreReachedByTurningRound) {

@@ -473,6 +473,20 @@ TEST_F(Setpoints, AnAxisThatRefusesDoesNotKeepTheOthersFromMoving) {
   EXPECT_EQ(bench->pulses("y"), 0);
 }
 
+// The rounding of a calculation: to the soft limit it would take a million years.
+TEST_F(Setpoints, AVelocityThatMakesNoStepIsRestAndLetsTheOthersMove) {
+  for (const std::string& why : bench->machine->jog({{"x", 1e-17, {}}, {"y", 0.05, {}}})) {
+    EXPECT_EQ(why, "");
+  }
+  advance(0.05);
+  EXPECT_FALSE(x().state().moving);
+  EXPECT_GT(bench->pulses("y"), 0);
+  EXPECT_EQ(bench->machine->jog({{"x", 0.0, {}}, {"y", 1e-17, {}}}),
+            (std::vector<std::string>{"", ""}));
+  advance(1.0);
+  EXPECT_FALSE(bench->axis("y").state().moving);
+}
+
 TEST_F(Setpoints, AxesThatBeganTogetherAreIndependent) {
   for (const std::string& why : bench->machine->jog({{"x", 0.05, {}}, {"y", 0.05, {}}})) {
     EXPECT_EQ(why, "");

@@ -47,9 +47,10 @@ struct PathSegment {
   /// The curve of a segment.
   enum class Shape {
     kLine,  ///< straight
-    /// A circular arc around a centre, or a full turn if both ends are the same in its plane; axes
-    /// outside of the plane move in proportion to its angle. The distances from the centre to its
-    /// begin and to its end may differ by kArcMismatch: the centre is then moved.
+    /// A circular arc around a centre, or a full turn if both ends are the same in its plane, to
+    /// within 0.002 microsteps; axes outside of the plane move in proportion to its angle. The
+    /// distances from the centre to its begin and to its end may differ by kArcMismatch: the centre
+    /// is then moved. An arc of more than half a turn must not need its centre to be moved by more.
     kArcAround,
     kArcThrough,  ///< the same through a point between its begin and its end
     kBezier,      ///< cubic

@@ -33,10 +33,10 @@ struct SimulatedAxis {
   /// [mm|deg] Position of the switch; empty: outside the soft limit.
   std::optional<double> min_switch;
   std::optional<double> max_switch;
-  double settling_ms = 10.0;     ///< [ms] from the last pulse until the driver is in position
-  double load_falls = 0.0;       ///< [mm/s|deg/s] of a load that nothing holds, towards min
-  double spring_hz = 0.0;        ///< [Hz] of a mass that the carriage pulls by a spring; 0: none
-  double spring_damping = 0.05;  ///< its damping ratio
+  double settling_ms = 10.0;    ///< [ms] from the last pulse until the driver is in position
+  double load_falls = 0.0;      ///< [mm/s|deg/s] of a load that nothing holds, towards min
+  double spring_hz = 0.0;       ///< [Hz] of a mass that the carriage pulls by a spring; 0: none
+  double spring_damping = 0.1;  ///< its damping ratio: what an input shaper expects by default
   SimulatedWiring wiring;
   sim::RigFaults faults;
   /// How many writes to STEP succeed before all others fail.
