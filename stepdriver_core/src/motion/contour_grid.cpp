@@ -14,7 +14,8 @@ constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an i
 constexpr double kMostArcDeviation = 0.005;  // of the resolution
 constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
-constexpr double kNoLength = 1e-14;          // of the length of an interval
+// Of the length of an interval: after such a correction, what is left is rounding.
+constexpr double kSmallCorrection = 1e-7;
 constexpr int kPartsOfCorner = 5;            // at least, of each half
 constexpr double kGentleTurn = 0.1;          // [rad] of half of a corner
 constexpr int kPartsOfCurve = 4;             // at least
@@ -206,15 +207,22 @@ double ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoi
   }
   auto& [begin, middle, end] = scratch_;
   evaluate(of.segment, of.from, begin);
-  const double part = std::clamp(distance / of.length, 0.0, 1.0);
-  double parameter = of.from + part * (of.to - of.from);
+  // With an even change of the rate.
+  double change = 0.0;
+  for (std::size_t j = 0; j < axes_; ++j) {
+    change += begin.point.first[j] * begin.point.second[j] / begin.rate;
+  }
+  const double ahead = std::clamp(distance, 0.0, of.length);
+  const double square = std::max(0.0, begin.rate * begin.rate + 2.0 * change * ahead);
+  double parameter =
+      std::min(of.to, of.from + 2.0 * ahead / (begin.rate + std::sqrt(square)));
   constexpr int kCorrections = 4;
   for (int i = 0; i < kCorrections; ++i) {
     evaluate(of.segment, (of.from + parameter) / 2.0, middle);
     evaluate(of.segment, parameter, end);
     const double error = lengthOf(begin, middle, end) - distance;
-    if (std::abs(error) < kNoLength * of.length) break;
     parameter = std::clamp(parameter - error / end.rate, of.from, of.to);
+    if (std::abs(error) < kSmallCorrection * of.length) break;
   }
   evaluate(of.segment, parameter, end);
   point.position = end.point.position;

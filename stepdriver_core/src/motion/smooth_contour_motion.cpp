@@ -34,6 +34,7 @@ constexpr double kLowerSmoothBy = 1.002;
 constexpr double kShorterBy = 0.7;             // the time of the average
 constexpr double kShortestAverage = 1e-3;      // s
 constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
+constexpr double kNearFoot = 1e-3;             // of the resolution
 constexpr int kMostDivisionRounds = 4;
 constexpr std::size_t kPartsOfDivision = 4;
 
@@ -118,19 +119,18 @@ class QuinticDemand {
   }
 
   SmoothDemand of(const ContourLimits& limits) const {
-    const int direction = directionOf(v0_, v1_);
+    double most_jerk = std::max(std::abs(jerk(0.0)), std::abs(jerk(1.0)));
+    const double level = -c4_ / (5.0 * c5_);
+    if (level > 0.0 && level < 1.0) most_jerk = std::max(most_jerk, std::abs(jerk(level)));
     SmoothDemand demand;
-    const auto take_speed = [&](double u) {
-      demand.speed = std::max(demand.speed, std::abs(velocity(u)) / limits.speed);
-    };
-    const auto take_acceleration = [&](double u) {
-      const double a = acceleration(u);
-      demand.acceleration =
-          std::max(demand.acceleration,
-                   std::abs(a) / accelerationTowards(limits, direction, a > 0.0 ? 1 : -1));
-    };
-    double most_jerk = 0.0;
-    const auto take_jerk = [&](double u) { most_jerk = std::max(most_jerk, std::abs(jerk(u))); };
+    demand.jerk = std::max(demand.jerk, most_jerk / limits.jerk);
+    // Bounds that save the search for the extremes of most quintics.
+    const double above_ends =
+        std::max(std::abs(a0_), std::abs(acceleration(1.0))) + h_ / 2.0 * most_jerk;
+    const double faster = std::max(std::abs(v0_), std::abs(v1_)) + h_ * h_ / 8.0 * most_jerk;
+    const bool accelerates = above_ends > std::min(limits.acceleration, limits.deceleration);
+    const bool is_fast = faster > limits.speed;
+    if (!accelerates && !is_fast) return demand;
     // The acceleration is monotonic from one of these to the next.
     std::array<double, 4> turns{0.0, 1.0, 1.0, 1.0};
     std::size_t count = 1;
@@ -138,18 +138,19 @@ class QuinticDemand {
       if (u > turns[count - 1] && u < 1.0) turns[count++] = u;
     }
     turns[count++] = 1.0;
-    for (std::size_t i = 0; i < count; ++i) {
-      take_acceleration(turns[i]);
+    const int direction = directionOf(v0_, v1_);
+    for (std::size_t i = 0; i < count && accelerates; ++i) {
+      const double a = acceleration(turns[i]);
+      demand.acceleration =
+          std::max(demand.acceleration,
+                   std::abs(a) / accelerationTowards(limits, direction, a > 0.0 ? 1 : -1));
     }
-    take_jerk(0.0);
-    take_jerk(1.0);
-    const double level = -c4_ / (5.0 * c5_);
-    if (level > 0.0 && level < 1.0) take_jerk(level);
-    demand.jerk = std::max(demand.jerk, most_jerk / limits.jerk);
+    if (!is_fast) return demand;
+    const auto take_speed = [&](double u) {
+      demand.speed = std::max(demand.speed, std::abs(velocity(u)) / limits.speed);
+    };
     take_speed(0.0);
     take_speed(1.0);
-    const double above = std::max(std::abs(v0_), std::abs(v1_)) + h_ * h_ / 8.0 * most_jerk;
-    if (above <= limits.speed) return demand;
     for (std::size_t i = 0; i + 1 < count; ++i) {
       double low = turns[i];
       double high = turns[i + 1];
@@ -412,16 +413,20 @@ class SmoothSection {
     return closest;
   }
 
-  // How far the middle of the quintic that ends at a knot is from the contour, at a right angle.
+  // How far the middle of the quintic that ends at a knot is from an interval, at a right angle.
   double deviationOf(const SmoothKnots& knots, std::size_t index, std::size_t interval,
-                     double distance) const {
+                     double distance, ContourPoint& point) const {
     const double h = knots[index].time - knots[index - 1].time;
-    ContourPoint point;
+    const ContourGrid::Interval& of = grid_[interval];
+    const double part = (distance - caps_[interval].from) / of.length;
+    double parameter = of.from + std::clamp(part, 0.0, 1.0) * (of.to - of.from);
     double square = 0.0;
-    constexpr int kProjections = 3;
+    constexpr int kProjections = 4;
     for (int i = 0; i < kProjections; ++i) {
-      grid_.evaluateAt(interval, distance - caps_[interval].from, point);
+      contour_.evaluate(of.segment, parameter, point);
       double along = 0.0;
+      double rate = 0.0;  // squared, as the two others
+      double turn = 0.0;
       square = 0.0;
       for (std::size_t j = 0; j < limits_.size(); ++j) {
         const SmoothKnots::State& begin = knots.state(index - 1, j);
@@ -432,9 +437,14 @@ class SmoothSection {
                            point.position[j];
         square += off * off;
         along += off * point.first[j];
+        rate += point.first[j] * point.first[j];
+        turn += point.second[j] * point.second[j];
       }
-      square -= along * along;
-      distance += along;
+      square -= along * along / rate;
+      const double change = along / rate;  // of the parameter
+      parameter = std::clamp(parameter + change, of.from, of.to);
+      // Nearer to the foot, the contour is where its tangent is.
+      if (std::sqrt(turn) * change * change < kNearFoot * contour_.resolution()) break;
     }
     return std::sqrt(std::max(0.0, square));
   }
@@ -442,12 +452,14 @@ class SmoothSection {
   bool findDeviations(const SmoothKnots& knots, std::vector<bool>& deviates) const {
     bool found = false;
     std::size_t interval = 0;
+    ContourPoint point;
     for (std::size_t i = 1; i < knots.size(); ++i) {
       giveWayAt(i);
       const double middle = (knots[i - 1].distance + knots[i].distance) / 2.0;
       while (interval + 1 < grid_.size() && caps_[interval].to < middle) ++interval;
       if (grid_[interval].straight) continue;
-      if (deviationOf(knots, i, interval, middle) < kMostSmoothDeviation * contour_.resolution())
+      if (deviationOf(knots, i, interval, middle, point) <
+          kMostSmoothDeviation * contour_.resolution())
         continue;
       deviates[interval] = found = true;
     }
