@@ -15,8 +15,6 @@ namespace stepdriver::base {
 namespace {
 
 constexpr double kPeriod = 0.04;  // [s]
-constexpr double kRightAngle = 1.5707963267948966;
-
 /// A drive on a clock of its own, with a driver that does what it is told.
 class DriveTest : public testing::Test {
  protected:

@@ -13,8 +13,6 @@ namespace stepdriver::base {
 namespace {
 
 constexpr int kRounds = 2000;
-constexpr double kRightAngle = 1.5707963267948966;
-
 class Random {
  public:
   double from(double min, double max) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stepdriver_core/yaml.h"
+#include "support/findings_of.h"
 
 namespace stepdriver::console {
 namespace {
@@ -39,12 +40,6 @@ axes:
 joint_state_rate: 20.0  # [Hz]
 )";
 
-Findings of(const std::string& axis) {
-  Findings findings;
-  findings.axis = axis;
-  return findings;
-}
-
 /// The text with one part replaced; the test fails if the part isn't there once.
 std::string replaced(std::string text, const std::string& part, const std::string& by) {
   const std::size_t begin = text.find(part);
@@ -59,27 +54,29 @@ std::string textAfter(const Findings& findings, const std::string& text = kFile)
   return result.text;
 }
 
-TEST(CorrectedText, WithoutFindingsEveryCharacterStays) { EXPECT_EQ(textAfter(of("x")), kFile); }
+TEST(CorrectedText, WithoutFindingsEveryCharacterStays) {
+  EXPECT_EQ(textAfter(findingsOf("x")), kFile);
+}
 
 TEST(CorrectedText, ANumberChangesInItsPlaceAndItsCommentStaysInItsColumn) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.scale = 1.25;
   EXPECT_EQ(textAfter(findings), replaced(kFile, "steps_per_mm: 80.0        # [microsteps/mm]",
                                           "steps_per_mm: 100.0       # [microsteps/mm]"));
-  findings = of("y");
+  findings = findingsOf("y");
   findings.scale = 0.8;
   EXPECT_EQ(textAfter(findings), replaced(kFile, "mm_per_round: 40.0", "mm_per_round: 50.0"));
 }
 
 TEST(CorrectedText, ADirectionThatIsConfiguredChangesInItsPlace) {
-  Findings findings = of("y");
+  Findings findings = findingsOf("y");
   findings.wrong_way = true;
   EXPECT_EQ(textAfter(findings),
             replaced(kFile, "dir: true   # see above", "dir: false  # see above"));
 }
 
 TEST(CorrectedText, ANewKeyJoinsAFlowMap) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.wrong_way = true;
   EXPECT_EQ(textAfter(findings), replaced(kFile, "invert: {enable: true}    # behind",
                                           "invert: {dir: true, enable: true}    # behind"));
@@ -87,14 +84,14 @@ TEST(CorrectedText, ANewKeyJoinsAFlowMap) {
 
 TEST(CorrectedText, ANewKeyInABlockGetsALineOfItsOwn) {
   const std::string text = "axes:\n  x:   # the first\n    # 80 is right\n    steps_per_mm: 80\n";
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.wrong_way = true;
   EXPECT_EQ(textAfter(findings, text),
             "axes:\n  x:   # the first\n    invert: {dir: true}\n"
             "    # 80 is right\n    steps_per_mm: 80\n");
   EXPECT_EQ(textAfter(findings, "axes:\r\n  x:\r\n    steps_per_mm: 80\r\n"),
             "axes:\r\n  x:\r\n    invert: {dir: true}\r\n    steps_per_mm: 80\r\n");
-  findings = of("y");
+  findings = findingsOf("y");
   findings.max_inverted = true;
   EXPECT_EQ(textAfter(findings),
             replaced(kFile, "      max:\n        pin: GPIO25",
@@ -102,28 +99,28 @@ TEST(CorrectedText, ANewKeyInABlockGetsALineOfItsOwn) {
 }
 
 TEST(CorrectedText, SwappedSwitchesKeepTheirComments) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.switches_swapped = true;
   findings.min_inverted = true;
   std::string wanted = replaced(kFile, "min: {pin: GPIO23, active_level: high}",
                                 "max: {pin: GPIO23, active_level: low}");
   wanted = replaced(wanted, "max: {pin: \"GPIO24\"", "min: {pin: \"GPIO24\"");
   EXPECT_EQ(textAfter(findings), wanted);
-  findings = of("y");
+  findings = findingsOf("y");
   findings.switches_swapped = true;
   EXPECT_EQ(textAfter(findings), replaced(kFile, "      max:\n", "      min:\n"))
       << "a single switch moves to the other end";
 }
 
 TEST(CorrectedText, AQuotedValueIsReplacedWithItsQuotes) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.max_inverted = true;
   EXPECT_EQ(textAfter(findings),
             replaced(kFile, "active_level: 'high', bias", "active_level: low, bias"));
 }
 
 TEST(CorrectedText, MeansTheSameAsTheCorrectedParameters) {
-  Findings x = of("x");
+  Findings x = findingsOf("x");
   x.wrong_way = x.switches_swapped = x.min_inverted = x.max_inverted = true;
   x.scale = 1.1;
   Findings y = x;
@@ -138,7 +135,7 @@ TEST(CorrectedText, MeansTheSameAsTheCorrectedParameters) {
 TEST(CorrectedText, AValueOfAMergedMapIsOverridden) {
   const std::string text =
       "base: &base\n  steps_per_mm: 80.0\naxes:\n  x:\n    <<: *base\n  y:\n    <<: *base\n";
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.scale = 0.5;
   EXPECT_EQ(textAfter(findings, text), replaced(text, "  x:\n", "  x:\n    steps_per_mm: 40.0\n"));
 }
@@ -148,7 +145,7 @@ TEST(CorrectedText, SaysWhatToWriteByHandIfTheTextCannotBeChanged) {
   const std::string text =
       "axes:\n  x: &x\n    steps_per_mm: &steps 80.0\n    endstops: {min: {pin: a, active_level: "
       "low}}\n  y: *x\n";
-  Findings findings = of("y");
+  Findings findings = findingsOf("y");
   findings.scale = 1.25;
   findings.switches_swapped = true;
   findings.wrong_way = true;
@@ -174,7 +171,7 @@ TEST(CorrectedText, EveryShippedConfigurationKeepsItsComments) {
     std::vector<Findings> findings;
     for (const auto& [name, axis] : *axes->second.as<config::ConfigValue::Map>()) {
       if (axis.as<config::ConfigValue::Map>()->count("driver") == 0) continue;  // of the joystick
-      findings.push_back(of(name));
+      findings.push_back(findingsOf(name));
       findings.back().wrong_way = true;
       if (axis.as<config::ConfigValue::Map>()->count("endstops") > 0) {
         findings.back().switches_swapped = findings.back().min_inverted = true;
@@ -199,7 +196,7 @@ TEST(CorrectedText, AByteOrderMarkIsNoObstacle) {
   const std::string text =
       "\xEF\xBB\xBF"
       "axes: {x: {steps_per_mm: 80.0}}\n";
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.scale = 1.25;
   EXPECT_EQ(textAfter(findings, text),
             "\xEF\xBB\xBF"

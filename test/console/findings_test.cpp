@@ -12,6 +12,7 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/yaml.h"
 #include "support/axes.h"
+#include "support/findings_of.h"
 #include "wizard/configuration_file.h"
 
 namespace stepdriver::console {
@@ -35,18 +36,12 @@ constexpr const char* kAxis = R"(axes:
   r: {full_steps_per_round: 200}
 )";
 
-Findings of(const std::string& axis) {
-  Findings findings;
-  findings.axis = axis;
-  return findings;
-}
-
 TEST(Findings, WithoutAnyTheConfigurationStaysTheSame) {
-  EXPECT_EQ(text(corrected(valueOf(kAxis), of("x"))), text(valueOf(kAxis)));
+  EXPECT_EQ(text(corrected(valueOf(kAxis), findingsOf("x"))), text(valueOf(kAxis)));
 }
 
 TEST(Findings, TurnTheDirectionRound) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.wrong_way = true;
   ConfigValue once = corrected(valueOf(kAxis), findings);
   EXPECT_NE(text(once).find("invert:\n      dir: true"), std::string::npos) << text(once);
@@ -54,7 +49,7 @@ TEST(Findings, TurnTheDirectionRound) {
 }
 
 TEST(Findings, SwapTheLinesOfADriverWithOneForEachDirection) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.wrong_way = true;
   const std::string axis = "axes:\n  x:\n    pins: {cw: A, ccw: B}\n";
   EXPECT_EQ(text(corrected(valueOf(axis), findings)),
@@ -67,7 +62,7 @@ TEST(Findings, SwapTheLinesOfADriverWithOneForEachDirection) {
 }
 
 TEST(Findings, InvertASwitchBeforeTheyAreSwapped) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.min_inverted = true;
   findings.switches_swapped = true;
   const std::string wanted = R"(axes:
@@ -85,7 +80,7 @@ TEST(Findings, InvertASwitchBeforeTheyAreSwapped) {
 }
 
 TEST(Findings, MoveASingleSwitchToTheOtherEnd) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.switches_swapped = true;
   const ConfigValue after = corrected(
       valueOf("axes: {x: {endstops: {min: {pin: GPIO23, active_level: high}}}}"), findings);
@@ -95,7 +90,7 @@ TEST(Findings, MoveASingleSwitchToTheOtherEnd) {
 
 TEST(Findings, ScaleTheAxisInItsOwnKey) {
   const auto scaled = [](const std::string& axis, double factor) {
-    Findings findings = of(axis);
+    Findings findings = findingsOf(axis);
     findings.scale = factor;
     return text(corrected(valueOf(kAxis), findings));
   };
@@ -106,7 +101,7 @@ TEST(Findings, ScaleTheAxisInItsOwnKey) {
 }
 
 TEST(Findings, AreSaidInTheUnitOfTheAxis) {
-  Findings findings = of("x");
+  Findings findings = findingsOf("x");
   findings.scale = 1.25;
   EXPECT_EQ(changesText(findings, axisConfig("x")),
             std::vector<std::string>{"x: 100 steps per mm instead of 80"});

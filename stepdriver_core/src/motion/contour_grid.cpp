@@ -16,10 +16,10 @@ constexpr double kLeastPart = 1e-9;          // of a segment
 constexpr double kShortest = 1e-7;           // of a segment: not divided further
 // Of the length of an interval: after such a correction, what is left is rounding.
 constexpr double kSmallCorrection = 1e-7;
-constexpr int kPartsOfCorner = 5;            // at least, of each half
-constexpr double kGentleTurn = 0.1;          // [rad] of half of a corner
-constexpr int kPartsOfCurve = 4;             // at least
-constexpr std::size_t kUsualParts = 24;      // of a segment
+constexpr int kPartsOfCorner = 5;        // at least, of each half
+constexpr double kGentleTurn = 0.1;      // [rad] of half of a corner
+constexpr int kPartsOfCurve = 4;         // at least
+constexpr std::size_t kUsualParts = 24;  // of a segment
 
 }  // namespace
 
@@ -214,8 +214,7 @@ double ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoi
   }
   const double ahead = std::clamp(distance, 0.0, of.length);
   const double square = std::max(0.0, begin.rate * begin.rate + 2.0 * change * ahead);
-  double parameter =
-      std::min(of.to, of.from + 2.0 * ahead / (begin.rate + std::sqrt(square)));
+  double parameter = std::min(of.to, of.from + 2.0 * ahead / (begin.rate + std::sqrt(square)));
   constexpr int kCorrections = 4;
   for (int i = 0; i < kCorrections; ++i) {
     evaluate(of.segment, (of.from + parameter) / 2.0, middle);

@@ -4,8 +4,11 @@
 #include <vector>
 
 #include "kinematics.h"
+#include "support/constants.h"
 
 namespace stepdriver::base {
+
+inline constexpr double kRightAngle = test::kPi / 2.0;
 
 /// A wheel of the STM32 example: at most 1 m/s, 0.5 m/s^2, and 1.5 m/s^2 to slow down.
 inline Wheel wheelAt(double y) {

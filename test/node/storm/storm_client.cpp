@@ -6,8 +6,12 @@
 #include <numeric>
 #include <thread>
 
+#include "support/wait.h"
+
 namespace stepdriver::storm {
 namespace {
+
+using node_test::sleepFor;
 
 constexpr double kWaits = 0.3;
 constexpr double kLongestPause = 0.08;    // [s]
@@ -17,10 +21,6 @@ constexpr double kSetpointPeriod = 0.02;  // [s]
 constexpr double kLowest = 0.0;      // [m]
 constexpr double kHighest = 0.06;    // [m]
 constexpr double kFarthest = 0.012;  // [m] of a relative move
-
-void sleepFor(double seconds) {
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-}
 
 }  // namespace
 

@@ -40,6 +40,7 @@ namespace {
 
 using node_test::kBound;
 using node_test::NodeUnderTest;
+using node_test::sleepFor;
 using node_test::waitUntil;
 
 constexpr int kClients = 4;
@@ -50,10 +51,6 @@ constexpr double kRecording = 2.0;          // [s] until a flight recording is w
 // `~most_growth`.
 constexpr double kMostGrowth = 8.0;
 constexpr std::size_t kMostReported = 10;
-
-void sleepFor(double seconds) {
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-}
 
 /// The last states of the axes that the node has published.
 class LatestStates {

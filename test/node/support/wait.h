@@ -19,4 +19,9 @@ bool waitUntil(const Condition& condition, std::chrono::duration<double> bound =
   return true;
 }
 
+/// For what needs its time.
+inline void sleepFor(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
 }  // namespace stepdriver::node_test
