@@ -8,6 +8,7 @@ usage() {
   cat <<'END'
 usage: scripts/cross.sh [--build] arm64|armhf [ROOM...]
        scripts/cross.sh --board arm64
+       scripts/cross.sh --node arm64 [TEST...]
 
 Builds the core and the tests of the named rooms (folders of test/core; all of them by default) with
 Debian's cross compiler, and runs them under qemu-user; of named rooms, without the tests that take minutes
@@ -23,12 +24,15 @@ with the reason, if something of this isn't available.
   --board  boots Debian's kernel on a whole machine under QEMU instead, and moves the axis of
            examples/move_axis with the GPIO lines of that machine, by libgpiod. QEMU's own record of the
            lines must have each pulse of the move and no other, and the motor enabled for it
+  --node   makes the packages for that processor (scripts/package.sh --arch arm64) instead, and runs their node
+           under qemu-user against this computer's build of the named rostests; by default against all but
+           those that depend on the computer's time or look into the node's process
 END
 }
 
 only=
 case ${1:-} in
-  --build | --board)
+  --build | --board | --node)
     only=${1#--}
     shift
     ;;
@@ -40,7 +44,9 @@ case ${1:-} in
   *) usage >&2 && exit 2 ;;
 esac
 arch=$1
-[[ $only != board || ($arch == arm64 && $# == 1) ]] || { usage >&2 && exit 2; }
+case $only-$arch-$# in
+  board-armhf-* | node-armhf-* | board-arm64-[!1]*) usage >&2 && exit 2 ;;
+esac
 rooms=("${@:2}")
 
 missing() {
@@ -49,14 +55,59 @@ missing() {
 }
 
 choose_build_folder
+wanted=(core "cross-$arch")
+case $only in
+  board) wanted+=(board-arm64) ;;
+  node) wanted+=(ros plots ros-tests) ;;
+esac
 # In a process of its own, because it ends the shell if it fails.
-(install_packages core "cross-$arch" ${only:+"$only-$arch"}) >&2 || missing "its packages can't be installed"
+(install_packages "${wanted[@]}") >&2 || missing "its packages can't be installed"
 cross=$build/cross-$arch
 
 # ---- the libraries of the other processor ----
 
 # shellcheck source=scripts/sysroots.sh
 source "$root/scripts/sysroots.sh"
+
+# ---- the node ----
+
+# Those that a slow processor fails, and those that look into the node's process, which is the emulator's.
+tests_of_this_computer=()
+test_emulated_node() {
+  local tests=("$@") name status=0
+  quietly "node-$arch-packages" bash "$root/scripts/package.sh" --arch "$arch"
+  unpacked=$cache/$release-$arch-packages
+  rm -rf "$cross/node"
+  mkdir -p "$cross/node"
+  for name in "$build/packages-$arch"/ros-stepdriver_*.deb "$build/packages-$arch"/libstepdriver-core*.deb; do
+    dpkg-deb -x "$name" "$cross/node"
+  done
+  cat >"$cross/stepdriver_node" <<END
+#!/bin/sh
+exec /usr/bin/$emulator -L $unpacked $cross/node/usr/lib/stepdriver/stepdriver_node "\$@"
+END
+  chmod +x "$cross/stepdriver_node"
+  quietly "node-$arch-tests" configure_catkin
+  if ((${#tests[@]} == 0)); then
+    for name in "$src"/test/node/*_test.cpp; do
+      name=$(basename "$name" .cpp)
+      [[ " ${tests_of_this_computer[*]} " == *" $name "* ]] || tests+=("$name")
+    done
+  fi
+  quietly "node-$arch-tests" cmake --build "$build/catkin" -j "$jobs" --target "${tests[@]}"
+  use_ros "$build/catkin/devel"
+  for name in "${tests[@]}"; do
+    STEPDRIVER_NODE=$cross/stepdriver_node rostest "$src/test/node/node.test" "test:=$name" || status=1
+  done
+  return "$status"
+}
+if [[ $only == node ]]; then
+  test_emulated_node "${rooms[@]}"
+  exit
+fi
+
+# ---- the core ----
+
 # The kernel without its modules, and a shell.
 unpack_board() {
   local work=$1/work package
@@ -71,7 +122,7 @@ unpack_board() {
 keep "$arch" unpack_packages libc6-dev libfmt-dev libgpiod-dev libgtest-dev libstdc++6 libyaml-cpp-dev
 sysroot=$unpacked
 
-# ---- the builds ----
+# ---- its builds ----
 
 mkdir -p "$cross"
 cat >"$cross/toolchain.cmake" <<END
@@ -93,7 +144,7 @@ for room in "${rooms[@]}"; do targets+=("${room}_tests"); done
 ((${#targets[@]} > 0)) && targets+=(check_waveform trace_tests) || targets=(all)
 [[ $only != board ]] || targets=(stepdriver_core_yaml)
 
-# Several files of the library are compiled as one, which takes half the time; gcc then warns of members
+# Several files are compiled as one, which takes half the time; gcc then warns of members
 # whose type is in an anonymous namespace.
 configure_cross() {
   configure "$src/stepdriver_core" "$cross/core" "-DCMAKE_TOOLCHAIN_FILE=$cross/toolchain.cmake" "$strict" \
@@ -171,7 +222,7 @@ fi
 quietly cross-own-build cmake --build "$build/core" -j "$jobs" --target trace_tests
 [[ $only != build ]] || exit 0
 
-# ---- the tests ----
+# ---- its tests ----
 
 # Of named rooms: not the programs that aren't built, and not what takes minutes there.
 left_out='^$'
