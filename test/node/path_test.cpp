@@ -181,7 +181,7 @@ TEST_F(PathTest, MovesNothingIfItIsRefused) {
       {[](auto& r) {
          r.segments[1].end = {5.0, 0.02};
        },
-       "x: segment 1 of the path leads to 5 m"},
+       "x: segment 1 of the path at 5 m"},
       {[nan](auto& r) { r.tolerance = nan; },
        "the tolerance of the path is nan, but must be a finite number from 0 on"},
       {[](auto& r) { r.velocity = -0.1; },
@@ -238,7 +238,7 @@ TEST_F(PathTest, RefusesABadAppendAndContinues) {
   ASSERT_TRUE(begun.success) << begun.message;
   const auto far = append(begun.path, {kSquare[1], line({5.0, 0.0})}, true);
   EXPECT_FALSE(far.success);
-  expectSays(far.message, "x: segment 1 of the path leads to 5 m");
+  expectSays(far.message, "x: segment 1 of the path at 5 m");
   const auto other = append(begun.path + 1000, {kSquare[1]}, true);
   EXPECT_FALSE(other.success);
   expectSays(other.message, "doesn't continue: it has ended");
@@ -352,7 +352,7 @@ TEST_F(PathActionTest, IsRejectedWithTheReasonAndMovesNothing) {
   bad.segments[1].end = {5.0, 0.02};
   client->sendGoal(bad);
   EXPECT_EQ(client->await(), State::REJECTED);
-  client->expectEnd(FollowPathResult::REFUSED, "x: segment 1 of the path leads to 5 m");
+  client->expectEnd(FollowPathResult::REFUSED, "x: segment 1 of the path at 5 m");
   EXPECT_EQ(node.pulses(), 0);
 }
 

@@ -44,11 +44,13 @@ class PositionPointsNode : public testing::Test {
     return made;
   }
   /// A target that moves to 0.03 m in 1.5 s, at a rate.
-  void stream(double rate, double time_from_start) {
+  void stream(double rate, double time_from_start, const std::vector<double>& velocities = {}) {
     const int messages = static_cast<int>(1.5 * rate);
     ros::WallRate pace(rate);
     for (int i = 1; i <= messages; ++i) {
-      publisher.publish(message({0.03 * i / messages}, time_from_start));
+      JointTrajectory each = message({0.03 * i / messages}, time_from_start);
+      each.points[0].velocities = velocities;
+      publisher.publish(each);
       pace.sleep();
     }
   }
@@ -91,6 +93,13 @@ TEST_F(PositionPointsNode, FollowsTheMessagesOfRqtJointTrajectoryController) {
 }
 
 TEST_F(PositionPointsNode, FollowsTheMessagesOfMoveItServo) {
+  start(true);
+  stream(60.0, 1.0 / 60.0, {0.02, 0.02 / 3.0});
+  expectAtTheTarget();
+  EXPECT_FALSE(says("command: ")) << node.process().output();
+}
+
+TEST_F(PositionPointsNode, FollowsTheMessagesOfMoveItServoWithoutVelocities) {
   start(true);
   stream(60.0, 1.0 / 60.0);
   expectAtTheTarget();

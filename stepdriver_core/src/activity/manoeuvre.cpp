@@ -113,11 +113,13 @@ Failure failureOf(const std::exception& error) {
 }
 
 std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why) {
-  const std::string not_at =
-      goal.target ? ", not at " + axis.showPlace(axis.positionOf(static_cast<double>(*goal.target)))
-                  : "";
-  return fmt::format("{} stands at {}{}: {}", axis.name(), axis.showPlace(axis.positionNow()),
-                     not_at, why);
+  const std::string place = axis.showPlace(axis.positionNow());
+  std::string not_at;
+  if (goal.target) {
+    const std::string target = axis.showPlace(axis.positionOf(static_cast<double>(*goal.target)));
+    if (target != place) not_at = ", not at " + target;
+  }
+  return fmt::format("{} stands at {}{}: {}", axis.name(), place, not_at, why);
 }
 
 Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join,

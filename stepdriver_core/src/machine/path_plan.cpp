@@ -71,7 +71,7 @@ void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& a
   for (std::size_t i = 0; i < contour.size(); ++i) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       const auto [low, high] = contour.range(i, k);
-      const auto text = [i] { return segmentText(i) + " leads to"; };
+      const auto text = [i] { return segmentText(i) + " at"; };
       axes[k].refuseBeyondLimits(low, text);
       axes[k].refuseBeyondLimits(high, text);
     }
@@ -146,7 +146,7 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
   for (motion::ContourKnot& knot : knots) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       axes[k].refuseBeyondLimits(knot.positions[k], [&] {
-        return segmentText(first + knot.segment) + ", rounded at its corners, leads to";
+        return segmentText(first + knot.segment) + ", rounded at its corners, at";
       });
     }
     points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),

@@ -65,9 +65,12 @@ Trapezoid trapezoidOf(double length, double begin_square, double end_square,
   made.ramp_up = (made.peak - std::sqrt(begin_square)) / ramp.up;
   made.ramp_down = (made.peak - std::sqrt(end_square)) / ramp.down;
   made.way_up = (peak_square - begin_square) / (2.0 * ramp.up);
-  made.way_cruise =
-      std::max(0.0, length - made.way_up - (peak_square - end_square) / (2.0 * ramp.down));
+  const double way_down = (peak_square - end_square) / (2.0 * ramp.down);
+  made.way_cruise = std::max(0.0, length - made.way_up - way_down);
   made.cruise = made.way_cruise / made.peak;
+  // From a speed that is too high for the ramp, it has to slow down more steeply.
+  const double way_left = length - made.way_up;
+  if (way_down > way_left) made.ramp_down = 2.0 * way_left / (made.peak + std::sqrt(end_square));
   return made;
 }
 

@@ -134,6 +134,24 @@ PathRequest zigzag(std::size_t count) {
   return request;
 }
 
+TEST_F(PathQueue, StaysOnThePathIfItIsFedWhileItSlowsDownForItsEnd) {
+  // From 0.2 s on, it slows down.
+  for (double after = 0.15; after < 0.305; after += 0.005) {
+    SCOPED_TRACE(after);
+    build({plotterAxis("x"), plotterAxis("y")});
+    PathRequest path{{"x", "y"}, {}, false, 0.0, 500e-6};
+    path.segments = {lineTo({0.02, 0.0}), lineTo({0.02, 0.02}), lineTo({0.0, 0.02})};
+    begin(path, 1);
+    advance(after);
+    feed(2);
+    const CoordinatedResult result = machine().wait(move_);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    expectOnPath(path);
+    expectLimits();
+    for (const std::string name : {"x", "y"}) EXPECT_LE(bench->pulses(name), 1600) << name;
+  }
+}
+
 TEST_F(PathQueue, FollowsACircleInPiecesAsFastAsInOneGo) {
   const double in_one_go = finish(test::circle()).duration;
   build({plotterAxis("x"), plotterAxis("y")});
@@ -442,7 +460,7 @@ TEST_F(PathQueue, RefusesAWrongSegmentAndGoesOn) {
   EXPECT_REFUSED(append({lineTo({0.0, 0.01}), lineTo({0.0, kNan})}),
                  "y: segment 1 of the path has nan among its positions");
   EXPECT_REFUSED(append({lineTo({0.0, 0.01}), lineTo({0.0, -0.2})}),
-                 "y: segment 1 of the path leads to -0.2 m is below the soft limit");
+                 "y: segment 1 of the path at -0.2 m is below the soft limit");
   EXPECT_REFUSED(append({lineTo(end)}), "segment 0 of the path has a length of 0");
   EXPECT_REFUSED(append({lineTo({0.0})}), "segment 0 of the path has 1 positions, but must have 2");
   EXPECT_REFUSED(append(std::vector<PathSegment>(1'000'000, lineTo({0.0, 0.0}))),

@@ -355,7 +355,7 @@ TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
                                     })),
                  "segment 1 of the path has a length of 0");
   EXPECT_REFUSED(followPath(segment(0, [&](auto& given) { given.end[0] = -0.2; })),
-                 "x: segment 0 of the path leads to -0.2 m is below the soft limit");
+                 "x: segment 0 of the path at -0.2 m is below the soft limit");
   EXPECT_REFUSED(followPath(segment(2,
                                     [&](auto& given) {
                                       given.point = {0.0, 0.011};
@@ -392,7 +392,7 @@ TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
                  "more than half a round, and its ends are only 4e-06 m apart");
   // The arc's farthest point, not its end.
   EXPECT_REFUSED(followPath({{"x", "y"}, {arcTo({0.0, 0.0}, {-0.06, 0.0})}, false, 0.0, 0.0}),
-                 "x: segment 0 of the path leads to -0.12 m");
+                 "x: segment 0 of the path at -0.12 m");
   advance(1.0);
   EXPECT_EQ(bench->pulses("x"), 0);
   EXPECT_EQ(bench->pulses("y"), 0);

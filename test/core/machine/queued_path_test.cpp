@@ -7,7 +7,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -118,6 +120,83 @@ void expectWithin(const Profile& profile, const PathAxis& axis, double seam) {
   ASSERT_LE(std::abs(jump), 1e-3 * axis.limits.max_speed);
 }
 
+// The distances of a motion from the given path, of which no corner is rounded.
+class SharpPath {
+ public:
+  explicit SharpPath(test::RandomContour given) {
+    for (motion::ContourSegment& segment : given.segments) {
+      tolerance_ = std::max(tolerance_, segment.tolerance);
+      segment.tolerance = 0.0;
+    }
+    contour_.emplace(given.contour());
+  }
+  double tolerance() const { return tolerance_; }  // the largest
+
+  double distanceTo(const std::vector<double>& place) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < contour_->size(); ++i) {
+      for (std::size_t part = 0; part < kParts; ++part) {
+        nearest = std::min(nearest, leastWithin(i, part, place));
+      }
+    }
+    return nearest;
+  }
+
+ private:
+  static constexpr std::size_t kParts = 32;  // of each segment
+
+  // In a part of a segment, in which the distance has one minimum.
+  double leastWithin(std::size_t segment, std::size_t part, const std::vector<double>& place) {
+    double low = static_cast<double>(part) / kParts;
+    double high = static_cast<double>(part + 1) / kParts;
+    const double ends[] = {distanceAt(segment, low, place), distanceAt(segment, high, place)};
+    // The part is hardly longer than the way between its ends.
+    if (std::min(ends[0], ends[1]) > 2.0 * wayBetween(segment, low, high) + tolerance_)
+      return ends[0];
+    for (int i = 0; i < 40; ++i) {
+      const double third = (high - low) / 3.0;
+      const bool first =
+          distanceAt(segment, low + third, place) < distanceAt(segment, high - third, place);
+      (first ? high : low) += first ? -third : third;
+    }
+    return std::min({ends[0], ends[1], distanceAt(segment, low, place)});
+  }
+  double wayBetween(std::size_t segment, double from, double to) {
+    contour_->evaluate(segment, from, point_);
+    const std::vector<double> place = point_.position;
+    return distanceAt(segment, to, place);
+  }
+  double distanceAt(std::size_t segment, double u, const std::vector<double>& place) {
+    contour_->evaluate(segment, u, point_);
+    double square = 0.0;
+    for (std::size_t k = 0; k < place.size(); ++k) {
+      square += (place[k] - point_.position[k]) * (place[k] - point_.position[k]);
+    }
+    return std::sqrt(square);
+  }
+
+  std::optional<motion::Contour> contour_;
+  motion::ContourPoint point_;
+  double tolerance_ = 0.0;
+};
+
+// @param motions of all axes, from a position on the path on.
+void expectOnPath(SharpPath& path, const std::vector<Profile>& motions) {
+  constexpr int kPlaces = 50;
+  constexpr double kDeviation = 0.2;  // of cubics and quintics
+  double longest = 0.0;
+  for (const Profile& motion : motions) longest = std::max(longest, motion.duration().value());
+  std::vector<double> place(motions.size());
+  for (int i = 0; i <= kPlaces; ++i) {
+    const double time = longest * i / kPlaces;
+    for (std::size_t k = 0; k < motions.size(); ++k) {
+      const double at = std::min(time, motions[k].duration().value());
+      place[k] = motions[k].stateAt(std::llround(at * 1e9)).position.value();
+    }
+    ASSERT_LE(path.distanceTo(place), path.tolerance() + kDeviation) << i << "/" << kPlaces;
+  }
+}
+
 struct Axes {
   std::int64_t backlash;  // microsteps
   bool jerk;              // limited
@@ -125,7 +204,7 @@ struct Axes {
 
 class RandomQueue : public testing::TestWithParam<Axes> {};
 
-TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
+TEST_P(RandomQueue, IsContinuousOnThePathAndKeepsLimits) {
   std::mt19937 random(2027);
   int paths = 0;
   double ratios = 0.0;
@@ -150,6 +229,7 @@ TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
       continue;  // a cusp, or no room for the backlash
     }
     SCOPED_TRACE("path " + std::to_string(i));
+    SharpPath sharp(given);
     double now = 0.0;
     bool late = false;
     for (std::size_t fed = 1; fed < whole.segments.size(); ++fed) {
@@ -166,9 +246,10 @@ TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
         break;
       }
       ASSERT_GE(longer.same_until, now - 1e-9);
+      std::vector<Profile> motions;
       for (std::size_t k = 0; k < axes.size(); ++k) {
         const Profile before = motionOf(*path, k, now);
-        const Profile after = motionOf(*longer.path, k, now);
+        const Profile& after = motions.emplace_back(motionOf(*longer.path, k, now));
         SCOPED_TRACE("axis " + std::to_string(k) + " from " + std::to_string(now) + " same until " +
                      std::to_string(longer.same_until));
         const auto same_ns = std::llround((longer.same_until - now) * 1e9);
@@ -180,6 +261,9 @@ TEST_P(RandomQueue, IsContinuousAndKeepsLimits) {
         expectWithin(after, axes[k], longer.same_until - now);
         if (testing::Test::HasFatalFailure()) return;
       }
+      // With a backlash, these are the motions of the motors.
+      if (GetParam().backlash == 0) expectOnPath(sharp, motions);
+      if (testing::Test::HasFatalFailure()) return;
       path = longer.path;
     }
     const std::vector<double> targets = path->targets();
