@@ -11,6 +11,7 @@
 
 #include "stepdriver_core/axis/axis.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/refusal.h"
 
 // 1000 steps/m, at most 1 m/s and 2 m/s^2, unless a test sets other limits.
@@ -21,6 +22,8 @@ namespace {
 using axis::AxisLimits;
 using axis::MoveEnd;
 using test::Bench;
+using test::kInfinity;
+using test::kNan;
 using test::linearAxis;
 using test::violationsOf;
 
@@ -375,8 +378,6 @@ TEST_F(AxisLimitsTest, RefusesWhatIsBelowTheLowestOfAConfiguration) {
 
 TEST_F(AxisLimitsTest, RefusesWhatIsBeyondTheConfiguredOnesAndChangesNothing) {
   build(4.0);
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   struct Bad {
     AxisLimits limits;
     const char* words;
@@ -390,9 +391,9 @@ TEST_F(AxisLimitsTest, RefusesWhatIsBeyondTheConfiguredOnesAndChangesNothing) {
         Bad{{-1, 0, 0, 0},
             "the max_speed is -1 m/s, but must be a finite number above 0, or 0 for the configured "
             "one"},
-        Bad{{kNaN, 0, 0, 0}, "the max_speed is nan m/s, but must be a finite number"},
+        Bad{{kNan, 0, 0, 0}, "the max_speed is nan m/s, but must be a finite number"},
         Bad{{0.5, kInfinity, 0, 0}, "the acceleration is inf m/s^2, but must be a finite number"},
-        Bad{{0.5, 0, 0, kNaN}, "the jerk is nan m/s^3, but must be a finite number"}}) {
+        Bad{{0.5, 0, 0, kNan}, "the jerk is nan m/s^3, but must be a finite number"}}) {
     EXPECT_REFUSED(x().setLimits(bad.limits), bad.words);
     EXPECT_EQ(x().limits().max_speed, 1.0);
     EXPECT_EQ(x().limits().acceleration, 2.0);

@@ -21,6 +21,7 @@ namespace {
 
 using namespace test;  // NOLINT(google-build-using-namespace)
 using axis::MoveEnd;
+using test::kInfinity;
 using test::kNan;
 using Shape = PathSegment::Shape;
 
@@ -312,7 +313,6 @@ TEST_F(Path, BeginsOnlyAtRest) {
 }
 
 TEST_F(Path, IsRefusedAsAWholeAndMovesNothing) {
-  const double kInfinity = std::numeric_limits<double>::infinity();
   const auto with = [](auto change) {
     PathRequest request = mixed();
     change(request);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "support/constants.h"
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
 
@@ -19,6 +20,7 @@ namespace {
 
 using axis::MoveEnd;
 using machine::TrajectoryRequest;
+using test::kNan;
 using test::refusal;
 using test::trajectoryAxis;
 
@@ -254,7 +256,6 @@ TEST_F(StreamedPoints, AreRefusedWithTheShortestTimeIfTheyMustNotBeSlower) {
 }
 
 TEST_F(StreamedPoints, AreRefusedIfTheirVelocitiesAreNoNumbers) {
-  const double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_REFUSED(follow({{"x", "y"}, {{0.05, {0.1, 0.1}, {1.0, kNan}, {}}}, true}),
                  "y: point 0 of the trajectory has nan among its velocities");
   EXPECT_REFUSED(follow({{"x", "y"}, {{0.05, {0.1, 0.1}, {1.0}, {}}}, true}),
