@@ -26,7 +26,7 @@ with the reason, if something of this isn't available.
            lines must have each pulse of the move and no other, and the motor enabled for it
   --node   makes the packages for that processor (scripts/package.sh --arch arm64) instead, and runs their node
            under qemu-user against this computer's build of the named rostests; by default against all but
-           those that depend on the computer's time or look into the node's process
+           those that depend on time, reach into the node's process or start launch files
 END
 }
 
@@ -71,8 +71,9 @@ source "$root/scripts/sysroots.sh"
 
 # ---- the node ----
 
-# Those that a slow processor fails, and those that look into the node's process, which is the emulator's.
-tests_of_this_computer=()
+# Those that depend on time, look into the node's process, load a library into it, or start this computer's node
+# by a launch file.
+tests_of_this_computer=(line_action_test descriptors_test exhausted_test failing_disk_test examples_test launch_test)
 test_emulated_node() {
   local tests=("$@") name status=0
   quietly "node-$arch-packages" bash "$root/scripts/package.sh" --arch "$arch"
