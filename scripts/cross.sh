@@ -80,9 +80,7 @@ test_emulated_node() {
   unpacked=$cache/$release-$arch-packages
   rm -rf "$cross/node"
   mkdir -p "$cross/node"
-  for name in "$build/packages-$arch"/ros-stepdriver_*.deb "$build/packages-$arch"/libstepdriver-core*.deb; do
-    dpkg-deb -x "$name" "$cross/node"
-  done
+  dpkg-deb -x "$build/packages-$arch"/ros-stepdriver_*.deb "$cross/node"
   cat >"$cross/stepdriver_node" <<END
 #!/bin/sh
 exec /usr/bin/$emulator -L $unpacked $cross/node/usr/lib/stepdriver/stepdriver_node "\$@"

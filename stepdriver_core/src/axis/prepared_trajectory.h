@@ -79,7 +79,6 @@ class PreparedTrajectory {
 
     double duration() const { return slowdown * points.back().time; }
   };
-  bool onlyPositionsCount(const std::vector<TrajectoryPoint>& points) const;
   // The way to the first point.
   struct Head {
     std::vector<motion::Piece> pieces;
@@ -95,6 +94,8 @@ class PreparedTrajectory {
   std::optional<double> slowdownFor(Source source) const;
   Part prepare(std::size_t member, const Source& source) const;
   void requirePoints(const std::vector<TrajectoryPoint>& points) const;
+  /// Whether the velocities and accelerations of a single point aren't used.
+  bool onlyPositionsCount(const std::vector<TrajectoryPoint>& points) const;
   std::vector<motion::Waypoint> waypointsOf(std::size_t member, const Source& source) const;
   double wantedDuration() const;  // [s]
   Head headOf(std::size_t member, const PathStart& start) const;

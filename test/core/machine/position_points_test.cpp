@@ -21,6 +21,7 @@ namespace {
 using axis::MoveEnd;
 using machine::TrajectoryRequest;
 using test::kNan;
+using test::kPi;
 using test::refusal;
 using test::trajectoryAxis;
 
@@ -203,7 +204,7 @@ class StreamedPoints : public PositionPoints {
 
   // The set point moves along a sine of 0.2 m and 0.25 Hz.
   void stream(double period, double time_from_start, Velocities velocities) {
-    const double rate = std::acos(-1.0) / 2.0;
+    const double rate = kPi / 2.0;
     for (double time = period; time < 4.0; time += period) {
       const double place = 0.2 * std::sin(rate * time);
       const double speed = 0.2 * rate * std::cos(rate * time);
