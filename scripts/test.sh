@@ -12,8 +12,8 @@ usage: scripts/test.sh [--lint] [--core] [--kernel] [--node] [--ros] [--sanitize
 Installs missing packages, builds, and runs the named parts; by default all but --soak.
 
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
-          headers; the keys of package.xml; the links of the pages, and the files that they name; the tests
-          that docs/reliability.md names; the English of pages and comments
+          headers; the keys of package.xml; the links of the pages, and the files that they name; the table of
+          their commands; the tests that docs/reliability.md names; the English of pages and comments
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that use
           the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
           with this build
@@ -159,6 +159,7 @@ check_shell() {
 }
 
 check_packages() { /usr/bin/python3 -B "$root/test/docs/packages_test.py"; }
+check_command_table() { /usr/bin/python3 -B "$root/test/docs/command_table_test.py"; }
 check_links() { /usr/bin/python3 -B "$root/test/docs/links_test.py"; }
 check_reliability() { /usr/bin/python3 -B "$root/test/docs/reliability_test.py"; }
 check_prose() {
@@ -505,6 +506,7 @@ if wants lint; then
   stage shell check_shell
   stage doxygen check_doxygen
   stage packages check_packages
+  stage command-table check_command_table
   stage links check_links
   stage reliability check_reliability
   stage prose check_prose
