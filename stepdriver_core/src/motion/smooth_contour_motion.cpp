@@ -25,12 +25,13 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 constexpr double kClosestKnots = 100e-6;
 constexpr double kMostRounding = 1e-3 / 60.0;
 constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
-constexpr int kMostReplans = 12;
+constexpr int kMostPlans = 12;         // with one time of the average
 constexpr double kNoExcess = 1e-3;
 constexpr double kNoPart = 1e-9;          // of a segment
 constexpr double kSquareRounding = 1e-9;  // of the square of a speed
 constexpr double kNoDifference = 1e-6;
-constexpr double kLowerSmoothBy = 1.002;
+constexpr double kLowerMoreBy = 2e-3;  // at first, than by what exceeds a limit
+constexpr double kLowerMostMoreBy = 0.1;
 constexpr double kShorterBy = 0.7;             // the time of the average
 constexpr double kShortestAverage = 1e-3;      // s
 constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
@@ -359,6 +360,8 @@ class SmoothSection {
   struct Lowered {
     std::vector<CeilingSpan> speeds;
     std::vector<CeilingSpan> accelerations;
+    // The first places are many, and near to their limits. The last ones move with each plan.
+    double more = kLowerMoreBy;
   };
 
   // What the average contains when it begins at a speed: a motion at constant acceleration for the
@@ -466,9 +469,48 @@ class SmoothSection {
     return found;
   }
 
-  static double mostOf(const Plan& best) { return best.possible() ? best.duration() : kUnlimited; }
+  // The plans with one time of the average: each lowers what the one before exceeded, and takes
+  // longer, apart from what a plan is slowed down by as a whole.
+  class Rounds {
+   public:
+    Rounds(const SmoothSection& section, double time)
+        : section_(&section), time_(time), best_(section.planOnce(time, lowered_)) {
+      see(best_);
+    }
 
-  Plan bestOfTimes() const {
+    // [s] No later plan takes less.
+    double shortest() const { return shortest_; }
+    // Whether a later plan may be better.
+    bool isOpen() const { return open_; }
+    const Plan& best() const& { return best_; }
+    Plan best() && { return std::move(best_); }
+
+    void next() {
+      Plan plan = section_->planOnce(time_, lowered_);
+      see(plan);
+      if (plan.isBetterThan(best_)) best_ = std::move(plan);
+    }
+
+   private:
+    void see(const Plan& plan) {
+      ++plans_;
+      const bool planned = plan.excess < kUnlimited;
+      const bool done = plan.slowdown <= 1.0 + kNoExcess && plan.possible();
+      open_ = planned && !done && plans_ < kMostPlans;
+      shortest_ = planned ? plan.knots.back().time : kUnlimited;
+    }
+
+    const SmoothSection* section_;
+    double time_;
+    Lowered lowered_;
+    Plan best_;
+    double shortest_ = 0.0;
+    int plans_ = 0;
+    bool open_ = true;
+  };
+
+  // The longest average that can be of use [s].
+  double longestAverage() const {
     double time = 0.0;
     double jerk = kUnlimited;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
@@ -478,48 +520,44 @@ class SmoothSection {
       jerk = std::min(jerk, limits_[j].jerk);
     }
     // On a straight line without other limits, four parts of this duration are the fastest.
-    time = std::max(kShortestAverage, std::min(time, std::cbrt(caps_.back().to / (2.0 * jerk))));
-    Plan best = plan(time);
-    if (begin_.average > 0.0) {
-      Plan next = plan(begin_.average, mostOf(best));
-      if (next.isBetterThan(best)) best = std::move(next);
+    return std::max(kShortestAverage, std::min(time, std::cbrt(caps_.back().to / (2.0 * jerk))));
+  }
+
+  // Of all times of the average, the one whose last plan is the shortest goes on, until no other
+  // one can become faster than the best plan so far.
+  Plan bestOfTimes() const {
+    std::vector<Rounds> all;
+    const auto begin = [&](double time) {
+      all.emplace_back(*this, time);
+      return all.back().shortest();
+    };
+    double time = longestAverage();
+    double shortest = begin(time);
+    const auto shorten = [&] { return (time *= kShorterBy) > kShortestAverage; };
+    while (shorten()) {
+      const double before = std::exchange(shortest, begin(time));
+      if (shortest > before) break;
     }
-    int worse = 0;
-    while (worse < 2 && time * kShorterBy > kShortestAverage) {
-      time *= kShorterBy;
-      Plan next = plan(time, mostOf(best));
-      if (next.isBetterThan(best)) {
-        best = std::move(next);
-        worse = 0;
-      } else if (best.possible()) {
-        ++worse;
+    if (begin_.average > 0.0) begin(begin_.average);
+    for (;;) {
+      const auto best = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+        return a.best().isBetterThan(b.best());
+      });
+      const auto next = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+        return (a.isOpen() ? a.shortest() : kUnlimited) < (b.isOpen() ? b.shortest() : kUnlimited);
+      });
+      const bool possible = best->best().possible();
+      if (next->isOpen() && !(possible && next->shortest() >= best->best().duration())) {
+        next->next();
+      } else if (!possible && shorten()) {
+        begin(time);
+      } else {
+        return std::move(*best).best();
       }
     }
-    return best;
   }
 
   double capOf(std::size_t interval, const ContourSpeed& speed) const;
-
-  // @param most [s] longer plans aren't needed: each replan makes a plan longer, apart from what it
-  //   is slowed down by as a whole.
-  Plan plan(double time, double most = kUnlimited) const {
-    Lowered lowered;
-    Plan best = planOnce(time, lowered);
-    bool done = best.excess == kUnlimited || best.knots.back().time >= most ||
-                (best.slowdown <= 1.0 + kNoExcess && best.possible());
-    for (int i = 1; i < kMostReplans && !done; ++i) {
-      Plan next = planOnce(time, lowered);
-      if (next.excess == kUnlimited) break;
-      const double shortest = next.knots.back().time;
-      done = (next.slowdown <= 1.0 + kNoExcess && next.possible()) || shortest >= most;
-      if (next.isBetterThan(best)) {
-        best = std::move(next);
-      } else if (best.possible() && shortest >= best.duration()) {
-        break;
-      }
-    }
-    return best;
-  }
 
   // Adds to what is lowered.
   Plan planOnce(double time, Lowered& lowered) const {
@@ -703,7 +741,8 @@ class SmoothSection {
       if (grid[i].straight) {
         const ContourSpeed::Ramp ramp = speed.ramp(i);
         const double peak = speed.peakSquare(i);
-        append(begin + (peak - speed.square(i)) / (2.0 * ramp.up), peak);
+        // Rounding makes a way of its own out of a ramp that hardly rises.
+        append(std::min(end, begin + (peak - speed.square(i)) / (2.0 * ramp.up)), peak);
         append(std::min(end, end - (peak - speed.square(i + 1)) / (2.0 * ramp.down)), peak);
       }
       append(end, speed.square(i + 1));
@@ -714,6 +753,12 @@ class SmoothSection {
 
   SmoothDemand lower(const SmoothKnots& knots, const std::vector<SmoothPart>& parts,
                      const ContourGrid& grid, Lowered& lowered) const {
+    double steepest = 0.0;
+    for (const SmoothPart& part : parts) {
+      steepest = std::max(steepest, std::abs(part.front_acceleration));
+    }
+    const double more = 1.0 + lowered.more;
+    lowered.more = std::min(2.0 * lowered.more, kLowerMostMoreBy);
     SmoothDemand worst;
     for (std::size_t i = 1; i < knots.size(); ++i) {
       giveWayAt(i);
@@ -724,15 +769,15 @@ class SmoothSection {
                            .of(limits_[j]));
       }
       worst.include(demand);
+      if (demand.most() < 1.0 + kNoDifference) continue;
       const double slowdown = demand.slowdown();
-      if (slowdown < 1.0 + kNoDifference) continue;
       const double speed = std::max(knots[i - 1].speed, knots[i].speed);
       bool straight = true;
       for (std::size_t k = knots[i - 1].interval; k <= knots[i].interval; ++k) {
         straight = straight && grid[k].straight;
       }
       // So slowly, a curve makes no difference.
-      if (speed < kSlow * capNear(knots[i].distance)) straight = true;
+      if (speed < kSlow * lowestCap(knots[i - 1].distance, knots[i].distance)) straight = true;
       const std::size_t last = std::min(knots[i].part + 1, parts.size() - 1);
       double acceleration = 0.0;
       for (std::size_t k = knots[i - 1].part; k < last; ++k) {
@@ -741,23 +786,28 @@ class SmoothSection {
       }
       if (!straight || demand.speed > 1.0) {
         lowered.speeds.push_back({knots[i - 1].distance, knots[i].distance,
-                                  speed / ((straight ? demand.speed : slowdown) * kLowerSmoothBy)});
+                                  speed / ((straight ? demand.speed : slowdown) * more)});
       }
-      if (acceleration > 0.0) {
+      if (acceleration > kNoDifference * steepest) {
         const double by =
             straight ? std::max(demand.acceleration, demand.jerk) : slowdown * slowdown;
-        lowered.accelerations.push_back({parts[knots[i - 1].part].rear, parts[last].front,
-                                         acceleration / (by * kLowerSmoothBy)});
+        lowered.accelerations.push_back(
+            {parts[knots[i - 1].part].rear, parts[last].front, acceleration / (by * more)});
       }
     }
     return worst;
   }
 
-  double capNear(double distance) const {
-    const auto after =
-        std::upper_bound(caps_.begin() + 1, caps_.end(), distance,
-                         [](double x, const CeilingSpan& span) { return x < span.from; });
-    return (after - 1)->value;
+  // [unit/s] Of the intervals between two distances.
+  double lowestCap(double from, double to) const {
+    const double margin = kMargin * (to - from);
+    auto span = std::upper_bound(caps_.begin(), caps_.end(), from + margin,
+                                 [](double x, const CeilingSpan& cap) { return x < cap.to; });
+    double lowest = kUnlimited;
+    for (; span != caps_.end() && span->from < to - margin; ++span) {
+      lowest = std::min(lowest, span->value);
+    }
+    return lowest;
   }
 
   static constexpr double kMargin = 1e-9;  // of an interval, for rounding

@@ -226,6 +226,48 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
   RecordProperty("worst_distance", std::to_string(worst_distance));
 }
 
+// The largest part of its limits that an axis uses between two knots.
+double demandBetween(const ContourKnot& from, const ContourKnot& to,
+                     const std::vector<ContourLimits>& limits) {
+  double most = 0.0;
+  constexpr int kParts = 10;
+  for (std::size_t axis = 0; axis < limits.size(); ++axis) {
+    for (int part = 0; part <= kParts; ++part) {
+      const QuinticState state = quinticAt(from, to, axis, static_cast<double>(part) / kParts);
+      most = std::max({most, std::abs(state.velocity) / limits[axis].speed,
+                       std::abs(state.acceleration) / limits[axis].acceleration,
+                       std::abs(state.jerk) / limits[axis].jerk});
+    }
+  }
+  return most;
+}
+
+// Where a limit is exceeded, only that place becomes slower: on 500 lines in random directions, the
+// motion is at a limit in every part that takes a second.
+TEST(SmoothContourMotion, IsNotSlowedDownAsAWholeForOnePlace) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> way(-160.0, 160.0);
+  std::vector<ContourSegment> segments;
+  std::vector<double> place(3, 0.0);
+  for (int i = 0; i < 500; ++i) {
+    for (double& x : place) x += way(random);
+    segments.push_back(lineTo(place, 4.0));
+  }
+  const std::vector<ContourLimits> limits(3, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Contour contour({0.0, 0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
+  std::vector<double> demands(static_cast<std::size_t>(secondsOf(knots)) + 1, 0.0);
+  for (std::size_t k = 1; k < knots.size(); ++k) {
+    double& most = demands[static_cast<std::size_t>(knots[k].time_ns / 1'000'000'000)];
+    most = std::max(most, demandBetween(knots[k - 1], knots[k], limits));
+  }
+  demands.pop_back();  // is shorter
+  const double least = *std::min_element(demands.begin(), demands.end());
+  EXPECT_GE(least, 0.99);
+  RecordProperty("least", std::to_string(least));
+  RecordProperty("seconds", std::to_string(secondsOf(knots)));
+}
+
 // The distance and the speed along a section at a time, from its knots.
 class AlongSection {
  public:
