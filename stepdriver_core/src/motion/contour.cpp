@@ -21,6 +21,7 @@ constexpr double kEven = 1e-6;                     // of the curvature: no jump
 constexpr double kGentle = 30.0 / 180.0 * kPi;     // rad: roundings may overlap
 constexpr double kLeastBlend = 0.01;               // of the resolution
 constexpr double kLeastRate = 1e-4;                // of a Bezier, of the sum of its handles
+constexpr double kHandle = 0.2;                    // of the resolution, of a Bezier at least
 constexpr double kInLine = 1e-9;                   // sine of the angle of three points
 
 double norm(const std::vector<double>& vector) {
@@ -198,6 +199,42 @@ class GentleCorners {
   std::vector<Corner> corners_;
 };
 
+double distanceOf(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> way(a);
+  for (std::size_t i = 0; i < way.size(); ++i) way[i] -= b[i];
+  return norm(way);
+}
+
+// The control points of a Bezier. With one at its end, the derivative would be 0 there: it is moved
+// by a length, towards the next control point that isn't there. That moves the curve by 4/9 of the
+// length or less. If both are at their ends, the curve is a straight line, and another one of its
+// parameters has them at thirds.
+std::pair<std::vector<double>, std::vector<double>> awayFromEnds(const std::vector<double>& from,
+                                                                 const ContourSegment& given,
+                                                                 double length) {
+  const auto is_near = [&](const std::vector<double>& a, const std::vector<double>& b) {
+    return distanceOf(a, b) < length;
+  };
+  const auto towards = [&](const std::vector<double>& begin, const std::vector<double>& end,
+                           double part) {
+    std::vector<double> place(begin);
+    for (std::size_t i = 0; i < place.size(); ++i) place[i] += part * (end[i] - begin[i]);
+    return place;
+  };
+  const auto moved = [&](const std::vector<double>& begin, const std::vector<double>& control,
+                         const std::vector<double>& end) {
+    const std::vector<double>& to = is_near(begin, control) ? end : control;
+    return towards(begin, to, std::min(1.0, length / distanceOf(begin, to)));
+  };
+  const bool first = is_near(from, given.control1);
+  const bool second = is_near(given.end, given.control2);
+  if (first && second) {
+    return {towards(from, given.end, 1.0 / 3.0), towards(from, given.end, 2.0 / 3.0)};
+  }
+  return {first ? moved(from, given.control2, given.end) : given.control1,
+          second ? moved(given.end, given.control1, from) : given.control2};
+}
+
 // The point of a Bezier's derivative, a parabola, that is nearest to 0: tried where its distance
 // from 0 is least among many places, and then more closely around the best.
 double leastRate(const std::vector<double>& powers, std::size_t axes) {
@@ -278,11 +315,12 @@ Contour::Segment Contour::placed(const std::vector<double>& from, const ContourS
   segment.measured = given.measured;
   if (given.shape == ContourSegment::Shape::kBezier) {
     segment.powers.resize(4 * axes());
+    const auto [control1, control2] = awayFromEnds(from, given, kHandle * resolution_);
     double handles = 0.0;
     for (std::size_t i = 0; i < axes(); ++i) {
       const double p0 = from[i];
-      const double p1 = given.control1[i];
-      const double p2 = given.control2[i];
+      const double p1 = control1[i];
+      const double p2 = control2[i];
       const double p3 = given.end[i];
       double* c = &segment.powers[4 * i];
       c[0] = p0;
@@ -291,11 +329,10 @@ Contour::Segment Contour::placed(const std::vector<double>& from, const ContourS
       c[3] = p3 - p0 + 3.0 * (p1 - p2);
       handles += std::abs(p1 - p0) + std::abs(p2 - p1) + std::abs(p3 - p2);
     }
-    if (leastRate(segment.powers, axes()) < kLeastRate * handles) {
-      throw std::invalid_argument(
-          fmt::format("segment {} is a Bezier with a cusp, or with a control point at its end: "
-                      "its derivative is 0 there, and must not be",
-                      index));
+    const double least = std::min(kLeastRate * handles, kHandle * resolution_);
+    if (leastRate(segment.powers, axes()) < least) {
+      throw std::invalid_argument(fmt::format(
+          "segment {} is a Bezier with a cusp: its derivative is 0 there, and must not be", index));
     }
   } else {
     segment.powers.resize(2 * axes());

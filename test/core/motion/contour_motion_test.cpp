@@ -249,16 +249,18 @@ TEST(ContourMotion, IsNearlyTimeOptimalWithFewKnots) {
 }
 
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
-// the fine grid's.
+// the fine grid's. That isn't fine enough for the last paths, whose Beziers lack handles.
 TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
   std::mt19937 random(2026);
   constexpr int kPaths = 1000;
+  constexpr int kWithoutHandles = 200;
   double worst_ratio = 0.0;
   double ratios = 0.0;
   double worst_excess = 0.0;
   double worst_distance = 0.0;
-  for (int i = 0; i < kPaths; ++i) {
-    const test::RandomContour path = test::randomContour(random);
+  for (int i = 0; i < kPaths + kWithoutHandles; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    if (i >= kPaths) test::dropHandles(path);
     const Contour contour = path.contour();
     const std::vector<ContourKnot> knots = motion::planContour(contour, path.limits).knots;
     ASSERT_EQ(knots.front().time_ns, 0);
@@ -289,13 +291,14 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
         }
       }
     }
-    const double shortest = FineGrid(contour, path.limits).shortestTime();
-    const double ratio = durationOf(knots) / shortest;
-    worst_ratio = std::max(worst_ratio, ratio);
-    ratios += ratio;
-    EXPECT_LE(ratio, 1.02) << "path " << i << " of " << contour.size() << " segments, "
-                           << contour.axes() << " axes";
-    EXPECT_GE(ratio, 0.98) << "path " << i;
+    if (i < kPaths) {
+      const double ratio = durationOf(knots) / FineGrid(contour, path.limits).shortestTime();
+      worst_ratio = std::max(worst_ratio, ratio);
+      ratios += ratio;
+      EXPECT_LE(ratio, 1.02) << "path " << i << " of " << contour.size() << " segments, "
+                             << contour.axes() << " axes";
+      EXPECT_GE(ratio, 0.98) << "path " << i;
+    }
     if (i % 10 != 0) continue;
     for (std::size_t k = 1; k < knots.size(); ++k) {
       const std::size_t segment = knots[k].segment;

@@ -267,8 +267,44 @@ TEST(Contour, RefusesACusp) {
   EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), std::invalid_argument);
   bezier.control1 = {9.0, 10.0};
   EXPECT_NO_THROW(Contour({0.0, 0.0}, {bezier}, 1.0));
-  bezier.control1 = {0.0, 0.0};
-  EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), std::invalid_argument);
+}
+
+// As many drawings have: the curve is as given, and has a direction everywhere.
+TEST(Contour, TakesABezierWithAControlPointAtItsEnd) {
+  std::mt19937 random(12);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  for (int i = 0; i < 500; ++i) {
+    const double size = std::pow(10.0, number(0.5, 6.0));
+    const auto place = [&] {
+      return std::vector<double>{number(-size, size), number(-size, size), number(-size, size)};
+    };
+    const std::vector<double> start = place();
+    ContourSegment bezier;
+    bezier.shape = ContourSegment::Shape::kBezier;
+    bezier.end = place();
+    bezier.control1 = i % 3 == 1 ? place() : start;
+    bezier.control2 = i % 3 == 0 ? place() : bezier.end;
+    if (i % 7 == 0) bezier.control2 = start;
+    const Contour contour(start, {bezier}, 1.0);
+    ContourPoint point;
+    for (int k = 0; k <= 100; ++k) {
+      const double u = k / 100.0;
+      contour.evaluate(0, u, point);
+      ASSERT_GT(distance(point.first, {0.0, 0.0, 0.0}), 0.1) << i << " at " << u;
+      if (i % 3 == 2) continue;  // a straight line has another parameter
+      double square = 0.0;
+      for (std::size_t j = 0; j < 3; ++j) {
+        const double given = std::pow(1.0 - u, 3.0) * start[j] +
+                             3.0 * u * (1.0 - u) * (1.0 - u) * bezier.control1[j] +
+                             3.0 * u * u * (1.0 - u) * bezier.control2[j] +
+                             u * u * u * bezier.end[j];
+        square += (point.position[j] - given) * (point.position[j] - given);
+      }
+      ASSERT_LT(std::sqrt(square), 0.1) << i << " at " << u;
+    }
+  }
 }
 
 TEST(Contour, KnowsTheRangeOfEachAxis) {

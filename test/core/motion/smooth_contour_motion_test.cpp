@@ -157,19 +157,22 @@ TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
 }
 
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
-// that without a jerk limit, which no motion with one can go below.
+// that without a jerk limit, which no motion with one can go below. The Beziers of the last paths
+// lack handles.
 TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
   std::mt19937 random(2027);
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   constexpr int kPaths = 1000;
+  constexpr int kWithoutHandles = 200;
   double worst_ratio = 0.0;
   double ratios = 0.0;
   double worst_jerk = 0.0;
   double worst_distance = 0.0;
-  for (int i = 0; i < kPaths; ++i) {
+  for (int i = 0; i < kPaths + kWithoutHandles; ++i) {
     test::RandomContour path = test::randomContour(random);
+    if (i >= kPaths) test::dropHandles(path);
     // Accelerations that take 1 to 100 ms to build up; some axes have no jerk limit.
     for (std::size_t axis = 0; axis < path.limits.size(); ++axis) {
       if (axis > 0 && number(0.0, 1.0) < 0.3) continue;
@@ -215,9 +218,10 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
     }
     const double ratio =
         secondsOf(knots) / secondsOf(motion::planContour(contour, path.limits).knots);
+    EXPECT_GE(ratio, 0.995) << "path " << i;
+    if (i >= kPaths) continue;
     worst_ratio = std::max(worst_ratio, ratio);
     ratios += ratio;
-    EXPECT_GE(ratio, 0.995) << "path " << i;
   }
   EXPECT_LE(ratios / kPaths, 1.15);
   RecordProperty("mean_ratio", std::to_string(ratios / kPaths));

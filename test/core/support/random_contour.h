@@ -75,4 +75,17 @@ inline RandomContour randomContour(std::mt19937& random) {
   return made;
 }
 
+/// Puts control points of its Beziers at their ends: the first one, the second one or both.
+inline void dropHandles(RandomContour& path) {
+  const std::vector<double>* from = &path.start;
+  for (std::size_t i = 0; i < path.segments.size(); ++i) {
+    motion::ContourSegment& segment = path.segments[i];
+    if (segment.shape == motion::ContourSegment::Shape::kBezier) {
+      if (i % 3 != 1) segment.control1 = *from;
+      if (i % 3 != 0) segment.control2 = segment.end;
+    }
+    from = &segment.end;
+  }
+}
+
 }  // namespace stepdriver::test
