@@ -104,10 +104,13 @@ enum class Continuity {
 ///   or more.
 class Contour {
  public:
+  /// A control point of a Bezier that is at its end, or nearer to it than a fifth of the
+  /// resolution, is moved away by that: the curve deviates by less than a tenth of the resolution.
+  ///
   /// @param start one number for each axis. @param segments each one of a length above 0; at least
   ///   one. @param resolution [unit] what makes no difference: a microstep of the finest axis.
-  /// @throw std::invalid_argument if a Bezier's derivative is (almost) 0 at a point, which no axis
-  ///   can pass without a stop; it names the segment (the first is 0).
+  /// @throw std::invalid_argument if a Bezier's derivative is (almost) 0 at a point within it, which
+  ///   no axis can pass without a stop; it names the segment (the first is 0).
   /// @param continues more segments will be appended.
   Contour(std::vector<double> start, const std::vector<ContourSegment>& segments, double resolution,
           Continuity continuity = Continuity::kDirection, bool continues = false);

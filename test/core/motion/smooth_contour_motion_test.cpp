@@ -246,7 +246,7 @@ double demandBetween(const ContourKnot& from, const ContourKnot& to,
   return most;
 }
 
-// Where a limit is exceeded, only that place becomes slower: on 500 lines in random directions, the
+// Only the places at which a limit is exceeded become slower: on 500 lines in random directions, the
 // motion is at a limit in every part that takes a second.
 TEST(SmoothContourMotion, IsNotSlowedDownAsAWholeForOnePlace) {
   std::mt19937 random(5);
