@@ -523,8 +523,8 @@ class SmoothSection {
     return std::max(kShortestAverage, std::min(time, std::cbrt(caps_.back().to / (2.0 * jerk))));
   }
 
-  // Of all times of the average, the one whose last plan is the shortest gets the next plan, until no
-  // other one can become faster than the best plan so far.
+  // Of all times of the average, the one whose last plan is the shortest gets the next plan, until
+  // no other one can become faster than the best plan so far.
   Plan bestOfTimes() const {
     std::vector<Rounds> all;
     const auto begin = [&](double time) {
