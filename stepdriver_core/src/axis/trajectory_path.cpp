@@ -55,35 +55,39 @@ void TrajectoryPath::endTogether() {
 
 motion::Profile TrajectoryPath::plan(std::int64_t at_ns, const motion::MotionState& from,
                                      double speed_override) const {
-  return onPath(changeRate(at_ns, onCurves(from), std::min(speed_override, 1.0), &Member::bounds));
+  return onPath(slowDown(at_ns, onCurves(from), std::min(speed_override, 1.0), &Member::bounds));
 }
 
 motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
                                          const motion::MotionState& from) const {
-  const motion::MotionState begin = onCurves(from);
-  motion::Profile even = changeRate(at_ns, begin, 0.0, &Member::stop_bounds);
-  const double time = timeToRate(even, 0.0);
-  if (time > kShortestSlope) {
-    if (std::optional<motion::Profile> steeper = brake(at_ns, begin, time)) {
-      return onPath(*std::move(steeper));
+  return onPath(slowDown(at_ns, onCurves(from), 0.0, &Member::stop_bounds));
+}
+
+motion::Profile TrajectoryPath::slowDown(std::int64_t at_ns, const motion::MotionState& from,
+                                         double rate, Bounds bounds) const {
+  motion::Profile even = changeRate(at_ns, from, rate, bounds);
+  const double time = timeToRate(even, rate);
+  if (rate < from.velocity && time > kShortestSlope) {
+    if (std::optional<motion::Profile> steeper = brake(at_ns, from, rate, bounds, time)) {
+      return *std::move(steeper);
     }
   }
-  return onPath(even);
+  return even;
 }
 
 std::optional<motion::Profile> TrajectoryPath::brake(std::int64_t at_ns,
-                                                     const motion::MotionState& from,
-                                                     double sooner_than) const {
+                                                     const motion::MotionState& from, double rate,
+                                                     Bounds bounds, double sooner_than) const {
   std::vector<motion::BoundCourse> courses;
   courses.reserve(members_.size());
   for (const Member& member : members_) {
-    if (member.stop_bounds.jerk > 0.0) return std::nullopt;
+    if ((member.*bounds).jerk > 0.0) return std::nullopt;
     // The tolerance is for what a trajectory itself may exceed.
-    const double most = member.stop_bounds.acceleration / (1.0 + kTrajectoryTolerance);
+    const double most = (member.*bounds).acceleration / (1.0 + kTrajectoryTolerance);
     courses.push_back({member.curve, {most, 0.0}});
   }
   const double slice = std::max(kShortestSlope, sooner_than / kMostSlopes);
-  return motion::planBraking(at_ns, from, courses, slice, sooner_than,
+  return motion::planBraking(at_ns, from, rate, courses, slice, sooner_than,
                              members_.front().curve->duration());
 }
 

@@ -46,9 +46,12 @@ class TrajectoryPath : public SharedPath {
   /// Of the position on the curves.
   motion::Profile changeRate(std::int64_t at, const motion::MotionState& from, double rate,
                              Bounds bounds) const;
-  /// The steepest stop, if it takes less than a time [s] and no motor has a jerk limit.
+  /// The same, or a steeper fall of the rate.
+  motion::Profile slowDown(std::int64_t at, const motion::MotionState& from, double rate,
+                           Bounds bounds) const;
+  /// The steepest fall to a rate, if it takes less than a time [s] and no motor has a jerk limit.
   std::optional<motion::Profile> brake(std::int64_t at, const motion::MotionState& from,
-                                       double sooner_than) const;
+                                       double rate, Bounds bounds, double sooner_than) const;
   motion::Profile onPath(const motion::Profile& on_curves) const;
   motion::MotionState onCurves(const motion::MotionState& on_path) const;
   motion::RateLimits steepest(const motion::MotionState& from, double delay, Bounds bounds) const;

@@ -22,16 +22,19 @@ double steepestAt(const BoundCourse& course, DoubleDouble place, double rate) {
   return kSteepestSlope * speed <= room ? kSteepestSlope : std::max(room, 0.0) / speed;
 }
 
-bool stopsWithin(double slice, DoubleDouble rate, double slope) {
-  return rate.value() <= slope * slice;
-}
+// How the rate falls in a slice, to a lower one at most.
+struct Fall {
+  DoubleDouble from;
+  double to = 0.0;
+  double slice = 0.0;
 
-// A time of a constant slope: a slice, or until the rate is 0.
-Piece slowing(DoubleDouble place, DoubleDouble rate, double slope, double slice) {
-  const bool stops = stopsWithin(slice, rate, slope);
-  const DoubleDouble duration = stops ? rate / DoubleDouble(slope) : DoubleDouble(slice);
-  return {duration, place, rate.hi, -slope, 0.0, rate.lo};
-}
+  bool endsWith(double slope) const { return (from - DoubleDouble(to)).value() <= slope * slice; }
+  Piece piece(DoubleDouble place, double slope) const {
+    const DoubleDouble duration =
+        endsWith(slope) ? (from - DoubleDouble(to)) / DoubleDouble(slope) : DoubleDouble(slice);
+    return {duration, place, from.hi, -slope, 0.0, from.lo};
+  }
+};
 
 bool keep(const std::vector<BoundCourse>& courses, const Piece& piece) {
   const Profile path(0, {piece});
@@ -41,41 +44,42 @@ bool keep(const std::vector<BoundCourse>& courses, const Piece& piece) {
 }
 
 // That all motors allow in the whole slice.
-double steepestSlope(const std::vector<BoundCourse>& courses, DoubleDouble place, DoubleDouble rate,
-                     double slice) {
+double steepestSlope(const std::vector<BoundCourse>& courses, DoubleDouble place,
+                     const Fall& fall) {
   double slope = kSteepestSlope;
   const auto limit_at = [&](DoubleDouble there, double rate_there) {
     for (const BoundCourse& course : courses) {
       slope = std::min(slope, steepestAt(course, there, rate_there));
     }
   };
-  limit_at(place, rate.value());
-  const Piece first = slowing(place, rate, slope, slice);
+  limit_at(place, fall.from.value());
+  const Piece first = fall.piece(place, slope);
   limit_at(first.positionAt(first.duration), first.velocityAt(first.duration).value());
   for (int i = 0; i < kSlopeTries; ++i, slope *= kGentlerSlope) {
-    if (keep(courses, slowing(place, rate, slope, slice))) return slope;
+    if (keep(courses, fall.piece(place, slope))) return slope;
   }
   return 0.0;
 }
 
 }  // namespace
 
-std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from,
+std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from, double rate,
                                    const std::vector<BoundCourse>& courses, double slice,
                                    double most, DoubleDouble end) {
   std::vector<Piece> pieces;
   DoubleDouble place = from.position;
-  DoubleDouble rate = from.velocity;
+  Fall fall{from.velocity, rate, slice};
   for (double time = 0.0; time < most; time += slice) {
-    if (!(place + rate * DoubleDouble(slice) < end)) return std::nullopt;
-    const double slope = steepestSlope(courses, place, rate, slice);
-    const Piece& piece = pieces.emplace_back(slowing(place, rate, slope, slice));
-    if (stopsWithin(slice, rate, slope)) {
+    if (!(place + fall.from * DoubleDouble(slice) < end)) return std::nullopt;
+    const double slope = steepestSlope(courses, place, fall);
+    const Piece& piece = pieces.emplace_back(fall.piece(place, slope));
+    place = piece.positionAt(piece.duration);
+    if (fall.endsWith(slope)) {
       if (time + piece.duration.value() >= most) return std::nullopt;
+      if (rate > 0.0) pieces.push_back({(end - place) / DoubleDouble(rate), place, rate, 0.0, 0.0});
       return Profile(start_ns, std::move(pieces));
     }
-    place = piece.positionAt(piece.duration);
-    rate = piece.velocityAt(piece.duration);
+    fall.from = piece.velocityAt(piece.duration);
   }
   return std::nullopt;
 }

@@ -15,19 +15,21 @@ struct BoundCourse {
   MotorBounds bounds;
 };
 
-/// The path s(t) along courses that comes to rest as soon as their limits allow: at each place the
-/// rate falls as fast as the motor allows that has the least left. With |q'' s'^2 + q' s''| <= a
-/// that is s'' = -(a + q'' s'^2) / q' for q' > 0, and the same with both signs turned for q' < 0. A
-/// lower rate needs less of each limit, so falling as fast as possible is never wrong later.
+/// The path s(t) along courses that comes to a lower rate as soon as their limits allow, and keeps
+/// that to the end; a rate of 0 comes to rest. At each place the rate falls as fast as the motor
+/// allows that has the least left. With |q'' s'^2 + q' s''| <= a that is s'' = -(a + q'' s'^2) / q'
+/// for q' > 0, and the same with both signs turned for q' < 0. A lower rate needs less of each
+/// limit, so falling as fast as possible is never wrong later.
 ///
 /// @param from the current position [s] and rate
+/// @param rate from 0 to the current one
 /// @param slice [s] of time. The slope is constant during each, and chosen so that all motors keep
 ///   to their limits in the whole of it, see staysWithin().
-/// @param most [s] the longest duration that is of use
+/// @param most [s] how long it may take to the lower rate to be of use
 /// @param end [s] of the courses
-/// @return nothing if it isn't at rest then, or only at the end of the courses.
-/// @pre a rate above 0
-std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from,
+/// @return nothing if it isn't at that rate then, or only at the end of the courses.
+/// @pre a current rate above 0
+std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from, double rate,
                                    const std::vector<BoundCourse>& courses, double slice,
                                    double most, DoubleDouble end);
 

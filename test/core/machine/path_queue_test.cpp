@@ -465,10 +465,10 @@ TEST_F(PathQueue, RefusesAWrongSegmentAndGoesOn) {
   EXPECT_REFUSED(append({lineTo({0.0})}), "segment 0 of the path has 1 positions, but must have 2");
   EXPECT_REFUSED(append(std::vector<PathSegment>(1'000'000, lineTo({0.0, 0.0}))),
                  "1000000 segments are too many");
-  PathSegment cusp = lineTo({0.0, 0.0});
+  PathSegment cusp = lineTo({end[0] + 0.01, end[1]});
   cusp.shape = PathSegment::Shape::kBezier;
-  cusp.control1 = end;
-  cusp.control2 = {0.01, 0.0};
+  cusp.control1 = {end[0] + 0.01, end[1] + 0.01};
+  cusp.control2 = {end[0], end[1] + 0.01};
   EXPECT_REFUSED(append({cusp}), "segment 0 is a Bezier with a cusp");
   EXPECT_REFUSED(machine().appendPath({move_.id() + 1000, {}, true}), "doesn't continue");
   feed(80);

@@ -293,6 +293,33 @@ TEST_F(Path, RunsMoreSlowlyAtASpeedOverride) {
             kTolerance + kHalfMicrosteps + 0.05 * kMicrostep);
 }
 
+// One slope for the whole fall would have to be that of the sharpest place on its way.
+TEST_F(Path, FallsToASpeedOverrideWithinTheNextCorners) {
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 200e-6};
+  for (int i = 1; i < 60; ++i) {
+    request.segments.push_back(lineTo({0.001 * i, i % 2 == 1 ? 0.0005 : 0.0}));
+  }
+  const auto fastest = [&](double time) {
+    double most = 0.0;
+    for (double t = 0.0; t < time; t += 0.001) {
+      advance(0.001);
+      most = std::max(most, std::hypot(state("x").velocity, state("y").velocity));
+    }
+    return most;
+  };
+  const CoordinatedMove move = followPath(request);
+  advance(0.2);
+  const double full = fastest(0.1);
+  machine().setSpeedOverride(0.5);
+  EXPECT_GT(fastest(0.05), 0.55 * full);
+  EXPECT_LE(fastest(0.2), 0.51 * full);
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 59 * 80);
+  for (const std::string name : {"x", "y"}) {
+    EXPECT_LE(differences(name, 0.004).acceleration, 1.0 / kMicrostep * 1.05) << name;
+  }
+}
+
 TEST_F(Path, TakesUpTheBacklashOnTheWay) {
   std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
   for (config::AxisConfig& axis : axes) axis.backlash = 0.0001;

@@ -41,7 +41,8 @@ BoundCourse bound(Profile course, double acceleration = kLimit) {
 
 std::optional<Profile> brake(const std::vector<BoundCourse>& courses, double from,
                              double slice = kSlice, double most = kForEver) {
-  return planBraking(0, {from, 1.0, 0.0}, courses, slice, most, courses.front().curve->duration());
+  return planBraking(0, {from, 1.0, 0.0}, 0.0, courses, slice, most,
+                     courses.front().curve->duration());
 }
 
 /// The largest acceleration of a motor by differences over 20 us.
@@ -77,6 +78,39 @@ TEST(Braking, IsAtRestAtItsEnd) {
   const Piece last = stop->pieces().back();
   EXPECT_EQ(last.velocityAt(last.duration).value(), 0.0);
   EXPECT_NEAR(stop->duration().value(), 900.0 / kLimit, 1e-9);
+}
+
+// At the limit all the time, its speed is v - a t, its place v t - a t^2/2, and the course of speed
+// v + c a s is at the s with that place.
+double timeToFall(double v, double change, double rate) {
+  double low = 0.0;
+  double high = v / kLimit;
+  for (int i = 0; i < 60; ++i) {
+    const double t = (low + high) / 2.0;
+    const double place = v * t - kLimit * t * t / 2.0;
+    const double speed = std::sqrt(v * v + 2.0 * change * kLimit * place);  // of the course
+    (v - kLimit * t > rate * speed ? low : high) = t;
+  }
+  return low;
+}
+
+TEST(Braking, FallsToALowerRateAndKeepsItToTheEnd) {
+  constexpr double kRate = 0.3;
+  for (const double change : {0.0, -0.5, 0.5}) {
+    const std::vector<BoundCourse> one = {bound(courseOf(2000.0, {change * kLimit}, 0.09))};
+    const Profile path = *planBraking(0, {0.0, 1.0, 0.0}, kRate, one, kSlice, kForEver, 0.09);
+    const Piece& last = path.pieces().back();
+    EXPECT_EQ(last.v0, kRate);
+    EXPECT_EQ(last.a, 0.0);
+    EXPECT_NEAR(last.positionAt(last.duration).value(), 0.09, 1e-15);
+    const Piece& before = path.pieces()[path.pieceCount() - 2];
+    EXPECT_NEAR(before.velocityAt(before.duration).value(), kRate, 1e-15);
+    EXPECT_LE(largestAcceleration(one[0], path), 1.01 * kLimit);
+    const double ideal = timeToFall(2000.0, change, kRate);
+    const double fall = path.duration().value() - last.duration.value();
+    EXPECT_GE(fall, 0.999 * ideal) << change;
+    EXPECT_LE(fall, 1.03 * ideal + 2.0 * kSlice) << change;
+  }
 }
 
 TEST(Braking, CannotBrakeAMotorThatDeceleratesAtItsLimitAlready) {
