@@ -82,7 +82,6 @@ inline bool StepFinder::give(Step& step, std::int64_t time_ns) {
   return true;
 }
 
-// Rare or long code stays out of here, so that there is no stack frame.
 bool StepFinder::next(Step& step) {
   const Stretch& s = stretch_;
   if (s.way == s.way_end) return nextOfNewStretch(step);

@@ -88,8 +88,9 @@ class StepFinder {
   bool enterNextOfSum();
   void enter(const Piece& piece, DoubleDouble begin, DoubleDouble end, DoubleDouble piece_start);
   bool give(Step& step, std::int64_t time_ns);
-  bool nextOfNewStretch(Step& step);
-  bool nextOfOther(Step& step, double way);
+  // Rare or long code: inlined, it would give next() a stack frame.
+  [[gnu::noinline]] bool nextOfNewStretch(Step& step);
+  [[gnu::noinline]] bool nextOfOther(Step& step, double way);
   double timeFromAnchor(double way);
   double cubicTime(double way);
   double bracketedTime(double way) const;
