@@ -8,6 +8,7 @@
 
 #include "motion/braking.h"
 #include "motion/profile_parts.h"
+#include "motion/smooth_braking.h"
 #include "stepdriver_core/axis/axis_state.h"
 
 namespace stepdriver::axis {
@@ -21,6 +22,7 @@ constexpr int kTries = 60;             // down to a millionth of the steepest
 constexpr double kFirstDelay = 0.010;  // s
 // Braking as steeply as each place allows: at most this many slopes, none shorter than this.
 constexpr double kMostSlopes = 100.0;
+constexpr double kMostCurves = 40.0;      // with a jerk limit
 constexpr double kShortestSlope = 0.001;  // s
 
 // When a path from planRate() reaches the rate, or its end [s].
@@ -78,17 +80,22 @@ motion::Profile TrajectoryPath::slowDown(std::int64_t at_ns, const motion::Motio
 std::optional<motion::Profile> TrajectoryPath::brake(std::int64_t at_ns,
                                                      const motion::MotionState& from, double rate,
                                                      Bounds bounds, double sooner_than) const {
+  const bool smooth = std::any_of(members_.begin(), members_.end(), [&](const Member& member) {
+    return (member.*bounds).jerk > 0.0;
+  });
+  // The tolerance is for what a trajectory itself may exceed. With a jerk limit it needs that even
+  // at a slightly lower rate.
+  const double part = smooth ? 1.0 : 1.0 / (1.0 + kTrajectoryTolerance);
   std::vector<motion::BoundCourse> courses;
   courses.reserve(members_.size());
   for (const Member& member : members_) {
-    if ((member.*bounds).jerk > 0.0) return std::nullopt;
-    // The tolerance is for what a trajectory itself may exceed.
-    const double most = (member.*bounds).acceleration / (1.0 + kTrajectoryTolerance);
-    courses.push_back({member.curve, {most, 0.0}});
+    const motion::MotorBounds& given = member.*bounds;
+    courses.push_back({member.curve, {part * given.acceleration, given.jerk}});
   }
-  const double slice = std::max(kShortestSlope, sooner_than / kMostSlopes);
-  return motion::planBraking(at_ns, from, rate, courses, slice, sooner_than,
-                             members_.front().curve->duration());
+  const DoubleDouble end = members_.front().curve->duration();
+  const double slice = std::max(kShortestSlope, sooner_than / (smooth ? kMostCurves : kMostSlopes));
+  const auto plan = smooth ? motion::planSmoothBraking : motion::planBraking;
+  return plan(at_ns, from, rate, courses, slice, sooner_than, end);
 }
 
 motion::MotionState TrajectoryPath::restart(DoubleDouble position) const {

@@ -49,7 +49,7 @@ class TrajectoryPath : public SharedPath {
   /// The same, or a steeper fall of the rate.
   motion::Profile slowDown(std::int64_t at, const motion::MotionState& from, double rate,
                            Bounds bounds) const;
-  /// The steepest fall to a rate, if it takes less than a time [s] and no motor has a jerk limit.
+  /// The steepest fall to a rate, if it takes less than a time [s].
   std::optional<motion::Profile> brake(std::int64_t at, const motion::MotionState& from,
                                        double rate, Bounds bounds, double sooner_than) const;
   motion::Profile onPath(const motion::Profile& on_curves) const;

@@ -295,10 +295,6 @@ TEST_F(Path, RunsMoreSlowlyAtASpeedOverride) {
 
 // One slope for the whole fall would have to be that of the sharpest place on its way.
 TEST_F(Path, FallsToASpeedOverrideWithinTheNextCorners) {
-  PathRequest request{{"x", "y"}, {}, false, 0.0, 200e-6};
-  for (int i = 1; i < 60; ++i) {
-    request.segments.push_back(lineTo({0.001 * i, i % 2 == 1 ? 0.0005 : 0.0}));
-  }
   const auto fastest = [&](double time) {
     double most = 0.0;
     for (double t = 0.0; t < time; t += 0.001) {
@@ -307,7 +303,7 @@ TEST_F(Path, FallsToASpeedOverrideWithinTheNextCorners) {
     }
     return most;
   };
-  const CoordinatedMove move = followPath(request);
+  const CoordinatedMove move = followPath(corrugated());
   advance(0.2);
   const double full = fastest(0.1);
   machine().setSpeedOverride(0.5);
@@ -531,6 +527,35 @@ TEST_F(SmoothPath, RunsMoreSlowlyAtASpeedOverride) {
   expectAtRest();
   EXPECT_EQ(bench->pulses("x"), 0);
   expectOnTheCircle();
+  expectLimits(20.0, 10.0);
+}
+
+// A single S-curve would take up to 0.85 s.
+TEST_F(SmoothPath, ComesToRestWithinTheNextCorners) {
+  for (const double at : {0.2, 0.25, 0.3, 0.4}) {
+    const CoordinatedMove move = followPath(corrugated());
+    advance(at);
+    machine().hold();
+    advance(0.25);
+    EXPECT_TRUE(state("x").held);
+    EXPECT_EQ(state("x").velocity, 0.0) << at;
+    machine().resume();
+    EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+    expectLimits(20.0, 10.0);
+    bench->move(0.0, "x");
+    bench->move(0.0, "y");
+  }
+}
+
+TEST_F(SmoothPath, FallsToASpeedOverrideWithinTheNextCorners) {
+  const CoordinatedMove move = followPath(corrugated());
+  advance(0.3);
+  const double full = std::hypot(state("x").velocity, state("y").velocity);
+  machine().setSpeedOverride(0.5);
+  advance(0.15);
+  EXPECT_LE(std::hypot(state("x").velocity, state("y").velocity), 0.51 * full);
+  EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+  EXPECT_EQ(bench->pulses("x"), 59 * 80);
   expectLimits(20.0, 10.0);
 }
 

@@ -71,6 +71,16 @@ inline PathRequest mixed() {
   return request;
 }
 
+/// 59 mm along x in lines of 1 mm, with a corner after each: the axes are at their limits on all of
+/// it.
+inline PathRequest corrugated() {
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 200e-6};
+  for (int i = 1; i < 60; ++i) {
+    request.segments.push_back(lineTo({0.001 * i, i % 2 == 1 ? 0.0005 : 0.0}));
+  }
+  return request;
+}
+
 inline double distanceTo(const Place& point, const Place& a, const Place& b) {
   const double x = b[0] - a[0];
   const double y = b[1] - a[1];
