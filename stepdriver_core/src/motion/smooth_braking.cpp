@@ -84,10 +84,10 @@ class SmoothBraking {
       const RateState after = endOf(piece);
       const bool falls = after.slope <= 0.0 && after.rate.value() > target_;
       if (!falls || !keeps(piece)) continue;
-      std::optional<Piece> end = endOfSlope(after);
+      const std::optional<Piece> end = endOfSlope(after);
       if (after.slope < -kNoSlope && !end) continue;
       latest_ = i;
-      end_of_slope_ = std::move(end);
+      end_of_slope_ = end;
       return piece;
     }
     return std::exchange(end_of_slope_, std::nullopt);
