@@ -8,7 +8,7 @@ usage() {
   cat <<'END'
 usage: scripts/cross.sh [--build] arm64|armhf [ROOM...]
        scripts/cross.sh --board arm64
-       scripts/cross.sh --node arm64 [TEST...]
+       scripts/cross.sh --node arm64|armhf [TEST...]
 
 Builds the core and the tests of the named rooms (folders of test/core; all of them by default) with
 Debian's cross compiler, and runs them under qemu-user; of named rooms, without the tests that take minutes
@@ -24,7 +24,7 @@ with the reason, if something of this isn't available.
   --board  boots Debian's kernel on a whole machine under QEMU instead, and moves the axis of
            examples/move_axis with the GPIO lines of that machine, by libgpiod. QEMU's own record of the
            lines must have each pulse of the move and no other, and the motor enabled for it
-  --node   makes the packages for that processor (scripts/package.sh --arch arm64) instead, and runs their node
+  --node   makes the packages for that processor (scripts/package.sh --arch) instead, and runs their node
            under qemu-user against this computer's build of the named rostests; by default against all but
            those that depend on time, reach into the node's process or start launch files
 END
@@ -45,7 +45,7 @@ case ${1:-} in
 esac
 arch=$1
 case $only-$arch-$# in
-  board-armhf-* | node-armhf-* | board-arm64-[!1]*) usage >&2 && exit 2 ;;
+  board-armhf-* | board-arm64-[!1]*) usage >&2 && exit 2 ;;
 esac
 rooms=("${@:2}")
 

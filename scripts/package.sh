@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/package.sh [--twice] [--try | --arch arm64]
+usage: scripts/package.sh [--twice] [--try | --arch arm64|armhf]
 
 Installs what the build needs, makes the Debian packages of this checkout, shows lintian's findings, and
 leaves the packages in the folder packages of the build folder:
@@ -21,10 +21,10 @@ leaves the packages in the folder packages of the build folder:
   --try    also installs them, runs the tests of debian/tests, and installs a newer version; then removes
            and purges them: nothing may be left. It changes this system, so use it in one that you can
            throw away: scripts/test_in_root.sh bookworm --packages
-  --arch arm64  makes the packages of a Raspberry Pi with 64 bits by Debian's cross compiler, in the folder
-           packages-arm64. The other packages are for any processor: make them without this option. The
-           libraries for arm64 are unpacked as scripts/cross.sh does it, and are in their places only for
-           this build, in a mount namespace: nothing of them is installed
+  --arch arm64|armhf  makes the packages of a Raspberry Pi with 64 or 32 bits by Debian's cross compiler, in
+           the folder packages-arm64 or packages-armhf. The other packages are for any processor: make them
+           without this option. The libraries for that processor are unpacked as scripts/cross.sh does it,
+           and are in their places only for this build, in a mount namespace: nothing of them is installed
 
 Exit code 0: all went well, and lintian had no error and no warning.
 END
@@ -36,7 +36,7 @@ while (($# > 0)); do
     --twice) twice=1 ;;
     --try) try=1 ;;
     --arch)
-      [[ ${2:-} == arm64 ]] || { usage >&2 && exit 2; }
+      [[ ${2:-} == arm64 || ${2:-} == armhf ]] || { usage >&2 && exit 2; }
       arch=$2
       shift
       ;;
