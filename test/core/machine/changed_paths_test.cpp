@@ -18,7 +18,7 @@ namespace {
 using namespace test;  // NOLINT(google-build-using-namespace)
 using axis::MoveEnd;
 
-constexpr double kTolerance = 200e-6;  // m
+constexpr double kCornerTolerance = 200e-6;  // m
 constexpr double kNoJerkLimit = 0.0;
 
 class ChangedPaths : public PathBench, public testing::WithParamInterface<double> {
@@ -30,7 +30,7 @@ class ChangedPaths : public PathBench, public testing::WithParamInterface<double
   }
 
   PathRequest randomPath() {
-    PathRequest request{{"x", "y"}, {}, false, 0.0, kTolerance};
+    PathRequest request{{"x", "y"}, {}, false, 0.0, kCornerTolerance};
     const double size = std::pow(10.0, number(-3.0, -2.0));
     Place place{0.0, 0.0};
     for (int i = 0; i < 40; ++i) {
@@ -72,7 +72,7 @@ TEST_P(ChangedPaths, StayOnThePathAndKeepTheLimits) {
     ASSERT_EQ(result.end, MoveEnd::kReached) << round << ": " << result.message;
     expectAtRest();
     ASSERT_LE(farthest(pulsePlaces(), corners(request)),
-              kTolerance + kHalfMicrosteps + 0.1 * kMicrostep)
+              kCornerTolerance + kHalfMicrosteps + 0.1 * kMicrostep)
         << round;
     constexpr double kApart = 0.02;  // s
     for (const std::string name : {"x", "y"}) {

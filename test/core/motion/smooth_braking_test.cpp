@@ -24,8 +24,8 @@ using motion::Profile;
 
 constexpr double kAcceleration = 40'000.0;  // microsteps/s^2
 constexpr double kJerk = 400'000.0;         // microsteps/s^3
-constexpr double kSlice = 0.002;            // s
-constexpr double kForEver = 100.0;          // s
+constexpr double kShortPart = 0.002;        // s
+constexpr double kAnyTime = 100.0;          // s
 
 std::vector<BoundCourse> atSpeed(double speed) {
   const Piece even{1.0, 0.0, speed, 0.0, 0.0};
@@ -84,10 +84,10 @@ TEST(SmoothBraking, TakesLittleLongerThanAnSCurveWhereThatIsTheFastest) {
     const double ideal = speed > kAcceleration * ramp ? speed / kAcceleration + ramp
                                                       : 2.0 * std::sqrt(speed / kJerk);
     const auto path =
-        planSmoothBraking(0, {0.2, 1.0, 0.0}, 0.0, atSpeed(speed), kSlice, kForEver, 1.0);
+        planSmoothBraking(0, {0.2, 1.0, 0.0}, 0.0, atSpeed(speed), kShortPart, kAnyTime, 1.0);
     ASSERT_TRUE(path) << speed;
     EXPECT_GE(path->duration().value(), 0.999 * ideal) << speed;
-    EXPECT_LE(path->duration().value(), 1.2 * ideal + 2.0 * kSlice) << speed;
+    EXPECT_LE(path->duration().value(), 1.2 * ideal + 2.0 * kShortPart) << speed;
     const Piece& last = path->pieces().back();
     EXPECT_NEAR(last.velocityAt(last.duration).value(), 0.0, 1e-12);
     EXPECT_NEAR(last.accelerationAt(last.duration).value(), 0.0, 1e-12);
@@ -96,7 +96,7 @@ TEST(SmoothBraking, TakesLittleLongerThanAnSCurveWhereThatIsTheFastest) {
 
 TEST(SmoothBraking, EndsTheSlopeAtALowerRateAndKeepsThatToTheEnd) {
   const auto path =
-      planSmoothBraking(0, {0.2, 1.0, 0.0}, 0.4, atSpeed(2000.0), kSlice, kForEver, 1.0);
+      planSmoothBraking(0, {0.2, 1.0, 0.0}, 0.4, atSpeed(2000.0), kShortPart, kAnyTime, 1.0);
   ASSERT_TRUE(path);
   const Piece& last = path->pieces().back();
   EXPECT_EQ(last.v0, 0.4);
@@ -106,21 +106,22 @@ TEST(SmoothBraking, EndsTheSlopeAtALowerRateAndKeepsThatToTheEnd) {
 
 TEST(SmoothBraking, GoesOnFromTheSlopeOfNow) {
   const motion::MotionState falling{0.2, 0.8, -5.0};
-  const auto path = planSmoothBraking(0, falling, 0.0, atSpeed(2000.0), kSlice, kForEver, 1.0);
+  const auto path = planSmoothBraking(0, falling, 0.0, atSpeed(2000.0), kShortPart, kAnyTime, 1.0);
   ASSERT_TRUE(path);
   EXPECT_EQ(path->pieces().front().a, -5.0);
   const motion::MotionState rising{0.2, 0.8, 5.0};
-  EXPECT_FALSE(planSmoothBraking(0, rising, 0.0, atSpeed(2000.0), kSlice, kForEver, 1.0));
+  EXPECT_FALSE(planSmoothBraking(0, rising, 0.0, atSpeed(2000.0), kShortPart, kAnyTime, 1.0));
 }
 
 TEST(SmoothBraking, TellsIfItTakesLongerThanIsOfUse) {
   const auto within = [](double most) {
-    return planSmoothBraking(0, {0.2, 1.0, 0.0}, 0.0, atSpeed(2000.0), kSlice, most, 1.0);
+    return planSmoothBraking(0, {0.2, 1.0, 0.0}, 0.0, atSpeed(2000.0), kShortPart, most, 1.0);
   };
   EXPECT_FALSE(within(0.14));
   EXPECT_TRUE(within(0.18));
   // The course ends before.
-  EXPECT_FALSE(planSmoothBraking(0, {0.95, 1.0, 0.0}, 0.0, atSpeed(2000.0), kSlice, kForEver, 1.0));
+  EXPECT_FALSE(
+      planSmoothBraking(0, {0.95, 1.0, 0.0}, 0.0, atSpeed(2000.0), kShortPart, kAnyTime, 1.0));
 }
 
 TEST(SmoothBraking, KeepsTheLimitsOfAllMotorsAndIsFasterThanOneSCurve) {
@@ -133,7 +134,7 @@ TEST(SmoothBraking, KeepsTheLimitsOfAllMotorsAndIsFasterThanOneSCurve) {
     const double from = std::uniform_real_distribution<double>(0.05, 0.5)(random);
     const double rate = round % 2 == 0 ? 0.0 : 0.5;
     const double one = timeOfOneCurve(courses, from, rate);
-    const auto path = planSmoothBraking(0, {from, 1.0, 0.0}, rate, courses, kSlice, one,
+    const auto path = planSmoothBraking(0, {from, 1.0, 0.0}, rate, courses, kShortPart, one,
                                         courses.front().curve->duration());
     others += one;
     ours += one;
