@@ -246,8 +246,8 @@ double demandBetween(const ContourKnot& from, const ContourKnot& to,
   return most;
 }
 
-// Only the places at which a limit is exceeded become slower: on 500 lines in random directions, the
-// motion is at a limit in every part that takes a second.
+// Only the places at which a limit is exceeded become slower: on 500 lines in random directions,
+// the motion is at a limit in every part that takes a second.
 TEST(SmoothContourMotion, IsNotSlowedDownAsAWholeForOnePlace) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> way(-160.0, 160.0);
