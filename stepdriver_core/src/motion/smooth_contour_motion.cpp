@@ -480,6 +480,8 @@ class SmoothSection {
 
     // [s] No later plan takes less.
     double shortest() const { return shortest_; }
+    // [s] Of the best plan so far.
+    double duration() const { return best_.excess < kUnlimited ? best_.duration() : kUnlimited; }
     // Whether a later plan may be better.
     bool isOpen() const { return open_; }
     const Plan& best() const& { return best_; }
@@ -529,14 +531,14 @@ class SmoothSection {
     std::vector<Rounds> all;
     const auto begin = [&](double time) {
       all.emplace_back(*this, time);
-      return all.back().shortest();
+      return all.back().duration();
     };
     double time = longestAverage();
-    double shortest = begin(time);
+    double duration = begin(time);
     const auto shorten = [&] { return (time *= kShorterBy) > kShortestAverage; };
     while (shorten()) {
-      const double before = std::exchange(shortest, begin(time));
-      if (shortest > before) break;
+      const double before = std::exchange(duration, begin(time));
+      if (duration > before) break;
     }
     if (begin_.average > 0.0) begin(begin_.average);
     for (;;) {
