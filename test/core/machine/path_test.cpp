@@ -78,6 +78,16 @@ class Path : public PathBench {
     expectAtRest();
   }
 
+  /// The highest speed along the path during a time.
+  double fastest(double time) {
+    double most = 0.0;
+    for (double t = 0.0; t < time; t += 0.001) {
+      advance(0.001);
+      most = std::max(most, std::hypot(state("x").velocity, state("y").velocity));
+    }
+    return most;
+  }
+
   void expectNextPathBeginsThere() {
     EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}, false, 0.0, 0.0}).end, MoveEnd::kReached);
     EXPECT_EQ(bench->pulses("x"), 0);
@@ -295,14 +305,6 @@ TEST_F(Path, RunsMoreSlowlyAtASpeedOverride) {
 
 // One slope for the whole fall would have to be that of the sharpest place on its way.
 TEST_F(Path, FallsToASpeedOverrideWithinTheNextCorners) {
-  const auto fastest = [&](double time) {
-    double most = 0.0;
-    for (double t = 0.0; t < time; t += 0.001) {
-      advance(0.001);
-      most = std::max(most, std::hypot(state("x").velocity, state("y").velocity));
-    }
-    return most;
-  };
   const CoordinatedMove move = followPath(corrugated());
   advance(0.2);
   const double full = fastest(0.1);
@@ -549,11 +551,11 @@ TEST_F(SmoothPath, ComesToRestWithinTheNextCorners) {
 
 TEST_F(SmoothPath, FallsToASpeedOverrideWithinTheNextCorners) {
   const CoordinatedMove move = followPath(corrugated());
-  advance(0.3);
-  const double full = std::hypot(state("x").velocity, state("y").velocity);
+  advance(0.2);
+  const double full = fastest(0.1);
   machine().setSpeedOverride(0.5);
   advance(0.15);
-  EXPECT_LE(std::hypot(state("x").velocity, state("y").velocity), 0.51 * full);
+  EXPECT_LE(fastest(0.2), 0.51 * full);
   EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
   EXPECT_EQ(bench->pulses("x"), 59 * 80);
   expectLimits(20.0, 10.0);
