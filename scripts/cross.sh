@@ -12,8 +12,8 @@ usage: scripts/cross.sh [--build] arm64|armhf [ROOM...]
 
 Builds the core and the tests of the named rooms (folders of test/core; all of them by default) with
 Debian's cross compiler, and runs them under qemu-user, but for the search of all pairs of requests; of named
-rooms, without the tests that take minutes there. Then makes a set of motions with that build and with this computer's own, and compares the times of
-their steps, to the nanosecond.
+rooms, without the tests that take minutes there. Then makes a set of motions with that build and with this
+computer's own, and compares the times of their steps, to the nanosecond.
 
 The compiler and the emulator are installed if they are missing. The libraries come from this computer's
 apt sources, and are unpacked into a folder outside the system: its own architectures remain as they are.
