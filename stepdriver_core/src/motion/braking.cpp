@@ -36,13 +36,6 @@ struct Fall {
   }
 };
 
-bool keep(const std::vector<BoundCourse>& courses, const Piece& piece) {
-  const Profile path(0, {piece});
-  return std::all_of(courses.begin(), courses.end(), [&](const BoundCourse& course) {
-    return staysWithin(*course.curve, path, course.bounds);
-  });
-}
-
 // That all motors allow in the whole slice.
 double steepestSlope(const std::vector<BoundCourse>& courses, DoubleDouble place,
                      const Fall& fall) {
@@ -56,12 +49,23 @@ double steepestSlope(const std::vector<BoundCourse>& courses, DoubleDouble place
   const Piece first = fall.piece(place, slope);
   limit_at(first.positionAt(first.duration), first.velocityAt(first.duration).value());
   for (int i = 0; i < kSlopeTries; ++i, slope *= kGentlerSlope) {
-    if (keep(courses, fall.piece(place, slope))) return slope;
+    if (staysWithin(courses, fall.piece(place, slope))) return slope;
   }
   return 0.0;
 }
 
 }  // namespace
+
+bool staysWithin(const std::vector<BoundCourse>& courses, const Piece& piece) {
+  const Profile path(0, {piece});
+  return std::all_of(courses.begin(), courses.end(), [&](const BoundCourse& course) {
+    return staysWithin(*course.curve, path, course.bounds);
+  });
+}
+
+void keepToTheEnd(std::vector<Piece>& pieces, DoubleDouble place, double rate, DoubleDouble end) {
+  if (rate > 0.0) pieces.push_back({(end - place) / DoubleDouble(rate), place, rate, 0.0, 0.0});
+}
 
 std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from, double rate,
                                    const std::vector<BoundCourse>& courses, double slice,
@@ -76,7 +80,7 @@ std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& fro
     place = piece.positionAt(piece.duration);
     if (fall.endsWith(slope)) {
       if (time + piece.duration.value() >= most) return std::nullopt;
-      if (rate > 0.0) pieces.push_back({(end - place) / DoubleDouble(rate), place, rate, 0.0, 0.0});
+      keepToTheEnd(pieces, place, rate, end);
       return Profile(start_ns, std::move(pieces));
     }
     fall.from = piece.velocityAt(piece.duration);

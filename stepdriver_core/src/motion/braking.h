@@ -9,17 +9,23 @@
 
 namespace stepdriver::motion {
 
-/// The motion of one motor along a course, and its limits. Without a jerk limit.
+/// The motion of one motor along a course, and its limits.
 struct BoundCourse {
   std::shared_ptr<const Profile> curve;  ///< q(s), with s in seconds from its start
   MotorBounds bounds;
 };
 
+/// Whether all motors keep to their limits while the rate changes in a piece of the path.
+bool staysWithin(const std::vector<BoundCourse>& courses, const Piece& piece);
+
+/// Adds what keeps a rate from a place [s] to the end of the courses; nothing at a rate of 0.
+void keepToTheEnd(std::vector<Piece>& pieces, DoubleDouble place, double rate, DoubleDouble end);
+
 /// The path s(t) along courses that comes to a lower rate as soon as their limits allow, and keeps
 /// that to the end; a rate of 0 comes to rest. At each place the rate falls as fast as the motor
 /// allows that has the least left. With |q'' s'^2 + q' s''| <= a that is s'' = -(a + q'' s'^2) / q'
 /// for q' > 0, and the same with both signs turned for q' < 0. A lower rate needs less of each
-/// limit, so falling as fast as possible is never wrong later.
+/// limit, so falling as fast as possible is never wrong later. Jerk limits are ignored.
 ///
 /// @param from the current position [s] and rate
 /// @param rate from 0 to the current one

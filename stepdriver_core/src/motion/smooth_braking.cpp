@@ -1,6 +1,5 @@
 #include "motion/smooth_braking.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -118,11 +117,7 @@ class SmoothBraking {
   }
 
   bool keeps(const Piece& piece) const {
-    if (!(piece.positionAt(piece.duration) < end_)) return false;
-    const Profile path(0, {piece});
-    return std::all_of(courses_.begin(), courses_.end(), [&](const BoundCourse& course) {
-      return staysWithin(*course.curve, path, course.bounds);
-    });
+    return piece.positionAt(piece.duration) < end_ && staysWithin(courses_, piece);
   }
 
   const std::vector<BoundCourse>& courses_;
@@ -143,11 +138,7 @@ std::optional<Profile> planSmoothBraking(std::int64_t start_ns, const MotionStat
       SmoothBraking(rate, courses, slice, end)
           .plan({from.position, from.velocity, from.acceleration}, most);
   if (!pieces) return std::nullopt;
-  if (rate > 0.0) {
-    const Piece& last = pieces->back();
-    const DoubleDouble place = last.positionAt(last.duration);
-    pieces->push_back({(end - place) / DoubleDouble(rate), place, rate, 0.0, 0.0});
-  }
+  keepToTheEnd(*pieces, endOf(pieces->back()).place, rate, end);
   return Profile(start_ns, *std::move(pieces));
 }
 
