@@ -216,6 +216,21 @@ TEST_F(MasterTest, ThatForgetsTheNodeLearnsOfItAgain) {
   EXPECT_TRUE(isRegisteredAgain());
 }
 
+// As always in ROS, the name goes to the newer node: the master forgets the older one, and asks it
+// to end.
+TEST_F(MasterTest, ThatKnowsANewerNodeOfTheNameKeepsIt) {
+  start();
+  node.process().signal(SIGSTOP);
+  const std::string service = node.full("service_of_the_newer_one");
+  askMaster("registerService",
+            {node.name(), service, "rosrpc://127.0.0.1:1", "http://127.0.0.1:1/"});
+  sleepFor(1.5);  // the node asks each second, so now it does at once
+  node.process().signal(SIGCONT);
+  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+  expectSays(node.process().output(), "Ending on a shutdown call");
+  EXPECT_EQ(registered(node.name()), std::set<std::string>{"service " + service});
+}
+
 TEST_F(MasterTest, ThatIsLostEndsNoMotion) {
   start();
   ASSERT_TRUE(moveTo(0.1, false).success);  // 5 s

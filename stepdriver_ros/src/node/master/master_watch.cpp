@@ -64,8 +64,21 @@ void MasterWatch::look() {
   }
   const bool known = found->code == 1;
   if (known && !registrations_) registrations_ = Registrations::read(master_, name);
-  if (!known || !registered_) registerAgain();
+  if (!known || !registered_) {
+    const auto other = hasAnotherNode();
+    if (!other) return lose();
+    if (!*other) registerAgain();
+  }
   find();
+}
+
+// A master forgets the older one of two nodes of the same name, and only then asks it to end.
+std::optional<bool> MasterWatch::hasAnotherNode() {
+  const std::string& name = ros::this_node::getName();
+  auto found = master_.call("lookupNode", name, name);
+  if (!found || found->value.getType() != XmlRpc::XmlRpcValue::TypeString) return std::nullopt;
+  return found->code == 1 &&
+         static_cast<std::string>(found->value) != ros::XMLRPCManager::instance()->getServerURI();
 }
 
 void MasterWatch::lose() {

@@ -15,7 +15,8 @@ namespace stepdriver::ros_node {
 
 /// Asks the ROS master each second for this node's emergency stop, and registers all topics and
 /// services again with a master that has forgotten them, because it was restarted or was told so:
-/// roscpp registers only once, and without that no new client would find anything of the node.
+/// roscpp registers only once, and without that no new client would find anything of the node. If a
+/// newer node has taken this one's name, nothing is registered again: the name is that one's.
 class MasterWatch {
  public:
   /// @param on_lost called in the watch's thread each time the master no longer answers.
@@ -44,6 +45,8 @@ class MasterWatch {
   void look();
   void lose();
   void find();
+  /// Whether the master knows another node of this one's name. No value: it doesn't answer.
+  std::optional<bool> hasAnotherNode();
   void registerAgain();
 
   const std::function<void()> on_lost_;
