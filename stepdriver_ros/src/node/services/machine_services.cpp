@@ -10,10 +10,12 @@
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SpeedOverride.h>
 
+#include <chrono>
 #include <exception>
 #include <functional>
 #include <utility>
 
+#include "common/log_throttle.h"
 #include "common/text.h"
 #include "node/calls/bounded.h"
 #include "node/line_request.h"
@@ -67,7 +69,8 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
   try {
     simulation.rig().flushTrace();
   } catch (const Error& error) {
-    ROS_WARN_THROTTLE_NAMED(60.0, "rig", "%s", error.what());
+    static LogThrottle warnings(std::chrono::minutes(1));
+    if (warnings.isDue()) ROS_WARN_NAMED("rig", "%s", error.what());
     response.trace_error = error.what();
   }
   for (const config::AxisConfig& axis : simulation.axes()) {

@@ -4,6 +4,7 @@
 #include <ros/console.h>
 #include <ros/transport_hints.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "stepdriver_core/error.h"
@@ -13,17 +14,18 @@ namespace {
 
 // A stream of messages: an old one is useless when the next has arrived.
 constexpr std::uint32_t kQueuedSetpoints = 1;
-
-void warn(const std::string& why) {
-  ROS_WARN_THROTTLE_NAMED(1.0, "setpoint", "setpoint: %s", why.c_str());
-}
+constexpr std::chrono::seconds kWarnPeriod{1};
 
 }  // namespace
 
 SetpointSubscriber::SetpointSubscriber(ros::NodeHandle node, machine::Machine& machine,
                                        CallQueues& queues, machine::SetpointMode mode,
                                        double timeout)
-    : machine_(machine), mode_(mode), timeout_(timeout), axes_(machine.axes().size()) {
+    : machine_(machine),
+      mode_(mode),
+      timeout_(timeout),
+      warnings_(kWarnPeriod),
+      axes_(machine.axes().size()) {
   node.setCallbackQueue(&queues.streams());
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const boost::function<void(const std_msgs::Float64ConstPtr&)> take_one =
@@ -65,6 +67,10 @@ void SetpointSubscriber::add(std::size_t axis, double value,
   if (mode_ == machine::SetpointMode::kVelocity && value == 0.0) own.stream.end();
   messages.push_back(
       {wanted.config().name, value, own.stream.stopsAtBegin(wanted, ros::WallDuration(timeout_))});
+}
+
+void SetpointSubscriber::warn(const std::string& why) {
+  if (warnings_.isDue()) ROS_WARN_NAMED("setpoint", "setpoint: %s", why.c_str());
 }
 
 void SetpointSubscriber::take(std::size_t first, const std::vector<double>& values) {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/log_throttle.h"
 #include "message_stream.h"
 #include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
@@ -43,10 +44,12 @@ class SetpointSubscriber {
   void take(std::size_t first, const std::vector<double>& values);
   /// Adds the message for an axis, unless its number isn't finite.
   void add(std::size_t axis, double value, std::vector<machine::StreamMessage>& messages);
+  void warn(const std::string& why);
 
   machine::Machine& machine_;
   const machine::SetpointMode mode_;
   const double timeout_;
+  LogThrottle warnings_;
   std::mutex mutex_;
   std::vector<Own> axes_;
   std::deque<ros::Subscriber> subscribers_;
