@@ -73,6 +73,8 @@ timed() {
   trap "times >'$build/log/$1.times'" EXIT
   "$2"
 }
+# kept NAME FUNCTION: the same, and what it prints is also kept in log/stage-NAME.log.
+kept() { timed "$1" "$2" 2>&1 | tee "$build/log/stage-$1.log"; }
 # processor_seconds NAME...: the sum of those.
 processor_seconds() {
   cat "${@/#/$build/log/}" | awk -F '[ms ]+' '{ sum += 60 * ($1 + $3) + $2 + $4 } END { printf "%.0f", sum }'
@@ -90,7 +92,7 @@ stage() {
     return
   done
   say "" "==== $name"
-  run timed "$name" "$function"
+  run kept "$name" "$function"
   if ((run_status == 0)); then
     passed=$((passed + 1))
     conclude "$name" passed "$(took "$name" "$start")"
@@ -100,8 +102,19 @@ stage() {
   else
     failed=$((failed + 1))
     conclude "$name" FAILED "$(took "$name" "$start")"
+    failed_stages+=("$name")
   fi
 }
+# The findings of a stage that failed, and its end, for a reader of the last lines of all output.
+show_failure() {
+  local log=$build/log/stage-$1.log
+  say "" "==== why $1 failed ($log)"
+  grep -E -A 10 "$signs_of_failure" "$log" | head -n 50 || true
+  say "---- its end"
+  tail -n 20 "$log"
+}
+failed_stages=()
+signs_of_failure=': Failure$|[*]{3}(Failed|Exception|Timeout)|\[FAILURE\]|(Thread|Address)Sanitizer:|runtime error:| error: '
 
 # clang-tidy and the builds with sanitizers take longest. They run in the background with low priority,
 # one after the other, from the kernel's stages on: many tests leave them a processor. The stage that needs
@@ -570,6 +583,7 @@ for function in "${later[@]}"; do
   [[ ! -f $build/log/background-$function.times ]] || summary+=$(printf '  %-27s %7d s' "$function" \
     "$(processor_seconds "background-$function.times")")$'\n'
 done
+for name in "${failed_stages[@]}"; do show_failure "$name"; done
 say "" "stage        result    time   processor time" "$summary" \
   "In all $SECONDS s, and $(cd "$build/log" && processor_seconds ./*.times) s of processor time."
 say "$passed passed, $failed failed, $skipped skipped"
