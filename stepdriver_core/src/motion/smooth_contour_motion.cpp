@@ -1,7 +1,6 @@
 #include "smooth_contour_motion.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -15,6 +14,8 @@
 #include "contour_speed.h"
 #include "give_way.h"
 #include "motion/profile.h"
+#include "smooth_demand.h"
+#include "smooth_knots.h"
 
 namespace stepdriver::motion {
 namespace {
@@ -24,8 +25,7 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 // thousandth of its limit: a quintic has 60/h^3 of that.
 constexpr double kClosestKnots = 100e-6;
 constexpr double kMostRounding = 1e-3 / 60.0;
-constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
-constexpr int kMostPlans = 12;         // with one time of the average
+constexpr int kMostPlans = 12;  // with one time of the average
 constexpr double kNoExcess = 1e-3;
 constexpr double kNoPart = 1e-9;          // of a segment
 constexpr double kSquareRounding = 1e-9;  // of the square of a speed
@@ -38,284 +38,6 @@ constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
 constexpr double kNearFoot = 1e-3;             // of the resolution
 constexpr int kMostDivisionRounds = 4;
 constexpr std::size_t kPartsOfDivision = 4;
-
-// The knots of a motion between two stops, at any time.
-class SmoothKnots {
- public:
-  explicit SmoothKnots(std::size_t axes) : axes_(axes) {}
-
-  struct Knot {
-    double time = 0.0;
-    double distance = 0.0;
-    double speed = 0.0;
-    std::size_t interval = 0;
-    std::size_t part = 0;  // of the smoothed motion, that ends or contains it
-    double parameter = 0.0;
-    double acceleration = 0.0;
-    bool even = false;        // see SmoothPart
-    bool ends_curve = false;  // between it and a straight part
-  };
-
-  void append(const Knot& knot, const double* position, const double* first, const double* second) {
-    knots_.push_back(knot);
-    const double square = knot.speed * knot.speed;
-    for (std::size_t j = 0; j < axes_; ++j) {
-      states_.push_back(
-          {position[j], first[j] * knot.speed, first[j] * knot.acceleration + second[j] * square});
-    }
-  }
-  void dropLast() {
-    knots_.pop_back();
-    states_.resize(states_.size() - axes_);
-  }
-
-  struct State {
-    double position = 0.0;
-    double velocity = 0.0;
-    double acceleration = 0.0;
-  };
-
-  std::size_t size() const { return knots_.size(); }
-  const Knot& operator[](std::size_t index) const { return knots_[index]; }
-  const Knot& back() const { return knots_.back(); }
-  const State& state(std::size_t index, std::size_t axis) const {
-    return states_[index * axes_ + axis];
-  }
-
- private:
-  std::size_t axes_;
-  std::vector<Knot> knots_;
-  std::vector<State> states_;
-};
-
-// The largest parts of their limits that the axes use, or 1.
-struct SmoothDemand {
-  double speed = 1.0;
-  double acceleration = 1.0;
-  double jerk = 1.0;
-
-  void include(const SmoothDemand& other) {
-    speed = std::max(speed, other.speed);
-    acceleration = std::max(acceleration, other.acceleration);
-    jerk = std::max(jerk, other.jerk);
-  }
-  double most() const { return std::max({speed, acceleration, jerk}); }
-  // How much slower the motion has to be.
-  double slowdown() const { return std::max({speed, std::sqrt(acceleration), std::cbrt(jerk)}); }
-};
-
-// A quintic over u from 0 to 1.
-class QuinticDemand {
- public:
-  QuinticDemand(const SmoothKnots::State& begin, const SmoothKnots::State& end, double duration)
-      : h_(duration), v0_(begin.velocity), v1_(end.velocity), a0_(begin.acceleration) {
-    const double way = end.position - begin.position;
-    const double v0 = h_ * v0_;
-    const double v1 = h_ * v1_;
-    const double a0 = h_ * h_ * a0_ / 2.0;
-    const double a1 = h_ * h_ * end.acceleration / 2.0;
-    c3_ = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * a0 + a1;
-    c4_ = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * a0 - 2.0 * a1;
-    c5_ = 6.0 * way - 3.0 * v0 - 3.0 * v1 - a0 + a1;
-  }
-
-  SmoothDemand of(const ContourLimits& limits) const {
-    double most_jerk = std::max(std::abs(jerk(0.0)), std::abs(jerk(1.0)));
-    const double level = -c4_ / (5.0 * c5_);
-    if (level > 0.0 && level < 1.0) most_jerk = std::max(most_jerk, std::abs(jerk(level)));
-    SmoothDemand demand;
-    demand.jerk = std::max(demand.jerk, most_jerk / limits.jerk);
-    // Bounds that save the search for the extremes of most quintics.
-    const double above_ends =
-        std::max(std::abs(a0_), std::abs(acceleration(1.0))) + h_ / 2.0 * most_jerk;
-    const double faster = std::max(std::abs(v0_), std::abs(v1_)) + h_ * h_ / 8.0 * most_jerk;
-    const bool accelerates = above_ends > std::min(limits.acceleration, limits.deceleration);
-    const bool is_fast = faster > limits.speed;
-    if (!accelerates && !is_fast) return demand;
-    // The acceleration is monotonic from one of these to the next.
-    std::array<double, 4> turns{0.0, 1.0, 1.0, 1.0};
-    std::size_t count = 1;
-    for (const double u : rootsOfJerk()) {
-      if (u > turns[count - 1] && u < 1.0) turns[count++] = u;
-    }
-    turns[count++] = 1.0;
-    const int direction = directionOf(v0_, v1_);
-    for (std::size_t i = 0; i < count && accelerates; ++i) {
-      const double a = acceleration(turns[i]);
-      demand.acceleration =
-          std::max(demand.acceleration,
-                   std::abs(a) / accelerationTowards(limits, direction, a > 0.0 ? 1 : -1));
-    }
-    if (!is_fast) return demand;
-    const auto take_speed = [&](double u) {
-      demand.speed = std::max(demand.speed, std::abs(velocity(u)) / limits.speed);
-    };
-    take_speed(0.0);
-    take_speed(1.0);
-    for (std::size_t i = 0; i + 1 < count; ++i) {
-      double low = turns[i];
-      double high = turns[i + 1];
-      if (acceleration(low) * acceleration(high) >= 0.0) continue;
-      constexpr int kHalvings = 40;
-      for (int k = 0; k < kHalvings; ++k) {
-        const double middle = (low + high) / 2.0;
-        (acceleration(low) * acceleration(middle) > 0.0 ? low : high) = middle;
-      }
-      take_speed(low);
-    }
-    return demand;
-  }
-
- private:
-  double velocity(double u) const {
-    return v0_ + u * (a0_ * h_ + u * (3.0 * c3_ + u * (4.0 * c4_ + u * 5.0 * c5_)) / h_);
-  }
-  double acceleration(double u) const {
-    return a0_ + u * (6.0 * c3_ + u * (12.0 * c4_ + u * 20.0 * c5_)) / (h_ * h_);
-  }
-  double jerk(double u) const {
-    return (6.0 * c3_ + u * (24.0 * c4_ + u * 60.0 * c5_)) / (h_ * h_ * h_);
-  }
-  // In increasing order; NaN if there is none.
-  std::array<double, 2> rootsOfJerk() const {
-    // 10 c5 u^2 + 4 c4 u + c3 = 0
-    const double root = std::sqrt(4.0 * c4_ * c4_ - 10.0 * c5_ * c3_);
-    const double sum = -(2.0 * c4_ + std::copysign(root, c4_));
-    const double a = sum / (10.0 * c5_);
-    const double b = c3_ / sum;
-    return {std::min(a, b), std::max(a, b)};
-  }
-
-  double h_;
-  double v0_;
-  double v1_;
-  double a0_;
-  double c3_ = 0.0;
-  double c4_ = 0.0;
-  double c5_ = 0.0;
-};
-
-// [unit/s^3] The highest s''' at which the axes keep to their jerk limits on a straight line in the
-// directions of an interval, and build up their accelerations in this time at the earliest.
-double highestJerk(const ContourGrid& grid, std::size_t interval,
-                   const std::vector<ContourLimits>& limits, double time) {
-  double highest = kUnlimited;
-  for (std::size_t j = 0; j < limits.size(); ++j) {
-    const double part =
-        std::max(std::abs(grid.firstAtBegin(interval)[j]), std::abs(grid.firstAtEnd(interval)[j]));
-    const double acceleration = std::max(limits[j].acceleration, limits[j].deceleration);
-    const double jerk = std::min(limits[j].jerk, acceleration / time);
-    if (part > 0.0) highest = std::min(highest, jerk / part);
-  }
-  return highest;
-}
-
-// When a part of a smoothed motion has moved by a distance [s], before it ends.
-double timeTo(const SmoothPart& part, double distance, double duration) {
-  double low = 0.0;
-  double high = duration;
-  double h = duration / 2.0;
-  constexpr int kMostSteps = 60;
-  for (int i = 0; i < kMostSteps && high - low > 1e-13 * duration; ++i) {
-    const double moved =
-        h * (part.speed + h * (part.acceleration / 2.0 + h * part.jerk / 6.0)) - distance;
-    (moved > 0.0 ? high : low) = h;
-    const double speed = part.speed + h * (part.acceleration + h * part.jerk / 2.0);
-    const double newton = h - moved / speed;
-    if (std::abs(newton - h) <= 1e-14 * duration) break;
-    h = newton > low && newton < high ? newton : (low + high) / 2.0;
-  }
-  return h;
-}
-
-// The knots of a smoothed motion: when its jerk changes, and at the places of a grid.
-class KnotMaker {
- public:
-  KnotMaker(const ContourGrid& grid, const std::vector<ContourLimits>& limits,
-            const std::vector<SmoothPart>& parts, double time, double closest)
-      : grid_(grid),
-        limits_(limits),
-        parts_(parts),
-        time_(time),
-        closest_(closest),
-        knots_(grid.axes()) {}
-
-  SmoothKnots make() {
-    appendPlace(0, parts_.front(), 0.0, 0);
-    double jerk = parts_.front().jerk;
-    for (std::size_t k = 0; k + 1 < parts_.size(); ++k) {
-      giveWayAt(k);
-      const SmoothPart& part = parts_[k];
-      const bool becomes_even = k > 0 && part.even && !parts_[k - 1].even;
-      if (becomes_even || std::abs(part.jerk - jerk) >
-                              kSmallChange * highestJerk(grid_, interval_, limits_, time_)) {
-        appendBegin(part, k);
-        jerk = part.jerk;
-      }
-      const SmoothPart& next = parts_[k + 1];
-      while (interval_ + 1 < grid_.size() && begin_ + grid_[interval_].length < next.distance) {
-        const bool straight = grid_[interval_].straight;
-        const bool curved = !straight || !grid_[interval_ + 1].straight;
-        begin_ += grid_[interval_].length;
-        ++interval_;
-        if (!curved) continue;
-        const double moved = begin_ - part.distance;
-        const double h = moved > 0.0 ? timeTo(part, moved, next.time - part.time) : 0.0;
-        // Without a knot there, a long quintic on a straight part would begin on the curve.
-        const bool ends_curve = straight != grid_[interval_].straight;
-        if (ends_curve && tooClose(part.time + h) && knots_.size() > 1 &&
-            !knots_.back().ends_curve) {
-          knots_.dropLast();
-        }
-        appendPlace(interval_, part, h, k, ends_curve);
-      }
-    }
-    if (knots_.size() > 1 && parts_.back().time - knots_.back().time < closest_) {
-      knots_.dropLast();
-    }
-    appendPlace(grid_.size(), parts_.back(), 0.0, parts_.size() - 1);
-    return std::move(knots_);
-  }
-
- private:
-  bool tooClose(double time) const {
-    return knots_.size() > 0 && time - knots_.back().time < closest_;
-  }
-
-  void appendBegin(const SmoothPart& part, std::size_t index) {
-    if (tooClose(part.time)) return;
-    const double parameter = grid_.evaluateAt(interval_, part.distance - begin_, point_);
-    knots_.append({part.time, part.distance, part.speed, interval_, index, parameter,
-                   part.acceleration, part.even},
-                  point_.position.data(), point_.first.data(), point_.second.data());
-  }
-
-  void appendPlace(std::size_t place, const SmoothPart& part, double h, std::size_t index,
-                   bool ends_curve = false) {
-    if (tooClose(part.time + h)) return;
-    const std::size_t before = place == 0 ? 0 : place - 1;
-    const double* first = place == 0 ? grid_.firstAtBegin(0) : grid_.firstAtEnd(before);
-    const double* second = place == 0 ? grid_.secondAtBegin(0) : grid_.secondAtEnd(before);
-    const double speed = part.speed + h * (part.acceleration + h * part.jerk / 2.0);
-    const double distance =
-        part.distance + h * (part.speed + h * (part.acceleration / 2.0 + h * part.jerk / 6.0));
-    const bool even = part.even && (h == 0.0 || parts_[index + 1].even);
-    knots_.append({part.time + h, distance, speed, before, index,
-                   place == 0 ? grid_[0].from : grid_[before].to, part.acceleration + h * part.jerk,
-                   even, ends_curve},
-                  grid_.position(place), first, second);
-  }
-
-  const ContourGrid& grid_;
-  const std::vector<ContourLimits>& limits_;
-  const std::vector<SmoothPart>& parts_;
-  double time_;     // of the average
-  double closest_;  // [s] knots
-  SmoothKnots knots_;
-  ContourPoint point_;
-  std::size_t interval_ = 0;  // that contains the motion
-  double begin_ = 0.0;        // of it [unit]
-};
 
 // The motion between two stops, or from a speed to a stop.
 class SmoothSection {
@@ -623,7 +345,7 @@ class SmoothSection {
       return impossible(limits_.size());
     }
     const std::vector<SmoothPart> parts = smoothed(places, time, moves());
-    Plan plan{KnotMaker(grid, limits_, parts, time, closestKnots()).make(), {}, {}};
+    Plan plan{makeKnots(grid, limits_, parts, time, closestKnots()), {}, {}};
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
       plan.segments.push_back(grid[plan.knots[i].interval].segment);
       plan.straight.push_back(i + 1 < plan.knots.size() && isEven(plan.knots, i, parts, grid));
@@ -766,9 +488,8 @@ class SmoothSection {
       giveWayAt(i);
       SmoothDemand demand;
       for (std::size_t j = 0; j < limits_.size(); ++j) {
-        demand.include(QuinticDemand(knots.state(i - 1, j), knots.state(i, j),
-                                     knots[i].time - knots[i - 1].time)
-                           .of(limits_[j]));
+        demand.include(demandOf(knots.state(i - 1, j), knots.state(i, j),
+                                knots[i].time - knots[i - 1].time, limits_[j]));
       }
       worst.include(demand);
       if (demand.most() < 1.0 + kNoDifference) continue;
