@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "gentle_corners.h"
 #include "give_way.h"
 
 namespace stepdriver::motion {
@@ -15,7 +16,6 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmooth = 1e-6;                   // rad: no corner
 constexpr double kSharpest = 170.0 / 180.0 * kPi;  // rad: beyond that, it is a stop
-constexpr double kMidRounding = 3.0 / 8.0;         // m(0)/d
 constexpr double kMostBend = 0.0108;               // of |n(w) - w|w||/(4 d^2)
 constexpr double kEven = 1e-6;                     // of the curvature: no jump
 constexpr double kGentle = 30.0 / 180.0 * kPi;     // rad: roundings may overlap
@@ -36,168 +36,6 @@ double norm(const std::vector<double>& powers, std::size_t axes) {
   for (std::size_t i = 0; i < axes; ++i) sum += powers[2 * i + 1] * powers[2 * i + 1];
   return std::sqrt(sum);
 }
-
-// Corners of lines, one after the other, whose roundings may overlap, see Contour.
-class GentleCorners {
- public:
-  /// @param begin [unit] of the first line, and `end` of the last one: no rounding is beyond them.
-  GentleCorners(double begin, double end) : begin_(begin), end_(end) {}
-
-  /// @param length of the line before it. @param turn sin(turn/2). @param distance of its rounding
-  ///   if it overlaps no other one. @param fixed its rounding can't be changed. @param kept [unit]
-  ///   the part of the line that is kept as it is, apart from fixed roundings.
-  void append(double length, double turn, double distance, double tolerance, bool fixed,
-              double kept) {
-    const double before = corners_.empty() ? 0.0 : corners_.back().place;
-    if (kept > 0.0) begin_ = std::max(begin_, before + kept);
-    corners_.push_back({before + length, turn, distance, distance, tolerance, begin_, fixed});
-  }
-
-  std::vector<double> widened() {
-    end_ += corners_.back().place;
-    yieldToFixed();
-    for (std::size_t i = 0; i < corners_.size(); ++i) {
-      giveWay(i);
-      widen(i);
-    }
-    bool fits = false;
-    for (int i = 0; i < kMostPasses && !fits; ++i) fits = narrow();
-    std::vector<double> distances;
-    for (const Corner& corner : corners_) {
-      distances.push_back(fits ? corner.distance : corner.least);
-    }
-    return distances;
-  }
-
- private:
-  static constexpr int kMostPasses = 30;
-  static constexpr int kHalvings = 30;
-  static constexpr std::size_t kMostNeighbours = 32;  // at each side
-  static constexpr double kMostTurns = 0.5;
-  static constexpr double kInside = 1.0 - 1e-9;  // so that rounding passes no end
-
-  struct Corner {
-    double place;
-    double turn;
-    double least;
-    double distance;
-    double tolerance;
-    double begin;  // no rounding before it, if it isn't fixed
-    bool fixed;
-    double taken = 0.0;  // of the tolerance, by fixed roundings
-  };
-
-  // (m(w) - |w|)/d for y = |w|/d
-  static double roundingAt(double y) {
-    return y < 1.0 ? kMidRounding + y * y * (0.75 - 0.125 * y * y) - y : 0.0;
-  }
-
-  std::size_t firstNear(std::size_t corner) const {
-    return corner - std::min(corner, kMostNeighbours);
-  }
-  std::size_t lastNear(std::size_t corner) const {
-    return std::min(corner + kMostNeighbours, corners_.size() - 1);
-  }
-
-  double turnsWithin(std::size_t index, double distance) const {
-    double turns = 0.0;
-    for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
-      if (std::abs(corners_[i].place - corners_[index].place) < distance) turns += corners_[i].turn;
-    }
-    return turns;
-  }
-
-  // Fixed roundings leave less of the tolerance to the others. If corners have been added near a
-  // fixed one, their roundings don't overlap with it: others did already.
-  void yieldToFixed() {
-    for (std::size_t k = 0; k < corners_.size(); ++k) {
-      if (!corners_[k].fixed || corners_[k].distance == 0.0) continue;
-      const Corner& fixed = corners_[k];
-      for (std::size_t i = firstNear(k); i <= lastNear(k); ++i) {
-        Corner& other = corners_[i];
-        if (other.fixed || other.turn == 0.0) continue;
-        const double away = std::abs(other.place - fixed.place);
-        other.taken += fixed.turn * fixed.distance * roundingAt(away / fixed.distance);
-      }
-    }
-    for (Corner& corner : corners_) {
-      if (corner.fixed || corner.turn == 0.0) continue;
-      const double most = std::max(0.0, corner.tolerance - corner.taken);
-      corner.least = corner.distance = std::min(corner.least, most / (kMidRounding * corner.turn));
-    }
-    for (std::size_t k = 0; k < corners_.size(); ++k) {
-      const Corner& fixed = corners_[k];
-      if (!fixed.fixed || turnsWithin(k, 2.0 * fixed.distance) <= kMostTurns) continue;
-      for (std::size_t i = k + 1; i <= lastNear(k); ++i) {
-        Corner& other = corners_[i];
-        const double end = fixed.place + fixed.distance;
-        other.begin = std::max(other.begin, std::min(end, other.place - other.least));
-      }
-    }
-  }
-
-  bool allows(std::size_t index, double distance) const {
-    const Corner& corner = corners_[index];
-    double deviation = 0.0;
-    for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
-      const double away = std::abs(corners_[i].place - corner.place);
-      deviation += corners_[i].turn * distance * roundingAt(away / distance);
-    }
-    return turnsWithin(index, 2.0 * distance) <= kMostTurns && deviation <= corner.tolerance;
-  }
-
-  void widen(std::size_t index) {
-    Corner& corner = corners_[index];
-    if (corner.turn == 0.0 || corner.fixed) return;
-    // Twice the distance is within the neighbours that are counted.
-    double high = kInside * std::min(corner.place - corner.begin, end_ - corner.place);
-    if (index >= kMostNeighbours) {
-      high = std::min(high, (corner.place - corners_[firstNear(index)].place) / 2.0);
-    }
-    if (index + kMostNeighbours < corners_.size()) {
-      high = std::min(high, (corners_[lastNear(index)].place - corner.place) / 2.0);
-    }
-    double low = corner.distance;
-    for (int i = 0; i < kHalvings && low < high; ++i) {
-      const double middle = (low + high) / 2.0;
-      (allows(index, middle) ? low : high) = middle;
-    }
-    corner.distance = low;
-  }
-
-  // Of the roundings where their sum exceeds a tolerance. @return whether none did.
-  bool narrow() {
-    bool fits = true;
-    std::vector<double> factors(corners_.size(), 1.0);
-    for (std::size_t k = 0; k < corners_.size(); ++k) {
-      if (corners_[k].turn == 0.0) continue;
-      double deviation = 0.0;
-      for (std::size_t i = firstNear(k); i <= lastNear(k); ++i) {
-        const double away = std::abs(corners_[i].place - corners_[k].place);
-        deviation +=
-            corners_[i].turn * corners_[i].distance * roundingAt(away / corners_[i].distance);
-      }
-      constexpr double kRounding = 1e-9;
-      if (deviation <= corners_[k].tolerance * (1.0 + kRounding)) continue;
-      fits = false;
-      const double factor = std::sqrt(corners_[k].tolerance / deviation);
-      for (std::size_t i = firstNear(k); i <= lastNear(k); ++i) {
-        if (std::abs(corners_[i].place - corners_[k].place) < corners_[i].distance) {
-          factors[i] = std::min(factors[i], factor);
-        }
-      }
-    }
-    for (std::size_t i = 0; i < corners_.size(); ++i) {
-      if (corners_[i].fixed) continue;
-      corners_[i].distance = std::max(corners_[i].least, corners_[i].distance * factors[i]);
-    }
-    return fits;
-  }
-
-  double begin_;
-  double end_;
-  std::vector<Corner> corners_;
-};
 
 double distanceOf(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> way(a);

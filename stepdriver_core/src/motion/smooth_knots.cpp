@@ -13,7 +13,7 @@ namespace {
 constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
 
 // When a part of a smoothed motion has moved by a distance [s], before it ends.
-double timeTo(const SmoothPart& part, double distance, double duration) {
+double timeUntilMoved(const SmoothPart& part, double distance, double duration) {
   double low = 0.0;
   double high = duration;
   double h = duration / 2.0;
@@ -61,7 +61,7 @@ class KnotMaker {
         ++interval_;
         if (!curved) continue;
         const double moved = begin_ - part.distance;
-        const double h = moved > 0.0 ? timeTo(part, moved, next.time - part.time) : 0.0;
+        const double h = moved > 0.0 ? timeUntilMoved(part, moved, next.time - part.time) : 0.0;
         // Without a knot there, a long quintic on a straight part would begin on the curve.
         const bool ends_curve = straight != grid_[interval_].straight;
         if (ends_curve && tooClose(part.time + h) && knots_.size() > 1 &&
