@@ -23,7 +23,8 @@ constexpr double kShortestSegment = 1e-3;  // microsteps of one of its axes
 constexpr double kSameEnds = 2e-3;
 constexpr double kHalfTurn = 3.14159265358979323846;  // rad
 
-// More than half a turn.
+// More than half a turn around the given centre. The angle of the arc is that around its moved
+// centre, which may be between the ends where the given one is in line with them.
 bool isLargeArc(const std::array<double, 2>& from, const std::array<double, 2>& centre,
                 const std::array<double, 2>& to, bool clockwise) {
   const double begin = std::atan2(from[1] - centre[1], from[0] - centre[0]);
