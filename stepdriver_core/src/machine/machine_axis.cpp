@@ -59,7 +59,10 @@ axis::Move MachineAxis::moveRounds(double rounds, double velocity) {
 std::optional<axis::MoveResult> MachineAxis::result(const axis::Move& move) const {
   if (move.outcome == nullptr) return std::nullopt;
   auto ended = move.outcome->get();
-  if (ended) return ended;
+  if (ended) {
+    shell_.awaitTurn();
+    return ended;
+  }
   // Nobody waits until the chip answers.
   std::string why = shell_.whyHung();
   if (why.empty()) return std::nullopt;
@@ -114,6 +117,7 @@ std::vector<axis::HomingResult> homeTogether(Shell& shell, const std::vector<Axi
     ask(shell, CancelHoming{accepted.ids});
     shell.wait(over_or_cancelled);
   }
+  shell.awaitTurn();
   std::vector<axis::HomingResult> results;
   results.reserve(accepted.outcomes.size());
   for (const auto& outcome : accepted.outcomes) results.push_back(*outcome->get());

@@ -181,6 +181,11 @@ void Shell::wait(const std::function<bool()>& ready, bool often) {
   }
 }
 
+void Shell::awaitTurn() {
+  std::unique_lock<std::mutex> lock(answers_mutex_);
+  answered_.wait(lock, [this, begun = turns_begun_.load()] { return turns_ended_ >= begun; });
+}
+
 std::string Shell::whyHung() const {
   const std::lock_guard<std::mutex> lock(answers_mutex_);
   return why_hung_;
@@ -469,6 +474,7 @@ void Shell::handle(decltype(Input::what) what) {
   input.stops_asked = engine_.stopsAsked();
   input.what = std::move(what);
   if (recorder_ != nullptr) recorder_->addInput(input);
+  ++turns_begun_;
   controller_.handle(input, out);
   due_ = controller_.due();
   watches_ = controller_.watchesInputs();
@@ -487,6 +493,7 @@ void Shell::carryOut(const Input& input, activity::Outputs& out) {
       if (waiting != answers_.end()) waiting->second.reply = std::move(reply);
     }
     ++turns_;
+    ++turns_ended_;
   }
   answered_.notify_all();
   if (out.stops) engine_.stopAtOnce();

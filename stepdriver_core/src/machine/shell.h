@@ -59,6 +59,10 @@ class Shell : public pulse::NewsListener {
   /// @throw GpioError if the pulse thread hangs.
   void wait(const std::function<bool()>& ready, bool often = false);
 
+  /// Returns once a turn of the controller that is under way has ended: what it has set an outcome
+  /// for can be seen in state() and snapshot() then.
+  void awaitTurn();
+
   /// Only without threads: lets the clock run for a while.
   void advance(pulse::Nanoseconds time);
 
@@ -144,6 +148,7 @@ class Shell : public pulse::NewsListener {
   std::condition_variable answered_;
   std::unordered_map<activity::CallId, Call> answers_;
   std::uint64_t turns_ = 0;
+  std::uint64_t turns_ended_ = 0;  // of the controller
   std::string why_hung_;
   std::shared_ptr<const MachineSnapshot> snapshot_;
 
@@ -152,6 +157,7 @@ class Shell : public pulse::NewsListener {
   std::atomic<bool> news_hold_{false};  // the clock is held for news that hasn't been handled yet
 
   // Of the thread that runs the controller.
+  std::atomic<std::uint64_t> turns_begun_{0};  // which others read
   std::deque<pulse::Command> outbox_;
   std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
   EngineNews news_seen_;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <thread>
 
 #include "support/homing_bench.h"
 
@@ -36,6 +37,30 @@ TEST(VirtualTime, DoesNotPassWhatASwitchSaysHoweverLateTheThreads) {
       EXPECT_NEAR(result.position, carriage, 2.0 * test::kStep) << i << ", " << result.axis;
     }
   }
+}
+
+// Each axis has a client, so the machine often handles something of the other axis when a motion
+// ends.
+TEST(VirtualTime, ShowsAtOnceWhatAMotionThatEndedHasLeft) {
+  Bench bench({shortHoming("x"), shortHoming("y")}, true, 0.0);
+  const auto move_and_home = [](axis::Axis& axis) {
+    axis.setPosition(0.0);
+    for (int i = 0; i < 150 && !testing::Test::HasFailure(); ++i) {
+      const axis::MoveResult moved = axis.wait(axis.moveTo(-0.0985));
+      ASSERT_EQ(moved.end, axis::MoveEnd::kReached) << moved.message;
+      const axis::AxisState after_move = axis.state();
+      EXPECT_FALSE(after_move.moving) << i;
+      EXPECT_EQ(after_move.position, moved.position) << i;
+      const axis::HomingResult homed = axis.home();
+      ASSERT_EQ(homed.end, HomingEnd::kHomed) << homed.message;
+      const axis::AxisState after_homing = axis.state();
+      EXPECT_TRUE(after_homing.homed) << i;
+      EXPECT_EQ(after_homing.position, homed.position) << i;
+    }
+  };
+  std::thread other([&] { move_and_home(bench.axis("y")); });
+  move_and_home(bench.axis("x"));
+  other.join();
 }
 
 }  // namespace
