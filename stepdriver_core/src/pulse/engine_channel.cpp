@@ -71,7 +71,7 @@ void EngineChannel::follow(const Follow& order) {
     const Successors::Entry first{order.profile, order.serial, order.settles};
     shared != nullptr ? shared->begin(*this, first) : adopt(first);
     last_planned = order.profile.startNs();
-    late = 0;
+    late = behind = 0;
     running = false;
   } else {
     successors.add({order.profile, order.serial, order.settles});

@@ -32,6 +32,11 @@ struct EngineChannel {
   /// The planned interval between the last step and the next one. @pre There is a next one.
   Nanoseconds interval() const { return next->time_ns - last_planned; }
 
+  /// How much longer than planned it is since the last step of the motion; 0 before its first one.
+  Nanoseconds overdue(Nanoseconds now) const {
+    return running && next ? now - rose - interval() : 0;
+  }
+
   /// It moves at a speed at which the motor can't start or stop at once.
   bool isFast() const { return running && next && interval() < restart_interval; }
 
@@ -106,6 +111,7 @@ struct EngineChannel {
   std::optional<motion::Step> next;
   Nanoseconds last_planned = 0;  // motion time of the step before, or of the profile's start
   Nanoseconds late = 0;          // of the next step, so far
+  Nanoseconds behind = 0;        // overdue() of the last step when its write had ended
 
   // Clock times at which the writes of the last edges had ended.
   Nanoseconds rose = 0;

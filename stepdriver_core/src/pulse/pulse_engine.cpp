@@ -396,20 +396,24 @@ void PulseEngine::collectDue(Nanoseconds now) {
   dues_.collect(now, due_);
 }
 
-// Returns whether the timeline slid, so that other channels are due now.
+// A delay in a pulse, or in a write, puts off the next step: then that one isn't late, but has come
+// too long after the last one. Returns whether the timeline slid, so that other channels are due
+// now.
 bool PulseEngine::meetLateness(Nanoseconds now) {
   Nanoseconds excess = 0;
   for (const std::size_t index : due_) {
     Channel& channel = channels_[index];
+    if (channel.action() != Action::kRise) continue;
     const Nanoseconds late = now - dues_[index];
-    if (late == 0 || channel.action() != Action::kRise) continue;
+    const Nanoseconds worst = std::max({late, channel.overdue(now), channel.behind});
+    if (late == 0 && worst <= max_lateness_) continue;
     channel.late = std::max(channel.late, late);
     const bool too_late =
-        late > max_lateness_ &&
+        worst > max_lateness_ &&
         (channel.shared != nullptr ? channel.shared->isFast(now - state_.slipped - late)
                                    : channel.isFast());
     if (too_late) {
-      channel.state.end_lateness = late;
+      channel.state.end_lateness = worst;
       end(channel, EndReason::kTooLate, now);
       continue;
     }
@@ -526,6 +530,7 @@ void PulseEngine::written(Channel& channel, Nanoseconds now) {
       return;
     }
   }
+  channel.behind = channel.overdue(now);
   channel.rose = now;
   ++state_.pulses;
   state_.worst_lateness = std::max(state_.worst_lateness, channel.late);

@@ -120,7 +120,8 @@ void SharedMotors::begin(EngineChannel& axis, const Successors::Entry& followed)
     since_ = followed.profile.startNs();
     for (EngineChannel* motor : motors_) {
       motor->last_planned = since_;
-      motor->late = 0;
+      motor->late = motor->behind = 0;
+      motor->running = false;
     }
   }
   seed();

@@ -38,17 +38,19 @@ class DelayedLine : public PulseEngineTest {
  protected:
   static constexpr double kRestartSpeed = 400.0;  // [microsteps/s]
 
-  void startLine(double speed) {
-    make({config(0), config(1), config(2)}, kMaxLateness);
+  void startLine(double speed, std::size_t axes = kAxes) {
+    std::vector<ChannelConfig> configs;
+    for (std::size_t i = 0; i < axes; ++i) configs.push_back(config(static_cast<int>(i)));
+    make(configs, kMaxLateness);
     const auto way = static_cast<std::int64_t>(speed);
     const motion::Profile path =
         motion::planFromRest(kMillisecond, 0, way, {0.0, speed, 4.0 * speed, 4.0 * speed});
-    for (std::size_t i = 0; i < kAxes; ++i) {
+    for (std::size_t i = 0; i < axes; ++i) {
       profiles.push_back(std::make_unique<motion::Profile>(motion::scaled(path, 0.0, kScales[i])));
       follows.push_back({static_cast<int>(i), ++serial, profiles.back().get(), 0,
                          std::llround(1e9 / kRestartSpeed), 7});
     }
-    postFollows(kAxes);
+    postFollows(axes);
   }
 
   std::vector<motion::Step> planOf(std::size_t axis) const {
@@ -129,6 +131,63 @@ INSTANTIATE_TEST_SUITE_P(
                     Delay{"FiveMillisecondsSlow", 5 * kMillisecond, 300.0, false},
                     Delay{"FiftyMillisecondsSlow", 50 * kMillisecond, 300.0, false},
                     Delay{"HalfASecondSlow", 500 * kMillisecond, 300.0, false}),
+    [](const auto& delay) { return delay.param.name; });
+
+struct DelayInPulse {
+  const char* name;
+  bool in_write;  ///< of the first edge of a pulse; otherwise between the two edges
+  Nanoseconds length;
+  double speed;  ///< of the path [microsteps/s]
+  bool faults;
+};
+
+void PrintTo(const DelayInPulse& delay, std::ostream* out) {  // NOLINT: GoogleTest's name
+  *out << delay.name;
+}
+
+class DelaysInPulses : public DelayedLine, public testing::WithParamInterface<DelayInPulse> {};
+
+// Afterwards no step is late: the next one is put off by the end of the pulse.
+TEST_P(DelaysInPulses, BunchNothingAndFaultWhereTheyMust) {
+  startLine(GetParam().speed, 1);
+  runUntil(500 * kMillisecond);
+  Nanoseconds due = engine->serve();
+  while (lines.levels[0]) {
+    clock.waitUntil(due);
+    due = engine->serve();
+  }
+  clock.waitUntil(due);
+  if (GetParam().in_write) lines.write_cost = GetParam().length;
+  engine->serve();
+  lines.write_cost = 0;
+  ASSERT_TRUE(lines.levels[0]);
+  const std::size_t made = risesOf(0).size();
+  if (!GetParam().in_write) clock.waitUntil(clock.now() + GetParam().length);
+  runOut();
+  expectNothingBunched(0);
+  const ChannelState state = engine->channel(0);
+  EXPECT_EQ(state.count, static_cast<std::int64_t>(risesOf(0).size()));
+  EXPECT_FALSE(lines.levels[0]);
+  if (!GetParam().faults) {
+    EXPECT_EQ(state.end, EndReason::kDone);
+    EXPECT_EQ(risesOf(0).size(), planOf(0).size());
+    return;
+  }
+  EXPECT_EQ(state.end, EndReason::kTooLate);
+  EXPECT_GT(state.end_lateness, kMaxLateness);
+  EXPECT_TRUE(state.end_abrupt);
+  EXPECT_EQ(risesOf(0).size(), made);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    , DelaysInPulses,
+    testing::Values(
+        DelayInPulse{"FourMillisecondsFast", false, 4 * kMillisecond, 20'000.0, false},
+        DelayInPulse{"FiftyMillisecondsFast", false, 50 * kMillisecond, 20'000.0, true},
+        DelayInPulse{"FiftyMillisecondsSlow", false, 50 * kMillisecond, 300.0, false},
+        DelayInPulse{"WriteOfFourMillisecondsFast", true, 4 * kMillisecond, 20'000.0, false},
+        DelayInPulse{"WriteOfFiftyMillisecondsFast", true, 50 * kMillisecond, 20'000.0, true},
+        DelayInPulse{"WriteOfFiftyMillisecondsSlow", true, 50 * kMillisecond, 300.0, false}),
     [](const auto& delay) { return delay.param.name; });
 
 TEST_F(DelayedLine, CountsOnceWhereTheWriteIsSlowToo) {
