@@ -60,6 +60,10 @@ void EngineChannel::adopt(const Successors::Entry& followed) {
   look_at = 0;
 }
 
+Nanoseconds EngineChannel::restartInterval() const {
+  return shared != nullptr ? shared->restartInterval() : restart_interval;
+}
+
 void EngineChannel::follow(const Follow& order) {
   restart_interval = order.restart_interval;
   group = order.group;

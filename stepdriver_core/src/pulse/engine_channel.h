@@ -32,13 +32,18 @@ struct EngineChannel {
   /// The planned interval between the last step and the next one. @pre There is a next one.
   Nanoseconds interval() const { return next->time_ns - last_planned; }
 
-  /// How much longer than planned it is since the last step of the motion; 0 before its first one.
+  /// How much longer than planned it is since the last step, if the motor can't stop or start at
+  /// once between them; otherwise 0.
   Nanoseconds overdue(Nanoseconds now) const {
-    return running && next ? now - rose - interval() : 0;
+    if (!running || !next || interval() >= restartInterval()) return 0;
+    return now - rose - interval();
   }
 
   /// It moves at a speed at which the motor can't start or stop at once.
   bool isFast() const { return running && next && interval() < restart_interval; }
+
+  /// Steps with this interval or a longer one can begin and end at once.
+  Nanoseconds restartInterval() const;
 
   /// The next step is obsolete: it would come after the first successor has begun.
   bool isSucceeded() const {

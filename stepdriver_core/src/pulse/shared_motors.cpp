@@ -65,11 +65,16 @@ bool SharedMotors::isReserved() const {
                      [](const EngineChannel* axis) { return axis->reserved; });
 }
 
+Nanoseconds SharedMotors::restartInterval() const {
+  Nanoseconds longest = 0;
+  for (const EngineChannel* axis : axes_) longest = std::max(longest, axis->restart_interval);
+  return longest;
+}
+
 bool SharedMotors::isFast(Nanoseconds motion_now) const {
   std::array<double, motion::kMostTerms> velocities{};
-  Nanoseconds restart = 0;
+  const Nanoseconds restart = restartInterval();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
-    restart = std::max(restart, axes_[i]->restart_interval);
     if (!axes_[i]->follows()) continue;
     velocities.at(i) = axes_[i]->profile.stateAt(motion_now).velocity;
   }

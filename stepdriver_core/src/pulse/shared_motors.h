@@ -32,6 +32,8 @@ class SharedMotors {
   bool isReserved() const;
   /// A motor moves at a speed at which it can't start or stop at once.
   bool isFast(Nanoseconds motion_now) const;
+  /// The longest of the axes, see EngineChannel::restartInterval().
+  Nanoseconds restartInterval() const;
   /// See EngineChannel::madeUntil().
   Nanoseconds madeUntil() const;
 

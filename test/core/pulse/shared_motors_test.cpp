@@ -101,6 +101,40 @@ TEST_F(SharedMotorsTest, AProfileThatTakesOverMakesNoStepBeforeIt) {
   EXPECT_EQ(engine->channel(1).count, 2);
 }
 
+TEST_F(SharedMotorsTest, ADelayInAPulseOfAFastMotorIsAFault) {
+  restart_interval = 2'000'000;
+  follow(cruise(1'000'000, 0, 100, 1000.0), 0);
+  runUntil(50'000'000);
+  Nanoseconds due = engine->serve();
+  while (!lines.levels[0]) {
+    clock.waitUntil(due);
+    due = engine->serve();
+  }
+  const std::size_t before = pulses(0);
+  clock.waitUntil(clock.now() + 50'000'000);
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kTooLate);
+  EXPECT_EQ(pulses(0), before);
+  EXPECT_EQ(pulses(1), before);
+}
+
+// The motor of their sum stands still for a second, in which the other one is late now and then.
+TEST_F(SharedMotorsTest, ManyDelaysTogetherAreNoDelayOfAMotorThatStoodStill) {
+  restart_interval = 2'000'000;
+  follow(profileOf(1'000'000, {{0.02, 1000.0}, {1.0, 1000.0}, {0.02, 1000.0}}), 0);
+  follow(profileOf(1'000'000, {{0.02, 0.0}, {1.0, -1000.0}, {0.02, 0.0}}), 1);
+  for (int i = 1; i <= 10; ++i) {
+    runUntil(i * 80'000'000);
+    clock.waitUntil(clock.now() + 2'000'000);
+  }
+  EXPECT_GT(engine->state().slipped, 5'000'000);
+  runOut();
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(1).end, EndReason::kDone);
+  EXPECT_EQ(pulses(0), 40U);
+  EXPECT_EQ(pulses(1), 2040U);
+}
+
 TEST_F(SharedMotorsTest, NoOrderIsFollowedWhileThePinsOfAChipAreWritten) {
   Command reserve;
   reserve.kind = Command::Kind::kReserve;
