@@ -47,7 +47,8 @@ struct MachineOptions {
   /// Threads of the machine serve its pulses and calls. If false, waiting calls and advance() serve
   /// the pulses: for tests on a virtual clock.
   bool threaded = true;
-  /// A pulse that comes later than this at a speed that the motor can't restart from is a fault.
+  /// A pulse that comes later than this, or so much longer after the last one than planned, at a
+  /// speed that the motor can't restart from is a fault.
   double max_lateness = 0.005;  ///< [s]
   /// On a real clock, first measure what step rates this computer and its lines can sustain.
   bool measure = false;
