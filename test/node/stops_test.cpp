@@ -247,8 +247,7 @@ TEST(Fault, OfALineThatFailsEndsTheMoveAndIsShown) {
   EXPECT_EQ(node.pulses(), pulses);
 }
 
-// On the rig's clock it looks the same as with real lines: the next pulse is late. A clock that a
-// busy computer has let fall behind its pace takes less of a suspension for a stall.
+// On the rig's clock it looks the same as with real lines: the next pulse is late.
 TEST(SuspendedNode, EndsItsMoveByAFault) {
   NodeUnderTest node;
   node.set("simulation/speed", 1.0);
