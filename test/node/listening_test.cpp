@@ -110,7 +110,8 @@ TEST(Listening, NodeOnTheLoopbackIsClosedToOtherComputers) {
   NodeUnderTest node;
   node.start();
   expectListens(node.process().pid(), true, kPortsOfNode);
-  EXPECT_EQ(node.process().output().find("WARN"), std::string::npos) << node.process().output();
+  EXPECT_EQ(node.process().output().find("tells others"), std::string::npos)
+      << node.process().output();
 }
 
 TEST(Listening, NodeWithAnAddressIsOpenToOtherComputers) {
