@@ -72,6 +72,7 @@ timed() {
   # shellcheck disable=SC2064  # this name, not that of a function called from here
   trap "times >'$build/log/$1.times'" EXIT
   "$2"
+  exit  # bash 5.0 forgets the trap without it
 }
 # kept NAME FUNCTION: the same, and what it prints is also kept in log/stage-NAME.log.
 kept() { timed "$1" "$2" 2>&1 | tee "$build/log/stage-$1.log"; }
