@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Checks package.xml: rosdep must know each key, and scripts/packages.txt must have its Debian package.
+The Debian package of the programs must depend on each module that one of its Python programs imports.
 
 usage: test/docs/packages_test.py
 
@@ -8,6 +9,7 @@ dependency needs a line here, with the package of its rule for Debian 12. A key 
 libboost-program-options, whose rules end with Debian 11, is refused.
 """
 
+import ast
 import re
 import sys
 import xml.etree.ElementTree as xml
@@ -38,7 +40,39 @@ ROS_KEYS = set(
 WITHOUT_KEY = {"python3-svgelements"}
 
 
+# In the Debian package itself, and one in whose place a program takes its own messages.
+OWN_MODULES = {"stepdriver", "stepdriver_plots"}
+WITH_SUBSTITUTE = {"control_msgs"}
+
+
+def imported_by(program):
+    for node in ast.walk(ast.parse(pages.text_of(program))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.module
+
+
+def python_packages_of(program):
+    modules = {name.split(".")[0] for name in imported_by(program)}
+    modules -= sys.stdlib_module_names | OWN_MODULES | WITH_SUBSTITUTE
+    return {"python3-" + name.replace("_", "-") for name in modules}
+
+
+def missing_from_control():
+    stanza = re.search(r"^Package: ros-stepdriver\n(?:.+\n)+", pages.text_of("debian/control"), re.MULTILINE).group()
+    lines = re.search(r"^Depends:\n((?: .*\n)+)", stanza, re.MULTILINE).group(1)
+    depends = set(re.findall(r"^ ([a-z0-9-]+)", lines, re.MULTILINE))
+    programs = [path for path in (pages.ROOT / "stepdriver_ros/scripts").rglob("*") if path.is_file()]
+    programs += (pages.ROOT / "examples/first_programs").glob("*.py")
+    for path in sorted(programs):
+        program = path.relative_to(pages.ROOT)
+        for package in sorted(python_packages_of(program) - depends - WITHOUT_KEY):
+            yield f"debian/control: ros-stepdriver doesn't depend on {package}, which {program} needs"
+
+
 def problems():
+    yield from missing_from_control()
     keys = {
         element.text.strip()
         for element in xml.fromstring(pages.text_of("package.xml"))
