@@ -125,10 +125,11 @@ try_development() {
     $after
     cmake --build --preset dev -j $jobs --target stepdriver_generate_messages"
 }
-# roslaunch ends by the interrupt after its start, in order.
+# roslaunch ends by the interrupt after its start, in order. Docker lets a container find itself by its name, but
+# this isolation doesn't.
 try_node() {
   in_container "$container" -- bash -euc '
-    timeout --signal=INT 30 roslaunch stepdriver axis.launch || (($? == 124))' \
+    ROS_IP=127.0.0.1 timeout --signal=INT 30 roslaunch stepdriver axis.launch || (($? == 124))' \
     >"$build/log/container-launch.log" 2>&1
   grep -F 'Ready: 1 axis' "$build/log/container-launch.log"
 }

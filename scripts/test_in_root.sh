@@ -22,22 +22,23 @@ The base root is kept in ~/.cache/stepdriver/roots (or in the folder that STEPDR
 the next time; the working copy is removed at the end.
 
   --blank  uses a folder whose path contains a blank: catkin can't build there, so the build goes
-           elsewhere
+           elsewhere. Not with --packages
   --demo   only runs scripts/demo.sh, once: a newcomer's first command
-  --packages  only runs scripts/package.sh --twice --try: makes the Debian packages and tries them
+  --packages  only runs scripts/package.sh --twice, and then tries the Debian packages that it made in
+           another clean root, by scripts/package.sh --try
   --arch arm64|armhf  only runs scripts/cross.sh for that processor: builds the core with a cross compiler,
            and runs all of its tests under an emulator
   --keep   keeps the working copy, and prints its path
 END
 }
 
-suite='' keep='' only='' checkout=/home/user/stepdriver
+suite='' keep='' only='' packages='' checkout=/home/user/stepdriver
 while (($# > 0)); do
   case $1 in
     bookworm | trixie | focal) suite=$1 ;;
     --blank) checkout="/home/new user/step driver" ;;
     --demo) only=demo.sh ;;
-    --packages) only='package.sh --twice --try' ;;
+    --packages) only='package.sh --twice' packages=1 ;;
     --arch)
       [[ ${2:-} == arm64 || ${2:-} == armhf ]] || { usage >&2 && exit 2; }
       only="cross.sh $2"
@@ -50,6 +51,7 @@ while (($# > 0)); do
   shift
 done
 [[ -n $suite ]] || { usage >&2 && exit 2; }
+[[ -z $packages || $checkout != *' '* ]] || { usage >&2 && exit 2; }
 [[ -z $only || $suite != focal ]] || die "on Ubuntu only scripts/test.sh --core --node can be tried"
 (($(id -u) == 0)) || die "needs root, for debootstrap and chroot: sudo $0 $suite"
 
@@ -66,49 +68,59 @@ make_base_root "$suite"
 
 # ---- the copy ----
 
-work=$(mktemp -d "$roots/$suite.XXXXXX")
-remove_work() {
-  if [[ -n $keep ]]; then
-    say "Kept: $work"
-  else
-    rm -rf --one-file-system "$work"
-  fi
+copies=()
+remove_copies() {
+  local copy
+  for copy in "${copies[@]}"; do
+    if [[ -n $keep ]]; then
+      say "Kept: $copy"
+    else
+      rm -rf --one-file-system "$copy"
+    fi
+  done
 }
-at_exit remove_work
-say "Copying the checkout into a clean $suite in $work"
-cp -a "$base/." "$work/"
-connect_root "$work"
-# As an installer of Debian writes it.
-printf '127.0.0.1 localhost\n127.0.1.1 %s\n' "$(hostname)" >"$work/etc/hosts"
+at_exit remove_copies
 
-mkdir -p "$work$checkout"
-if git -C "$root" rev-parse --is-inside-work-tree >/dev/null 2>&1; then
-  (cd "$root" && git ls-files -z --cached --others --exclude-standard) |
-    while IFS= read -r -d '' name; do
-      [[ ! -e $root/$name ]] || printf '%s\0' "$name"
-    done | tar -C "$root" --null -T - -c
-else
-  tar -C "$root" --exclude=./build --exclude=./.git -c .
-fi | tar -C "$work$checkout" --no-same-owner -x
+# make_copy: a clean root with the checkout, in $work.
+make_copy() {
+  work=$(mktemp -d "$roots/$suite.XXXXXX")
+  copies+=("$work")
+  say "Copying the checkout into a clean $suite in $work"
+  cp -a "$base/." "$work/"
+  connect_root "$work"
+  # As an installer of Debian writes it.
+  printf '127.0.0.1 localhost\n127.0.1.1 %s\n' "$(hostname)" >"$work/etc/hosts"
+
+  mkdir -p "$work$checkout"
+  if git -C "$root" rev-parse --is-inside-work-tree >/dev/null 2>&1; then
+    (cd "$root" && git ls-files -z --cached --others --exclude-standard) |
+      while IFS= read -r -d '' name; do
+        [[ ! -e $root/$name ]] || printf '%s\0' "$name"
+      done | tar -C "$root" --null -T - -c
+  else
+    tar -C "$root" --exclude=./build --exclude=./.git -c .
+  fi | tar -C "$work$checkout" --no-same-owner -x
+}
+make_copy
 
 # ---- the run ----
 
 # The run has its own mount and process namespaces, if that is allowed: whatever it mounts or starts
 # ends with it.
-inside=(chroot "$work")
+enter=(chroot)
 if unshare --mount --pid --fork --kill-child true 2>/dev/null; then
   # shellcheck disable=SC2016
-  inside=(unshare --mount --pid --fork --kill-child bash -c '
+  enter=(unshare --mount --pid --fork --kill-child bash -c '
     # The root of a system is a mount point, and some programs depend on it.
     mount --bind "$1" "$1" && mount -t proc proc "$1/proc" && mount -t tmpfs tmpfs "$1/dev/shm" &&
       mount -t devpts -o ptmxmode=0666 devpts "$1/dev/pts" || true
-    exec chroot "$@"' in_root "$work")
+    exec chroot "$@"' in_root)
 else
   say "Namespaces aren't allowed here: continuing without /proc, /dev/shm and /dev/pts"
 fi
 
 in_root() {
-  "${inside[@]}" /usr/bin/env -i HOME=/root LANG=C.UTF-8 \
+  "${enter[@]}" "$work" /usr/bin/env -i HOME=/root LANG=C.UTF-8 \
     PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
     ${http_proxy+http_proxy="$http_proxy"} ${https_proxy+https_proxy="$https_proxy"} \
     ${no_proxy+no_proxy="$no_proxy"} ${underlay:+STEPDRIVER_UNDERLAY="$underlay"} "$@"
@@ -149,14 +161,25 @@ fi
 
 exit_codes=''
 worst=0
-for command in "${commands[@]}"; do
-  say "" "######## $suite: scripts/$command"
-  start=$SECONDS
-  # shellcheck disable=SC2086
-  run in_root bash "$checkout/scripts/"$command
-  exit_codes+=" $command exit code $run_status after $((SECONDS - start)) s;"
+# try_command SCRIPT [OPTION...]
+try_command() {
+  local start=$SECONDS
+  say "" "######## $suite: scripts/$*"
+  run in_root bash "$checkout/scripts/$1" "${@:2}"
+  exit_codes+=" $* exit code $run_status after $((SECONDS - start)) s;"
   ((run_status == 0)) || worst=1
+}
+for command in "${commands[@]}"; do
+  read -ra words <<<"$command"
+  try_command "${words[@]}"
 done
+# What the build needs would hide what a package forgets to depend on.
+if [[ -n $packages ]] && ((worst == 0)); then
+  made=$work$checkout/build/packages
+  make_copy
+  cp -a "$made" "$work/made-packages"
+  try_command package.sh --try /made-packages
+fi
 
 say "" "On a clean $suite:${exit_codes%;}"
 ((worst == 0))
