@@ -38,8 +38,6 @@ ROS_KEYS = set(
 )
 # Needed by an installed program, but rosdep has no key for them: docs/first_programs.md names them.
 WITHOUT_KEY = {"python3-svgelements"}
-
-
 # In the Debian package itself, and one in whose place a program takes its own messages.
 OWN_MODULES = {"stepdriver", "stepdriver_plots"}
 WITH_SUBSTITUTE = {"control_msgs"}
@@ -63,10 +61,9 @@ def missing_from_control():
     stanza = re.search(r"^Package: ros-stepdriver\n(?:.+\n)+", pages.text_of("debian/control"), re.MULTILINE).group()
     lines = re.search(r"^Depends:\n((?: .*\n)+)", stanza, re.MULTILINE).group(1)
     depends = set(re.findall(r"^ ([a-z0-9-]+)", lines, re.MULTILINE))
-    programs = [path for path in (pages.ROOT / "stepdriver_ros/scripts").rglob("*") if path.is_file()]
-    programs += (pages.ROOT / "examples/first_programs").glob("*.py")
-    for path in sorted(programs):
-        program = path.relative_to(pages.ROOT)
+    for program in pages.own_files():
+        if not re.match(r"stepdriver_ros/scripts/(?!.*\.pyc$)|examples/first_programs/.*\.py$", program):
+            continue
         for package in sorted(python_packages_of(program) - depends - WITHOUT_KEY):
             yield f"debian/control: ros-stepdriver doesn't depend on {package}, which {program} needs"
 

@@ -101,6 +101,18 @@ void waitForText(NodeProcess& process, const std::string& text) {
       << "it doesn't print " << text << ": " << process.output();
 }
 
+// Of anything but the limits that Ubuntu's roscpp doesn't have.
+bool warns(const std::string& output) {
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("WARN") != std::string::npos &&
+        line.find("Large messages have no common limit") == std::string::npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // An address for documentation: no computer has it.
 constexpr const char* kOtherAddress = "192.0.2.1";
 
@@ -110,8 +122,7 @@ TEST(Listening, NodeOnTheLoopbackIsClosedToOtherComputers) {
   NodeUnderTest node;
   node.start();
   expectListens(node.process().pid(), true, kPortsOfNode);
-  EXPECT_EQ(node.process().output().find("tells others"), std::string::npos)
-      << node.process().output();
+  EXPECT_FALSE(warns(node.process().output())) << node.process().output();
 }
 
 TEST(Listening, NodeWithAnAddressIsOpenToOtherComputers) {
