@@ -18,6 +18,7 @@ TEST(TableUnits, ConvertTheNumbersOfTheDriversTexts) {
             "the velocity 200 mm/s is above the maximum 100 mm/s, from the configuration"},
            {"the jerk 2 m/s^3 is above 1e-05 m/s^3", "the jerk 2000 mm/s^3 is above 0.01 mm/s^3"},
            {"0.1 m", "100.0000 mm"},
+           {"from 0.1 m,0.2 m", "from 100.0000 mm,200.0000 mm"},
        }) {
     EXPECT_EQ(inTableUnits(text), wanted);
   }

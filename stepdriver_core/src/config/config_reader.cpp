@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <regex>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "message_text.h"
+#include "stepdriver_core/pattern.h"
 #include "stepdriver_core/printable.h"
 
 namespace stepdriver::config {
@@ -50,14 +52,15 @@ std::string shownWithType(const ConfigValue& value) {
 /// How to write a number with an exponent that YAML 1.1 takes for text: "1e6" as 1.0e+6. Empty if
 /// the value is none.
 std::string exponentHint(const ConfigValue& value) {
-  static const std::regex number("([-+]?[0-9]+)(\\.[0-9]*)?[eE]([-+]?)([0-9]+)");
+  static const Pattern number("^([-+]?[0-9]+)([.][0-9]*)?[eE]([-+]?)([0-9]+)$");
   const auto* text = value.as<std::string>();
-  std::smatch parts;
-  if (text == nullptr || !std::regex_match(*text, parts, number)) return "";
-  const std::string fraction = parts[2].length() > 1 ? parts[2].str() : ".0";
-  const std::string sign = parts[3].length() > 0 ? parts[3].str() : "+";
-  return fmt::format("; write {}{}e{}{}, because YAML reads {} as text", parts[1].str(), fraction,
-                     sign, parts[4].str(), *text);
+  if (text == nullptr) return "";
+  const std::vector<std::string_view> parts = number.find(*text);
+  if (parts.empty()) return "";
+  const std::string_view fraction = parts[2].size() > 1 ? parts[2] : ".0";
+  const std::string_view sign = parts[3].empty() ? "+" : parts[3];
+  return fmt::format("; write {}{}e{}{}, because YAML reads {} as text", parts[1], fraction, sign,
+                     parts[4], *text);
 }
 
 const ConfigValue::Map* mapOrIssue(const ConfigValue& value, const std::string& name,

@@ -8,9 +8,10 @@
 #include <cstdlib>
 #include <limits>
 #include <optional>
-#include <regex>
+#include <string>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/pattern.h"
 
 namespace stepdriver::yaml {
 namespace {
@@ -26,18 +27,11 @@ std::string without(const std::string& text, char unwanted) {
   return rest;
 }
 
-/// Making one takes much longer than matching it: each is made once.
-std::regex pattern(const char* text) { return std::regex(text, std::regex::extended); }
-
-bool matches(const std::string& text, const std::regex& pattern) {
-  return std::regex_match(text, pattern);
-}
-
 std::optional<bool> booleanOf(const std::string& text) {
-  static const std::regex yes = pattern("yes|Yes|YES|true|True|TRUE|on|On|ON");
-  static const std::regex no = pattern("no|No|NO|false|False|FALSE|off|Off|OFF");
-  if (matches(text, yes)) return true;
-  if (matches(text, no)) return false;
+  static const Pattern yes("^(yes|Yes|YES|true|True|TRUE|on|On|ON)$");
+  static const Pattern no("^(no|No|NO|false|False|FALSE|off|Off|OFF)$");
+  if (yes.matches(text)) return true;
+  if (no.matches(text)) return false;
   return {};
 }
 
@@ -66,9 +60,9 @@ Signed signOf(const std::string& text) {
 
 /// @return the number as a double, which holds every int of 32 bits exactly.
 std::optional<double> integerOf(const std::string& text) {
-  static const std::regex integer = pattern(
-      "[-+]?(0b[01_]+|0[0-7_]+|0|[1-9][0-9_]*|0x[0-9a-fA-F_]+|[1-9][0-9_]*(:[0-5]?[0-9])+)");
-  if (!matches(text, integer)) return {};
+  static const Pattern integer(
+      "^[-+]?(0b[01_]+|0[0-7_]+|0|[1-9][0-9_]*|0x[0-9a-fA-F_]+|[1-9][0-9_]*(:[0-5]?[0-9])+)$");
+  if (!integer.matches(text)) return {};
   const auto [sign, digits] = signOf(without(text, '_'));
   if (digits.find(':') != std::string::npos) return sign * sexagesimal(digits);
   int base = 10;
@@ -83,17 +77,17 @@ std::optional<double> integerOf(const std::string& text) {
 }
 
 std::optional<double> realOf(const std::string& text) {
-  static const std::regex nan = pattern("[.](nan|NaN|NAN)");
-  static const std::regex infinity = pattern("[-+]?[.](inf|Inf|INF)");
-  static const std::regex in_sixties = pattern("[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+[.][0-9_]*");
-  static const std::regex decimal =
-      pattern("[-+]?[0-9][0-9_]*[.][0-9_]*([eE][-+][0-9]+)?|[.][0-9][0-9_]*([eE][-+][0-9]+)?");
-  if (matches(text, nan)) return std::numeric_limits<double>::quiet_NaN();
-  if (matches(text, infinity)) {
+  static const Pattern nan("^[.](nan|NaN|NAN)$");
+  static const Pattern infinity("^[-+]?[.](inf|Inf|INF)$");
+  static const Pattern in_sixties("^[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+[.][0-9_]*$");
+  static const Pattern decimal(
+      "^([-+]?[0-9][0-9_]*[.][0-9_]*([eE][-+][0-9]+)?|[.][0-9][0-9_]*([eE][-+][0-9]+)?)$");
+  if (nan.matches(text)) return std::numeric_limits<double>::quiet_NaN();
+  if (infinity.matches(text)) {
     return signOf(text).sign * std::numeric_limits<double>::infinity();
   }
-  const bool sixties = matches(text, in_sixties);
-  if (!sixties && !matches(text, decimal)) return {};
+  const bool sixties = in_sixties.matches(text);
+  if (!sixties && !decimal.matches(text)) return {};
   const auto [sign, digits] = signOf(without(text, '_'));
   return sign * (sixties ? sexagesimal(digits) : std::strtod(digits.c_str(), nullptr));
 }
@@ -146,13 +140,13 @@ ConfigValue integerValue(double number, const std::string& text) {
 }  // namespace
 
 ConfigValue resolveScalar(const std::string& text) {
-  static const std::regex nothing = pattern("~|null|Null|NULL|");
-  static const std::regex angle = pattern("(deg|rad)[(][^)]*[)]");
-  if (matches(text, nothing)) return {};
+  static const Pattern nothing("^(~|null|Null|NULL)?$");
+  static const Pattern angle("^(deg|rad)[(][^)]*[)]$");
+  if (nothing.matches(text)) return {};
   if (const auto flag = booleanOf(text)) return {*flag};
   if (const auto integer = integerOf(text)) return integerValue(*integer, text);
   if (const auto number = realOf(text)) return {*number};
-  if (matches(text, angle)) return angleOf(text);
+  if (angle.matches(text)) return angleOf(text);
   return {text};
 }
 

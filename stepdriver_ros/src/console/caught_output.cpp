@@ -7,9 +7,9 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <regex>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/pattern.h"
 
 namespace stepdriver::console {
 
@@ -44,10 +44,13 @@ std::vector<std::string> CaughtOutput::lines() {
   while ((size = read(pipe_, buffer.data(), buffer.size())) > 0) {
     partial_.append(buffer.data(), static_cast<std::size_t>(size));
   }
-  static const std::regex colours("\033\\[[0-9;]*m");
+  static const Pattern colour("\033\\[[0-9;]*m");
   std::vector<std::string> lines;
   for (std::size_t end = 0; (end = partial_.find('\n')) != std::string::npos;) {
-    const std::string line = std::regex_replace(partial_.substr(0, end), colours, "");
+    std::string line = partial_.substr(0, end);
+    for (auto found = colour.find(line); !found.empty(); found = colour.find(line)) {
+      line.erase(static_cast<std::size_t>(found[0].data() - line.data()), found[0].size());
+    }
     if (!line.empty()) lines.push_back(line);
     partial_.erase(0, end + 1);
   }

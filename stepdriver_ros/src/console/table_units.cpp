@@ -4,10 +4,11 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <regex>
+#include <string_view>
 
 #include "common/text.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/pattern.h"
 
 namespace stepdriver::console {
 
@@ -27,24 +28,26 @@ std::string moveText(const std::string& axis, const TableUnits& units, double ta
 
 std::string inTableUnits(const std::string& text) {
   // A number, its unit, and what it is per: none for a position, `/s` for a speed.
-  static const std::regex quantity(
-      R"((^|[^\w.])(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?) (m|rad)((?:/s(?:\^\d)?)?)(?![\w/^]))");
+  static const Pattern quantity(
+      "(^|[^[:alnum:]_.])(-?[0-9]+([.][0-9]+)?(e[-+]?[0-9]+)?) (m|rad)((/s(\\^[0-9])?)?)"
+      "([^[:alnum:]_/^]|$)");
   std::string converted;
-  auto rest = text.cbegin();
-  for (std::sregex_iterator match(text.begin(), text.end(), quantity), end; match != end; ++match) {
-    const bool linear = (*match)[3] == "m";
+  std::size_t done = 0;
+  for (auto parts = quantity.find(text); !parts.empty(); parts = quantity.find(text, done)) {
+    const bool linear = parts[5] == "m";
     const auto kind = linear ? config::Kind::kLinear : config::Kind::kRotary;
     const double value =
-        std::strtod((*match)[2].str().c_str(), nullptr) * config::configUnitsPerUnit(kind);
+        std::strtod(std::string(parts[2]).c_str(), nullptr) * config::configUnitsPerUnit(kind);
     const std::string unit = linear ? "mm" : "deg";
-    const std::string per = (*match)[4];
-    converted.append(rest, (*match)[0].first);
-    converted += (*match)[1].str() +
-                 (per.empty() ? positionText(value, unit)
-                              : fmt::format("{} {}{}", ros_node::roundedText(value), unit, per));
-    rest = (*match)[0].second;
+    const std::string_view per = parts[6];
+    const auto begin = static_cast<std::size_t>(parts[2].data() - text.data());
+    converted.append(text, done, begin - done);
+    converted += per.empty() ? positionText(value, unit)
+                             : fmt::format("{} {}{}", ros_node::roundedText(value), unit, per);
+    // The character after it may be the one before the next.
+    done = static_cast<std::size_t>(per.data() + per.size() - text.data());
   }
-  return converted.append(rest, text.cend());
+  return converted.append(text, done);
 }
 
 }  // namespace stepdriver::console

@@ -224,6 +224,7 @@ TEST(ConfigReader, SaysHowYamlWantsAnExponent) {
   EXPECT_NE(hint("-2.5E3").find("write -2.5e+3,"), std::string::npos) << hint("-2.5E3");
   EXPECT_NE(hint("1.e-3").find("write 1.0e-3,"), std::string::npos) << hint("1.e-3");
   EXPECT_EQ(hint("fast"), "/n/key: is \"fast\" (a string), but must be a number above 0");
+  EXPECT_EQ(hint(std::string(100'000, '1')).rfind("/n/key: is \"111", 0), 0U);
 }
 
 TEST(ConfigReader, NamesTheNearestKnownKey) {
