@@ -21,6 +21,9 @@ namespace stepdriver::ros_node {
 /// actions. A stamp in the future counts as the time of arrival: actionlib applies a cancel to all
 /// goals up to its stamp, and doesn't check whether a sum of stamps is beyond the last time that
 /// ros::Time can represent.
+///
+/// An action that has one defines its destructor in its source file: otherwise every file that uses
+/// the action compiles all of actionlib's server for it.
 template <typename Action>
 class ActionServer : public actionlib::ActionServerBase<Action> {
   using Base = actionlib::ActionServerBase<Action>;

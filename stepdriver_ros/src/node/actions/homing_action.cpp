@@ -27,6 +27,8 @@ HomingAction::HomingAction(const ros::NodeHandle& node, axis::Axis& axis, Action
         home(goal, cancelled);
       }) {}
 
+HomingAction::~HomingAction() = default;
+
 void HomingAction::home(Goals::GoalHandle& goal, const std::function<bool()>& cancelled) {
   HomingReports reports;
   HomeResult answer;
@@ -64,6 +66,8 @@ MachineHomingAction::MachineHomingAction(const ros::NodeHandle& node, machine::M
     : machine_(machine),
       goals_(node, "homing", statuses,
              [this](auto& goal, const auto& cancelled) { home(goal, cancelled); }) {}
+
+MachineHomingAction::~MachineHomingAction() = default;
 
 void MachineHomingAction::home(Goals::GoalHandle& goal, const std::function<bool()>& cancelled) {
   HomingReports reports;

@@ -34,6 +34,7 @@ class HomingAction {
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
   /// @param axis, statuses outlive the action; before its end the machine has been shut down.
   HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses);
+  ~HomingAction();
 
  private:
   using Goals = SerialAction<HomeAction>;
@@ -51,6 +52,7 @@ class MachineHomingAction {
   /// @param machine, statuses outlive the action; before its end the machine has been shut down.
   MachineHomingAction(const ros::NodeHandle& node, machine::Machine& machine,
                       ActionStatuses& statuses);
+  ~MachineHomingAction();
 
  private:
   using Goals = SerialAction<HomeAxesAction>;

@@ -12,6 +12,8 @@ AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis,
   start();
 }
 
+AxisMoveAction::~AxisMoveAction() = default;
+
 FollowingMove AxisMoveAction::begin(const GoalHandle& handle) {
   const auto goal = handle.getGoal();
   FollowingMove following;

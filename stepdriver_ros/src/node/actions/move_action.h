@@ -29,6 +29,7 @@ class AxisMoveAction : public MotionAction<MoveAction, FollowingMove> {
   /// @param begun is called when a goal has begun: from then on poll() must be called.
   AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses,
                  std::function<void()> begun);
+  ~AxisMoveAction() override;
 
  private:
   FollowingMove begin(const GoalHandle& handle) override;

@@ -57,6 +57,8 @@ TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine
   start();
 }
 
+TrajectoryAction::~TrajectoryAction() = default;
+
 // ---- goals and cancels ----
 
 TrajectoryJoint TrajectoryAction::jointOf(const std::string& name) const {

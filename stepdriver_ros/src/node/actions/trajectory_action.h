@@ -45,6 +45,7 @@ class TrajectoryAction
   /// @param allow_slower see machine::TrajectoryRequest.
   TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
                    ActionStatuses& statuses, bool allow_slower);
+  ~TrajectoryAction() override;
 
  private:
   using Following = FollowingTrajectory;
