@@ -207,9 +207,13 @@ discard_foreign_build() {
   grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$from" "$into/CMakeCache.txt" || rm -rf "$into"
 }
 
+# With 2 GB for each compiler, none collects its garbage: it takes 7 % of its time.
+roomy=
+memory=$(sed -n 's/^MemTotal: *\([0-9]*\) kB/\1/p' /proc/meminfo 2>/dev/null) || memory=0
+((memory / jobs < 2000000)) || roomy=' --param=ggc-min-heapsize=524288'  # kB
 # With -g1 a backtrace names each line, and the compiler is a third faster than with all that a debugger
 # could show.
-build_type=(-DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG")
+build_type=(-DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG$roomy")
 
 configure() {
   local from=$1 into=$2
