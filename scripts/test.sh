@@ -224,10 +224,12 @@ compiled_together_by() {
   sed -nE 's|^ *"file": "(.*/Unity/[^"]*)".*|\1|p' "$build/tidy/$1/compile_commands.json"
 }
 # tidy BUILD [OPTION...]: the files on standard input.
+# clang doesn't know all of gcc's options.
 tidy() {
   local name=$1
   shift
   /usr/bin/python3 -B "$root/scripts/tidy.py" "$build/tidy/$name" "$@" \
+    --extra-arg={-Wno-unknown-warning-option,-Qunused-arguments} \
     --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/"
 }
 
