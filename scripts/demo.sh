@@ -91,7 +91,7 @@ choose_build_folder
 [[ $installed == packaged ]] || install_packages core ros trace
 if [[ -z $installed ]]; then
   rm -rf "$ROS_HOME/log"
-  say "Building: the first time this takes about three minutes of processor time" \
+  say "Building: the first time this takes two to three minutes of processor time" \
     "    (in another terminal: tail -f $build/log/build.log)"
   quietly build build_demo
   quietly install cmake --install "$build/demo/catkin"
