@@ -207,7 +207,7 @@ discard_foreign_build() {
   grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$from" "$into/CMakeCache.txt" || rm -rf "$into"
 }
 
-# With 2 GB for each compiler, none collects its garbage: it takes 7 % of its time.
+# If each compiler has 2 GB, it begins to collect its garbage later: that takes 7 % of its time.
 roomy=
 memory=$(sed -n 's/^MemTotal: *\([0-9]*\) kB/\1/p' /proc/meminfo 2>/dev/null) || memory=0
 ((memory / jobs < 2000000)) || roomy=' --param=ggc-min-heapsize=524288'  # kB

@@ -1,6 +1,7 @@
 #include "stepdriver_core/pattern.h"
 
 #include <array>
+#include <new>
 #include <stdexcept>
 
 namespace stepdriver {
@@ -21,8 +22,9 @@ std::vector<std::string_view> Pattern::find(const std::string& text, std::size_t
   places[0].rm_eo = static_cast<regoff_t>(text.size());
   std::vector<std::string_view> parts;
   // REG_STARTEND: the text isn't terminated, and may have any character.
-  if (regexec(&compiled_, text.c_str(), places.size(), places.data(), REG_STARTEND) != 0)
-    return parts;
+  const int error = regexec(&compiled_, text.c_str(), places.size(), places.data(), REG_STARTEND);
+  if (error == REG_NOMATCH) return parts;
+  if (error != 0) throw std::bad_alloc();
   for (const regmatch_t& place : places) {
     parts.emplace_back();
     if (place.rm_so < 0) continue;

@@ -23,11 +23,12 @@ class Pattern {
 
   /// The first match that begins at `from` or later, and of those the longest one.
   ///
-  /// @return the match, and then what each pair of parentheses has matched, without data if that
-  /// isn't
-  ///   part of the match; all are views of the text. Empty if there is no match.
+  /// @return views of the text: the match, and then what each pair of parentheses has matched,
+  ///   without data if that is no part of the match. Empty if there is no match.
+  /// @throw std::bad_alloc if there isn't enough memory for it.
   std::vector<std::string_view> find(const std::string& text, std::size_t from = 0) const;
 
+  /// Whether there is a match. With `^` and `$`, the expression must match the whole text.
   bool matches(const std::string& text) const { return !find(text).empty(); }
 
  private:
