@@ -208,9 +208,9 @@ discard_foreign_build() {
 }
 
 # If each compiler has 2 GB, it begins to collect its garbage later: that takes 7 % of its time.
-roomy=
-memory=$(sed -n 's/^MemTotal: *\([0-9]*\) kB/\1/p' /proc/meminfo 2>/dev/null) || memory=0
-((memory / jobs < 2000000)) || roomy=' --param=ggc-min-heapsize=524288'  # kB
+# Both sizes are in kB.
+roomy=$(awk -v jobs="$jobs" '$1 == "MemTotal:" && $2 / jobs >= 2e6 { print " --param=ggc-min-heapsize=524288" }' \
+  /proc/meminfo 2>/dev/null) || true
 # With -g1 a backtrace names each line, and the compiler is a third faster than with all that a debugger
 # could show.
 build_type=(-DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG$roomy")

@@ -48,8 +48,10 @@ std::vector<std::string> CaughtOutput::lines() {
   std::vector<std::string> lines;
   for (std::size_t end = 0; (end = partial_.find('\n')) != std::string::npos;) {
     std::string line = partial_.substr(0, end);
-    for (auto found = colour.find(line); !found.empty(); found = colour.find(line)) {
-      line.erase(static_cast<std::size_t>(found[0].data() - line.data()), found[0].size());
+    for (auto found = colour.find(line); !found.empty();) {
+      const auto from = static_cast<std::size_t>(found[0].data() - line.data());
+      line.erase(from, found[0].size());
+      found = colour.find(line, from);
     }
     if (!line.empty()) lines.push_back(line);
     partial_.erase(0, end + 1);
