@@ -180,6 +180,9 @@ PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   requirePoints(points);
   lone_position_ = onlyPositionsCount(points);
+  has_velocities_ = std::none_of(points.begin(), points.end(), [](const TrajectoryPoint& point) {
+    return point.velocities.empty();
+  });
   std::vector<TrajectoryPoint> positions;
   if (lone_position_ && !points.front().velocities.empty()) {
     const TrajectoryPoint& point = points.front();
@@ -225,7 +228,7 @@ std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
       const motion::MotionState& from = source.expected[member];
       const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
       try {
-        const Profile curve = motion::planSpline(0, from, waypoints, axis.mostAcceleration());
+        const Profile curve = motion::planSpline(0, from, waypoints, curveLimits(member));
         more = std::max(more, slowdownOf(axis, motion::profilePeaks(curve),
                                          motion::splineJerk(from, waypoints)));
       } catch (const std::invalid_argument& error) {
@@ -307,6 +310,13 @@ motion::MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {
   return limits;
 }
 
+motion::SplineLimits PreparedTrajectory::curveLimits(std::size_t member) const {
+  const PathAxis& axis = axes_[member];
+  motion::SplineLimits limits{axis.mostAcceleration(), axis.limits.max_speed};
+  if (has_velocities_ && axis.limits.jerk == 0.0) limits.gentler_beyond = kMore;
+  return limits;
+}
+
 PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
                                                      const Source& source) const {
   const PathAxis& axis = axes_[member];
@@ -322,7 +332,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
   part.begins_at_start = waypoints.size() > 1 && waypoints.front().time_ns == 0;
   part.bounds = {axis.mostAcceleration() * kMore, axis.limits.jerk * kMore};
   try {
-    part.spline = std::make_unique<const motion::SplineTail>(waypoints, axis.mostAcceleration());
+    part.spline = std::make_unique<const motion::SplineTail>(waypoints, curveLimits(member));
   } catch (const std::invalid_argument& error) {
     axis.refuse(error.what());
   }

@@ -108,10 +108,12 @@ class PreparedTrajectory {
                                     const std::function<std::string()>& remedy) const;
   motion::MotorPlan planWhole(std::size_t member, const motion::Profile& joint, double slack) const;
   motion::MotionLimits motorLimits(std::size_t member) const;
+  motion::SplineLimits curveLimits(std::size_t member) const;
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
   bool lone_position_ = false;  // of its only point, only the positions count
+  bool has_velocities_ = false;  // at all points
   bool allow_slower_ = false;
 };
 

@@ -381,7 +381,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
     }
     motion::MotionState joint_state{state.motor.position - state.slack, state.motor.velocity, 0.0};
     if (smooth) joint_state.acceleration = points.front().accelerations[k] * axis.steps_per_unit;
-    Profile motor = motion::planSpline(0, joint_state, waypoints, axis.mostAcceleration());
+    Profile motor = motion::planSpline(0, joint_state, waypoints, {axis.mostAcceleration()});
     if (axis.backlash > 0) {
       motion::MotionLimits limits = axis.limits;
       limits.acceleration = axis.mostAcceleration();

@@ -35,6 +35,16 @@ constexpr double kQuinticAccelerationError = 0.0025;
 /// nearest whole microstep, halves to even.
 inline std::int64_t restingCount(double position) { return std::llround(std::nearbyint(position)); }
 
+/// What the curve of a trajectory should keep to, if its points allow it.
+struct SplineLimits {
+  double acceleration = std::numeric_limits<double>::infinity();  ///< [microsteps/s^2]
+  double speed = std::numeric_limits<double>::infinity();         ///< [microsteps/s]
+  /// A segment whose curve exceeds a limit by more than this factor gets a gentler one through the
+  /// same positions and velocities. Infinity if the velocities aren't the sender's, or if the
+  /// acceleration must not jump.
+  double gentler_beyond = std::numeric_limits<double>::infinity();
+};
+
 /// One axis of a trajectory: from the state at its start through all waypoints, each at its time to
 /// the nanosecond, to rest at the last one.
 ///
@@ -51,8 +61,17 @@ inline std::int64_t restingCount(double position) { return std::llround(std::nea
 /// that makes this kQuinticError or less; apart from this, a step comes when the curve crosses a
 /// half-step line. Position and velocity are continuous; the velocity is off by at most sqrt(3)
 /// h^3/216 max|p''''|, the acceleration by h^2/12 max|p''''| <= 32 kQuinticError/h^2, and between
-/// two of the cubics it jumps by h^3/15 |p'''''|. If that takes a cubic above `most_acceleration`,
-/// n is doubled until it doesn't, or until h^2/12 max|p''''| is kQuinticAccelerationError of it.
+/// two of the cubics it jumps by h^3/15 |p'''''|. If that takes a cubic above the limit of the
+/// acceleration, n is doubled until it doesn't, or until h^2/12 max|p''''| is
+/// kQuinticAccelerationError of it.
+///
+/// A sender's acceleration may jump between two points, as at the corners of a trapezoid of
+/// velocity. The quintic through its samples then overshoots by up to 37 %, and the cubic by up to
+/// 33 %. With SplineLimits::gentler_beyond, such a segment becomes the cubic if that keeps to the
+/// limits, and otherwise the curve whose largest acceleration is the smallest possible one: its
+/// velocity changes evenly, stays at the limit of the speed if it comes that far, and changes
+/// evenly again. If that exceeds a limit, so does every other curve with these positions and
+/// velocities.
 ///
 /// Each segment starts from its waypoint as given, so that errors don't accumulate: where two
 /// pieces meet, the positions differ by less than 2^-52 of the piece's distance.
@@ -62,16 +81,16 @@ inline std::int64_t restingCount(double position) { return std::llround(std::nea
 ///
 /// @param from finite; its position is within kFarthest of 0.
 /// @param waypoints at least one, at increasing times from 0 on, all numbers finite.
-/// @param most_acceleration [microsteps/s^2] the limit of the axis.
+/// @param limits those of the axis.
 /// @throw std::invalid_argument if these conditions don't hold, naming the waypoint (the first is
 ///   0), the value and what is allowed; and if velocities and accelerations lead a curve out of
 ///   2^53 microsteps.
 /// @throw std::range_error if it takes Profile::kLongest or longer.
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
-                   const std::vector<Waypoint>& waypoints,
-                   double most_acceleration = std::numeric_limits<double>::infinity());
+                   const std::vector<Waypoint>& waypoints, const SplineLimits& limits = {});
 
-/// The demands of a trajectory on a motor with a jerk limit.
+/// The demands of a trajectory on a motor with a jerk limit, without
+/// SplineLimits::gentler_beyond.
 struct SplineJerk {
   Peak jerk;  ///< [microsteps/s^3] the largest absolute value in a segment, with its sign
   Peak acceleration_jump;  ///< [microsteps/s^2] the largest sudden change, with its sign: at the
@@ -90,8 +109,7 @@ SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& wayp
 class SplineTail {
  public:
   /// @throw as planSpline().
-  explicit SplineTail(const std::vector<Waypoint>& waypoints,
-                      double most_acceleration = std::numeric_limits<double>::infinity());
+  explicit SplineTail(const std::vector<Waypoint>& waypoints, const SplineLimits& limits = {});
 
   /// When the tail begins [s], after the trajectory's start. If there is only one segment, it ends
   /// here.
@@ -108,7 +126,7 @@ class SplineTail {
   SplineJerk headJerk(const MotionState& from) const;
 
  private:
-  double most_acceleration_;
+  SplineLimits limits_;
   Waypoint first_;                   // the end of the first segment
   std::size_t first_index_ = 0;      // of it
   double begin_acceleration_ = 0.0;  // of the tail [microsteps/s^2]

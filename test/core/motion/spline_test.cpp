@@ -222,7 +222,7 @@ TEST(Spline, KeepsTheAccelerationThatItsQuinticKeeps) {
       {10'000'000, 0.15 * kMost * kTime * kTime, 0.5 * kMost * kTime, kMost},
       {kSecond, 100.0, 0.0, 0.0}};
   const auto first = [&](double most) {
-    const Profile curve = planSpline(0, {}, waypoints, most);
+    const Profile curve = planSpline(0, {}, waypoints, {most});
     std::vector<Piece> pieces;
     for (const Piece& piece : curve.pieces()) {
       if (piece.p0.value() < waypoints[1].position) pieces.push_back(piece);
@@ -296,6 +296,115 @@ TEST(ProfilePeaks, NameTheJumpBetweenTwoLines) {
   const ProfilePeaks peaks = profilePeaks(profile);
   EXPECT_DOUBLE_EQ(peaks.velocity_jump.value, -40.0);
   EXPECT_DOUBLE_EQ(peaks.velocity_jump.time_s, 1.0);
+}
+
+// What a planner sends: a trapezoid of velocity exactly at the limits, sampled at even times from a
+// phase on.
+struct SampledTrapezoid {
+  double length;
+  double speed;
+  double acceleration;
+
+  double ramp() const { return speed / acceleration; }
+  double duration() const { return length / speed + ramp(); }
+  Waypoint at(double t, bool with_acceleration) const {
+    const double left = duration() - t;
+    const double way = t < ramp()      ? acceleration * t * t / 2.0
+                       : left < ramp() ? length - acceleration * left * left / 2.0
+                                       : speed * (t - ramp() / 2.0);
+    const double v = acceleration * std::max(0.0, std::min({t, ramp(), left}));
+    Waypoint made{std::llround(t * 1e9), way, v, {}};
+    if (with_acceleration)
+      made.acceleration = t < ramp() ? acceleration : left > ramp() ? 0.0 : -acceleration;
+    return made;
+  }
+  std::vector<Waypoint> samples(double period, double phase, bool with_acceleration) const {
+    std::vector<Waypoint> made;
+    for (double t = phase * period; t < duration() - 1e-6; t += period) {
+      if (t > 0.0) made.push_back(at(t, with_acceleration));
+    }
+    made.push_back({std::llround(duration() * 1e9), length, 0.0, {}});
+    if (with_acceleration) made.back().acceleration = 0.0;
+    return made;
+  }
+};
+
+TEST(Spline, KeepsTheLimitsThatTheSamplesOfATrapezoidKeep) {
+  const SampledTrapezoid trapezoid{8000.0, 8000.0, 40000.0};
+  const double speed = trapezoid.speed;
+  const double acceleration = trapezoid.acceleration;
+  double without = 0.0;
+  for (const bool with_acceleration : {true, false}) {
+    for (const double period : {0.1, 0.05, 0.02, 0.01}) {
+      for (const double phase : {1.0, 0.1, 1.0 / 3.0, 0.5, 0.77, 0.99}) {
+        const std::vector<Waypoint> points = trapezoid.samples(period, phase, with_acceleration);
+        const ProfilePeaks plain = profilePeaks(planSpline(0, {}, points));
+        without = std::max(without, std::abs(plain.acceleration.value) / acceleration);
+        const Profile profile = planSpline(0, {}, points, {acceleration, speed, 1.01});
+        const ProfilePeaks peaks = profilePeaks(profile);
+        const std::string which = "period " + std::to_string(period) + " s, phase " +
+                                  std::to_string(phase) +
+                                  (with_acceleration ? ", with accelerations" : "");
+        EXPECT_LE(std::abs(peaks.acceleration.value), 1.01 * acceleration) << which;
+        EXPECT_LE(std::abs(peaks.velocity.value), 1.01 * speed) << which;
+        EXPECT_LE(std::abs(peaks.velocity_jump.value), 1e-6 * speed) << which;
+        EXPECT_EQ(profile.stateAt(points.back().time_ns).position.value(), 8000.0) << which;
+      }
+    }
+  }
+  EXPECT_GT(without, 1.3) << "the test needs samples whose quintics and cubics overshoot";
+}
+
+// Velocities that change evenly, at up to the limits, between points at any times: over twelve
+// decades.
+TEST(Spline, IsNeverHeldAgainstAPlanWithinTheLimits) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto decades = [&](double low, double high) {
+    return low * std::pow(high / low, unit(random));
+  };
+  int replaced = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double time = 1e-9 * std::ceil(1e9 * decades(1e-6, 1e6));
+    const double speed = decades(1e-3, 1e9);
+    const double acceleration = speed / time * decades(1e-2, 1e2);
+    // Three stretches of an even acceleration each, within the limits.
+    const double v0 = speed * (2.0 * unit(random) - 1.0);
+    double v = v0;
+    double way = 0.0;
+    double left = time;
+    for (int k = 0; k < 3; ++k) {
+      const double part = k == 2 ? left : left * unit(random);
+      const double change = std::clamp(acceleration * part * (2.0 * unit(random) - 1.0) * 2.0,
+                                       -acceleration * part, acceleration * part);
+      const double next = std::clamp(v + change, -speed, speed);
+      way += part * (v + next) / 2.0;
+      v = next;
+      left -= part;
+    }
+    // The last waypoint is a whole step.
+    if (!(std::abs(way) < 1e12)) continue;
+    const std::vector<Waypoint> points = {
+        {std::llround(time * 1e9), way, v, 0.0},
+        {std::llround(time * 1e9) + 1000 * kSecond, 0.0, 0.0, 0.0}};
+    const MotionState from{0.0, v0, unit(random) < 0.5 ? 0.0 : acceleration};
+    const auto first = [&](double beyond) {
+      std::vector<Piece> pieces;
+      const Profile whole = planSpline(0, from, points, {acceleration, speed, beyond});
+      for (std::size_t k = 0; k < whole.pieceCount(); ++k) {
+        if (whole.pieceStart(k).value() < time * (1.0 - 1e-9)) pieces.push_back(whole.piece(k));
+      }
+      return Profile(0, pieces);
+    };
+    const Profile plain = first(1e300);
+    const Profile kept = first(1.0001);
+    if (kept.pieceCount() != plain.pieceCount()) ++replaced;
+    const ProfilePeaks peaks = profilePeaks(kept, v0, v);
+    ASSERT_LE(std::abs(peaks.acceleration.value), 1.0002 * acceleration) << i;
+    ASSERT_LE(std::abs(peaks.velocity.value), 1.0002 * speed) << i;
+    ASSERT_LE(std::abs(peaks.velocity_jump.value), 1e-6 * speed) << i;
+  }
+  EXPECT_GT(replaced, 200);
 }
 
 void expectRefused(const std::vector<Waypoint>& waypoints, const std::string& words) {
