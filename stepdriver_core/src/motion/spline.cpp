@@ -90,7 +90,7 @@ struct GentlestMotion {
 
 // Let c = p1 - p0 - (v0 + v1) T/2 be the way that a constant acceleration would miss, and
 // u = v1 - v0. Without a limit of the speed, the acceleration is x for a time (T + u/x)/2 and then
-// -x, where x has the sign of c and x^2 T^2/4 - c x - u^2/4 = 0. With the limit V, it is
+// -x. It has the sign of c, and x^2 T^2/4 - c x - u^2/4 = 0. With the limit V, it is
 // ((V - v0)^2 + (V - v1)^2)/(2 (V T - (p1 - p0))) on both sides of V.
 GentlestMotion gentlestMotion(const Segment& segment, double most_speed) {
   const double time = segment.duration().value();
