@@ -34,8 +34,10 @@ class Turns {
   /// A piece that begins at a time [s].
   void take(const Piece& piece, double start) {
     const double end = piece.duration.value();
+    // A turn next to an end of the piece is that end, whose time has no rounding error.
+    const double margin = 1e-9 * end;
     for (double t = piece.firstTurn(0.0); t < end; t = piece.firstTurn(t)) {
-      take(piece.positionAt(t), start + t);
+      if (t > margin && t < end - margin) take(piece.positionAt(t), start + t);
     }
     take(piece.positionAt(piece.duration), start + end);
   }

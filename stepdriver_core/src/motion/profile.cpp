@@ -27,10 +27,9 @@ DoubleDouble Piece::accelerationAt(DoubleDouble t) const { return DoubleDouble(a
 
 double Piece::firstTurn(double after) const {
   const double end = duration.value();
-  const double margin = 1e-9 * end;
   double first = end;
   const auto consider = [&](double root) {
-    if (root > after + margin && root < end - margin) first = std::min(first, root);
+    if (root > after && root < end) first = std::min(first, root);
   };
   if (j == 0.0) {
     if (a != 0.0) consider(-v0 / a);

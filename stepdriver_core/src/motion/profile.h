@@ -26,8 +26,8 @@ struct Piece {
   DoubleDouble velocityAt(DoubleDouble t) const;
   DoubleDouble accelerationAt(DoubleDouble t) const;
 
-  /// The first time after `after` [s] and clearly before the end at which the velocity changes its
-  /// sign; the end if there is none. A turning point this close to an end moves nothing.
+  /// The first time after `after` [s] and before the end at which the velocity changes its sign;
+  /// the end if there is none. To go from turn to turn, begin with 0 and continue with each result.
   double firstTurn(double after) const;
 };
 

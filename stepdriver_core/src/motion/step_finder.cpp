@@ -12,6 +12,12 @@ constexpr double kFar = 281474.976710656;  // s, 2^48 ns, 78 hours
 // Up to this time, the rounding of a stretch's reciprocals causes an error below 1/64 ns.
 constexpr double kShort = 20000.0;  // s
 
+// Whether a ramp takes less than this from standstill to its fast end, and makes a microstep within
+// it. A residual of a sum is no such ramp.
+bool isShortRamp(double acceleration, double fastest) {
+  return fastest < kShort * acceleration && acceleration * (kShort * kShort) > 1.0;
+}
+
 // Nearest integer of a number below 2^51: the sum has no bits left for a fraction. (llrint() is a
 // call into the library.)
 std::int64_t nearest(double number) {
@@ -19,11 +25,13 @@ std::int64_t nearest(double number) {
   return static_cast<std::int64_t>((number + kShift) - kShift);
 }
 
-// The first turning point or highest speed after the time `after`; the end if there is none.
+// The first turning point or extreme of the speed after the time `after`; the end if there is none.
 double firstCut(const Piece& piece, double after) {
   const double turn = piece.firstTurn(after);
   if (piece.j == 0.0) return turn;
   const double level = -piece.a / piece.j;
+  // Next to an end, the speed changes by less than a double's rounding from there to its extreme:
+  // a part of its own would cost more than it is worth.
   const double margin = 1e-9 * piece.duration.value();
   return level > after + margin && level < turn - margin ? level : turn;
 }
@@ -106,7 +114,7 @@ bool StepFinder::nextOfNewStretch(Step& step) {
 
 bool StepFinder::nextOfOther(Step& step, double way) {
   const Stretch& s = stretch_;
-  const double t = way > 0.0 ? timeFromAnchor(way) : 0.0;
+  const double t = way > 0.0 ? std::min(timeFromAnchor(way), s.duration) : 0.0;
   return give(
       step, t < kFar ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + t * s.ns_per_s) : refined(t));
 }
@@ -150,8 +158,14 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   const std::int64_t steps = direction > 0.0 ? reached - stands : stands - reached;
   if (steps <= 0) return;
 
-  const double v_begin = direction * piece.velocityAt(begin).value();
-  const double v_end = direction * piece.velocityAt(end).value();
+  // Next to a turning point, the speed of the slow end may be below 0 by a residual: it belongs to
+  // the curve, so it stays. A curve whose fast end has none moves only by rounding.
+  const DoubleDouble exact_begin = piece.velocityAt(begin);
+  const DoubleDouble exact_end = piece.velocityAt(end);
+  const double v_begin = direction * exact_begin.value();
+  const double v_end = direction * exact_end.value();
+  const double fastest = std::max(v_begin, v_end);
+  if (!(fastest > 0.0)) return;
   const bool backwards = v_end < v_begin;
   const DoubleDouble anchor = backwards ? end : begin;
 
@@ -171,28 +185,38 @@ void StepFinder::enter(const Piece& piece, DoubleDouble begin, DoubleDouble end,
   stretch_.way_end = stretch_.way + steps * stretch_.way_step;
   const auto away = static_cast<double>(stretch_.away);
   stretch_.way_rest = away * (direction * 0.5 - anchor_position.rest);
-  stretch_.v = std::max(0.0, backwards ? v_end : v_begin);
+  stretch_.exact_v = DoubleDouble(direction) * (backwards ? exact_end : exact_begin);
+  stretch_.exact_a = DoubleDouble(away) * piece.accelerationAt(anchor);
+  stretch_.v = stretch_.exact_v.value();
   stretch_.v_squared = stretch_.v * stretch_.v;
-  stretch_.a = away * piece.accelerationAt(anchor).value();
+  stretch_.a = stretch_.exact_a.value();
   stretch_.twice_a = 2.0 * stretch_.a;
   stretch_.j = direction * piece.j;
   stretch_.duration = (end - begin).value();
-  if (piece.j != 0.0) {
-    stretch_.curve = Stretch::Curve::kCubic;
-  } else if (piece.a != 0.0) {
-    const double from_rest = stretch_.duration + stretch_.v / stretch_.a;
-    stretch_.curve =
-        from_rest < kShort ? Stretch::Curve::kShortParabola : Stretch::Curve::kParabola;
-    stretch_.ns_per_unit = stretch_.ns_per_s / stretch_.a;
-  } else {
-    stretch_.curve =
-        stretch_.duration < kShort ? Stretch::Curve::kShortLine : Stretch::Curve::kLine;
-    stretch_.ns_per_unit = stretch_.ns_per_s / stretch_.v;
-  }
+  chooseCurve(v_begin == v_end, fastest);
   stretch_.last[0] = backwards ? stretch_.duration : 0.0;
   stretch_.known = 0;
   stretch_.begin_ns = motion_time(begin).whole;
   stretch_.end_ns = motion_time(end).whole;
+}
+
+// If the speed is the same at both ends, it is the same between them: an acceleration or a jerk
+// that doesn't change it is a residual of a sum, whose sign means nothing. Otherwise the
+// acceleration of a parabola is above 0, because the slow end is the anchor.
+void StepFinder::chooseCurve(bool constant_speed, double fastest) {
+  using Curve = Stretch::Curve;
+  Stretch& s = stretch_;
+  if (constant_speed) {
+    // A microstep takes less than kShort, too.
+    const bool is_short = s.duration < kShort && s.v * kShort > 1.0;
+    s.curve = is_short ? Curve::kShortLine : Curve::kLine;
+    s.ns_per_unit = s.ns_per_s / s.v;
+  } else if (s.j != 0.0) {
+    s.curve = Curve::kCubic;
+  } else {
+    s.curve = isShortRamp(s.a, fastest) ? Curve::kShortParabola : Curve::kParabola;
+    s.ns_per_unit = s.ns_per_s / s.a;
+  }
 }
 
 double StepFinder::bracketedTime(double way) const {
@@ -220,7 +244,7 @@ double StepFinder::bracketedTime(double way) const {
 
 std::int64_t StepFinder::refined(double t) const {
   const Stretch& s = stretch_;
-  const Piece seen{s.duration, 0.0, s.v, s.a, s.j};
+  const Piece seen{s.duration, 0.0, s.exact_v.hi, s.exact_a.hi, s.j, s.exact_v.lo, s.exact_a.lo};
   const DoubleDouble way = fromInteger(s.way) + DoubleDouble(s.way_rest);
   const double correction =
       (way - seen.positionAt(DoubleDouble(t))).value() / seen.velocityAt(DoubleDouble(t)).value();

@@ -23,14 +23,15 @@ struct Step {
 /// nanosecond to which they are rounded.
 ///
 /// The curve is followed in stretches in which the speed only rises or only falls, each from its
-/// slow end. Without a jerk all terms of the equation have the same sign there, and the root in the
-/// form 2 x / (v + sqrt(v^2 + 2 a x)) has no cancellation. The form (sqrt(v^2 + 2 a x) - v)/a,
-/// which needs no division, has an error of about 2^-52 V/a, with V the speed at the fast end: it
-/// is used if the motor takes less than hours from rest to V. With a jerk the finder uses Newton's
-/// method, starting at the time that the cubic through the last four steps' times predicts. That is
-/// mostly so near that one iteration is enough; the second term of its error, a dt^2/(2 v), shows
-/// this without another evaluation. Otherwise more iterations follow, from the last step's time and
-/// inside a bracket.
+/// slow end. If the speed is the same at both ends, it is a line, whatever residual of a sum its
+/// acceleration is. Without a jerk all terms of the equation have the same sign there, and the root
+/// in the form 2 x / (v + sqrt(v^2 + 2 a x)) has no cancellation. The form (sqrt(v^2 + 2 a x) -
+/// v)/a, which needs no division, has an error of about 2^-52 V/a, with V the speed at the fast
+/// end: it is used if the motor takes less than hours from rest to V. With a jerk the finder uses
+/// Newton's method, starting at the time that the cubic through the last four steps' times
+/// predicts. That is mostly so near that one iteration is enough; the second term of its error, a
+/// dt^2/(2 v), shows this without another evaluation. Otherwise more iterations follow, from the
+/// last step's time and inside a bracket.
 ///
 /// Doesn't allocate or throw. Only one thread may use it at a time.
 class StepFinder {
@@ -77,6 +78,8 @@ class StepFinder {
     double ns_per_s = 1e9;     // with time_sign
     double ns_per_unit = 0.0;  // ns_per_s / v of a kShortLine, ns_per_s / a of a kShortParabola
     double duration = 0.0;     // s
+    DoubleDouble exact_v;      // v and a with all their bits
+    DoubleDouble exact_a;
     // s from the anchor: the times of the last steps, the latest first.
     std::array<double, 4> last = {};
     int known = 0;  // of these
@@ -87,6 +90,7 @@ class StepFinder {
   bool enterNext();
   bool enterNextOfSum();
   void enter(const Piece& piece, DoubleDouble begin, DoubleDouble end, DoubleDouble piece_start);
+  void chooseCurve(bool constant_speed, double fastest);
   bool give(Step& step, std::int64_t time_ns);
   // Rare or long code: inlined, it would give next() a stack frame.
   [[gnu::noinline]] bool nextOfNewStretch(Step& step);

@@ -108,6 +108,58 @@ TEST(StepFinder, FollowsRandomCubicsLikeBisectionDoes) {
   }
 }
 
+// A sum of parts leaves an acceleration or a jerk of either sign that should be 0.
+TEST(StepFinder, KeepsAConstantSpeedWhateverResidualItsAccelerationIs) {
+  for (const double residual : {-1e-9, -1e-13, -1e-30, 1e-30, 1e-13}) {
+    for (const Profile& profile :
+         {onePiece(1.0, 0.0, 4000.0, residual, 0.0), onePiece(1.0, 0.0, 4000.0, 0.0, residual),
+          onePiece(1.0, 0.0, 4000.0, residual, -residual)}) {
+      const auto steps = allSteps(profile, 0);
+      ASSERT_EQ(steps.size(), 4000U);
+      for (std::size_t k = 0; k < steps.size(); ++k) {
+        ASSERT_EQ(steps[k].time_ns, 125'000 + static_cast<std::int64_t>(k) * 250'000)
+            << "residual " << residual << ", step " << k;
+      }
+    }
+  }
+}
+
+// All speeds are residuals: nothing moves, and the owed step waits for what does.
+TEST(StepFinder, DoesNotFollowAResidualSpeed) {
+  const Profile profile(0, {Piece{1.0, 0.5, 1e-300, -1e-290, 0.0}, Piece{1.0, 0.5, 0.0, 2.0, 0.0}});
+  const auto steps = allSteps(profile, 0);
+  ASSERT_EQ(steps.size(), 1U);
+  EXPECT_GE(steps[0].time_ns, 0);
+  EXPECT_LE(steps[0].time_ns, 1'000'000'001);
+}
+
+// A ramp of 10^8 steps in 10^4 s that ends or begins up to 10 us past its turn.
+TEST(StepFinder, IsExactIfALongRampEndsJustPastItsTurn) {
+  const double ramp = 1e4;  // s
+  for (const double past : {0.0, 1e-12, 1e-9, 1e-7, 1e-6, 9e-6}) {
+    // p = -(T - t)^2 + T^2, and its mirror image.
+    for (const bool ends : {true, false}) {
+      const double length = ramp + past;
+      const double t0 = ends ? 0.0 : -past;
+      const double v0 = 2.0 * (ends ? ramp : t0);
+      const double a = ends ? -2.0 : 2.0;
+      const double p0 = ends ? 0.0 : t0 * t0;
+      const Profile profile = onePiece(length, p0, v0, a, 0.0);
+      const std::int64_t first = ends ? 99'999'900 : 0;
+      StepFinder finder(profile, first);
+      Step step;
+      for (std::int64_t k = first; k < first + 100; ++k) {
+        ASSERT_TRUE(finder.next(step));
+        if (ends && k < first + 2) continue;  // owed at once: the finder was not there before
+        const long double line = static_cast<long double>(k) + 0.5L;
+        const long double exact = ends ? ramp - std::sqrt(1e8L - line) : past + std::sqrt(line);
+        ASSERT_LE(std::abs(step.time_ns - exact * 1e9L), 0.6L)
+            << "step " << k << ", " << past << " s past the turn";
+      }
+    }
+  }
+}
+
 TEST(StepFinder, StaysExactOverYears) {
   // 0.001 steps/s for 2^20 steps: 33 years. The period is 1000 s to the last bit of 0.001.
   const Profile profile = planFromRest(0, 0, 1 << 20, {0.001, 0.001, 1.0, 1.0});
