@@ -15,9 +15,12 @@
 namespace stepdriver::motion {
 namespace {
 
-// [s] Knots aren't closer than this, so that rounded times and positions don't change
-// accelerations. In such a time an acceleration makes no difference to the position.
-constexpr double kShortestPiece = 20e-6;
+// Of an acceleration: rounded times and positions change it by no more. The times of both ends of a
+// cubic of the duration h are rounded by e each, which changes its acceleration a by 6 a e/h, and a
+// position that is rounded by r changes it by 6 r/h^2: knots aren't closer than that allows.
+constexpr double kMostRounding = 1.5e-4;
+// The same if the axes would move by more than a microstep in such a time.
+constexpr double kMostRoundingOfFast = 5e-3;
 // What exceeds a limit after so many plans slows the whole motion down; one that begins at a speed
 // can't be slowed down.
 constexpr int kMostPlans = 6;
@@ -43,6 +46,7 @@ constexpr double kPoorCubic = 1.01;
 // Of the duration of an interval with constant acceleration along it.
 constexpr double kMostStretch = 0.1;
 constexpr double kMostDeviation = 0.02;  // of the resolution
+constexpr double kMostLeftOut = 0.01;    // of the resolution
 constexpr int kMostDivisions = 4;
 constexpr std::size_t kPartsOfDivided = 2;
 
@@ -58,8 +62,9 @@ struct Trapezoid {
   double duration() const { return ramp_up + cruise + ramp_down; }
 };
 
+// @param shortest [s] shorter ramps become so long if there is room for that.
 Trapezoid trapezoidOf(double length, double begin_square, double end_square,
-                      const ContourSpeed::Ramp& ramp, double peak_square) {
+                      const ContourSpeed::Ramp& ramp, double peak_square, double shortest) {
   Trapezoid made;
   made.peak = std::sqrt(peak_square);
   made.ramp_up = (made.peak - std::sqrt(begin_square)) / ramp.up;
@@ -71,6 +76,16 @@ Trapezoid trapezoidOf(double length, double begin_square, double end_square,
   // From a speed that is too high for the ramp, it has to slow down more steeply.
   const double way_left = length - made.way_up;
   if (way_down > way_left) made.ramp_down = 2.0 * way_left / (made.peak + std::sqrt(end_square));
+  const auto longer = [&](double time) { return time > 0.0 ? std::max(time, shortest) : 0.0; };
+  const double up = longer(made.ramp_up);
+  const double down = longer(made.ramp_down);
+  const double gentle_up = up * (made.peak + std::sqrt(begin_square)) / 2.0;
+  const double gentle_down = down * (made.peak + std::sqrt(end_square)) / 2.0;
+  const double gentle_cruise = length - gentle_up - gentle_down;
+  const bool is_short = up > made.ramp_up || down > made.ramp_down;
+  if (is_short && gentle_cruise > shortest * made.peak) {
+    return {up, gentle_up, gentle_cruise / made.peak, gentle_cruise, down, made.peak};
+  }
   return made;
 }
 
@@ -87,8 +102,8 @@ struct Demand {
 // the speeds at both ends of an interval is kept until they change.
 class Knots {
  public:
-  Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits)
-      : grid_(grid), limits_(limits), axes_(grid.axes()) {
+  Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits, double resolution)
+      : grid_(grid), limits_(limits), resolution_(resolution), axes_(grid.axes()) {
     kept_.reserve(grid.capacity());
     kept_.resize(grid.size());
   }
@@ -119,7 +134,9 @@ class Knots {
 
   void make(const ContourSpeed& speed) {
     findDurations(speed);
+    findClosest();
     knots_.clear();
+    inner_.clear();
     // A straight part may have two more.
     knots_.reserve(2 * grid_.size());
     appendPlace(0, 0.0, kept_[0].begin, 0);
@@ -158,22 +175,23 @@ class Knots {
   double time(std::size_t knot) const { return knots_[knot].time; }
   std::size_t interval(std::size_t knot) const { return knots_[knot].interval; }
   double position(std::size_t knot, std::size_t axis) const {
-    const Knot& of = knots_[knot];
-    return of.place == kNoPlace
-               ? grid_.position(of.interval)[axis] + grid_.firstAtBegin(of.interval)[axis] * of.way
-               : grid_.position(of.place)[axis];
+    return jointAt(knots_[knot], axis).position;
   }
   double velocity(std::size_t knot, std::size_t axis) const {
-    const Knot& of = knots_[knot];
-    const bool at_end = of.place != kNoPlace && of.place > 0;
-    const double* direction =
-        at_end ? grid_.firstAtEnd(of.interval) : grid_.firstAtBegin(of.interval);
-    return direction[axis] * of.speed;
+    return jointAt(knots_[knot], axis).velocity;
   }
   double parameter(std::size_t knot) const { return knots_[knot].parameter; }
   double speed(std::size_t knot) const { return knots_[knot].speed; }
+  /// Whether it is a place of the contour, or on a straight part of it.
+  bool isOnContour(std::size_t knot) const { return knots_[knot].inner == kNone; }
+  /// The first interval that contains the way from a knot to the next one.
+  std::size_t intervalAfter(std::size_t knot) const {
+    const Knot& of = knots_[knot];
+    return of.place == kNone || of.place == 0 ? of.interval : of.interval + 1;
+  }
   /// On the way from the knot before it.
   bool isStraight(std::size_t knot) const {
+    if (knots_[knot].skipped) return false;
     const std::size_t last = interval(knot);
     const std::size_t first = interval(knot - 1);
     const bool whole = first + 1 == last && parameter(knot - 1) == grid_[first].to;
@@ -190,7 +208,7 @@ class Knots {
   /// Of the cubic that ends at a knot.
   Demand demandBefore(std::size_t knot) {
     const std::size_t place = knots_[knot].place;
-    const bool whole = place != kNoPlace && knots_[knot - 1].place + 1 == place;
+    const bool whole = place != kNone && knots_[knot - 1].place + 1 == place;
     if (whole && !grid_[place - 1].straight) return demandOf(place - 1);
     return cubicDemand(
         time(knot) - time(knot - 1),
@@ -203,7 +221,8 @@ class Knots {
   }
 
  private:
-  static constexpr std::size_t kNoPlace = std::numeric_limits<std::size_t>::max();
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  static constexpr double kForever = std::numeric_limits<double>::infinity();
 
   // Of an interval.
   struct Kept {
@@ -218,10 +237,13 @@ class Knots {
   struct Knot {
     double time;
     std::size_t interval;  // of the grid, which ends at the knot or contains it
-    std::size_t place;     // or kNoPlace, within a straight part
-    double way;            // unit, from the begin of the straight part
+    std::size_t place;     // or kNone, within an interval
+    double way;            // unit, from the begin of a straight part
     double parameter;
     double speed;
+    bool rests = false;         // at a place
+    std::size_t inner = kNone;  // first of its states, within an interval that isn't straight
+    bool skipped = false;       // whether others were left out between the one before and it
   };
   struct Joint {
     double position;
@@ -286,43 +308,168 @@ class Knots {
   }
 
   Trapezoid trapezoid(std::size_t interval, const ContourSpeed& speed) const {
+    constexpr double kRounding = 1.001;  // for differences of times
     return trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
-                       speed.ramp(interval), speed.peakSquare(interval));
+                       speed.ramp(interval), speed.peakSquare(interval), kRounding * closest_);
   }
 
   void appendStraight(std::size_t interval, const ContourSpeed& speed, double time) {
     const Trapezoid made = trapezoid(interval, speed);
+    kept_[interval].duration = made.duration();
     appendOnLine(interval, time + made.ramp_up, made.way_up, made.peak);
     appendOnLine(interval, time + made.ramp_up + made.cruise, made.way_up + made.way_cruise,
                  made.peak);
   }
 
   void appendOnLine(std::size_t interval, double time, double way, double speed) {
-    if (!makeRoom(time, false)) return;
+    append(onLine(interval, time, way, speed));
+  }
+
+  Knot onLine(std::size_t interval, double time, double way, double speed) const {
     const ContourGrid::Interval& of = grid_[interval];
     const double part = std::min(1.0, way / of.length);
-    knots_.push_back({time, interval, kNoPlace, way, of.from + part * (of.to - of.from), speed});
+    return {time, interval, kNone, way, of.from + part * (of.to - of.from), speed};
   }
 
   void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
-    if (!makeRoom(time, speed == 0.0)) return;
     const double parameter = place == 0 ? grid_[0].from : grid_[interval].to;
-    knots_.push_back({time, interval, place, 0.0, parameter, speed});
+    append({time, interval, place, 0.0, parameter, speed, speed == 0.0});
   }
 
-  // Of two knots that are too close to each other, one at rest stays, or else the earlier one.
-  bool makeRoom(double time, bool rests) {
-    if (knots_.empty() || time - knots_.back().time >= kShortestPiece) return true;
-    if (!rests || knots_.back().speed == 0.0) return rests;
-    knots_.pop_back();
-    return true;
+  // Of knots that are too close to each other, only the first one stays, or one at rest. If the
+  // others make a difference, they are replaced by a state of the same motion at the shortest time
+  // from the one that stays. What is left out is then only how the axes move in that time; before
+  // and after it, the motion is as planned.
+  void append(const Knot& next) {
+    const double since = knots_.empty() ? kForever : next.time - knots_.back().time;
+    if (since < closest_ && next.rests) {
+      appendRest(next);
+    } else {
+      if (skips_ && since >= 2.0 * closest_ && matters(knots_.back(), seen_, next)) {
+        push(within(seen_, next, knots_.back().time + closest_));
+      }
+      if (since >= closest_) {
+        push(next);
+      } else {
+        skips_ = true;
+      }
+    }
+    seen_ = next;
+  }
+
+  void push(const Knot& next) {
+    knots_.push_back(next);
+    knots_.back().skipped = skips_;
+    skips_ = false;
+  }
+
+  // @pre it is too close to the last knot.
+  void appendRest(const Knot& rest) {
+    if (knots_.size() > 1 && !knots_.back().rests) {
+      const Knot close = knots_.back();
+      knots_.pop_back();
+      const Knot& before = knots_.back();
+      const bool has_room = rest.time - before.time >= 2.0 * closest_;
+      if (has_room && !close.skipped && matters(before, close, rest)) {
+        push(within(before, close, rest.time - closest_));
+        knots_.back().skipped = false;
+      }
+      skips_ = true;
+    }
+    push(rest);
+  }
+
+  // Whether the cubic between two knots is off by more than a small part of the resolution because
+  // one between them is left out. If it is off by dp and dv there, it is off by up to
+  // dp + 4/27 h dv in the time h before or after that.
+  bool matters(const Knot& from, const Knot& left_out, const Knot& to) const {
+    const double longest = std::max(left_out.time - from.time, to.time - left_out.time);
+    for (std::size_t j = 0; j < axes_; ++j) {
+      const Joint is = cubicAt(from, to, left_out.time, j);
+      const Joint wanted = jointAt(left_out, j);
+      const double most = std::abs(is.position - wanted.position) +
+                          4.0 / 27.0 * longest * std::abs(is.velocity - wanted.velocity);
+      if (most > kMostLeftOut * resolution_) return true;
+    }
+    return false;
+  }
+
+  // On the cubic between two knots.
+  Joint cubicAt(const Knot& from, const Knot& to, double time, std::size_t axis) const {
+    const double whole = to.time - from.time;
+    const double passed = time - from.time;
+    const Joint begin = jointAt(from, axis);
+    const Joint end = jointAt(to, axis);
+    const double mean = (end.position - begin.position) / whole;
+    const double a = (6.0 * mean - 4.0 * begin.velocity - 2.0 * end.velocity) / whole;
+    const double jerk = 6.0 * (begin.velocity + end.velocity - 2.0 * mean) / (whole * whole);
+    return {begin.position + passed * (begin.velocity + passed * (a / 2.0 + passed * jerk / 6.0)),
+            begin.velocity + passed * (a + passed * jerk / 2.0)};
+  }
+
+  // The state at a time between two knots with no other one between them.
+  Knot within(const Knot& from, const Knot& to, double time) {
+    const double whole = to.time - from.time;
+    const double passed = time - from.time;
+    const double speed = from.speed + (to.speed - from.speed) * (passed / whole);
+    const std::size_t interval = to.interval;
+    if (grid_[interval].straight) {
+      const bool both = from.place == kNone && from.interval == interval;
+      const double begin = both ? from.way : 0.0;
+      return onLine(interval, time, begin + passed * (from.speed + speed) / 2.0, speed);
+    }
+    const double begin = from.interval == interval ? from.parameter : grid_[interval].from;
+    Knot made{time, interval, kNone, 0.0, begin + (to.parameter - begin) * (passed / whole), speed};
+    made.inner = inner_.size();
+    for (std::size_t j = 0; j < axes_; ++j) inner_.push_back(cubicAt(from, to, time, j));
+    return made;
+  }
+
+  Joint jointAt(const Knot& knot, std::size_t axis) const {
+    if (knot.inner != kNone) return inner_[knot.inner + axis];
+    if (knot.place == kNone) {
+      const double direction = grid_.firstAtBegin(knot.interval)[axis];
+      return {grid_.position(knot.interval)[axis] + direction * knot.way, direction * knot.speed};
+    }
+    const double* direction =
+        knot.place > 0 ? grid_.firstAtEnd(knot.interval) : grid_.firstAtBegin(knot.interval);
+    return {grid_.position(knot.place)[axis], direction[axis] * knot.speed};
+  }
+
+  // [s] See kMostRounding.
+  void findClosest() {
+    constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+    double duration = 0.0;
+    for (const Kept& kept : kept_) duration += kept.duration;
+    const double time = 6.0 * std::max(0.5e-9, 2.0 * kEpsilon * duration);
+    closest_ = time / kMostRounding;
+    double rounded = time / kMostRoundingOfFast;
+    for (std::size_t j = 0; j < axes_; ++j) {
+      double farthest = 0.0;
+      bool moves = false;
+      for (std::size_t i = 0; i <= grid_.size(); ++i) {
+        farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
+        moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
+      }
+      if (!moves) continue;
+      const auto [least, most] = std::minmax(limits_[j].acceleration, limits_[j].deceleration);
+      closest_ = std::min(closest_, std::sqrt(resolution_ / most));
+      rounded =
+          std::max(rounded, std::sqrt(6.0 * 2.0 * kEpsilon * farthest / (kMostRounding * least)));
+    }
+    closest_ = std::max(closest_, rounded);
   }
 
   const ContourGrid& grid_;
   const std::vector<ContourLimits>& limits_;
+  double resolution_;  // [unit] of the contour
   std::size_t axes_;
   std::vector<Kept> kept_;  // of each interval
   std::vector<Knot> knots_;
+  std::vector<Joint> inner_;  // of each axis, of some of them
+  double closest_ = 0.0;      // [s] knots, but for two at rest
+  bool skips_ = false;        // whether knots were left out after the last one
+  Knot seen_{};               // the last one, even if it was left out
 };
 
 // By what factor limits are exceeded; 1 if they aren't.
@@ -429,7 +576,7 @@ Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, Contour
     worst.speed = std::max(worst.speed, excess.speed);
     if (excess.acceleration == 1.0 && excess.speed == 1.0) continue;
     const std::size_t last = knots.interval(i);
-    const std::size_t first = std::min(knots.interval(i - 1) + (i > 1 ? 1 : 0), last);
+    const std::size_t first = std::min(knots.intervalAfter(i - 1), last);
     const auto by = [&](double factor) { return factor > 1.0 ? factor * by_more : 1.0; };
     for (std::size_t k = first; k <= last; ++k) {
       const bool checks = excess.acceleration > poor && !grid[k].straight && speed.checkBothEnds(k);
@@ -456,7 +603,7 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
     knot.segment = grid[knots.interval(i)].segment;
     knot.parameter = knots.parameter(i);
     knot.speed = knots.speed(i) / factor;
-    knot.may_begin = knot.parameter >= contour.roundedUntil(knot.segment);
+    knot.may_begin = knots.isOnContour(i) && knot.parameter >= contour.roundedUntil(knot.segment);
     knot.straight = i + 1 < knots.size() && knots.isStraight(i + 1);
     knot.positions.resize(grid.axes());
     knot.velocities.resize(grid.axes());
@@ -507,7 +654,7 @@ Outcome planKnots(const Contour& contour, const std::vector<ContourLimits>& limi
 ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                         const ContourBegin& begin) {
   ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
-  Knots knots(grid, limits);
+  Knots knots(grid, limits, contour.resolution());
   const Outcome outcome = planKnots(contour, limits, begin.speed, grid, knots);
   ContourPlan plan;
   if (begin.speed > 0.0) plan.excess = outcome.excess;

@@ -21,10 +21,12 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
-// [s] Knots aren't closer than this, nor than a rounded position may change the jerk by a
-// thousandth of its limit: a quintic has 60/h^3 of that.
-constexpr double kClosestKnots = 100e-6;
-constexpr double kMostRounding = 1e-3 / 60.0;
+// Of a jerk limit: rounded times and numbers change a jerk by no more. The times of both ends of a
+// quintic of the duration h are rounded by e each, which changes its jerk j by 9 j e/h, and numbers
+// that are rounded by r change it by 60 r/h^3 if they are positions, and by 24 r/h^2 if they are
+// speeds: knots aren't closer than that allows.
+constexpr double kMostRoundingOfTimes = 4.5e-5;
+constexpr double kMostRounding = 1e-3;
 constexpr int kMostPlans = 12;  // with one time of the average
 constexpr double kNoExcess = 1e-3;
 constexpr double kNoPart = 1e-9;          // of a segment
@@ -125,15 +127,31 @@ class SmoothSection {
     return false;
   }
 
-  double closestKnots() const {
-    double closest = kClosestKnots;
+  // [s] See kMostRounding. @param time of the average [s].
+  double closestKnots(const std::vector<SmoothPart>& parts, double time) const {
+    constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+    const double duration = parts.back().time;
+    double speed = 0.0;
+    double jerk = 0.0;
+    for (const SmoothPart& part : parts) {
+      speed = std::max(speed, part.speed);
+      jerk = std::max(jerk, std::abs(part.jerk));
+    }
+    double closest = 9.0 * std::max(0.5e-9, kEpsilon * duration) / kMostRoundingOfTimes;
+    // The speed is a difference of places at times that are rounded.
+    const double speed_rounding = kEpsilon * duration * speed / time;
+    closest = std::max(closest, std::sqrt(24.0 * speed_rounding / (kMostRounding * jerk)));
+    const double sums = std::sqrt(static_cast<double>(parts.size())) * parts.back().distance;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
-      double farthest = 0.0;
+      double farthest = sums;
+      bool moves = false;
       for (std::size_t i = 0; i <= grid_.size(); ++i) {
         farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
+        moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
       }
-      const double rounding = farthest * std::numeric_limits<double>::epsilon();
-      closest = std::max(closest, std::cbrt(rounding / (kMostRounding * limits_[j].jerk)));
+      const double rounding = kEpsilon * farthest;
+      const double cube = 60.0 * rounding / (kMostRounding * limits_[j].jerk);
+      if (moves) closest = std::max(closest, std::cbrt(cube));
     }
     return closest;
   }
@@ -345,7 +363,10 @@ class SmoothSection {
       return impossible(limits_.size());
     }
     const std::vector<SmoothPart> parts = smoothed(places, time, moves());
-    Plan plan{makeKnots(grid, limits_, parts, time, closestKnots()), {}, {}};
+    Plan plan{
+        makeKnots(grid, limits_, parts, time, closestKnots(parts, time), contour_.resolution()),
+        {},
+        {}};
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
       plan.segments.push_back(grid[plan.knots[i].interval].segment);
       plan.straight.push_back(i + 1 < plan.knots.size() && isEven(plan.knots, i, parts, grid));

@@ -23,7 +23,6 @@ class SmoothKnots {
     double parameter = 0.0;     ///< of the segment
     double acceleration = 0.0;  ///< [unit/s^2]
     bool even = false;          ///< see SmoothPart
-    bool ends_curve = false;    ///< between it and a straight part
   };
 
   void append(const Knot& knot, const double* position, const double* first, const double* second) {
@@ -33,10 +32,6 @@ class SmoothKnots {
       states_.push_back(
           {position[j], first[j] * knot.speed, first[j] * knot.acceleration + second[j] * square});
     }
-  }
-  void dropLast() {
-    knots_.pop_back();
-    states_.resize(states_.size() - axes_);
   }
 
   struct State {
@@ -64,11 +59,15 @@ double highestJerk(const ContourGrid& grid, std::size_t interval,
                    const std::vector<ContourLimits>& limits, double time);
 
 /// The knots of a smoothed motion along a grid: where its jerk changes, and at the places of
-/// curves.
+/// curves. What would be too close to the knot before it is left out: after the shortest time,
+/// there is a knot with another state of the same motion instead, so that the motion from there on
+/// is the same. Small changes of the jerk are left out if the quintic without them deviates by a
+/// hundredth of `resolution` or less.
 ///
 /// @param time of the average [s].
 /// @param closest no knot is nearer to the one before [s].
 SmoothKnots makeKnots(const ContourGrid& grid, const std::vector<ContourLimits>& limits,
-                      const std::vector<SmoothPart>& parts, double time, double closest);
+                      const std::vector<SmoothPart>& parts, double time, double closest,
+                      double resolution);
 
 }  // namespace stepdriver::motion

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "axis/path_axis.h"
+#include "axis/prepared_trajectory.h"
+#include "axis/trajectory_path.h"
+#include "machine/path_plan.h"
+#include "motion/profile.h"
+#include "support/steps_of.h"
+
+// Paths from the request to the steps that come out, without a machine.
+
+namespace stepdriver::test {
+
+/// An axis at rest at 0, without a start speed, a backlash or soft limits.
+struct PathAxisLimits {
+  double steps_per_unit = 80'000.0;  ///< [microsteps/unit]
+  double speed = 0.1;                ///< [unit/s]
+  double acceleration = 1.0;         ///< [unit/s^2]
+  double jerk = 0.0;                 ///< [unit/s^3] 0: no limit
+};
+
+inline axis::PathAxis pathAxis(const std::string& name, const PathAxisLimits& given) {
+  axis::PathAxis axis;
+  axis.name = name;
+  axis.microsteps = 16;
+  axis.steps_per_unit = given.steps_per_unit;
+  axis.limits.max_speed = given.speed * given.steps_per_unit;
+  axis.limits.acceleration = axis.limits.deceleration = given.acceleration * given.steps_per_unit;
+  axis.limits.jerk = given.jerk * given.steps_per_unit;
+  axis.stop_limits = axis.limits;
+  return axis;
+}
+
+/// The steps of one axis.
+using AxisSteps = std::vector<std::pair<std::int64_t, int>>;
+
+struct PlannedPath {
+  machine::PathPlan plan;
+  std::shared_ptr<const axis::SharedPath> path;
+  std::vector<std::shared_ptr<const motion::Profile>> curves;  ///< of each axis
+
+  AxisSteps steps(std::size_t axis) const { return motion::stepsOf(*curves[axis]); }
+  std::int64_t endCount(std::size_t axis) const {
+    std::int64_t count = 0;
+    for (const auto& step : steps(axis)) count += step.second;
+    return count;
+  }
+  double duration() const { return curves.front()->duration().value(); }
+};
+
+/// The path as the machine plans it.
+inline PlannedPath planned(const machine::PathRequest& request,
+                           const std::vector<axis::PathAxis>& axes) {
+  PlannedPath made;
+  made.plan = machine::planPath(request, axes, std::vector<machine::PathOrigin>(axes.size()));
+  const std::vector<motion::MotionState> rest(axes.size());
+  const auto prepared =
+      std::make_shared<const axis::PreparedTrajectory>(axes, made.plan.points, rest);
+  made.path = axis::PreparedTrajectory::join(prepared, std::vector<axis::PathStart>(axes.size()));
+  const auto& trajectory = dynamic_cast<const axis::TrajectoryPath&>(*made.path);
+  for (const auto& member : trajectory.members()) made.curves.push_back(member.curve);
+  return made;
+}
+
+}  // namespace stepdriver::test
