@@ -144,6 +144,7 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
 
   if (!energized_ || braked || pulse.moved == 0) return;
   rotor_ += static_cast<double>(pulse.moved);
+  stepped_ += pulse.moved;
   for (const Drive& drive : drives_) drive.axis->noteMoved(time_ns);
   ++motor_steps_;
   // The loss is in the coupling, not in the rotor: the rotor then still agrees with the translator,
@@ -166,10 +167,7 @@ void RigAxis::snapRotor() {
   rotor_ = phase + cycle * std::round((rotor_ - phase) / cycle);
 }
 
-void RigAxis::couple(std::vector<Drive> drives) {
-  drives_ = std::move(drives);
-  farthest_ = {-spec_.start, spec_.start};
-}
+void RigAxis::couple(std::vector<Drive> drives) { drives_ = std::move(drives); }
 
 double RigAxis::motorWay() const {
   const double microsteps = rotor_ - static_cast<double>(slipped_);
@@ -201,7 +199,18 @@ void RigAxis::moveOwnSwitches(std::int64_t time_ns) {
   if (max_switch_) max_switch_->follow(carriage(), time_ns);
 }
 
+double RigAxis::steppedWay() const {
+  double way = 0.0;
+  for (const Drive& drive : drives_) {
+    const RigAxis& motor = *drive.axis;
+    way += drive.carriage_way * static_cast<double>(motor.stepped_) * motor.spec_.full_step_travel /
+           motor.chip_.finest();
+  }
+  return way;
+}
+
 // The steps of its motors are not at the same time: each may be half a microstep ahead or behind.
+// Only steps count: a rotor that snaps, a load that falls and a hand move the carriage as well.
 void RigAxis::noteMoved(std::int64_t time_ns) {
   double apart = 0.25 * spec_.full_step_travel / chip_.microsteps();
   for (const Drive& drive : drives_) {
@@ -211,7 +220,7 @@ void RigAxis::noteMoved(std::int64_t time_ns) {
   for (const Side side : {Side::kMin, Side::kMax}) {
     SwitchModel* const contact = switchAt(side);
     if (contact == nullptr) continue;
-    const double place = side == Side::kMax ? carriage() : -carriage();
+    const double place = side == Side::kMax ? steppedWay() : -steppedWay();
     double& farthest = farthest_.at(side == Side::kMax ? 1 : 0);
     if (!contact->noteStep(time_ns)) {
       farthest = place;

@@ -55,6 +55,8 @@ class RigAxis {
  private:
   double carriage() const;
   double motorWay() const;
+  /// [mm|deg] How far the steps of its motors alone have moved the carriage of a coupled axis.
+  double steppedWay() const;
   /// A motor has moved its carriage, which others move too.
   void noteMoved(std::int64_t time_ns);
   void moveOwnSwitches(std::int64_t time_ns);
@@ -80,6 +82,7 @@ class RigAxis {
   ChipModel chip_;
   bool energized_;
   double rotor_ = 0.0;  // microsteps of the finest mode, from its position when the rig was made
+  std::int64_t stepped_ = 0;      // microsteps by which pulses have moved the rotor
   std::int64_t slipped_ = 0;      // microsteps that the rotor made and the carriage didn't
   std::int64_t motor_steps_ = 0;  // since the faults were set
   std::int64_t pulses_forward_ = 0;
@@ -95,7 +98,7 @@ class RigAxis {
   std::optional<BrakeModel> brake_;
   std::optional<SpringMass> mass_;
   std::vector<Drive> drives_;  // empty: its own motor alone
-  // [mm|deg] Of a coupled axis: how far outwards it may get, by side.
+  // [mm|deg] Of a coupled axis: how far outwards its steps may take it, by side.
   std::array<double, 2> farthest_{};
   std::int64_t power_from_ns_ = kForEver;
   bool powers_up_ = false;  // as soon as the power is there

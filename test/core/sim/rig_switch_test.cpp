@@ -151,6 +151,47 @@ TEST(RigSwitch, CountsNoStepIfItIsPressedBetweenTheReadingAndTheStep) {
   EXPECT_EQ(bench.report().violations, (test::Violations{{Violation::kStepIntoSwitch, 2}}));
 }
 
+/// The axes x and y of a CoreXY, y with a max switch that 7 full steps press.
+struct CoreXyRig : HandRig {
+  CoreXyRig()
+      : HandRig(axes(), {{{"x", "y"}, {{1.0, 1.0}, {1.0, -1.0}}, {{0.5, 0.5}, {0.5, -0.5}}}}) {
+    ready().ready("y");
+  }
+
+  static std::vector<RigAxisSpec> axes() {
+    std::vector<RigAxisSpec> specs{plainAxis("a4988"), plainAxis("a4988", "y")};
+    specs[1].max_switch.emplace();
+    specs[1].max_switch->line = "y.max";
+    specs[1].max_switch->active_level = true;
+    specs[1].max_switch->position = 7 * kTravel;
+    return specs;
+  }
+
+  /// Both motors make a full step, x.dir's forward.
+  void step(bool y_forward) {
+    wait(kHalf).set("x.dir", true).set("y.dir", y_forward).wait(kHalf);
+    pulse().pulse(1, "y.step");
+  }
+  void moveY(int full_steps) {
+    for (int i = 0; i < full_steps; ++i) step(false);
+  }
+};
+
+// Without its current the translator goes home, and the rotors then snap by a full step, outwards.
+TEST(RigSwitch, OfAxesThatShareMotorsCountsOnlySteps) {
+  CoreXyRig bench;
+  bench.moveY(7);
+  EXPECT_TRUE(bench.reads("y.max"));
+  for (const bool awake : {false, true}) bench.set("x.sleep", awake).set("y.sleep", awake);
+  EXPECT_NEAR(bench.report("y").carriage, 8 * kTravel, 1e-9);
+  bench.wait(1'000'000'000);
+  bench.step(true);
+  EXPECT_EQ(test::inWords(bench.report("y").violations), "none") << "x moves, and y doesn't";
+  EXPECT_NEAR(bench.report("x").carriage, kTravel, 1e-9);
+  bench.moveY(3);
+  EXPECT_GT(bench.report("y").totalViolations(), 0) << bench.report("y").carriage << " mm";
+}
+
 TEST(RigSwitch, SharesALineWithAnother) {
   RigAxisSpec spec = axisWithSwitches();
   spec.min_switch->line = spec.max_switch->line = "x.both";

@@ -48,8 +48,9 @@ inline std::string inWords(const Violations& violations) {
 
 /// A rig whose edges are made by hand. Time advances only if the test says so.
 struct HandRig {
-  explicit HandRig(const std::vector<sim::RigAxisSpec>& specs)
-      : trace(std::make_shared<sim::MemoryTrace>()), rig(specs, trace) {}
+  explicit HandRig(const std::vector<sim::RigAxisSpec>& specs,
+                   const std::vector<sim::RigCoupling>& couplings = {})
+      : trace(std::make_shared<sim::MemoryTrace>()), rig(specs, trace, couplings) {}
   explicit HandRig(const sim::RigAxisSpec& spec) : HandRig(std::vector<sim::RigAxisSpec>{spec}) {}
   explicit HandRig(const std::string& model) : HandRig(plainAxis(model)) {}
 
