@@ -143,6 +143,7 @@ void VirtualClock::takeStall() {
     lag_ = lag;
   } else {
     now_ += lag - lag_;
+    ++stalls_;
   }
 }
 

@@ -123,10 +123,12 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
                                     const SimulationConfig& config) {
   std::vector<sim::RigAxisSpec> rig;
   rig.reserve(axes.size());
-  for (const AxisConfig& axis : axes) {
+  for (std::size_t number = 0; number < axes.size(); ++number) {
+    const AxisConfig& axis = axes[number];
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(axis.motorAt(i).motor);
       rig.push_back(rigAxisOf(motorAlone(axis, i), simulated));
+      rig.back().limits = motorLimits(axes, number);
     }
   }
   return rig;
@@ -159,7 +161,32 @@ std::shared_ptr<sim::PinTrace> traceOf(const SimulationConfig& config) {
       config.trace, config.trace_overwrites_any_file ? Replaces::kAnyFile : Replaces::kTraces);
 }
 
+/// The limits of an axis, in steps of a motor.
+sim::MotorLimits limitsOf(const AxisConfig& axis, double steps_per_unit) {
+  const double acceleration = std::max(
+      {axis.acceleration, axis.deceleration, axis.stop_deceleration.value_or(axis.deceleration)});
+  return {axis.max_speed * steps_per_unit, acceleration * steps_per_unit,
+          axis.start_speed * steps_per_unit};
+}
+
 }  // namespace
+
+sim::MotorLimits motorLimits(const std::vector<AxisConfig>& axes, std::size_t axis) {
+  const AxisConfig& own = axes.at(axis);
+  if (own.kinematics == nullptr) return limitsOf(own, own.steps_per_unit);
+  const config::Kinematics& shared = *own.kinematics;
+  const std::vector<double>& row = shared.matrix.at(shared.numberOf(own.name));
+  sim::MotorLimits sum;
+  for (const AxisConfig& sharer : axes) {
+    const std::size_t number = shared.numberOf(sharer.name);
+    if (number >= row.size()) continue;
+    const sim::MotorLimits part = limitsOf(sharer, std::abs(row[number]) * own.steps_per_unit);
+    sum.rate += part.rate;
+    sum.acceleration += part.acceleration;
+    sum.start_rate += part.start_rate;
+  }
+  return sum;
+}
 
 void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config,
                      const std::string& name, std::vector<ConfigIssue>& issues) {
@@ -188,7 +215,7 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
       emergency_stop_(std::move(emergency_stop)),
       clock_(config.speed),
       rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes), relayOf(motor_power)),
-      backend_(rig_, [this] { return clock_.now(); }) {
+      backend_(rig_, [this] { return timeOfEdge(); }) {
   for (const AxisConfig& axis : axes) {
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const config::MotorConfig& motor = axis.motorAt(i);
@@ -201,6 +228,12 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
     }
   }
   if (emergency_stop_) pressEmergencyStop(config.emergency_stop);
+}
+
+pulse::Nanoseconds Simulation::timeOfEdge() {
+  const std::uint64_t stalls = clock_.stalls();
+  if (stalls_.exchange(stalls) != stalls) rig_.clockStalled();
+  return clock_.now();
 }
 
 void Simulation::pressEmergencyStop(bool pressed) {

@@ -63,7 +63,7 @@ class Rig::Impl {
         return axis->spec().name == spec.name;
       });
       if (twin) throw std::invalid_argument("The rig has two axes named " + spec.name + ".");
-      axes.push_back(std::make_unique<RigAxis>(spec));
+      axes.push_back(std::make_unique<RigAxis>(spec, slides));
       wire(*axes.back());
     }
     for (const RigCoupling& coupling : couplings) couple(coupling);
@@ -132,6 +132,7 @@ class Rig::Impl {
   }
 
   std::mutex mutex;
+  Slides slides;
   std::vector<std::unique_ptr<RigAxis>> axes;
   std::optional<PowerRelay> relay;
   TraceFeed feed;
@@ -249,6 +250,11 @@ void Rig::placeCarriage(const std::string& axis, double position, std::int64_t t
   const std::int64_t now_ns = impl_->advance(time_ns);
   impl_->axisOf(axis).placeCarriage(position, now_ns);
   impl_->switchesMoved(now_ns);
+}
+
+void Rig::clockStalled() {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  for (const auto& axis : impl_->axes) axis->clockStalled();
 }
 
 void Rig::flushTrace() {

@@ -46,15 +46,17 @@ std::optional<SwitchModel> madeSwitch(const std::optional<SwitchSpec>& spec, Sid
 
 }  // namespace
 
-RigAxis::RigAxis(const RigAxisSpec& spec)
+RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
     : spec_(checked(spec)),
       chip_(spec_),
       energized_(chip_.energized()),
       min_switch_(madeSwitch(spec_.min_switch, Side::kMin, spec_.start)),
       max_switch_(madeSwitch(spec_.max_switch, Side::kMax, spec_.start)),
       fault_(madeContact(spec_.fault_line, spec_.chip.fault_active.value_or(false), false)),
-      in_position_(madeContact(spec_.in_position_line,
-                               spec_.chip.in_position_active.value_or(false), true)) {
+      in_position_(
+          madeContact(spec_.in_position_line, spec_.chip.in_position_active.value_or(false), true)),
+      slides_(slides) {
+  if (spec_.limits) judge_.emplace(*spec_.limits);
   if (spec_.brake) brake_.emplace(*spec_.brake);
   if (spec_.spring) mass_.emplace(spec_.spring->frequency, spec_.spring->damping, spec_.start);
   settle(kForEver);
@@ -72,7 +74,25 @@ void RigAxis::request(Pin pin, bool line_level, std::int64_t time_ns) {
 
 void RigAxis::edge(Pin pin, bool line_level, std::int64_t time_ns) {
   fall(time_ns);
+  const bool cw_ccw = spec_.chip.step_inputs == driver::StepInputs::kCwCcw;
+  if (pin == Pin::kDir && !cw_ccw && line_level != chip_.lineLevel(pin)) noteTurn();
   follow(chip_.edge(pin, line_level, time_ns), time_ns);
+}
+
+// The next step waits at most for all times of the chip from the last one on.
+void RigAxis::noteTurn() {
+  const driver::Timing& timing = spec_.chip.timing;
+  slides_.add(timing.step_high_ns + timing.step_low_ns + timing.dir_hold_ns + timing.dir_setup_ns);
+}
+
+void RigAxis::judge(bool forward, std::int64_t time_ns) {
+  // Without DIR, only the pulse itself shows the turn.
+  const bool cw_ccw = spec_.chip.step_inputs == driver::StepInputs::kCwCcw;
+  if (cw_ccw && std::exchange(last_forward_, forward) != forward) noteTurn();
+  if (!judge_) return;
+  const double way = static_cast<double>(spec_.microsteps) / chip_.microsteps();
+  const auto violation = judge_->step(forward ? way : -way, time_ns, slides_.total());
+  if (violation) chip_.count(*violation);
 }
 
 void RigAxis::setBrake(bool line_level, std::int64_t time_ns) {
@@ -131,6 +151,7 @@ void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t 
 
 void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   ++(pulse.forward ? pulses_forward_ : pulses_backward_);
+  judge(pulse.forward, time_ns);
   for (const Side side : {Side::kMin, Side::kMax}) {
     SwitchModel* const contact = drives_.empty() ? switchAt(side) : nullptr;
     const bool is_ahead = pulse.forward == (side == Side::kMax);
@@ -283,6 +304,7 @@ RigAxisReport RigAxis::report(std::int64_t time_ns) const {
   report.min_pressed = min_switch_ && min_switch_->active(time_ns);
   report.max_pressed = max_switch_ && max_switch_->active(time_ns);
   report.violations = chip_.violations();
+  if (judge_) report.beyond_limits = judge_->firstViolation();
   return report;
 }
 

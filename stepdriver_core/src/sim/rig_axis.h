@@ -8,6 +8,7 @@
 
 #include "brake_model.h"
 #include "chip_model.h"
+#include "motion_judge.h"
 #include "spring_mass.h"
 #include "stepdriver_core/sim/rig.h"
 #include "switch_model.h"
@@ -17,8 +18,9 @@ namespace stepdriver::sim {
 /// One axis of the rig: chip, rotor, carriage and switches, one moving the next.
 class RigAxis {
  public:
+  /// @param slides of the rig, outlives the axis.
   /// @throw std::invalid_argument if the chip can't do what the specification says.
-  explicit RigAxis(const RigAxisSpec& spec);
+  RigAxis(const RigAxisSpec& spec, Slides& slides);
 
   /// A motor that moves the carriage of a coupled axis.
   struct Drive {
@@ -50,6 +52,9 @@ class RigAxis {
   SwitchModel* inPositionContact() { return in_position_ ? &*in_position_ : nullptr; }
   void setFaults(const RigFaults& faults, std::int64_t time_ns);
   void placeCarriage(double position, std::int64_t time_ns);
+  void clockStalled() {
+    if (judge_) judge_->forget();
+  }
   RigAxisReport report(std::int64_t time_ns) const;
 
  private:
@@ -64,6 +69,8 @@ class RigAxis {
   void turnBy(double way);
   void follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns);
   void takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns);
+  void noteTurn();
+  void judge(bool forward, std::int64_t time_ns);
   void breakChip(std::int64_t time_ns);
   void mendChip();
   void settle(std::int64_t time_ns);
@@ -100,6 +107,9 @@ class RigAxis {
   std::vector<Drive> drives_;  // empty: its own motor alone
   // [mm|deg] Of a coupled axis: how far outwards its steps may take it, by side.
   std::array<double, 2> farthest_{};
+  Slides& slides_;
+  std::optional<MotionJudge> judge_;
+  bool last_forward_ = false;  // the direction of the last pulse
   std::int64_t power_from_ns_ = kForEver;
   bool powers_up_ = false;  // as soon as the power is there
 };

@@ -36,6 +36,10 @@ const char* nameOf(Violation violation) {
       return "step against the brake";
     case Violation::kStepWithoutPower:
       return "step while the motor power is off";
+    case Violation::kAboveTopRate:
+      return "steps above the top speed";
+    case Violation::kAboveAcceleration:
+      return "speed changed faster than the acceleration";
   }
   return "unknown violation";
 }

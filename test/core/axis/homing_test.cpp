@@ -82,6 +82,7 @@ TEST_F(HomingTest, FindsTheTriggerPointInATimelineThatHasSlid) {
   x().moveTo(0.05);
   bench->machine->advance(0.1);
   bench->clock.waitUntil(bench->clock.now() + 4'000'000);
+  bench->rig.clockStalled();
   bench->machine->advance(1.0);
   ASSERT_GT(bench->machine->figures().slipped, 0.003);
   expectHomed(x().home());
@@ -94,6 +95,7 @@ TEST_F(HomingTest, KnowsTheTriggerPointToAStepWhereTheTimelineSlidesAfterIt) {
     if (!closed && x().state().homing == HomingPhase::kLatching && *x().endstops().min) {
       closed = true;
       bench->clock.waitUntil(bench->clock.now() + 100'000'000);  // forty steps of the latch
+      bench->rig.clockStalled();
     }
     return false;
   }));

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdlib>
+#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,6 +10,7 @@
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/setup/simulation.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::test {
@@ -102,11 +105,28 @@ class Bench {
         bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
-        rig(rig_axes, trace, couplings(axes), motorPowerOf(options)),
+        rig(judged(rig_axes, axes), trace, couplings(axes), motorPowerOf(options)),
         backend(rig, [this] { return clock.now(); }) {
     options.threaded = threaded;
     machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
   }
+
+  /// In a test, no motor may have got steps beyond what the configuration allows.
+  ~Bench() {
+    if (may_exceed_limits) return;
+    for (const std::string& name : rig.axes()) {
+      const std::string beyond = rig.report(name).beyond_limits;
+      if (beyond.empty()) continue;
+#ifdef ADD_FAILURE
+      ADD_FAILURE() << name << ": " << beyond;
+#else
+      std::cerr << name << ": " << beyond << "\n";
+      std::abort();
+#endif
+    }
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
 
   /// The relay of the motor power, as it is configured.
   static std::optional<sim::MotorPowerSpec> motorPowerOf(const machine::MachineOptions& options) {
@@ -124,6 +144,21 @@ class Bench {
     std::vector<sim::RigAxisSpec> specs;
     specs.reserve(axes.size());
     for (const config::AxisConfig& config : axes) specs.push_back(rigAxis(config));
+    return specs;
+  }
+
+  /// The rig knows what the configuration allows each motor.
+  static std::vector<sim::RigAxisSpec> judged(std::vector<sim::RigAxisSpec> specs,
+                                              const std::vector<config::AxisConfig>& axes) {
+    for (std::size_t number = 0; number < axes.size(); ++number) {
+      for (std::size_t i = 0; i < axes[number].motors(); ++i) {
+        for (sim::RigAxisSpec& spec : specs) {
+          if (spec.name == axes[number].traceName(i) && !spec.limits) {
+            spec.limits = setup::motorLimits(axes, number);
+          }
+        }
+      }
+    }
     return specs;
   }
 
@@ -150,6 +185,7 @@ class Bench {
     return axis(name).wait(axis(name).moveTo(position));
   }
 
+  bool may_exceed_limits = false;
   pulse::VirtualClock clock;
   std::shared_ptr<sim::MemoryTrace> trace;
   sim::Rig rig;
@@ -163,7 +199,7 @@ inline std::string violationsOf(const sim::RigAxisReport& report) {
   for (const auto& [kind, count] : report.violations) {
     text += std::string(sim::nameOf(kind)) + ": " + std::to_string(count) + "; ";
   }
-  return text;
+  return text + report.beyond_limits;
 }
 
 }  // namespace stepdriver::test

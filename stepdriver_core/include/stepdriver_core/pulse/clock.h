@@ -105,6 +105,8 @@ class VirtualClock : public Clock {
   Nanoseconds now() override;
   void waitUntil(Nanoseconds time) override;
   void wake() override;
+  /// How often a wait has ended late. For any thread.
+  std::uint64_t stalls() const { return stalls_.load(std::memory_order_acquire); }
   bool keepsRealTime() const override { return speed_ > 0.0 && speed_ <= 1.0; }
   void hold() override;
   void release() override;
@@ -122,6 +124,7 @@ class VirtualClock : public Clock {
   std::condition_variable changed_;
   // Changed only with the mutex. Without a speed it can be read at any time.
   std::atomic<Nanoseconds> now_{0};
+  std::atomic<std::uint64_t> stalls_{0};
   Nanoseconds awaited_ = kNever;
   Nanoseconds lag_ = 0;  // behind its pace, at the end of the last wait
   bool waiting_ = false;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -15,6 +18,12 @@
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::setup {
+
+/// The limits of the motor that has the pins of an axis: those of the axis, or the most that all
+/// axes that share it can demand of it together.
+///
+/// @param axis its place in `axes`.
+sim::MotorLimits motorLimits(const std::vector<config::AxisConfig>& axes, std::size_t axis);
 
 /// The simulated rig of a configuration, its lines and its clock. All calls are safe from any
 /// thread.
@@ -51,11 +60,15 @@ class Simulation {
   void pressEndstop(const std::string& axis, End end, bool pressed);
 
  private:
+  /// For an edge that is being made.
+  pulse::Nanoseconds timeOfEdge();
+
   std::vector<config::AxisConfig> axes_;
   const std::optional<config::InputSwitch> emergency_stop_;
   std::map<std::string, sim::RigFaults> faults_;
   std::mutex mutex_;
   std::map<std::string, sim::RigFaults> pressed_;  // the faults, and the pressed switches
+  std::atomic<std::uint64_t> stalls_{0};           // of the clock, that the rig knows
   pulse::VirtualClock clock_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;

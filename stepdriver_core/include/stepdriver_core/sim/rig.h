@@ -60,6 +60,18 @@ struct SpringSpec {
   double damping = 0.0;    ///< damping ratio, from 0 to below 1
 };
 
+/// What the configuration allows a motor. Steps are microsteps of RigAxisSpec::microsteps; in
+/// another mode, as many of them as it has fewer or more for the same way count as one.
+struct MotorLimits {
+  double rate = 0.0;          ///< [steps/s] the highest; above 0
+  double acceleration = 0.0;  ///< [steps/s^2] the highest, speeding up or slowing down; above 0
+  double start_rate = 0.0;    ///< [steps/s] by which the speed may jump
+  /// The times of the edges are exactly as planned, on a virtual clock. Otherwise a step may be
+  /// late, and the interval to the next one may be down to three quarters of what was planned:
+  /// then no acceleration can be judged.
+  bool exact_times = true;
+};
+
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
@@ -79,6 +91,7 @@ struct RigAxisSpec {
   /// [mm/s|deg/s] how fast the load sinks towards min while neither the motor nor a brake holds it
   double load_falls = 0.0;
   std::optional<SpringSpec> spring;
+  std::optional<MotorLimits> limits;  ///< empty: its motor may do anything
 };
 
 /// Axes whose motors together move their carriages, as on a CoreXY. A turn of the n-th axis's motor
@@ -113,6 +126,11 @@ enum class Violation {
   kStepIntoSwitch,
   kStepAgainstBrake,  ///< before the brake is released and its release time is over
   kStepWithoutPower,  ///< while the motor power is off, or before it is there
+  /// Steps faster than MotorLimits::rate, by more than a hundredth, which trajectories may have.
+  kAboveTopRate,
+  /// Steps whose speed changes faster than MotorLimits::acceleration, by more than a hundredth.
+  /// Steps may end at once; what follows then begins from rest.
+  kAboveAcceleration,
 };
 
 /// In words, as in reports: `short step high`.
@@ -135,6 +153,8 @@ struct RigAxisReport {
   bool min_pressed = false;  ///< the reading of its line at the rig's latest time
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
+  /// The first step beyond MotorLimits, with its time and numbers; empty if there was none.
+  std::string beyond_limits;
 
   /// Of all kinds together.
   std::int64_t totalViolations() const;
@@ -218,6 +238,10 @@ class Rig : public gpio::Board {
   /// flows, it snaps to the nearest position with the translator's phase, up to two full steps
   /// away.
   void placeCarriage(const std::string& axis, double position, std::int64_t time_ns);
+
+  /// Something has stopped the clock, so that the next steps may be late: speeds and accelerations
+  /// are then judged again from the second step on.
+  void clockStalled();
 
   /// Makes the trace readable up to its last edge while the rig lives.
   ///

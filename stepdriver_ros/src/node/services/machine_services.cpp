@@ -52,13 +52,14 @@ void tell(machine::Machine& machine, const machine::CoordinatedMove& move, bool 
   response.duration = move.duration;
 }
 
-/// "2 short step high, 1 step while asleep"
+/// "2 short step high, 1 step while asleep"; of steps beyond the limits also the first one.
 std::string kindsText(const sim::RigAxisReport& report) {
   std::string text;
   for (const auto& [violation, count] : report.violations) {
     if (!text.empty()) text += ", ";
     text += fmt::format("{} {}", count, sim::nameOf(violation));
   }
+  if (!report.beyond_limits.empty()) text += "; first " + report.beyond_limits;
   return text.empty() ? "none" : text;
 }
 
