@@ -229,12 +229,12 @@ void AxisModel::refuseMicrosteps(int wanted) const {
   const std::vector<int> known = driver::selectableMicrosteps(chip);
   if (chip.modes.empty()) {
     refuse(
-        fmt::format("it can't change to {} microsteps: those of a {} are set by its DIP switches "
+        fmt::format("it can't change to {} microsteps: those of the {} are set by its DIP switches "
                     "while its power is off, and configured as `microsteps`, here {}",
                     wanted, chip.title, motor.microsteps()));
   }
   if (std::find(known.begin(), known.end(), wanted) == known.end()) {
-    refuse(fmt::format("a {} has no 1/{} mode; it has {}", chip.title, wanted,
+    refuse(fmt::format("the {} has no 1/{} mode; it has {}", chip.title, wanted,
                        fmt::join(known, ", ")));
   }
   if (!motor.pins().hasMode()) {

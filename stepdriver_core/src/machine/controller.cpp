@@ -75,7 +75,7 @@ std::string whyNoPin(const config::AxisConfig& axis,
                      const char* name) {
   for (std::size_t i = 0; i < axis.motors(); ++i) {
     const driver::DriverChip& chip = axis.motorAt(i).driver;
-    if (!(chip.*active_level)) return fmt::format("a {} has no {} pin", chip.title, name);
+    if (!(chip.*active_level)) return fmt::format("the {} has no {} pin", chip.title, name);
   }
   return fmt::format("pins/{} isn't configured", pin);
 }

@@ -17,7 +17,7 @@ const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const bool is_known =
       known.empty() || std::find(known.begin(), known.end(), spec.microsteps) != known.end();
   if (!is_known || spec.microsteps < 1) {
-    throw std::invalid_argument(fmt::format("Axis {} of the rig: a {} doesn't do {} microsteps.",
+    throw std::invalid_argument(fmt::format("Axis {} of the rig: the {} doesn't do {} microsteps.",
                                             spec.name, spec.chip.title, spec.microsteps));
   }
   if (!(spec.full_step_travel > 0.0)) {

@@ -117,7 +117,7 @@ TEST(AxisChip, RefusesAMicrostepModeThatHasNoPositionHere) {
   EXPECT_REFUSED(x.setMicrosteps(1), "1/1 has no position at 0.00204 m; the nearest");
   EXPECT_REFUSED(x.setMicrosteps(8), "no position");
   EXPECT_REFUSED(x.setMicrosteps(3), "it has 1, 2, 4, 8, 16");
-  EXPECT_REFUSED(x.setMicrosteps(32), "no 1/32 mode");
+  EXPECT_REFUSED(x.setMicrosteps(32), "the A4988 has no 1/32 mode; it has 1, 2, 4, 8, 16");
   EXPECT_EQ(x.state().microsteps, 16);
   EXPECT_EQ(bench.pulses(), 163);
 }
@@ -186,7 +186,7 @@ TEST(AxisChip, CountsTheTranslatorFromHomeAfterAReset) {
 TEST(AxisChip, RefusesToSetTheMicrostepsOfATb6600) {
   Bench bench({linearAxis("x", "tb6600")});
   EXPECT_REFUSED(bench.axis().setMicrosteps(8),
-                 "it can't change to 8 microsteps: those of a TB6600 are set by its DIP switches");
+                 "it can't change to 8 microsteps: those of the TB6600 are set by its DIP switches");
   EXPECT_REFUSED(bench.axis().sleep(true), "no SLEEP pin");
   EXPECT_REFUSED(bench.axis().reset(), "no RESET pin");
 }

@@ -332,8 +332,8 @@ TEST_F(Gantry, ResetsTheDriversThatHaveReset) {
   expectNoViolations();
   test::giveDriver(config.twins[0], driver::driverChip("tmc2209"));
   build(config);
-  EXPECT_REFUSED(y().reset(), "a TMC2209 has no RESET pin");
-  EXPECT_REFUSED(y().sleep(true), "a TMC2209 has no SLEEP pin");
+  EXPECT_REFUSED(y().reset(), "the TMC2209 has no RESET pin");
+  EXPECT_REFUSED(y().sleep(true), "the TMC2209 has no SLEEP pin");
 }
 
 TEST_F(Gantry, StepsBothMotorsOnBothEdges) {
