@@ -18,9 +18,10 @@ TEST(PlotMotion, DrawsWhatARunningNodeWouldDoAndMovesNothing) {
   const auto end = runProgram("plot_motion", {"plan", "--node", node.name(), "--axis", "x", "--to",
                                               "0.1", "-o", picture.path()});
   EXPECT_EQ(end.code, 0);
-  expectSays(end.output, "x: would move to 0.1 m in 1.2 s");
+  expectSays(end.output, "x: from 0 to 100 mm in 1.2 s\nx: 1.2 s, from 0 to 100 mm");
   expectSays(end.output, picture.path());
-  for (const char* words : {"velocity [mm/s]", "step period [us]", "position [mm]", "jerk [mm/s"}) {
+  for (const char* words :
+       {"velocity [mm/s]", "step period [us]", "position [mm]", "no jerk to show"}) {
     expectSays(picture.text(), words);
   }
   EXPECT_EQ(node.pulses(), 0);
@@ -60,6 +61,8 @@ TEST(PlotMotion, DrawsThePulsesOfATrace) {
       runProgram("plot_motion", {"trace", trace, "--steps-per-mm", "80", "-o", picture.path()});
   EXPECT_EQ(end.code, 0) << end.output;
   EXPECT_EQ(picture.text().substr(1, 3), "PNG");
+  expectSays(end.output, "x: 800 pulses in ");
+  expectSays(end.output, "from 0 to 10 mm (least 0, greatest 10 mm)");
   EXPECT_EQ(runProgram("plot_motion", {"trace", trace, "--axis", "y"}).code, 1);
   EXPECT_EQ(runProgram("plot_motion", {"trace", trace, "--from", "9999"}).code, 1);
 }

@@ -36,11 +36,11 @@ class BagTest(unittest.TestCase):
     def test_draws_joint_states_in_millimetres(self):
         self.assertEqual(self.draw("--steps-per-mm", "80"), (0, ""))
         self.assertIn("velocity [mm/s]", self.picture.read_text())
-        self.assertNotIn("needs the steps per unit", self.picture.read_text())
+        self.assertNotIn("need the steps per unit", self.picture.read_text())
 
     def test_says_what_it_needs_for_the_step_period(self):
         self.assertEqual(self.draw(), (0, ""))
-        self.assertIn("needs the steps per unit", self.picture.read_text())
+        self.assertIn("need the steps per unit", self.picture.read_text())
 
     def test_says_what_the_bag_lacks(self):
         for arguments, words in ((["--joint", "y_joint"], "no joint y_joint; it has: x_joint"),

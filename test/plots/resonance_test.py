@@ -1,8 +1,12 @@
+import argparse
+import importlib.machinery
+import importlib.util
 import math
 import random
 import unittest
 
-import support  # noqa: F401: the path to the modules
+import support
+from stepdriver_plots.errors import Undrawable
 from stepdriver_plots.resonance import (POINTS, amplitude_at, largest_amplitude, left_by, oscillation,
                                         peaks_of, proposal, shapers)
 
@@ -11,6 +15,26 @@ def response(frequency, own, damping):
     """What an accelerometer on the mass shows of an oscillation of the axis with amplitude 1."""
     r = frequency / own
     return abs(1.0 / complex(1.0 - r * r, 2.0 * damping * r))
+
+
+def program():
+    loader = importlib.machinery.SourceFileLoader("measure_resonance", str(support.SCRIPTS / "measure_resonance"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("measure_resonance", loader))
+    loader.exec_module(module)
+    return module
+
+
+class OwnNode:
+    """What measure_resonance asks of a node."""
+
+    def __init__(self, **params):
+        self.params = {"max_speed_mm_s": 100.0, "acceleration_mm_s2": 1000.0, **params}
+
+    def scale(self, _):
+        return 1000.0, "mm"
+
+    def axis_param(self, _, key, default=None):
+        return self.params.get(key, default)
 
 
 FREQUENCIES = [float(f) for f in range(10, 101)]
@@ -64,6 +88,25 @@ class ResonanceTest(unittest.TestCase):
         shaper, left = proposal(FREQUENCIES, wide, peak)
         self.assertNotEqual(shaper.name, "zv")
         self.assertLess(left, left_by(shapers(peak.frequency, peak.damping)[0], 50.0, peak.damping))
+
+    def test_says_what_the_configuration_refuses_together_with_the_proposal(self):
+        measure = program()
+        self.assertEqual(measure.contradictions(OwnNode(), "x", "mm"), [])
+        found = measure.contradictions(OwnNode(backlash_mm=0.05, start_speed_mm_s=2.0), "x", "mm")
+        self.assertEqual(measure.lines_of([], found),
+                         ["# remove start_speed_mm_s: it can't be combined with an input_shaper",
+                          "# remove backlash_mm: it can't be combined with an input_shaper", "input_shaper:"])
+
+    def test_measures_only_frequencies_of_which_there_are_shapers(self):
+        measure = program()
+        for low, high, good in ((0.5, 1000.0, True), (0.4, 10.0, False), (10.0, 1001.0, False)):
+            options = argparse.Namespace(low=low, high=high, step=10.0)
+            if good:
+                self.assertEqual(measure.frequencies(options)[0], low)
+                continue
+            with self.assertRaises(Undrawable) as caught:
+                measure.frequencies(options)
+            self.assertIn("an input_shaper is for frequencies from 0.5 to 1000 Hz", str(caught.exception))
 
     def test_the_shapers_are_those_of_the_driver(self):
         for damping in (0.0, 0.05, 0.2):

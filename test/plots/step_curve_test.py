@@ -2,6 +2,14 @@ import unittest
 
 from support import ramp
 from stepdriver_plots.step_curve import StepCurve, differences
+from stepdriver_plots.summary import summary
+
+
+def trapezoid_of_edges():
+    """2400 steps: up to 8000 steps/s within 400 steps, and down again."""
+    up = ramp(400, 80000.0)
+    times = up + [0.1 + (i + 0.5) / 8000.0 for i in range(1600)] + [0.4 - time for time in reversed(up)]
+    return StepCurve.of_counts([round(time, 9) for time in times], list(range(1, 2401)), "x", "mm", 0.0125)
 
 
 class StepCurveTest(unittest.TestCase):
@@ -21,6 +29,26 @@ class StepCurveTest(unittest.TestCase):
         self.assertEqual(curve.position()[1], [0.25, 0.75, 1.25])
         self.assertEqual(curve.speed()[1], [50.0, 50.0])
         self.assertEqual(curve.period_over_position(), ([0.5, 1.0], [10000.0, 10000.0]))
+
+    def test_begins_at_the_count_before_its_first_edge(self):
+        curve = StepCurve.of_counts([0.0, 0.01, 0.02], [501, 502, 503], first=500)
+        self.assertEqual(curve.position()[1], [500.5, 501.5, 502.5])
+        self.assertEqual(curve.speed()[1], [100.0, 100.0])
+        self.assertEqual(summary(curve), ": 3 pulses in 0.02 s, from 500 to 503 steps (least 500, greatest 503 steps), "
+                                         "at most 100 steps/s")
+
+    def test_says_in_one_line_what_an_axis_did(self):
+        times = ramp(800, 2000.0)
+        counts = list(range(1, 801))
+        curve = StepCurve.of_counts(times, counts, "x", "mm", 0.0125)
+        self.assertEqual(summary(curve), "x: 800 pulses in 0.872 s, from 0 to 10 mm (least 0, greatest 10 mm), at most "
+                                         "22.35 mm/s (1,788 steps/s)")
+
+    def test_finds_out_whether_the_acceleration_jumps(self):
+        self.assertFalse(trapezoid_of_edges().has_jerk_limit)
+        # A jerk of 6e5 steps/s^3, one third of the way.
+        smooth = [round((i + 0.5) ** (1.0 / 3.0) / 100.0, 9) for i in range(3000)]
+        self.assertTrue(StepCurve.of_counts(smooth, list(range(1, 3001))).has_jerk_limit)
 
     def test_stands_where_no_step_comes(self):
         curve = StepCurve.of_counts([0.0, 0.01, 1.0, 1.01], [1, 2, 3, 4])

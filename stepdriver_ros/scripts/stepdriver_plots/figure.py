@@ -8,9 +8,12 @@ try:
 except ImportError:
     sys.exit("Pictures are drawn by matplotlib: apt install python3-matplotlib")
 
+from .errors import Undrawable, refuse_endless  # noqa: E402: matplotlib comes first
+
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402: the backend comes first
-from matplotlib.ticker import MaxNLocator, MultipleLocator  # noqa: E402
+from matplotlib.ticker import (FuncFormatter, LogLocator, MaxNLocator, MultipleLocator,  # noqa: E402
+                               NullFormatter)  # noqa: E402
 
 # Older versions, as in Ubuntu 20.04, measure their texts with another backend, and say so.
 warnings.filterwarnings("ignore", message="tight_layout : falling back to Agg renderer")
@@ -34,6 +37,19 @@ FORMATS = ("svg", "png")
 SAMPLES = 250
 
 
+def refuse_unwritable(path):
+    """Called before anything moves, so that no motion is without its picture."""
+    refuse_endless(path)
+    is_new = not path.exists()
+    try:
+        with open(path, "ab"):
+            pass
+    except OSError as error:
+        raise Undrawable(f"{path}: can't be written: {error.strerror}") from error
+    if is_new:
+        path.unlink()
+
+
 def save(figure, path):
     figure.tight_layout()
     metadata = {"Date": None, "Creator": None} if path.suffix == ".svg" else {"Software": None}
@@ -51,6 +67,7 @@ def draw_motion(curves, path, title="", deflections=()):
         draw_deflections(figure, panels[3], deflections, unit)
     else:
         figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2))
+    with_jerk = [curve for curve in curves if curve.has_jerk_limit]
     for curve, colour in zip(curves, COLOURS * len(curves)):
         coarse = curve.coarse(SAMPLES)
         for panel, (xs, ys) in (
@@ -59,12 +76,8 @@ def draw_motion(curves, path, title="", deflections=()):
                 (panels[2, 0], curve.position()),
                 (panels[0, 1], curve.speed()),
                 (panels[1, 1], coarse.acceleration()),
-                (panels[2, 1], coarse.jerk())):
+                (panels[2, 1], coarse.jerk() if curve in with_jerk else ([], []))):
             panel.plot(xs, ys, color=colour, label=curve.label)
-    if not any(curve.step for curve in curves):
-        say_in(panels[1, 0], "needs the steps per unit")
-    if not any(curve.has_jerk_limit for curve in curves):
-        say_in(panels[2, 1], "no jerk limit")
     place, time = f"position [{unit}]", "time [s]"
     for panel, x, y in ((panels[0, 0], place, f"velocity [{unit}/s]"),
                         (panels[1, 0], place, "step period [us]"),
@@ -74,9 +87,16 @@ def draw_motion(curves, path, title="", deflections=()):
                         (panels[2, 1], time, f"jerk [{unit}/s$^3$]")):
         panel.set_xlabel(x)
         panel.set_ylabel(y)
-    panels[1, 0].set_ylim(bottom=0.0)
+    for panel in (panels[0, 0], panels[0, 1]):
+        include_zero(panel)
+    if any(curve.step for curve in curves):
+        logarithmic(panels[1, 0])
+    else:
+        say_instead(panels[1, 0], "step periods need the steps per unit")
+    if not with_jerk:
+        say_instead(panels[2, 1], "no jerk to show: the acceleration jumps")
     if len(curves) > 1:
-        panels[0, 0].legend(loc="best", frameon=False)
+        legend_above(panels[0, 0])
     figure.suptitle(title)
     save(figure, path)
 
@@ -93,7 +113,7 @@ def draw_spectrum(frequencies, responses, shapers, path, axis):
     panel.set_ylim(bottom=0.0)
     panel.set_xlabel("frequency [Hz]")
     panel.set_ylabel(f"acceleration,\nover that of {axis}")
-    panel.legend(loc="best", frameon=False)
+    legend_above(panel)
     save(figure, path)
 
 
@@ -107,11 +127,34 @@ def draw_deflections(figure, row, deflections, unit):
         panel.plot(times, values, color=colour, label=label)
     panel.set_xlabel("time [s]")
     panel.set_ylabel(f"deflection [{unit}]")
-    panel.legend(loc="best", frameon=False)
+    legend_above(panel)
 
 
-def say_in(panel, text):
-    """Shows a text in place of a graph."""
+def include_zero(panel):
+    """Lets the vertical axis begin or end at 0 if all values are on one side of it."""
+    low, high = panel.dataLim.intervaly
+    if low >= 0.0:
+        panel.set_ylim(bottom=0.0)
+    elif high <= 0.0:
+        panel.set_ylim(top=0.0)
+
+
+def logarithmic(panel):
+    """The periods at the ends of a ramp are a hundred times those at full speed."""
+    panel.set_yscale("log")
+    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.yaxis.set_minor_formatter(NullFormatter())
+
+
+def legend_above(panel):
+    """Shows the legend outside of the panel, so that it covers no curve."""
+    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=4, frameon=False, borderpad=0.0)
+
+
+def say_instead(panel, text):
+    """Shows a text in place of a graph and its axes."""
+    panel.set_axis_off()
     panel.text(0.5, 0.5, text, ha="center", va="center", transform=panel.transAxes,
                color="#777777")
 
@@ -124,8 +167,8 @@ def same_ticks(panel):
         axis.set_major_locator(MultipleLocator(step))
 
 
-def draw_drawing(lines, parts, limits, path, title, axes=("x", "y")):
-    """Draws the lines, and over them the path of the axes. parts: (positions, whether they belong to
+def draw_drawing(lines, parts, limits, path, title, axes=("x", "y"), dots=()):
+    """Draws the lines and dots, and over them the path of the axes. parts: (positions, whether they belong to
     the drawing). If both axes have both limits, a frame shows them."""
     figure, panel = plt.subplots(figsize=(6.4, 5.6))
     labels = {}
@@ -133,20 +176,22 @@ def draw_drawing(lines, parts, limits, path, title, axes=("x", "y")):
     if None not in (left, right, low, high):
         labels["soft limits"], = panel.plot([left, right, right, left, left],
                                             [low, low, high, high, low],
-                                            color="#bbbbbb", linewidth=0.8)
+                                            color="#222222", linewidth=0.8, linestyle="--")
     for begin, end in (line[:2] for line in lines if line[2]):
         labels["lines of the drawing"], = panel.plot(
             *zip(begin, end), color=COLOURS[1], linewidth=3.0, alpha=0.25, solid_capstyle="round")
+    for dot in dots:
+        labels["dots of the drawing"], = panel.plot(*dot, "o", color=COLOURS[1], alpha=0.25)
     for places, drawn in parts:
         if len(places) > 1:
             name = "where the axes were" if drawn else "way between strokes"
-            labels[name], = panel.plot(*zip(*places), color=COLOURS[0] if drawn else "#999999",
-                                       linewidth=1.0 if drawn else 0.5)
+            labels[name], = panel.plot(*zip(*places), color=COLOURS[0] if drawn else COLOURS[2],
+                                       linewidth=1.0 if drawn else 0.8, linestyle="-" if drawn else ":")
     panel.set_aspect("equal")
     same_ticks(panel)
     panel.set_xlabel(f"{axes[0]} [mm]")
     panel.set_ylabel(f"{axes[1]} [mm]")
     panel.legend(labels.values(), labels.keys(), loc="upper center",
-                 bbox_to_anchor=(0.5, -0.12), ncol=len(labels), frameon=False)
+                 bbox_to_anchor=(0.5, -0.12), ncol=3, frameon=False)
     panel.set_title(title)
     save(figure, path)

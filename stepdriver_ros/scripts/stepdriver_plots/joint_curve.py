@@ -14,7 +14,9 @@ class JointCurve:
         self.label = label
         self.unit = unit
         self.step = step
+        self.stands = places
 
+    samples = "joint states"
     has_jerk_limit = True  # joint states can't show that there is none
 
     def coarse(self, _samples):

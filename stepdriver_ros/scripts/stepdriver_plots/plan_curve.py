@@ -54,6 +54,12 @@ class PlanCurve:
         last = self.pieces[-1]
         return place(last, last.duration), 0.0, 0.0, 0.0
 
+    samples = None
+
+    @property
+    def stands(self):
+        return self.position()[1]
+
     @property
     def has_jerk_limit(self):
         """If false, the acceleration jumps from one piece to the next."""

@@ -6,6 +6,8 @@ their lines divided by the time, the acceleration is the rate of change of the s
 
 REST = 0.1  # [s] without a step means standstill
 GAP = float("nan")  # interrupts the line of a graph
+JERK_SAMPLES = 250
+JUMP = 1.5  # With twice the samples, the jerk at a jump of the acceleration doubles; elsewhere it is the same.
 
 
 def differences(times, values):
@@ -29,14 +31,24 @@ class StepCurve:
         self.label = label
         self.unit = unit
         self.step = step
+        self.stands = places  # The positions at which it may come to rest.
+
+    samples = "pulses"
 
     @classmethod
-    def of_counts(cls, times, counts, label="", unit="steps", step=1.0):
-        """From the count after each edge; the count before the first edge is 0."""
-        places = [(before + count) / 2 * step for before, count in zip([0] + counts, counts)]
-        return cls(times, places, label, unit, step)
+    def of_counts(cls, times, counts, label="", unit="steps", step=1.0, first=0):
+        """From the count after each edge. first: the count before the first edge."""
+        places = [(before + count) / 2 * step for before, count in zip([first] + counts, counts)]
+        curve = cls(times, places, label, unit, step)
+        curve.stands = [count * step for count in [first] + counts]
+        return curve
 
-    has_jerk_limit = True  # edges can't show that there is none
+    @property
+    def has_jerk_limit(self):
+        """If the acceleration jumps, the jerk that is found there rises with the number of samples."""
+        fine, rough = (max((abs(value) for value in self.coarse(samples).jerk()[1] if value == value), default=0.0)
+                       for samples in (JERK_SAMPLES, JERK_SAMPLES // 2))
+        return fine < JUMP * rough or fine == 0.0
 
     def coarse(self, samples):
         """The same curve from only about this many edges. That removes the noise that whole
