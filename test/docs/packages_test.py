@@ -26,6 +26,7 @@ SYSTEM_KEYS = {
     "libsystemd-dev": "libsystemd-dev",
     "liburdfdom-dev": "liburdfdom-dev",
     "python3-matplotlib": "python3-matplotlib",
+    "python3-shapely": "python3-shapely",
     "python3-yaml": "python3-yaml",
     "tmux": "tmux",
     "yaml-cpp": "libyaml-cpp-dev",
@@ -37,7 +38,9 @@ ROS_KEYS = set(
     "rostest rviz sensor_msgs std_msgs std_srvs tf2_msgs tf2_ros trajectory_msgs visualization_msgs".split()
 )
 # Needed by an installed program, but rosdep has no key for them: docs/first_programs.md names them.
-WITHOUT_KEY = {"python3-svgelements"}
+WITHOUT_KEY = {"librsvg2-bin", "python3-svgelements"}
+# draw needs them for SVG files only, and says so.
+RECOMMENDED = WITHOUT_KEY | {"python3-shapely"}
 # In the Debian package itself, and one in whose place a program takes its own messages.
 OWN_MODULES = {"stepdriver", "stepdriver_plots"}
 WITH_SUBSTITUTE = {"control_msgs"}
@@ -59,12 +62,16 @@ def python_packages_of(program):
 
 def missing_from_control():
     stanza = re.search(r"^Package: ros-stepdriver\n(?:.+\n)+", pages.text_of("debian/control"), re.MULTILINE).group()
-    lines = re.search(r"^Depends:\n((?: .*\n)+)", stanza, re.MULTILINE).group(1)
-    depends = set(re.findall(r"^ ([a-z0-9-]+)", lines, re.MULTILINE))
+    depends, recommends = (
+        set(re.findall(r"^ ([a-z0-9-]+)", lines, re.MULTILINE))
+        for lines in re.findall(r"^(?:Depends|Recommends):\n((?: .*\n)+)", stanza, re.MULTILINE)
+    )
+    for package in sorted(RECOMMENDED - recommends):
+        yield f"debian/control: ros-stepdriver doesn't recommend {package}"
     for program in pages.own_files():
         if not re.match(r"stepdriver_ros/scripts/(?!.*\.pyc$)|examples/first_programs/.*\.py$", program):
             continue
-        for package in sorted(python_packages_of(program) - depends - WITHOUT_KEY):
+        for package in sorted(python_packages_of(program) - depends - RECOMMENDED):
             yield f"debian/control: ros-stepdriver doesn't depend on {package}, which {program} needs"
 
 

@@ -38,6 +38,7 @@ LIMITS = ((0.0, 200.0), (-50.0, 50.0))  # [mm] of the axes
 WORDS = [b"0", b"-1", b"1e308", b"1e-320", b"-1e308", b"nan", b"inf", b"9223372036854775807", b"#", b"%",
          b"M", b"Z", b"A", b"a 1 1 0 0 1 ", b"C", b"q", b"<g>", b"</g>", b"scale(0)", b"rotate(1e308)",
          b"matrix(", b"<use href='#a'/>", b"id='a' ", b"<svg ", b"viewBox='0 0 0 0' ", b"width='1in' ",
+         b"clip-path='url(#a)' ", b"<clipPath ", b"mask='url(#e)' ", b"style='fill:none' ", b"<image href='a' ",
          b"\n", b" ", b"$scope module ", b"$upscope $end\n", b"$timescale 1 ms $end\n", b"$var wire 1 a step $end\n",
          b"#0\n", b"1a\n", b"0a\n", b"0b\n", b"1b\n", b"\x00\x00\x00\x00", b"\xff\xff\xff\xff", b"op=\x07",
          b"chunk_pos=", b"conn=", b"\x1b[2J"]
@@ -65,14 +66,14 @@ def finite(strokes):
 
 def read_drawing(path):
     strokes, _ = drawing.read_drawing(path)
-    require(all(len(stroke) > 1 for stroke in strokes), "each stroke has a line")
+    require(all(strokes), "each stroke has a point")
     require(finite(strokes), "each point is finite")
     placed = drawing.placed(strokes, LIMITS)
     require(finite(placed), "each placed point is finite")
     drawing.refuse_beyond(placed, ("x", "y"), LIMITS)
     if sum(len(stroke) for stroke in strokes) <= 60:
         stroke = one_stroke.one_stroke(placed, (0.0, 0.0)).stroke
-        require(finite([stroke]) and len(stroke) > 1, "one stroke has points")
+        require(stroke and finite([stroke]), "one stroke has points")
 
 
 def read_recording(path):

@@ -35,7 +35,7 @@ class Draw : public testing::Test {
   }
   /// How far the pulses of an axis were off the lines [mm], as the output says.
   static double offIn(const std::string& axis, const std::string& output) {
-    const std::size_t place = output.find(" mm in " + axis + " (microstep 0.0125 mm)");
+    const std::size_t place = output.find(" mm in " + axis);
     EXPECT_NE(place, std::string::npos) << output;
     if (place == std::string::npos) return -1.0;
     return std::stod(output.substr(output.find_last_of(" \n", place - 1)));
@@ -75,7 +75,7 @@ TEST_F(Draw, FollowsThePointsAndShowsWhatThePulsesDrew) {
   const auto end = draw({"--tolerance", "0"});
   EXPECT_EQ(end.code, 0);
   // From (5, 0): 400 and 800, 1600, 1200, then back.
-  expectSays(end.output, "6800 pulses, at most this far off the lines:");
+  expectSays(end.output, "6,800 pulses. Largest deviation: ");
   expectSays(end.output, "71 of 71 mm, 100 %");
   for (const std::string axis : {"x", "y"}) {
     const double off = offIn(axis, end.output);
@@ -101,6 +101,18 @@ TEST_F(Draw, RoundsCornersIfAnAxisHasAJerkLimit) {
   node.traced();
   node.start();
   expectRounded();
+}
+
+TEST_F(Draw, GoesThroughDots) {
+  node.traced();
+  node.start();
+  write("10 10\n\n20 10\n\n20 30\n");
+  const auto end = draw({"--tolerance", "0"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  expectSays(end.output, "4,000 pulses. Largest deviation: ");
+  expectSays(picture.text(), "dots of the drawing");
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{1600, 2400}));
 }
 
 TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {
@@ -129,6 +141,10 @@ TEST_F(Draw, RefusesBeforeAnythingMoves) {
   const auto refused = draw({"--speed", "5000"});
   EXPECT_EQ(refused.code, 1);
   expectSays(refused.output, "the speed 5000 mm/s is above the ");
+  const auto unwritable = runProgram(
+      "draw", {points.path(), "--node", node.name(), "-o", points.path() + "/none/drawn.svg"});
+  EXPECT_EQ(unwritable.code, 1);
+  expectSays(unwritable.output, "/none/drawn.svg: can't be written: ");
   EXPECT_EQ(runProgram("draw", {"--help"}).code, 0);
   EXPECT_EQ(node.pulses(), 0);
   EXPECT_FALSE(picture.exists());

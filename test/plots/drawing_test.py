@@ -26,20 +26,29 @@ class DrawingTest(unittest.TestCase):
 
     def test_says_which_line_is_no_point(self):
         for text, words in (("1 2\n3\n", "line 2: 3: isn't a point"), ("1 two\n", "line 1"),
-                            ("1 nan\n", "line 1: 1 nan: isn't a point; both numbers must be finite"), ("1 2\n", "contains no line")):
+                            ("1 nan\n", "line 1: 1 nan: isn't a point; both numbers must be finite"),
+                            ("# only this\n", "contains no line")):
             with self.assertRaises(BadDrawing) as caught:
                 self.read("points.txt", text)
             self.assertIn(words, str(caught.exception))
 
-    @support.needs_svgelements
+    def test_a_stroke_of_one_point_is_a_dot(self):
+        strokes, _ = self.read("points.txt", "1 2\n\n3 4\n3 4\n\n5 6\n7 8\n")
+        self.assertEqual(strokes, [[(1, 2)], [(3, 4)], [(5, 6), (7, 8)]])
+        self.assertEqual(list(drawing.segments((0, 0), strokes)),
+                         [((0, 0), (1, 2), False), ((1, 2), (3, 4), False), ((3, 4), (5, 6), False),
+                          ((5, 6), (7, 8), True)])
+        self.assertEqual(drawing.placed([[(5.0, 5.0)]], PAPER), [[(100.0, 75.0)]])
+
+    @support.reads_svg
     def test_turns_an_svg_upright_and_fits_it_into_the_limits(self):
         strokes, in_place = self.read("a.svg", '<svg><path d="M0 0H10V20"/></svg>')
         self.assertFalse(in_place)
         (left, top), _, (right, bottom) = drawing.placed(strokes, PAPER)[0]
-        self.assertAlmostEqual(top - bottom, 150.0 - 2 * 7.5)
-        self.assertAlmostEqual(right - left, (150.0 - 2 * 7.5) / 2)
-        self.assertAlmostEqual((left + right) / 2, 100.0)
-        self.assertAlmostEqual((top + bottom) / 2, 75.0)
+        self.assertAlmostEqual(top - bottom, 150.0 - 2 * 7.5, delta=1e-4)
+        self.assertAlmostEqual(right - left, (150.0 - 2 * 7.5) / 2, delta=1e-4)
+        self.assertAlmostEqual((left + right) / 2, 100.0, delta=1e-4)
+        self.assertAlmostEqual((top + bottom) / 2, 75.0, delta=1e-4)
 
     def test_places_by_scale_and_corner(self):
         strokes = [[(1.0, 1.0), (2.0, 3.0)]]
@@ -72,7 +81,7 @@ class DrawingTest(unittest.TestCase):
         self.assertIn("the speed 125 mm/s is above the 100 mm/s that x and y allow from (30, 40) to",
                       str(caught.exception))
 
-    @support.needs_svgelements
+    @support.reads_svg
     def test_refuses_groups_that_are_nested_without_end(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "deep.svg"

@@ -66,7 +66,22 @@ class OneStrokeTest(unittest.TestCase):
     def test_refuses_lines_of_no_length(self):
         with self.assertRaises(BadDrawing) as caught:
             one_stroke([[(0.0, 0.0), (0.0, 1e-6)], [(50.0, 0.0), (50.0, 1e-6)]], (0.0, 0.0))
-        self.assertIn("shorter than 5e-05 mm", str(caught.exception))
+        self.assertIn("shorter than 0.0005 mm", str(caught.exception))
+
+    def test_goes_through_dots(self):
+        found = self.check([[(0.0, 0.0), (1.0, 0.0)], [(3.0, 0.0)]])
+        self.assertEqual(found.stroke, [(0.0, 0.0), (1.0, 0.0), (3.0, 0.0)])
+        self.assertEqual(one_stroke([[(3.0, 4.0)]], (0.0, 0.0)).stroke, [(3.0, 4.0)])
+
+    def test_points_that_differ_by_rounding_are_one(self):
+        for seed in range(40):
+            dice = random.Random(seed)
+            a, b, c = ((dice.uniform(0, 100), dice.uniform(0, 100)) for _ in range(3))
+            near = tuple(value + dice.uniform(-3e-4, 3e-4) for value in b)
+            found = one_stroke([[a, b], [near, c], [(0.0, 0.0), (100.0, 100.0)]], a)
+            self.assertIn([a, b, c], [found.stroke[:3], found.stroke[-3:][::-1]] + [
+                list(three) for three in zip(found.stroke, found.stroke[1:], found.stroke[2:])] + [
+                list(three)[::-1] for three in zip(found.stroke, found.stroke[1:], found.stroke[2:])])
 
     def test_draws_any_drawing(self):
         for seed in range(60):

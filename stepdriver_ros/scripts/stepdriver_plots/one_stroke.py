@@ -1,6 +1,7 @@
 """Turns a drawing into one stroke, for a pen that can't be lifted."""
 
 import heapq
+import itertools
 import math
 from collections import defaultdict, namedtuple
 
@@ -18,7 +19,9 @@ class OneStroke(namedtuple("OneStroke", "stroke length twice added")):
         return f"one stroke of {self.length:.0f} mm{': ' if more else ''}{' and '.join(more)}"
 
 
-SAME = 1e-6  # of the drawing's size: points that are closer than this count as one
+# Of the drawing's size: points that are closer than this count as one. Points of an SVG file have rounding
+# errors of up to 3e-6 of its page, if they are stroked with a transform.
+SAME = 1e-5
 
 
 def one_stroke(strokes, start):
@@ -42,22 +45,28 @@ class Graph:
     def __init__(self, strokes):
         points = [point for stroke in strokes for point in stroke]
         size = max(max(values) - min(values) for values in zip(*points))
-        self._grid = SAME * size
+        self._grid = SAME * (size or 1.0)
         self._places = {}  # position of each point of the grid
         self._lines = defaultdict(lambda: defaultdict(int))  # [from][to]: how often
         for stroke in strokes:
             nodes = [self._node(point) for point in stroke]
+            if len(nodes) == 1:
+                self._lines[nodes[0]]  # a dot
             for here, there in zip(nodes, nodes[1:]):
                 if here != there and there not in self._lines[here]:
                     self._add(here, there)
         if not self._lines:
             raise BadDrawing("one stroke can't follow lines that are all shorter than "
-                             f"{self._grid:.6g} mm, a millionth of the drawing's size")
+                             f"{self._grid:.6g} mm, 1e-5 of the drawing's size")
 
     def _node(self, point):
-        node = tuple(round(value / self._grid) for value in point)
-        self._places.setdefault(node, point)
-        return node
+        column, row = (round(value / self._grid) for value in point)
+        cells = [(column + i, row + j) for i, j in itertools.product((0, -1, 1), repeat=2)]
+        for node in cells:
+            if node in self._places and math.dist(point, self._places[node]) <= self._grid:
+                return node
+        self._places.setdefault(cells[0], point)
+        return cells[0]
 
     def _add(self, here, there):
         self._lines[here][there] += 1
