@@ -98,14 +98,16 @@ std::optional<Switch> switchWithJerk(const Path& path, DoubleDouble length, doub
 }
 
 // Without a jerk limit the stop moves on only while the speed rises, which is the end of the path:
-// by w^2/(2 a) + w^2/(2 d) until the speed is w, if it begins at standstill or passes it.
+// by w^2/(2 a) + w^2/(2 d) until the speed is w, if it begins at standstill or passes it. A rise
+// that takes no time is no phase; the path then ends with a phase that slows down, whose
+// acceleration has the same sign.
 std::optional<Switch> switchWithoutJerk(const Path& path, DoubleDouble missing, double sign,
                                         const MotionLimits& limits) {
   if (path.size() == 0) return std::nullopt;
   const std::size_t last = path.size() - 1;
   const Phase& phase = path[last];
-  if (!(sign * phase.a.hi > 0.0)) return std::nullopt;
   const double a = limits.acceleration;
+  if (sign * phase.a.hi != a) return std::nullopt;
   const DoubleDouble ratio = exactSum(a, limits.deceleration) / limits.deceleration;
   const DoubleDouble u = phase.v * sign;
   const DoubleDouble square = u.hi > 0.0 ? u * u : DoubleDouble();

@@ -19,8 +19,9 @@ Piece pieceOf(const Phase& phase, DoubleDouble position) {
 }
 
 void Path::run(double j, DoubleDouble duration) {
-  if (!(duration.hi > kNoTime)) return;
+  if (!(duration.hi > 0.0)) return;
   const Advance<DoubleDouble> end = advance(v_, a_, j, duration);
+  if (!(duration.hi > kNoTime)) return settle(end.v, end.a);
   Phase* last = size_ > 0 ? &phases_[size_ - 1] : nullptr;
   if (last != nullptr && last->j == j && same(end_v_, v_, last->v) && same(end_a_, a_, last->a)) {
     last->duration = last->duration + duration;

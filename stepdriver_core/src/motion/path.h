@@ -26,7 +26,8 @@ class Path {
   Path(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
 
   /// Appends a phase of jerk `j`. It is merged with the phase before it if the two are one motion.
-  /// A phase of less than a millionth of a nanosecond is only rounding and is ignored.
+  /// A phase of less than a millionth of a nanosecond moves nothing and is left out, but not what
+  /// it changes: at the highest acceleration, the lowest speed is reached within that time.
   void run(double j, DoubleDouble duration);
   /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded
   /// one.

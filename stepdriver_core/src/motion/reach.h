@@ -33,11 +33,11 @@ class Reach {
   Reach(Real v, Real a) : v_(v), a_(a) {}
 
   /// Continues for `duration` [s] with the jerk `j`. A phase of less than a millionth of a
-  /// nanosecond is only rounding and is ignored.
+  /// nanosecond moves nothing, as in a Path.
   void run(double j, Real duration) {
-    if (!(highOf(duration) > kNoTime)) return;
+    if (!(highOf(duration) > 0.0)) return;
     const Advance<Real> end = advance(v_, a_, j, duration);
-    length_ = length_ + end.way;
+    if (highOf(duration) > kNoTime) length_ = length_ + end.way;
     settle(end.v, end.a);
   }
   /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded

@@ -86,6 +86,19 @@ TEST(PlanMove, TargetBehindIsTurnedToWithoutPassingIt) {
   }
 }
 
+// At the bounds of a configuration, the ramp up takes 1e-15 s, and is no phase.
+TEST(PlanMove, ReachesItsTargetWithARampThatTakesNoTime) {
+  const MotionLimits limits{0, 1e-3, 1e12, 2e8, 0};
+  for (const double velocity : {-575.0, -1e-3, 1e-3, 348.0}) {
+    for (const std::int64_t target : {-1'000'000, -1, 0, 1, 1'000'000}) {
+      const MotionState from = at(0.25, velocity);
+      const Plan plan = planMove(0, from, target, limits);
+      EXPECT_NEAR((plan.profile.endPosition() - fromInteger(target)).value(), 0.0, 1e-15)
+          << velocity << " to " << target;
+    }
+  }
+}
+
 TEST(PlanMove, TurnsShortOfATargetThatItCouldOnlyRestBeyond) {
   // At the full deceleration of 2000 the speed is 0 after 250 microsteps, but the deceleration
   // isn't. To be at rest there, it must decrease earlier, and that takes 250.83.
