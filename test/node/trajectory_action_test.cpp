@@ -310,6 +310,36 @@ TEST_F(TrajectoryActionTest, EndsAbortedOutsideTheGoalTolerance) {
   EXPECT_EQ(run(goal), State::SUCCEEDED) << said();
 }
 
+TEST_F(TrajectoryActionTest, GoesToTheNearestTurnOfAContinuousJoint) {
+  node.erase("axes/x");
+  node.set("axes/x/driver", "drv8825");
+  node.set("axes/x/joint", "x_joint");
+  node.set("axes/x/pins/step", "x_step");
+  node.set("axes/x/pins/dir", "x_dir");
+  node.set("axes/x/pins/enable", "x_enable");
+  node.set("axes/x/microsteps", 16);
+  node.set("axes/x/full_steps_per_round", 200);
+  node.set("axes/x/max_speed_deg_s", 180.0);
+  node.set("axes/x/acceleration_deg_s2", 360.0);
+  node.set("axes/x/enable_on_start", true);
+  node.set("axes/x/continuous", true);
+  start();
+  SetPosition::Request set;
+  set.position = 7.0;
+  ASSERT_TRUE(node.call<SetPosition>("x/set_position", set).success);
+  Goal goal = ofOne("x_joint", 0.5, 1.0);
+  tolerate(goal.goal_tolerance, "x_joint", 0.01);
+  EXPECT_EQ(run(goal), State::SUCCEEDED) << said();
+  const double turned = 0.5 + 2.0 * std::acos(-1.0);
+  MoveTo::Request move;
+  move.position = 1.0;
+  move.shortest = 1;
+  move.wait = 1;
+  const MoveTo::Response moved = node.call<MoveTo>("x/move_to", move);
+  EXPECT_TRUE(moved.success) << moved.message;
+  EXPECT_NEAR(moved.position, turned + 0.5, 0.002);
+}
+
 TEST_F(TrajectoryActionTest, GoesOnAfterAHoldAndTellsWhereThatTookTooLong) {
   start(1.0);
   const Recorder<AxisStates> states(node.full("axis_states"));

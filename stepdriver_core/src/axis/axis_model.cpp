@@ -47,6 +47,7 @@ PathAxis AxisModel::pathAxis() const {
   facts.microsteps = motor.microsteps();
   facts.steps_per_unit = stepsPerUnit();
   facts.origin = position.origin();
+  facts.continuous = config.continuous;
   facts.min_position = config.min_position;
   facts.max_position = config.max_position;
   facts.min_position_source = config.min_position_source;

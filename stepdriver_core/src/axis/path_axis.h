@@ -20,6 +20,7 @@ struct PathAxis {
   int microsteps = 1;           ///< of a full step
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] the position at count 0
+  bool continuous = false;      ///< see config::AxisConfig
   /// [unit] Soft limits.
   std::optional<double> min_position;
   std::optional<double> max_position;
@@ -38,6 +39,12 @@ struct PathAxis {
 
   double positionOf(double count) const { return origin + count / steps_per_unit; }
   double countOf(double position) const { return (position - origin) * steps_per_unit; }
+  /// [unit] The whole turns to add to a position so that it is as near as possible to another one;
+  /// 0 if the axis isn't continuous, or the position is too far away to be counted.
+  double turnsTowards(double other, double position) const {
+    if (!continuous || isTooFar(position)) return 0.0;
+    return config::kTurn * std::round((other - position) / config::kTurn);
+  }
   /// [microsteps/s^2] The larger of acceleration and deceleration.
   double mostAcceleration() const;
 

@@ -22,6 +22,8 @@ constexpr double kHighestAcceleration = 1e12;
 constexpr double kMostBacklash = 1e6;  // steps
 constexpr double kHighestJerk = 1e15;
 
+const char* const kContinuous = "continuous";
+
 /// The first given key of this unit; empty: there is none.
 std::string firstGiven(const ConfigReader& axis, const MotionKeys& keys) {
   for (const std::string& key : keys.all()) {
@@ -72,6 +74,7 @@ class MotionReader {
     readJerk(config);
     readBacklash(config);
     readPositions(config);
+    readContinuous(config);
   }
 
  private:
@@ -196,6 +199,20 @@ class MotionReader {
     }
     if (min) config.min_position = si(*min);
     if (max) config.max_position = si(*max);
+  }
+
+  void readContinuous(AxisConfig& config) {
+    config.continuous = axis_.boolean(kContinuous, config.continuous);
+    if (!config.continuous || presence_ == Presence::kOptional) return;
+    if (keys_.kind == Kind::kLinear) {
+      contradicts(kContinuous,
+                  "false: only a rotary axis, with its keys in degrees, turns without end");
+    } else if (config.min_position || config.max_position) {
+      contradicts(kContinuous,
+                  fmt::format("false, as {} is given: an axis that turns without end has "
+                              "no soft limits",
+                              config.min_position ? keys_.min_position : keys_.max_position));
+    }
   }
 
   std::optional<double> readPosition(const std::string& key) {

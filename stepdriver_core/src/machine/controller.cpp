@@ -414,7 +414,15 @@ void Controller::setTarget(Goal& goal, axis::AxisModel& axis, double position, b
 Goal Controller::goalOf(const MoveTo& wanted) {
   axis::AxisModel& moved = axis(wanted.axis);
   Goal goal;
-  setTarget(goal, moved, wanted.position, wanted.relative);
+  double position = wanted.position;
+  if (wanted.shortest) {
+    if (wanted.relative) moved.refuse("shortest: the position is relative, but must be absolute");
+    if (!moved.config.continuous) {
+      moved.refuse("shortest: the axis doesn't turn without end, see continuous in its parameters");
+    }
+    position += moved.pathAxis().turnsTowards(moved.positionOf(moved.jointCount()), position);
+  }
+  setTarget(goal, moved, position, wanted.relative);
   goal.velocity = moved.checkedVelocity(wanted.velocity);
   if (!moved.moving()) moved.refuseIntoEndstop(*goal.target - moved.jointCount());
   return goal;

@@ -183,9 +183,26 @@ class Machine::Impl {
       const std::vector<motion::MotionState> expected = begins_ns > 0
                                                             ? statesAt(begins_ns, now, wanted.axes)
                                                             : expectedStates(wanted.axes, facts);
+      const std::vector<axis::TrajectoryPoint> points = turned(request.points, facts, expected);
       wanted.prepared = disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(
-          std::move(facts), request.points, expected, request.allow_slower));
+          std::move(facts), points, expected, request.allow_slower));
     });
+  }
+
+  // Points whose first position on each continuous axis is the one that is nearest to the axis.
+  static std::vector<axis::TrajectoryPoint> turned(
+      std::vector<axis::TrajectoryPoint> points, const std::vector<axis::PathAxis>& facts,
+      const std::vector<motion::MotionState>& expected) {
+    for (std::size_t i = 0; i < facts.size(); ++i) {
+      if (points.empty() || i >= points.front().positions.size()) continue;  // it will be refused
+      const double begin = facts[i].positionOf(expected[i].position.value());
+      const double turns = facts[i].turnsTowards(begin, points.front().positions[i]);
+      if (!(std::abs(turns) > 0.0)) continue;
+      for (axis::TrajectoryPoint& point : points) {
+        if (i < point.positions.size()) point.positions[i] += turns;
+      }
+    }
+    return points;
   }
 
   CoordinatedMove followPath(const PathRequest& request) {

@@ -41,13 +41,13 @@ MachineAxis::MachineAxis(config::AxisConfig config, AxisId id, const motor::Moto
 
 // ---- motions ----
 
-axis::Move MachineAxis::moveTo(double position, bool relative, double velocity) {
-  const auto reply = ask(shell_, MoveTo{id_, position, relative, velocity});
+axis::Move MachineAxis::moveTo(double position, bool relative, double velocity, bool shortest) {
+  const auto reply = ask(shell_, MoveTo{id_, position, relative, velocity, shortest});
   return std::get<std::vector<axis::Move>>(reply.value).front();
 }
 
-axis::MovePlan MachineAxis::plan(double position, bool relative, double velocity) {
-  auto reply = ask(shell_, PlanMove{{id_, position, relative, velocity}});
+axis::MovePlan MachineAxis::plan(double position, bool relative, double velocity, bool shortest) {
+  auto reply = ask(shell_, PlanMove{{id_, position, relative, velocity, shortest}});
   return std::get<axis::MovePlan>(std::move(reply.value));
 }
 

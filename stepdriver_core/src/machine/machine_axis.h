@@ -24,8 +24,8 @@ class MachineAxis : public axis::Axis {
   AxisId id() const { return id_; }
 
   const config::AxisConfig& config() const override { return config_; }
-  axis::Move moveTo(double position, bool relative, double velocity) override;
-  axis::MovePlan plan(double position, bool relative, double velocity) override;
+  axis::Move moveTo(double position, bool relative, double velocity, bool shortest) override;
+  axis::MovePlan plan(double position, bool relative, double velocity, bool shortest) override;
   axis::Move moveRounds(double rounds, double velocity) override;
   std::optional<axis::MoveResult> result(const axis::Move& move) const override;
   axis::MoveResult wait(const axis::Move& move) override;

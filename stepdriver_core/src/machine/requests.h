@@ -31,6 +31,7 @@ struct MoveTo {
   double position = 0.0;
   bool relative = false;
   double velocity = 0.0;
+  bool shortest = false;
 };
 struct MoveRounds {
   AxisId axis = 0;

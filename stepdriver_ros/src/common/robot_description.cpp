@@ -52,6 +52,8 @@ class JointFitter {
                         axis_.name));
     } else if (checkType(*joint) && checkLimits(*joint)) {
       tighten(*joint);
+      const bool limited = axis_.min_position || axis_.max_position;
+      if (joint->type == urdf::Joint::CONTINUOUS && !limited) axis_.continuous = true;
     }
   }
 
@@ -76,6 +78,10 @@ class JointFitter {
       issueOfJoint(fmt::format(
           "is {}, but must be revolute or continuous: the axis is configured in degrees",
           typeName(joint)));
+      return false;
+    }
+    if (axis_.continuous && joint.type != urdf::Joint::CONTINUOUS) {
+      issueOfJoint("is revolute, but must be continuous: the axis has continuous: true");
       return false;
     }
     return true;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "stepdriver_core/axis/axis.h"
 #include "support/bench.h"
@@ -99,6 +100,74 @@ TEST(WheelAxis, TravelsPiTimesItsDiameterInARoundOfTheMotor) {
   EXPECT_EQ(bench.move(0.0).end, MoveEnd::kReached);
   EXPECT_EQ(bench.pulses(), 0);
   EXPECT_EQ(violationsOf(bench.report()), "");
+}
+
+config::AxisConfig continuous(double steps_per_round) {
+  config::AxisConfig config = turning(steps_per_round);
+  config.continuous = true;
+  return config;
+}
+
+// From 1000 turns and a bit: to the same angle on the near side, without unwinding.
+TEST(RotaryAxis, ContinuousGoesToTheNearestPlaceOfAPosition) {
+  Bench bench({continuous(200.0)});
+  axis::Axis& x = bench.axis();
+  x.setPosition(1000.25 * kRound);
+  const auto go = [&](double rounds) {
+    const std::int64_t before = bench.pulses();
+    EXPECT_EQ(x.wait(x.moveTo(rounds * kRound, false, 0.0, true)).end, MoveEnd::kReached);
+    return bench.pulses() - before;
+  };
+  EXPECT_EQ(go(0.5), 50);
+  EXPECT_NEAR(x.state().position, 1000.5 * kRound, 1e-9);
+  EXPECT_EQ(go(-700.25), 50);
+  EXPECT_EQ(go(0.5), -50);
+  EXPECT_EQ(go(123.5), 0);
+  EXPECT_NEAR(x.plan(0.75 * kRound, false, 0.0, true).move.target, 1000.75 * kRound, 1e-9);
+  EXPECT_EQ(x.wait(x.moveTo(999.0 * kRound)).end, MoveEnd::kReached)
+      << "whole turns count otherwise";
+  EXPECT_EQ(bench.pulses(), -250);
+}
+
+TEST(RotaryAxis, RefusesTheShortestWayIfItHasNone) {
+  Bench bench({turning(200.0)});
+  EXPECT_EQ(test::refusal([&] { bench.axis().moveTo(1.0, false, 0.0, true); }),
+            "x: shortest: the axis doesn't turn without end, see continuous in its parameters");
+  Bench other({continuous(200.0)});
+  EXPECT_EQ(test::refusal([&] { other.axis().moveTo(1.0, true, 0.0, true); }),
+            "x: shortest: the position is relative, but must be absolute");
+  EXPECT_NE(test::refusal([&] { other.axis().moveTo(1e300, false, 0.0, true); }), "");
+  EXPECT_EQ(bench.pulses(), 0);
+  EXPECT_EQ(other.pulses(), 0);
+}
+
+TEST(RotaryAxis, ContinuousFollowsATrajectoryFromTheNearestTurn) {
+  struct Case {
+    double stands;
+    std::vector<double> points;
+    double ends;
+  };
+  const std::vector<Case> cases = {
+      {-3.14159, {3.1412, 3.0}, 3.0 - kRound},
+      {7.0, {0.5}, 0.5 + kRound},
+      {7.0, {0.6, 0.5, 0.4 + 3.0 * kRound}, 0.4 + 4.0 * kRound},
+      {0.2, {0.1}, 0.1},
+      {kPi, {-kPi}, kPi},
+  };
+  for (const Case& each : cases) {
+    Bench bench({continuous(20000.0)});
+    bench.axis().setPosition(each.stands);
+    const double stood = bench.axis().state().position;
+    std::vector<axis::TrajectoryPoint> points;
+    double time = 0.0;
+    for (const double position : each.points) {
+      points.push_back({time += 10.0, {position}, {0.0}, {}});
+    }
+    const auto move = bench.machine->followTrajectory({{"x"}, points});
+    EXPECT_EQ(bench.machine->wait(move).end, MoveEnd::kReached);
+    EXPECT_NEAR(bench.axis().state().position, each.ends, kRound / 20000.0) << each.stands;
+    EXPECT_EQ(bench.pulses(), std::llround((each.ends - stood) * 20000.0 / kRound)) << each.stands;
+  }
 }
 
 }  // namespace

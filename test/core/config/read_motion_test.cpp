@@ -281,6 +281,24 @@ TEST(ReadMotion, RefusesWhatNoMotionCanCountOrTime) {
         "from 1e-09 to 1000000000"}});
 }
 
+TEST(ReadMotion, LetsOnlyARotaryAxisWithoutSoftLimitsBeContinuous) {
+  ConfigValue axis = rotaryAxis();
+  EXPECT_FALSE(readX(axis).continuous);
+  put(axis, "continuous", true);
+  EXPECT_TRUE(readX(axis).continuous);
+  put(axis, "max_position_deg", 90.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("continuous",
+                    "is true, but must be false, as max_position_deg is given: an axis "
+                    "that turns without end has no soft limits"));
+  axis = linearAxis();
+  put(axis, "continuous", true);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("continuous",
+                    "is true, but must be false: only a rotary axis, with its keys in "
+                    "degrees, turns without end"));
+}
+
 TEST(ReadMotion, SaysNothingAboutWhatFollowsFromAMistake) {
   ConfigValue axis = linearAxis();
   put(axis, "max_speed_mm_s", 1e6);  // too fast for any scale but a wrong one

@@ -32,16 +32,21 @@ class Axis {
   ///   target of the last move, even during that move. After a stop, a fault, a homing, an endstop
   ///   or setPosition() it counts from the position of the axis.
   /// @param velocity [unit/s] highest speed on the way; 0: the axis's maximum.
+  /// @param shortest whole turns don't count: the axis goes to the nearest place at which it stands
+  ///   as it would at `position`. Only on an axis with AxisConfig::continuous.
   /// @throw Refused if a number isn't finite, the target is beyond a soft limit, the velocity is
   ///   beyond the axis's maximum, the endstop on the way is active, the axis is disabled, asleep or
-  ///   at fault, the machine is on hold or shuts down, or the position is absolute and the axis
-  ///   must be homed first.
-  virtual Move moveTo(double position, bool relative = false, double velocity = 0.0) = 0;
+  ///   at fault, the machine is on hold or shuts down, the position is absolute and the axis must
+  ///   be homed first, or `shortest` is true and the position is relative or the axis isn't
+  ///   continuous.
+  virtual Move moveTo(double position, bool relative = false, double velocity = 0.0,
+                      bool shortest = false) = 0;
 
   /// What moveTo() would do now; nothing moves.
   ///
   /// @throw Refused as moveTo().
-  virtual MovePlan plan(double position, bool relative = false, double velocity = 0.0) = 0;
+  virtual MovePlan plan(double position, bool relative = false, double velocity = 0.0,
+                        bool shortest = false) = 0;
 
   /// Turns the motor by a number of revolutions, which need not be whole.
   ///

@@ -30,6 +30,9 @@ constexpr double configUnitsPerUnit(Kind kind) {
   return kind == Kind::kLinear ? 1000.0 : 180.0 / 3.14159265358979323846;
 }
 
+/// [rad] A turn of a rotary axis.
+constexpr double kTurn = 2.0 * 3.14159265358979323846;
+
 /// The axis's unit in messages and on every ROS interface: "m" or "rad".
 constexpr const char* unitOf(Kind kind) { return kind == Kind::kLinear ? "m" : "rad"; }
 
@@ -175,6 +178,10 @@ struct AxisConfig : MotorConfig {
   /// start speed or a backlash.
   std::vector<ShaperConfig> input_shaper;
   double backlash = 0.0;  ///< [unit] travel that a reversal loses; the motor makes it up
+  /// A rotary axis that turns without end, without soft limits: positions that differ by whole
+  /// turns are the same place. Trajectories then go to the nearest one, see
+  /// Machine::followTrajectory().
+  bool continuous = false;
   std::optional<double> min_position;  ///< [unit] soft limits
   std::optional<double> max_position;
   LimitSource max_speed_source = LimitSource::kConfiguration;

@@ -159,6 +159,9 @@ class Machine {
   /// motion, which may last longer than the points. A long one is planned in the calling thread and
   /// delays no other call.
   ///
+  /// On an axis with AxisConfig::continuous, all positions of the trajectory are changed by the
+  /// same whole turns: those with which the first point is as near as possible to the axis.
+  ///
   /// If it begins later, it is checked now, from the states that its axes will have then, and again
   /// if one of their plans changes. Until it begins, only streamed setpoints and jogs, and earlier
   /// trajectories, leave it as it is: a stop, a hold, a fault, an endstop, new limits and any other

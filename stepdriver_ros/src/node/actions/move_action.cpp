@@ -19,7 +19,8 @@ FollowingMove AxisMoveAction::begin(const GoalHandle& handle) {
   FollowingMove following;
   following.handle = handle;
   following.began_at = axis_.state().position;
-  following.move = axis_.moveTo(goal->position, goal->relative != 0, goal->velocity);
+  following.move =
+      axis_.moveTo(goal->position, goal->relative != 0, goal->velocity, goal->shortest != 0);
   return following;
 }
 

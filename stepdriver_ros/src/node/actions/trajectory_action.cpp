@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -82,6 +83,13 @@ FollowingTrajectory TrajectoryAction::begin(const Server::GoalHandle& handle) {
     following.wanted_duration = goal->trajectory.points.back().time_from_start.toSec();
   }
   following.goal = goal->trajectory.points.back().positions;
+  for (std::size_t i = 0; i < following.goal.size(); ++i) {
+    const auto& member = following.move.members[i];
+    if (!machine_.axis(member.axis).config().continuous) continue;
+    // It goes to the same place, at another turn.
+    following.goal[i] +=
+        config::kTurn * std::round((member.move.target - following.goal[i]) / config::kTurn);
+  }
   following.goal_velocity = goal->trajectory.points.back().velocities;
   following.began = ros::Time::now();
   following.begins_later = goal->trajectory.header.stamp > following.began;

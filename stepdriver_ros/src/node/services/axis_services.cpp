@@ -64,7 +64,8 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
 bool AxisServices::moveTo(MoveTo::Request& request, MoveTo::Response& response) {
   response.target = response.position = axis_.state().position;
   return respond(response, [&] {
-    const axis::Move move = axis_.moveTo(request.position, request.relative != 0, request.velocity);
+    const axis::Move move = axis_.moveTo(request.position, request.relative != 0, request.velocity,
+                                         request.shortest != 0);
     respondToMove(move, request.wait != 0, response);
   });
 }
@@ -80,8 +81,8 @@ bool AxisServices::moveRounds(MoveRounds::Request& request, MoveRounds::Response
 bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
   response.position = axis_.state().position;
   return respond(response, [&] {
-    const axis::MovePlan planned =
-        axis_.plan(request.position, request.relative != 0, request.velocity);
+    const axis::MovePlan planned = axis_.plan(request.position, request.relative != 0,
+                                              request.velocity, request.shortest != 0);
     response.position = planned.move.target;
     response.duration = planned.move.duration;
     response.overshoot = planned.move.overshoot;
