@@ -90,6 +90,21 @@ class StepCurveTest(unittest.TestCase):
             self.assertIn(wanted, coarse.times)
         self.assertLess(len(coarse.times), 30)
 
+    def test_motions_of_a_long_recording_have_accelerations(self):
+        up = ramp(500, 4000.0)  # 2000 steps/s within 0.5 s
+        motion = up + [1.0 - time for time in reversed(up)]
+        times = [10.0 * number + time for number in range(50) for time in motion]
+        coarse = StepCurve.of_counts(times, list(range(1, len(times) + 1))).coarse(250)
+        values = [value for value in coarse.acceleration()[1] if value == value]
+        self.assertGreater(len(values), 50 * 200)
+        self.assertAlmostEqual(max(values), 4000.0, delta=40.0)
+        self.assertAlmostEqual(min(values), -4000.0, delta=40.0)
+        # In a motion of 60 s the samples are farther apart than a rest is long.
+        long = [times[-1] + 10.0 + 60.0 * time for time in motion]
+        coarse = StepCurve.of_counts(times + long, list(range(1, len(times + long) + 1))).coarse(250)
+        self.assertGreater(len([at for at, value in zip(*coarse.acceleration())
+                                if value == value and at > long[0]]), 200)
+
 
 if __name__ == "__main__":
     unittest.main()

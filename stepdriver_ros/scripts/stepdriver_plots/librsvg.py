@@ -1,5 +1,6 @@
 """Lets librsvg interpret SVG: it resolves styles, units, copies, markers and text. What remains is what a
-viewer would show, as paths."""
+viewer would show, as paths. Tried with librsvg 2.54 on cairo 1.16 (Debian 12) and 2.60 on cairo 1.18
+(Debian 13), which write the same paths with styles and with attributes."""
 
 import resource
 import signal

@@ -54,11 +54,7 @@ class PlanCurve:
         last = self.pieces[-1]
         return place(last, last.duration), 0.0, 0.0, 0.0
 
-    samples = None
-
-    @property
-    def stands(self):
-        return self.position()[1]
+    samples = None  # It isn't recorded.
 
     @property
     def has_jerk_limit(self):

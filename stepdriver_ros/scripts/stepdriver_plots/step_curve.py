@@ -4,6 +4,8 @@ At each edge the motion crosses a half-step line. The speed between two edges is
 their lines divided by the time, the acceleration is the rate of change of the speed, and so on.
 """
 
+import itertools
+
 REST = 0.1  # [s] without a step means standstill
 GAP = float("nan")  # interrupts the line of a graph
 JERK_SAMPLES = 250
@@ -32,6 +34,7 @@ class StepCurve:
         self.unit = unit
         self.step = step
         self.stands = places  # The positions at which it may come to rest.
+        self._motions = None  # Numbers of the edges of each motion, if they don't follow from the times.
 
     samples = "pulses"
 
@@ -48,19 +51,23 @@ class StepCurve:
         """If the acceleration jumps, the jerk that is found there rises with the number of samples."""
         fine, rough = (max((abs(value) for value in self.coarse(samples).jerk()[1] if value == value), default=0.0)
                        for samples in (JERK_SAMPLES, JERK_SAMPLES // 2))
-        return fine < JUMP * rough or fine == 0.0
+        return 0.0 < fine < JUMP * rough
 
     def coarse(self, samples):
-        """The same curve from only about this many edges. That removes the noise that whole
+        """The same curve from only about this many edges of each motion. That removes the noise that whole
         nanoseconds cause in differences of differences."""
-        stretches = self._stretches()
-        window = sum(self.times[s[-1]] - self.times[s[0]] for s in stretches) / samples
-        kept = [i for stretch in stretches for i in self._thinned(stretch, window)]
-        return StepCurve([self.times[i] for i in kept], [self.places[i] for i in kept],
-                         self.label, self.unit, self.step)
+        thinned = [self._thinned(s, (self.times[s[-1]] - self.times[s[0]]) / samples) for s in self._stretches()]
+        kept = list(itertools.chain.from_iterable(thinned))
+        curve = StepCurve([self.times[i] for i in kept], [self.places[i] for i in kept],
+                          self.label, self.unit, self.step)
+        ends = list(itertools.accumulate((len(stretch) for stretch in thinned), initial=0))
+        curve._motions = [list(range(begin, end)) for begin, end in zip(ends, ends[1:])]
+        return curve
 
     def _stretches(self):
         """The edges of each motion between rests."""
+        if self._motions is not None:
+            return self._motions
         stretches = []
         for i, time in enumerate(self.times):
             if i == 0 or time - self.times[i - 1] > REST:

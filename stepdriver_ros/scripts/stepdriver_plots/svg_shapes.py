@@ -58,6 +58,9 @@ class Shapes:
         matrix = self._transformed(element, matrix)
         if element.get("clip-path"):
             clips += (Clip(self._target(element.get("clip-path")), matrix, style),)
+        # With cairo 1.18, images are composed by filters.
+        if element.get("filter"):
+            self._refuse_image()
         # An opacity is a mask, too, but without an image.
         if element.get("mask") and self._has_image(self._target(element.get("mask"))):
             raise BadDrawing(f"{self._path}: a mask isn't drawn: remove it in your drawing program")

@@ -19,7 +19,7 @@ class Trail:
         self._marker.color.b, self._marker.color.a = 0.6, 1.0
 
     def show(self, places):
-        """places [mm]: where the pen has been."""
+        """places [mm]: those of the pen so far."""
         from geometry_msgs.msg import Point
         self._marker.points = [Point(x / 1000.0, y / 1000.0, HEIGHT) for x, y in places]
         self._publisher.publish(self._marker)
