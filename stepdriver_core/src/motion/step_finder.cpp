@@ -114,7 +114,7 @@ bool StepFinder::nextOfNewStretch(Step& step) {
 
 bool StepFinder::nextOfOther(Step& step, double way) {
   const Stretch& s = stretch_;
-  const double t = way > 0.0 ? std::min(timeFromAnchor(way), s.duration) : 0.0;
+  const double t = way > 0.0 ? timeFromAnchor(way) : 0.0;
   return give(
       step, t < kFar ? s.anchor_ns.whole + nearest(s.anchor_ns.rest + t * s.ns_per_s) : refined(t));
 }
@@ -242,13 +242,17 @@ double StepFinder::bracketedTime(double way) const {
   return t;
 }
 
-std::int64_t StepFinder::refined(double t) const {
+std::int64_t StepFinder::refined(double rough) const {
   const Stretch& s = stretch_;
+  const double t = std::min(rough, s.duration);
   const Piece seen{s.duration, 0.0, s.exact_v.hi, s.exact_a.hi, s.j, s.exact_v.lo, s.exact_a.lo};
   const DoubleDouble way = fromInteger(s.way) + DoubleDouble(s.way_rest);
   const double correction =
       (way - seen.positionAt(DoubleDouble(t))).value() / seen.velocityAt(DoubleDouble(t)).value();
-  const DoubleDouble exact = DoubleDouble(t) + DoubleDouble(correction);
+  DoubleDouble exact = DoubleDouble(t) + DoubleDouble(correction);
+  // At a residual speed, rounding may put a line before or after the stretch, by any time.
+  if (!(exact.hi > 0.0)) exact = 0.0;
+  if (exact.hi > s.duration) exact = s.duration;
   const Split ns = splitNanoseconds(DoubleDouble(s.time_sign) * exact);
   return s.anchor_ns.whole + ns.whole + std::llrint(s.anchor_ns.rest + ns.rest);
 }

@@ -98,7 +98,7 @@ class StepFinder {
   double timeFromAnchor(double way);
   double cubicTime(double way);
   double bracketedTime(double way) const;
-  std::int64_t refined(double t) const;
+  std::int64_t refined(double rough) const;
 
   const Profile* profile_ = nullptr;
   ProfileSum* sum_ = nullptr;  // instead of a profile

@@ -160,6 +160,18 @@ TEST(StepFinder, IsExactIfALongRampEndsJustPastItsTurn) {
   }
 }
 
+// Seen from its slow end, the first line lies 8 years away: in doubles that is 30 ns exact.
+TEST(StepFinder, IsExactAtTheFastEndOfARampOfYears) {
+  const double v = 4.5e6;
+  const Profile profile = onePiece(2.5e8, 0.5 - 25e-9 * v, v, -0.0176, 0.0);
+  StepFinder finder(profile, 0);
+  Step step;
+  for (int k = 0; k < 100; ++k) {
+    ASSERT_TRUE(finder.next(step));
+    EXPECT_NEAR(static_cast<double>(step.time_ns), 25.0 + k * 1e9 / v, 1.0) << "step " << k;
+  }
+}
+
 TEST(StepFinder, StaysExactOverYears) {
   // 0.001 steps/s for 2^20 steps: 33 years. The period is 1000 s to the last bit of 0.001.
   const Profile profile = planFromRest(0, 0, 1 << 20, {0.001, 0.001, 1.0, 1.0});
