@@ -31,7 +31,7 @@ void simulatedSeconds(benchmark::State& state) {
   std::vector<config::AxisConfig> axes;
   for (std::int64_t i = 0; i < state.range(0); ++i) axes.push_back(fastAxis(i));
   pulse::VirtualClock clock;
-  sim::Rig rig(test::Bench::rigAxes(axes));
+  sim::Rig rig(test::Bench::judged(test::Bench::rigAxes(axes), axes));
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
   machine::MachineOptions options;
   options.threaded = false;

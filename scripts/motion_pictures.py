@@ -8,7 +8,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "stepdriver_ros/scripts"))
 from stepdriver_plots import figure as look  # noqa: E402: the path comes first
-from stepdriver_plots.figure import COLOURS, plt  # noqa: E402
+from stepdriver_plots.figure import COLOURS, MultipleLocator, plt  # noqa: E402
 from stepdriver_plots.step_curve import StepCurve  # noqa: E402
 
 UNITS = {"position": "steps", "speed": "steps/s", "acceleration": "steps/s$^2$"}
@@ -18,11 +18,16 @@ class Trace:
     def __init__(self, folder, name):
         self.marks = []
         self.steps = {}  # for each axis: times [s] and counts
+        self.curves = {}  # by name: times [s] and values
         with open(folder / (name + ".csv"), newline="") as file:
             for kind, axis, time_ns, what in csv.reader(file):
                 time = int(time_ns) * 1e-9
                 if kind == "mark":
                     self.marks.append((time, what))
+                elif kind == "curve":
+                    times, values = self.curves.setdefault(axis, ([], []))
+                    times.append(time)
+                    values.append(int(what) / 1000)
                 else:
                     times, counts = self.steps.setdefault(axis, ([], []))
                     times.append(time)
@@ -126,6 +131,30 @@ def draw_shaper(folder, trace, frequency, until):
     save(figure, folder, "input_shaper")
 
 
+def draw_rotor(folder, picture, trace):
+    """Field and rotor over time, and by how much the field leads."""
+    figure, (places, speeds, lags) = plt.subplots(3, 1, sharex=True, figsize=(6.4, 4.4))
+    for colour, name in zip(COLOURS, ("field", "rotor")):
+        times, values = trace.curves[name]
+        places.plot(times, values, color=colour, label=name)
+    begin = trace.steps["x"][0][0]
+    field_times, field_speeds = trace.curve("x").speed()
+    speeds.plot([time - begin for time in field_times], [speed / 16 for speed in field_speeds],
+                color=COLOURS[0])
+    speeds.plot(times[5:-5], [(later - earlier) / (times[10] - times[0])
+                              for earlier, later in zip(values, values[10:])], color=COLOURS[1])
+    lags.plot(*trace.curves["lag"], color=COLOURS[2])
+    for angle in (-180, 180):
+        lags.axhline(angle, color="#888888", linewidth=0.8, linestyle="--")
+    lags.yaxis.set_major_locator(MultipleLocator(90))
+    places.set_ylabel("position\n[full steps]")
+    speeds.set_ylabel("speed\n[full steps/s]")
+    lags.set_ylabel("lag [electrical\ndegrees]")
+    lags.set_xlabel("time [s]")
+    places.legend(loc="best", frameon=False)
+    save(figure, folder, picture)
+
+
 def save(figure, folder, picture):
     look.save(figure, folder / (picture + ".svg"))
 
@@ -159,6 +188,8 @@ def main(traces, pictures):
     draw(pictures, "trajectory_hold", [(held, "x", "x"), (held, "y", "y")], ["position", "speed"])
     draw_path(pictures, held)
     draw_shaper(pictures, trace("input_shaper"), 8.0, 1.0)
+    for name in ("rotor_follows", "rotor_falls_out"):
+        draw_rotor(pictures, name, trace(name))
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ mkdir -p "$traces" "$pictures"
 quietly pictures-configure configure_core
 quietly pictures-build cmake --build "$build/core" -j "$jobs" --target trace_tests
 STEPDRIVER_TRACES=$traces quietly pictures-traces "$build/core/test/core/trace_tests" \
-  --gtest_filter='MotionPictures.*'
+  --gtest_filter='*Pictures.*'
 /usr/bin/python3 "$root/scripts/motion_pictures.py" "$traces" "$pictures"
 [[ -n $check ]] || exit 0
 

@@ -86,6 +86,8 @@ class Dump {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
         rig.max_switch, rig.load_falls, rig.spring_hz, rig.spring_damping,
         rig.fail_step_write_after, rig.settling_ms, rig.faults.never_in_position);
+    all(rig.motor.pole_pairs, rig.motor.holding_torque, rig.motor.rotor_inertia,
+        rig.motor.load_inertia, rig.motor.friction, rig.motor.damping);
     all(rig.wiring.dir_inverted, rig.wiring.steps_per_unit, rig.wiring.min_pin, rig.wiring.max_pin,
         rig.wiring.min_active_level, rig.wiring.max_active_level);
     all(rig.faults.min_stuck, rig.faults.max_stuck, rig.faults.lose_every,

@@ -129,6 +129,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
       const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(axis.motorAt(i).motor);
       rig.push_back(rigAxisOf(motorAlone(axis, i), simulated));
       rig.back().limits = motorLimits(axes, number);
+      rig.back().motor = motorOf(axes, number, simulated.motor);
     }
   }
   return rig;
@@ -186,6 +187,23 @@ sim::MotorLimits motorLimits(const std::vector<AxisConfig>& axes, std::size_t ax
     sum.start_rate += part.start_rate;
   }
   return sum;
+}
+
+sim::MotorSpec motorOf(const std::vector<AxisConfig>& axes, std::size_t axis,
+                       const SimulatedMotor& simulated) {
+  constexpr double kGramSquareCentimetre = 1e-7;  // kg m^2
+  sim::MotorSpec motor;
+  motor.pole_pairs = simulated.pole_pairs;
+  motor.inertia = (simulated.rotor_inertia + simulated.load_inertia) * kGramSquareCentimetre;
+  motor.friction = simulated.friction;
+  motor.damping = simulated.damping;
+  if (simulated.holding_torque) {
+    motor.holding_torque = *simulated.holding_torque;
+    return motor;
+  }
+  const sim::MotorLimits limits = motorLimits(axes, axis);
+  const double microsteps = axes[axis].microsteps;
+  return sim::soundMotor(motor, limits.rate / microsteps, limits.acceleration / microsteps);
 }
 
 void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig& config,

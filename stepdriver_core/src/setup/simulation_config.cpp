@@ -18,6 +18,14 @@ constexpr double kLongestSettlingMs = 60'000.0;
 constexpr double kLongestFaultMs = 3.6e6;
 constexpr double kHighestHz = 1000.0;
 constexpr double kMostDamping = 0.9;
+// Twelve decades of torque and fifteen of inertia: far beyond any motor, and its frequency is still
+// a number.
+constexpr Range kTorques{1e-6, 1e6};        // Nm
+constexpr Range kRotorInertias{1e-6, 1e9};  // g cm^2
+constexpr Range kLoadInertias{0.0, 1e9};
+constexpr Range kFrictions{0.0, 1e6};  // Nm
+constexpr Range kMotorDampings{0.01, 10.0};
+constexpr int kMostPolePairs = 1000;
 constexpr int kMostWrites = std::numeric_limits<int>::max();
 
 /// Reads the rig of one axis, or of one of its motors.
@@ -44,6 +52,7 @@ class SimulatedAxisReader {
     axis.spring_hz = reader_.number("spring_hz", Range{0.0, kHighestHz}, axis.spring_hz);
     axis.spring_damping =
         reader_.number("spring_damping", Range{0.0, kMostDamping}, axis.spring_damping);
+    readMotor(axis.motor);
     readWiring(axis.wiring);
     axis.faults.min_stuck = stuck("min_stuck");
     axis.faults.max_stuck = stuck("max_stuck");
@@ -96,6 +105,18 @@ class SimulatedAxisReader {
           reader_.findNumber(what + "_" + unit + "_s", Range::notNegative(), Presence::kOptional);
     }
     return value;
+  }
+
+  void readMotor(SimulatedMotor& motor) {
+    ConfigReader reader = reader_.map("motor");
+    motor.pole_pairs = reader.integer("pole_pairs", 1, kMostPolePairs, motor.pole_pairs);
+    const auto torque = reader.findNumber("holding_torque_nm", kTorques, Presence::kOptional);
+    if (torque) motor.holding_torque = torque;
+    motor.rotor_inertia = reader.number("rotor_inertia_g_cm2", kRotorInertias, motor.rotor_inertia);
+    motor.load_inertia = reader.number("load_inertia_g_cm2", kLoadInertias, motor.load_inertia);
+    motor.friction = reader.number("friction_nm", kFrictions, motor.friction);
+    motor.damping = reader.number("damping", kMotorDampings, motor.damping);
+    reader.rejectUnknown();
   }
 
   void readWiring(SimulatedWiring& wiring) {

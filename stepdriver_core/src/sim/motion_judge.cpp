@@ -63,9 +63,9 @@ std::optional<Violation> MotionJudge::step(double way, std::int64_t time_ns,
 // From rest on a whole step, the next line is half a step away: v t + a t^2/2 = step/2, but not
 // above the top rate.
 void MotionJudge::rest(const Edge& last, Edge& next, double step) const {
-  const double start = std::max(
-      step / (std::sqrt(start_rate_ * start_rate_ + acceleration_ * step) + start_rate_),
-      0.5 * step / rate_);
+  const double start =
+      std::max(step / (std::sqrt(start_rate_ * start_rate_ + acceleration_ * step) + start_rate_),
+               0.5 * step / rate_);
   const bool may_have_rested = seconds(next.time_ns - last.time_ns + kTimeError) >= start;
   next.rests = last.rests + (may_have_rested ? 1 : 0);
   next.since_ns = may_have_rested ? next.time_ns : last.since_ns;

@@ -1,5 +1,7 @@
 #include "stepdriver_core/sim/rig.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -31,7 +33,8 @@ struct WriteFault {
 struct Line {
   std::vector<PinOnLine> pins;
   std::vector<SwitchModel*> contacts;
-  bool other_level = false;  // of an input that no axis has
+  std::vector<RigAxis*> axes;  // whose contacts these are
+  bool other_level = false;    // of an input that no axis has
   std::optional<WriteFault> write_fault;
   gpio::EdgeListener listener;
   bool told_level = false;  // the last level that the listener was told
@@ -70,7 +73,7 @@ class Rig::Impl {
     if (motor_power) wire(*motor_power);
   }
 
-  ~Impl() { feed.finish(); }
+  ~Impl() { feed.finish(summary()); }
 
   RigAxis& axisOf(const std::string& name) const {
     for (const auto& axis : axes) {
@@ -123,6 +126,18 @@ class Rig::Impl {
   /// Gives the axes the power that the relay of the motors switches.
   void switchPower(std::int64_t time_ns) {
     for (const auto& axis : axes) axis->setPower(relay->comesAt(), time_ns);
+  }
+
+  /// What each motor made of the steps.
+  std::vector<std::string> summary() const {
+    std::vector<std::string> texts;
+    for (const auto& axis : axes) {
+      if (!axis->spec().motor) continue;
+      const RigAxisReport report = axis->report(latest_ns);
+      texts.push_back(fmt::format("{}: largest lag {:.1f} electrical degrees, {} full steps lost",
+                                  axis->spec().name, report.largest_lag, report.lost_steps));
+    }
+    return texts;
   }
 
   void failWrites(const std::string& name, const std::optional<WriteFault>& fault) {
@@ -186,9 +201,11 @@ class Rig::Impl {
     wire(axis, axis.inPositionContact(), "in_position");
   }
 
-  void wire(const RigAxis& axis, SwitchModel* contact, const char* variable) {
+  void wire(RigAxis& axis, SwitchModel* contact, const char* variable) {
     if (contact == nullptr || contact->spec().line.empty()) return;
-    lineOf(contact->spec().line).contacts.push_back(contact);
+    Line& line = lineOf(contact->spec().line);
+    line.contacts.push_back(contact);
+    line.axes.push_back(&axis);
     feed.addSwitch({axis.spec().name, variable}, contact);
   }
 
@@ -300,6 +317,7 @@ bool Rig::inputLevel(int line, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
   const Line& input = impl_->at(line);
+  for (RigAxis* axis : input.axes) axis->turnMotors(now_ns);
   for (SwitchModel* contact : input.contacts) contact->noteRead(now_ns);
   return input.level([now_ns](const SwitchModel* contact) { return contact->active(now_ns); });
 }

@@ -12,6 +12,8 @@
 namespace stepdriver::sim {
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
+
 const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const std::vector<int>& known = spec.chip.microsteps;
   const bool is_known =
@@ -58,6 +60,7 @@ RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
       slides_(slides) {
   if (spec_.limits) judge_.emplace(*spec_.limits);
   if (spec_.brake) brake_.emplace(*spec_.brake);
+  if (spec_.motor) swing_.emplace(*spec_.motor);
   if (spec_.spring) mass_.emplace(spec_.spring->frequency, spec_.spring->damping, spec_.start);
   settle(kForEver);
 }
@@ -68,12 +71,12 @@ SwitchModel* RigAxis::switchAt(Side side) {
 }
 
 void RigAxis::request(Pin pin, bool line_level, std::int64_t time_ns) {
-  fall(time_ns);
+  advance(time_ns);
   follow(chip_.request(pin, line_level, time_ns), time_ns);
 }
 
 void RigAxis::edge(Pin pin, bool line_level, std::int64_t time_ns) {
-  fall(time_ns);
+  advance(time_ns);
   const bool cw_ccw = spec_.chip.step_inputs == driver::StepInputs::kCwCcw;
   if (pin == Pin::kDir && !cw_ccw && line_level != chip_.lineLevel(pin)) noteTurn();
   follow(chip_.edge(pin, line_level, time_ns), time_ns);
@@ -96,9 +99,14 @@ void RigAxis::judge(bool forward, std::int64_t time_ns) {
 }
 
 void RigAxis::setBrake(bool line_level, std::int64_t time_ns) {
-  fall(time_ns);
+  advance(time_ns);
   brake_->set(line_level, time_ns);
-  if (energized_) snapRotor();
+  if (energized_) snapRotor(time_ns);
+}
+
+void RigAxis::advance(std::int64_t time_ns) {
+  turnIfDue(time_ns);
+  fall(time_ns);
 }
 
 double RigAxis::fallUntil(std::int64_t time_ns) const {
@@ -118,7 +126,7 @@ void RigAxis::fall(std::int64_t time_ns) {
 }
 
 void RigAxis::setPower(std::int64_t from_ns, std::int64_t time_ns) {
-  fall(time_ns);
+  advance(time_ns);
   power_from_ns_ = from_ns;
   if (from_ns > time_ns) {
     powers_up_ = true;
@@ -134,7 +142,7 @@ void RigAxis::meetPower(std::int64_t time_ns) {
   chip_.powerUp();
   if (spec_.chip.fault_end != driver::FaultEnd::kItself) mendChip();
   energized_ = isEnergizedAt(time_ns);
-  if (energized_) snapRotor();
+  if (energized_) snapRotor(time_ns);
   settle(time_ns);
   moveSwitches(time_ns);
 }
@@ -144,7 +152,7 @@ void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t 
   const bool was_energized = energized_;
   energized_ = isEnergizedAt(time_ns);
   if (pulse) takePulse(*pulse, time_ns);
-  if (energized_ && !was_energized) snapRotor();
+  if (energized_ && !was_energized) snapRotor(time_ns);
   if (in_position_ && (pulse || energized_ != was_energized)) settle(time_ns);
   if (energized_) moveSwitches(time_ns);
 }
@@ -164,8 +172,10 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   if (braked) chip_.count(Violation::kStepAgainstBrake);
 
   if (!energized_ || braked || pulse.moved == 0) return;
+  turnRotor(time_ns);
   rotor_ += static_cast<double>(pulse.moved);
   stepped_ += pulse.moved;
+  if (swing_) swing_->moveField(angleOf(static_cast<double>(pulse.moved)));
   for (const Drive& drive : drives_) drive.axis->noteMoved(time_ns);
   ++motor_steps_;
   // The loss is in the coupling, not in the rotor: the rotor then still agrees with the translator,
@@ -181,11 +191,44 @@ void RigAxis::settle(std::int64_t time_ns) {
   in_position_->stick(false, never ? kNever : time_ns + spec_.settling_ns);
 }
 
-void RigAxis::snapRotor() {
-  if (brake_ && !brake_->isReleased()) return;
+void RigAxis::snapRotor(std::int64_t time_ns) {
+  if (!holdsRotor()) return;
   const auto phase = static_cast<double>(chip_.translator());
   const auto cycle = static_cast<double>(chip_.cycle());
+  const double before = rotor_;
   rotor_ = phase + cycle * std::round((rotor_ - phase) / cycle);
+  if (swing_ && rotor_ != before) swing_->snap(angleOf(rotor_ - before), time_ns);
+}
+
+double RigAxis::angleOf(double microsteps) const {
+  return 2.0 * kPi * microsteps / static_cast<double>(chip_.cycle());
+}
+
+// Without current the friction stops the rotor, and so does the brake.
+void RigAxis::turnIfDue(std::int64_t time_ns) {
+  if (!swing_) return;
+  if (!holdsRotor()) return swing_->rest(time_ns);
+  if (swing_->isDue(time_ns)) turnRotor(time_ns);
+}
+
+void RigAxis::turnRotor(std::int64_t time_ns) {
+  if (!swing_) return;
+  const std::int64_t behind = swing_->turnTo(time_ns);
+  if (behind == 0) return;
+  rotor_ -= static_cast<double>(behind * chip_.cycle());
+  moveSwitches(time_ns);
+}
+
+void RigAxis::turnMotors(std::int64_t time_ns) {
+  if (drives_.empty()) return turnIfDue(time_ns);
+  for (const Drive& drive : drives_) drive.axis->turnIfDue(time_ns);
+}
+
+double RigAxis::slipUntil(std::int64_t time_ns) const {
+  if (!swing_ || !holdsRotor()) return 0.0;
+  RotorModel later = *swing_;
+  return static_cast<double>(later.turnTo(time_ns)) * driver::kFullStepsPerCycle *
+         spec_.full_step_travel;
 }
 
 void RigAxis::couple(std::vector<Drive> drives) { drives_ = std::move(drives); }
@@ -253,7 +296,7 @@ void RigAxis::noteMoved(std::int64_t time_ns) {
 }
 
 void RigAxis::setFaults(const RigFaults& faults, std::int64_t time_ns) {
-  fall(time_ns);
+  advance(time_ns);
   faults_ = faults;
   motor_steps_ = 0;
   if (min_switch_) min_switch_->stick(faults.min_stuck);
@@ -277,16 +320,16 @@ void RigAxis::mendChip() {
   if (fault_) fault_->stick({});
 }
 
-void RigAxis::turnBy(double way) {
+void RigAxis::turnBy(double way, std::int64_t time_ns) {
   rotor_ += way * chip_.finest() / spec_.full_step_travel;
-  if (energized_) snapRotor();
+  if (energized_) snapRotor(time_ns);
 }
 
 void RigAxis::placeCarriage(double position, std::int64_t time_ns) {
-  fall(time_ns);
+  advance(time_ns);
   const double way = position - carriage();
-  if (drives_.empty()) turnBy(way);
-  for (const Drive& drive : drives_) drive.axis->turnBy(drive.motor_way * way);
+  if (drives_.empty()) turnBy(way, time_ns);
+  for (const Drive& drive : drives_) drive.axis->turnBy(drive.motor_way * way, time_ns);
   moveSwitches(time_ns);
 }
 
@@ -298,7 +341,17 @@ RigAxisReport RigAxis::report(std::int64_t time_ns) const {
   const double falling = fallUntil(time_ns);
   report.fell = fell_ + falling;
   report.carriage = carriage() - falling;
+  if (drives_.empty()) report.carriage -= slipUntil(time_ns);
+  for (const Drive& drive : drives_) {
+    report.carriage -= drive.carriage_way * drive.axis->slipUntil(time_ns);
+  }
   if (mass_) report.ringing = mass_->ringing(time_ns);
+  if (swing_) {
+    RotorModel later = *swing_;
+    if (holdsRotor()) later.turnTo(time_ns);
+    report.largest_lag = later.largestLag() * 180.0 / kPi;
+    report.lost_steps = driver::kFullStepsPerCycle * later.slips();
+  }
   report.microsteps = chip_.microsteps();
   report.energized = energized_ || (powers_up_ && isEnergizedAt(time_ns));
   report.min_pressed = min_switch_ && min_switch_->active(time_ns);

@@ -9,6 +9,7 @@
 #include "brake_model.h"
 #include "chip_model.h"
 #include "motion_judge.h"
+#include "rotor_model.h"
 #include "spring_mass.h"
 #include "stepdriver_core/sim/rig.h"
 #include "switch_model.h"
@@ -55,6 +56,9 @@ class RigAxis {
   void clockStalled() {
     if (judge_) judge_->forget();
   }
+  /// Its motors turn until this time, which may take its carriage off a switch, or onto one: the
+  /// program reads them.
+  void turnMotors(std::int64_t time_ns);
   RigAxisReport report(std::int64_t time_ns) const;
 
  private:
@@ -66,7 +70,7 @@ class RigAxis {
   void noteMoved(std::int64_t time_ns);
   void moveOwnSwitches(std::int64_t time_ns);
   /// By hand. @param way [mm|deg] of the motor.
-  void turnBy(double way);
+  void turnBy(double way, std::int64_t time_ns);
   void follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns);
   void takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns);
   void noteTurn();
@@ -74,7 +78,17 @@ class RigAxis {
   void breakChip(std::int64_t time_ns);
   void mendChip();
   void settle(std::int64_t time_ns);
-  void snapRotor();
+  void snapRotor(std::int64_t time_ns);
+  /// [electrical rad] Of a way of the rotor.
+  double angleOf(double microsteps) const;
+  /// The motor has current, and no brake holds it.
+  bool holdsRotor() const { return energized_ && (!brake_ || brake_->isReleased()); }
+  void turnRotor(std::int64_t time_ns);
+  void turnIfDue(std::int64_t time_ns);
+  /// [mm|deg] By how much the rotor falls behind from the last event to a time.
+  double slipUntil(std::int64_t time_ns) const;
+  /// All that happens between two events.
+  void advance(std::int64_t time_ns);
   /// [mm|deg] How far the load sinks from the last event to a time.
   double fallUntil(std::int64_t time_ns) const;
   bool isEnergizedAt(std::int64_t time_ns) const {
@@ -88,10 +102,13 @@ class RigAxis {
   const RigAxisSpec spec_;
   ChipModel chip_;
   bool energized_;
-  double rotor_ = 0.0;  // microsteps of the finest mode, from its position when the rig was made
-  std::int64_t stepped_ = 0;      // microsteps by which pulses have moved the rotor
-  std::int64_t slipped_ = 0;      // microsteps that the rotor made and the carriage didn't
-  std::int64_t motor_steps_ = 0;  // since the faults were set
+  // The place at which the rotor comes to rest, in microsteps of the finest mode from its position
+  // when the rig was made.
+  double rotor_ = 0.0;
+  std::optional<RotorModel> swing_;  // of the rotor around that place
+  std::int64_t stepped_ = 0;         // microsteps by which pulses have moved the rotor
+  std::int64_t slipped_ = 0;         // microsteps that the rotor made and the carriage didn't
+  std::int64_t motor_steps_ = 0;     // since the faults were set
   std::int64_t pulses_forward_ = 0;
   std::int64_t pulses_backward_ = 0;
   double fell_ = 0.0;                   // [mm|deg]

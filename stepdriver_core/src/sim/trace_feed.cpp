@@ -51,9 +51,11 @@ void TraceFeed::switchesMoved(std::int64_t time_ns) {
   }
 }
 
-void TraceFeed::finish() {
+void TraceFeed::finish(const std::vector<std::string>& summary) {
   advance(kNever - 1);
-  if (trace_ && start_ns_) begin();
+  if (!trace_ || !start_ns_) return;
+  begin();
+  for (const std::string& text : summary) trace_->summary(text);
 }
 
 void TraceFeed::flush() {

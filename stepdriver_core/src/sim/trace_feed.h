@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -37,8 +38,8 @@ class TraceFeed {
 
   void flush();
 
-  /// Writes all remaining bounces. No edge may follow.
-  void finish();
+  /// Writes all remaining bounces, and words about the whole trace. No edge may follow.
+  void finish(const std::vector<std::string>& summary);
 
  private:
   struct Contact {

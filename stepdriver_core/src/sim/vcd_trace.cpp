@@ -135,6 +135,8 @@ void VcdTrace::edge(int pin, bool level, std::int64_t time_ns) {
   if (buffer_.size() >= kBufferSize) writeOut();
 }
 
+void VcdTrace::summary(const std::string& text) { buffer_ += "$comment " + text + " $end\n"; }
+
 void VcdTrace::flush() {
   writeOut();
   if (!error_.empty()) throw Error(error_);

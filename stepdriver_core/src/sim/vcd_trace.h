@@ -38,6 +38,8 @@ class VcdTrace : public PinTrace {
              std::int64_t time_ns) override;
   void edge(int pin, bool level, std::int64_t time_ns) override;
 
+  /// As a comment.
+  void summary(const std::string& text) override;
   /// @throw Error, which names the reason, if the file couldn't be written, now or earlier.
   void flush() override;
 

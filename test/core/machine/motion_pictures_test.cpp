@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "sim/rotor_model.h"
 #include "sim/spring_mass.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/machine/machine.h"
@@ -33,8 +35,10 @@ config::AxisConfig config(const std::string& name = "x") {
 
 class MotionPictures : public testing::Test {
  protected:
-  void build(const std::vector<config::AxisConfig>& axes) {
-    bench = std::make_unique<Bench>(axes);
+  void build(const std::vector<config::AxisConfig>& axes) { build(axes, Bench::rigAxes(axes)); }
+  void build(const std::vector<config::AxisConfig>& axes,
+             const std::vector<sim::RigAxisSpec>& rig) {
+    bench = std::make_unique<Bench>(axes, rig);
     trace = std::make_unique<MotionTrace>(*bench);
   }
 
@@ -269,6 +273,93 @@ TEST_F(MotionPictures, InputShaper) {
   EXPECT_GT(ringing("x"), 15.0);
   EXPECT_LT(ringing("y"), 1.0);
   trace->keep("input_shaper");
+}
+
+constexpr int kMicrosteps = 16;
+constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+
+/// A motor of 0.1 Nm with a heavy load: it can accelerate by at most 159,000 full steps/s^2.
+sim::MotorSpec weakMotor() {
+  sim::MotorSpec motor;
+  motor.holding_torque = 0.1;
+  motor.inertia = 200e-7;
+  motor.damping = 0.05;
+  return motor;
+}
+
+/// 80 full steps at up to 1000 full steps/s.
+config::AxisConfig fastAxis(double acceleration) {
+  config::AxisConfig fast = config();
+  fast.max_speed = kMicrosteps * 1.0;
+  fast.acceleration = fast.deceleration = kMicrosteps * acceleration / 1000.0;
+  return fast;
+}
+
+class RotorPictures : public MotionPictures {
+ protected:
+  /// @return what the rig has seen until the rotor is at rest.
+  sim::RigAxisReport move(double acceleration) {
+    const config::AxisConfig fast = fastAxis(acceleration);
+    std::vector<sim::RigAxisSpec> rig = Bench::rigAxes({fast});
+    rig.front().motor = weakMotor();
+    build({fast}, rig);
+    takes(kMicrosteps * 0.08);
+    advance(1.0);
+    EXPECT_EQ(bench->pulses("x"), kMicrosteps * 80);
+    return bench->report("x");
+  }
+
+  /// Adds field and rotor to the trace, both in full steps, as the edges turn them.
+  void addRotor() {
+    sim::RotorModel rotor(weakMotor());
+    std::vector<std::pair<double, double>> field;
+    std::vector<std::pair<double, double>> follower;
+    std::vector<std::pair<double, double>> lag;
+    std::int64_t behind = 0;
+    std::int64_t count = 0;
+    const std::vector<MotionTrace::Step> steps = trace->steps("x");
+    const double begin = steps.front().time;
+    rotor.rest(0);
+    std::size_t next = 0;
+    for (int sample = 0; sample <= 1500; ++sample) {
+      const double time = begin + sample * 1e-4;
+      for (; next < steps.size() && steps[next].time <= time; ++next) {
+        behind += rotor.turnTo(std::llround(steps[next].time * 1e9));
+        rotor.moveField(90.0 / kDegrees / kMicrosteps *
+                        static_cast<double>(steps[next].count - count));
+        count = steps[next].count;
+      }
+      behind += rotor.turnTo(std::llround(time * 1e9));
+      field.emplace_back(time - begin, static_cast<double>(count) / kMicrosteps);
+      lag.emplace_back(time - begin, rotor.lag() * kDegrees);
+      follower.emplace_back(time - begin, field.back().second - lag.back().second / 90.0 -
+                                              4.0 * static_cast<double>(behind));
+    }
+    trace->add("field", field);
+    trace->add("rotor", follower);
+    trace->add("lag", lag);
+  }
+};
+
+TEST_F(RotorPictures, Follows) {
+  const sim::RigAxisReport seen = move(40'000.0);
+  EXPECT_EQ(seen.lost_steps, 0);
+  EXPECT_NEAR(seen.carriage, kMicrosteps * 80.0, 1e-9) << "mm, at a step/mm";
+  // 40,000 of 159,000 full steps/s^2: 15 degrees, and twice that as the ramp begins at once. The
+  // damping takes 18 at full speed.
+  EXPECT_NEAR(seen.largest_lag, 50.0, 8.0);
+  addRotor();
+  trace->keep("rotor_follows");
+}
+
+TEST_F(RotorPictures, FallsOutOfStep) {
+  const sim::RigAxisReport seen = move(160'000.0);
+  EXPECT_GT(seen.lost_steps, 40);
+  EXPECT_EQ(seen.lost_steps % 4, 0);
+  EXPECT_EQ(seen.largest_lag, 180.0);
+  EXPECT_NEAR(seen.carriage, kMicrosteps * (80.0 - static_cast<double>(seen.lost_steps)), 1e-9);
+  addRotor();
+  trace->keep("rotor_falls_out");
 }
 
 }  // namespace

@@ -88,6 +88,27 @@ TEST_F(VcdTraceTest, WritesWhatViewersRead) {
             "#1000000001001\n");
 }
 
+TEST_F(VcdTraceTest, EndsWithASummaryOfTheMotors) {
+  {
+    RigAxisSpec spec = test::plainAxis("a4988");
+    spec.motor = MotorSpec{};
+    const RigAxisSpec without_motor = test::plainAxis("a4988", "y");
+    Rig rig({spec, without_motor}, std::make_shared<VcdTrace>(path_));
+    rig.onRequest(rig.lineIndex("x.enable"), false, 1'000'000);
+    rig.onRequest(rig.lineIndex("x.sleep"), true, 1'000'000);
+    rig.onRequest(rig.lineIndex("x.reset"), true, 1'000'000);
+    rig.onEdge(rig.lineIndex("x.step"), true, 2'000'000);
+    rig.onEdge(rig.lineIndex("x.step"), false, 3'000'000);
+  }
+  const std::string end =
+      "#2000000\n0a\n"
+      "$comment x: largest lag 90.0 electrical degrees, 0 full steps lost $end\n"
+      "#2001000\n";
+  const std::string all = text();
+  ASSERT_GT(all.size(), end.size());
+  EXPECT_EQ(all.substr(all.size() - end.size()), end) << all;
+}
+
 TEST_F(VcdTraceTest, IsReadableWhileItGrowsAfterAFlush) {
   VcdTrace trace(path_);
   trace.begin({{"x", "step"}}, {false}, 0);

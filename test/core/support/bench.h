@@ -147,15 +147,15 @@ class Bench {
     return specs;
   }
 
-  /// The rig knows what the configuration allows each motor.
+  /// The rig knows what the configuration allows each motor, and has motors that can do that.
   static std::vector<sim::RigAxisSpec> judged(std::vector<sim::RigAxisSpec> specs,
                                               const std::vector<config::AxisConfig>& axes) {
     for (std::size_t number = 0; number < axes.size(); ++number) {
       for (std::size_t i = 0; i < axes[number].motors(); ++i) {
         for (sim::RigAxisSpec& spec : specs) {
-          if (spec.name == axes[number].traceName(i) && !spec.limits) {
-            spec.limits = setup::motorLimits(axes, number);
-          }
+          if (spec.name != axes[number].traceName(i)) continue;
+          if (!spec.limits) spec.limits = setup::motorLimits(axes, number);
+          if (!spec.motor) spec.motor = setup::motorOf(axes, number);
         }
       }
     }

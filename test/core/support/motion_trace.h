@@ -55,13 +55,24 @@ class MotionTrace {
     return 0.0;
   }
 
+  /// Adds a curve to the picture: its points, by their times [s].
+  void add(const std::string& name, std::vector<std::pair<double, double>> points) {
+    curves_.emplace_back(name, std::move(points));
+  }
+
   /// If the environment variable STEPDRIVER_TRACES names a folder, writes the trace to NAME.csv
-  /// there: `step,AXIS,TIME_NS,COUNT` for each step and `mark,,TIME_NS,WORDS`.
+  /// there: `step,AXIS,TIME_NS,COUNT` for each step, `mark,,TIME_NS,WORDS`, and
+  /// `curve,NAME,TIME_NS,VALUE` for each point of a curve, in thousandths.
   void keep(const std::string& name) const {
     const char* const folder = std::getenv("STEPDRIVER_TRACES");
     if (folder == nullptr) return;
     std::ofstream file(std::string(folder) + "/" + name + ".csv");
     for (const auto& [time, words] : marks_) file << "mark,," << ns(time) << ',' << words << '\n';
+    for (const auto& [curve, points] : curves_) {
+      for (const auto& [time, value] : points) {
+        file << "curve," << curve << ',' << ns(time) << ',' << std::llround(1000.0 * value) << '\n';
+      }
+    }
     for (const std::string& axis : bench_.rig.axes()) {
       for (const Step& step : steps(axis)) {
         file << "step," << axis << ',' << ns(step.time) << ',' << step.count << '\n';
@@ -78,6 +89,7 @@ class MotionTrace {
   Bench& bench_;
   std::int64_t begin_ns_;
   std::vector<std::pair<double, std::string>> marks_;
+  std::vector<std::pair<std::string, std::vector<std::pair<double, double>>>> curves_;
 };
 
 }  // namespace stepdriver::test

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/setup/simulation.h"
 
 namespace stepdriver::yaml {
 namespace {
@@ -352,6 +353,34 @@ TEST_F(ConfigurationFile, MayDescribeTheRigOfOneMotor) {
   EXPECT_EQ(y.ofMotor("right").faults.lose_every, 0);
   EXPECT_THROW(read("middle: {start_mm: 4.0}"), ConfigError);
   EXPECT_THROW(read("right: {start_cm: 4.0}"), ConfigError);
+}
+
+TEST_F(ConfigurationFile, MayDescribeTheMotorsOfTheRig) {
+  const auto read = [&](const std::string& motor) {
+    return readFile(
+        file(std::string(kAxis) + "simulation: {axes: {x: {motor: {" + motor + "}}}}\n"),
+        setup::BackendChoice::kSimulated);
+  };
+  const auto motor = [&](const std::string& text) {
+    const setup::MachineConfig config = read(text);
+    return setup::motorOf(config.axes, 0, config.simulation.axes.at("x").motor);
+  };
+  const sim::MotorSpec known = motor(
+      "pole_pairs: 100, holding_torque_nm: 0.25, rotor_inertia_g_cm2: 35.0, "
+      "load_inertia_g_cm2: 15.0, friction_nm: 0.02, damping: 0.05");
+  EXPECT_EQ(known.pole_pairs, 100);
+  EXPECT_EQ(known.holding_torque, 0.25) << "also if that is too little";
+  EXPECT_NEAR(known.inertia, 50e-7, 1e-18);
+  EXPECT_EQ(known.friction, 0.02);
+  EXPECT_EQ(known.damping, 0.05);
+  EXPECT_EQ(motor("").holding_torque, 0.3);
+  EXPECT_EQ(motor("friction_nm: 1.0").holding_torque, 4.0);
+  for (const char* wrong :
+       {"holding_torque: 0.3", "holding_torque_nm: 0.0", "holding_torque_nm: 1.1e+6",
+        "rotor_inertia_g_cm2: 0.0", "load_inertia_g_cm2: -1.0", "friction_nm: -0.1", "damping: 0.0",
+        "damping: 11.0", "pole_pairs: 0", "pole_pairs: 1001", "pole_pairs: 50.0"}) {
+    EXPECT_THROW(read(wrong), ConfigError) << wrong;
+  }
 }
 
 }  // namespace

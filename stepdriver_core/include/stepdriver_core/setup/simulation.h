@@ -25,6 +25,14 @@ namespace stepdriver::setup {
 /// @param axis its place in `axes`.
 sim::MotorLimits motorLimits(const std::vector<config::AxisConfig>& axes, std::size_t axis);
 
+/// The motor that has the pins of an axis, on the rig. Without a configured holding torque it has
+/// as much as the limits of the axis take, or those of all axes that share it, see
+/// sim::soundMotor().
+///
+/// @param axis its place in `axes`.
+sim::MotorSpec motorOf(const std::vector<config::AxisConfig>& axes, std::size_t axis,
+                       const SimulatedMotor& simulated = {});
+
 /// The simulated rig of a configuration, its lines and its clock. All calls are safe from any
 /// thread.
 class Simulation {

@@ -23,6 +23,17 @@ struct SimulatedWiring {
   std::optional<bool> max_active_level;
 };
 
+/// A motor of the rig: a hybrid stepper, see sim::MotorSpec.
+struct SimulatedMotor {
+  int pole_pairs = 50;
+  /// [Nm] Empty: as much as loses no step, see sim::soundMotor().
+  std::optional<double> holding_torque;
+  double rotor_inertia = 54.0;  ///< [g cm^2]
+  double load_inertia = 54.0;   ///< [g cm^2] of all that it moves, at the motor's shaft
+  double friction = 0.0;        ///< [Nm]
+  double damping = 0.2;         ///< damping ratio
+};
+
 /// How the rig of one axis is built, and what is wrong with it. Lengths are in mm on a linear axis,
 /// in degrees on a rotary one.
 struct SimulatedAxis {
@@ -37,6 +48,7 @@ struct SimulatedAxis {
   double load_falls = 0.0;      ///< [mm/s|deg/s] of a load that nothing holds, towards min
   double spring_hz = 0.0;       ///< [Hz] of a mass that the carriage pulls by a spring; 0: none
   double spring_damping = 0.1;  ///< its damping ratio: what an input shaper expects by default
+  SimulatedMotor motor;
   SimulatedWiring wiring;
   sim::RigFaults faults;
   /// How many writes to STEP succeed before all others fail.
@@ -44,8 +56,8 @@ struct SimulatedAxis {
   /// By name, the rigs of those motors of an axis with several that differ from the axis's.
   std::map<std::string, SimulatedAxis> motors;
 
-  const SimulatedAxis& ofMotor(const std::string& motor) const {
-    const auto own = motors.find(motor);
+  const SimulatedAxis& ofMotor(const std::string& name) const {
+    const auto own = motors.find(name);
     return own != motors.end() ? own->second : *this;
   }
 };
@@ -79,6 +91,13 @@ struct SimulationConfig {
 ///       settling_ms: 10.0        # until the in-position output is active after a pulse
 ///       never_in_position: false # true: it stays inactive
 ///       load_falls_mm_s: 0.0     # how fast the load sinks towards min while nothing holds it
+///       motor:                 # the rotor between the chip and the carriage
+///         pole_pairs: 50
+///         holding_torque_nm: 0.3      # default: as much as loses no step, at least 0.3
+///         rotor_inertia_g_cm2: 54.0
+///         load_inertia_g_cm2: 54.0    # of all that it moves, at the motor's shaft
+///         friction_nm: 0.0
+///         damping: 0.2                # damping ratio of its small oscillations
 ///       wiring:                # what the configuration is wrong about; default: nothing
 ///         dir_inverted: true
 ///         steps_per_mm: 100.0  # steps_per_degree

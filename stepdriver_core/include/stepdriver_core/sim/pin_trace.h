@@ -30,6 +30,9 @@ class PinTrace {
   /// A pin changed to this level. Called in the order of time.
   virtual void edge(int pin, bool level, std::int64_t time_ns) = 0;
 
+  /// Words about the whole trace. Called after the last edge.
+  virtual void summary(const std::string& /*text*/) {}
+
   /// Makes all edges so far visible to readers of the growing trace.
   virtual void flush() {}
 };

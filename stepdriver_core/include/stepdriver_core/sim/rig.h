@@ -72,6 +72,32 @@ struct MotorLimits {
   bool exact_times = true;
 };
 
+/// The motor of an axis: a hybrid stepper whose torque is a sine of the electrical angle between
+/// its field and its rotor. The defaults are those of a common NEMA 17 motor with a load of the
+/// same inertia.
+struct MotorSpec {
+  int pole_pairs = 50;           ///< above 0; a full step is a quarter of a pole pair
+  double holding_torque = 0.30;  ///< [Nm] above 0
+  double inertia = 108e-7;       ///< [kg m^2] of rotor and load, at the motor's shaft; above 0
+  double friction = 0.0;         ///< [Nm] of bearings and load, against each turn
+  /// Damping ratio of its small oscillations, above 0. A motor has less, from 0.05 on: with full
+  /// steps it then resonates, and loses steps at some speeds.
+  double damping = 0.2;
+};
+
+/// The motor, with as much more holding torque as it takes to lose no step of an axis within these
+/// limits, in each microstep mode.
+///
+/// With w the frequency of small oscillations, at least 1.5 times the electrical speed: the motor
+/// can start and stop at that speed at once (w/2 is enough for that without damping and with
+/// microsteps), the damping takes a lag of asin(2 d/1.5) = 15 degrees, and full steps at the worst
+/// speed less than 120 degrees. The acceleration takes at most a quarter of the torque, and so does
+/// the friction.
+///
+/// @param rate [full steps/s] the top speed of the motor
+/// @param acceleration [full steps/s^2] its highest one
+MotorSpec soundMotor(MotorSpec motor, double rate, double acceleration);
+
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
@@ -92,6 +118,7 @@ struct RigAxisSpec {
   double load_falls = 0.0;
   std::optional<SpringSpec> spring;
   std::optional<MotorLimits> limits;  ///< empty: its motor may do anything
+  std::optional<MotorSpec> motor;  ///< empty: its rotor follows the field whatever comes
 };
 
 /// Axes whose motors together move their carriages, as on a CoreXY. A turn of the n-th axis's motor
@@ -149,8 +176,12 @@ struct RigAxisReport {
   /// [mm|deg] The amplitude with which the mass on the spring would ring on if the carriage stayed
   /// here and nothing damped it; 0 without a spring.
   double ringing = 0.0;
-  bool energized = false;    ///< current flows: enabled, awake, not in RESET, and with power
-  bool min_pressed = false;  ///< the reading of its line at the rig's latest time
+  /// [electrical degrees] The largest angle so far between field and rotor of its motor. A full
+  /// step is 90 degrees; at 180 steps are lost. Without a RigAxisSpec::motor it is 0.
+  double largest_lag = 0.0;
+  std::int64_t lost_steps = 0;  ///< full steps that the rotor lost, in total: four at each slip
+  bool energized = false;       ///< current flows: enabled, awake, not in RESET, and with power
+  bool min_pressed = false;     ///< the reading of its line at the rig's latest time
   bool max_pressed = false;
   std::map<Violation, std::int64_t> violations;  ///< only kinds that occurred
   /// The first step beyond MotorLimits, with its time and numbers; empty if there was none.

@@ -86,6 +86,8 @@ RigReport::Response reportOf(setup::Simulation& simulation) {
       response.skew.push_back((report.carriage - first) / config::configUnitsPerUnit(axis.kind));
       response.fell.push_back(report.fell / config::configUnitsPerUnit(axis.kind));
       response.ringing.push_back(report.ringing / config::configUnitsPerUnit(axis.kind));
+      response.largest_lag.push_back(report.largest_lag);
+      response.lost_steps.push_back(report.lost_steps);
       response.microsteps.push_back(report.microsteps);
       response.violations.push_back(report.totalViolations());
       response.violation_kinds.push_back(kindsText(report));
