@@ -25,6 +25,7 @@ SYSTEM_KEYS = {
     "libncurses-dev": "libncurses-dev",
     "libsystemd-dev": "libsystemd-dev",
     "liburdfdom-dev": "liburdfdom-dev",
+    "libxml2": "libxml2-dev",
     "python3-matplotlib": "python3-matplotlib",
     "python3-shapely": "python3-shapely",
     "python3-yaml": "python3-yaml",

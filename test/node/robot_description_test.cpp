@@ -143,9 +143,10 @@ TEST_P(BadRobotDescription, IsAReasonNotToStart) {
 }
 
 const std::vector<BadDescription> kBadDescriptions = {
-    {"Empty", false, "", "can't be read as a URDF"},
-    {"NoXml", false, "robot", "can't be read as a URDF"},
-    {"Unfinished", false, "<robot name=\"r\"><link", "can't be read as a URDF"},
+    {"Empty", false, "", "can't be read as XML: line 1, column 1"},
+    {"NoXml", false, "robot", "can't be read as XML: line 1, column 1"},
+    {"Unfinished", false, "<robot name=\"r\"><link", "can't be read as XML: line 1, column 22"},
+    {"NoRobot", false, "<sdf/>", "can't be read as a URDF"},
     {"PrismaticWithoutLimit", false, robot("prismatic", ""), "joint without <limit"},
     {"RevoluteWithoutLimit", true, robot("revolute", ""), "joint without <limit"},
     {"WithoutTheJoint", false, "<robot name=\"r\"><link name=\"a\"/></robot>",

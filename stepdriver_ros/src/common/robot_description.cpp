@@ -10,6 +10,7 @@
 #include "common/text.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/farthest_limit.h"
+#include "xml_mistake.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -190,6 +191,10 @@ std::vector<std::string> applyRobotDescription(const std::string& urdf, const st
                                                std::vector<AxisConfig>& axes,
                                                std::vector<ConfigIssue>& issues) {
   std::vector<std::string> warnings;
+  if (const std::string mistake = mistakeInXml(urdf); !mistake.empty()) {
+    issues.push_back({name, "can't be read as XML: " + mistake});
+    return warnings;
+  }
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(urdf);
   if (!model) {
     issues.push_back(

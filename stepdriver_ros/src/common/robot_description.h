@@ -10,7 +10,7 @@ namespace stepdriver::ros_node {
 
 /// Tightens the limits of the axes to those of their joints in a URDF.
 ///
-/// @param urdf the XML of a robot description.
+/// @param urdf the XML of a robot description. It is refused if mistakeInXml() finds one.
 /// @param name full name of its parameter.
 /// @param issues every mistake in it, and every mismatch with the axes, is added here; the axes
 ///   must then not be used.
