@@ -22,6 +22,7 @@
 #include <thread>
 #include <vector>
 
+#include "support/cut_connections.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
@@ -163,6 +164,25 @@ class BaseTest : public testing::Test {
   std::unique_ptr<Recorder<Jog>> jogs;
   std::unique_ptr<Recorder<AxisStates>> states;
 };
+
+TEST_F(BaseTest, DrivesNowhereByALatchedCommandThatComesAgainWithANewConnection) {
+  node.start();
+  joints = std::make_unique<Recorder<JointState>>(node.beside("joint_states"));
+  states = std::make_unique<Recorder<AxisStates>>(node.full("axis_states"));
+  launch();
+  ASSERT_TRUE(waitUntil([this] { return says("Ready"); }));
+  publisher = ros::NodeHandle().advertise<geometry_msgs::Twist>(node.beside("cmd_vel"), 1, true);
+  publish(0.3, 0.0);
+  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 0; })) << "its publisher is new";
+  ASSERT_TRUE(waitUntil([this] { return says("No cmd_vel for") && rests(); }));
+  const std::int64_t pulses = node.pulses();
+  cutConnections();
+  EXPECT_TRUE(waitUntil([&] { return says(", which latches") || node.pulses() > pulses; }));
+  EXPECT_TRUE(says(node.beside("cmd_vel") + ": a message of")) << base->output();
+  EXPECT_EQ(node.pulses(), pulses);
+  publish(0.3, 0.0);
+  EXPECT_TRUE(waitUntil([&] { return node.pulses() > pulses; })) << "a newer one";
+}
 
 TEST_F(BaseTest, DrivesASquareWhosePoseIsThatOfTheCounts) {
   node.set("simulation/speed", 10.0);

@@ -106,6 +106,18 @@ class JoystickTest : public testing::Test {
   std::unique_ptr<Recorder<AxisStates>> states;
 };
 
+TEST_F(JoystickTest, JogsNothingByAMessageThatWasLatchedBeforeItsStart) {
+  publisher = ros::NodeHandle().advertise<sensor_msgs::Joy>(node.beside("joy"), 1, true);
+  publish(1.0);
+  node.start();
+  jogs = std::make_unique<Recorder<Jog>>(node.full("jog"));
+  launch();
+  EXPECT_TRUE(waitUntil([this] { return says(", which latches") || jogs->count() > 0; }));
+  EXPECT_TRUE(says(node.beside("joy") + ": a message of")) << joystick->output();
+  EXPECT_EQ(node.pulses(), 0);
+  EXPECT_TRUE(holdUntil(1.0, [this] { return node.pulses() > 0; })) << "newer ones";
+}
+
 TEST_F(JoystickTest, JogsTheAxisAsFarAsTheStickIsOut) {
   start();
   EXPECT_TRUE(holdUntil(0.6, [&] { return std::abs(speed() - 0.025) < 1e-6; }))

@@ -9,6 +9,7 @@
 #include <ros/spinner.h>
 #include <ros/this_node.h>
 #include <sensor_msgs/JointState.h>
+#include <std_msgs/Float64.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/Jog.h>
 #include <sys/socket.h>
@@ -194,6 +195,29 @@ TEST_F(MasterTest, ThatIsRestartedTellsOfPublishersThatCameBeforeTheNode) {
   node.process().signal(SIGCONT);
   ASSERT_TRUE(isRegisteredAgain());
   EXPECT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() == 1; }));
+}
+
+// Its message was published before the node could receive it.
+TEST_F(MasterTest, ThatIsRestartedMakesNoLatchedMessageMoveAnything) {
+  start();
+  master->kill();
+  ASSERT_TRUE(isLost());
+  node.process().signal(SIGSTOP);
+  master->start();
+  ASSERT_TRUE(master->answers());
+  const auto publisher =
+      ros::NodeHandle().advertise<std_msgs::Float64>(node.full("x/setpoint"), 1, true);
+  std_msgs::Float64 message;
+  message.data = 0.01;
+  publisher.publish(message);
+  node.process().signal(SIGCONT);
+  ASSERT_TRUE(isRegisteredAgain());
+  EXPECT_TRUE(waitUntil([&] {
+    return pulses() > 0 || node.process().output().find(", which latches") != std::string::npos;
+  }));
+  EXPECT_EQ(pulses(), 0);
+  publisher.publish(message);
+  EXPECT_TRUE(waitUntil([this] { return pulses() > 0; })) << "a newer one";
 }
 
 // As after `rosnode cleanup`, if the node didn't answer it in time.

@@ -7,7 +7,9 @@
 #include <atomic>
 #include <string>
 
-#include "node/actions/action_statuses.h"
+#include "common/latched_messages.h"
+#include "common/master_directory.h"
+#include "node/actions/action_topics.h"
 #include "support/motion_client.h"
 #include "support/wait.h"
 
@@ -22,8 +24,8 @@ struct Motion {
 /// Its motions can't be stopped: they end when the test says so.
 class Unstoppable : public ros_node::MotionAction<MoveAction, Motion> {
  public:
-  Unstoppable(const ros::NodeHandle& node, ros_node::ActionStatuses& statuses)
-      : MotionAction(node, "move", statuses, [] {}) {
+  Unstoppable(const ros::NodeHandle& node, ros_node::ActionTopics& topics)
+      : MotionAction(node, "move", topics, [] {}) {
     start();
   }
 
@@ -49,8 +51,10 @@ class Unstoppable : public ros_node::MotionAction<MoveAction, Motion> {
 
 TEST(MotionAction, AGoalThatCannotBeStoppedStaysCurrentUntilItsMotionEnds) {
   const ros::NodeHandle node("motion_action");
-  ros_node::ActionStatuses statuses(node, 5.0);
-  Unstoppable action(node, statuses);
+  ros_node::MasterDirectory directory;
+  ros_node::LatchedMessages latched(directory);
+  ros_node::ActionTopics topics(node, 5.0, latched);
+  Unstoppable action(node, topics);
   MotionClient<MoveAction> client(node.resolveName("move"));
   client.sendGoal({});
   ASSERT_TRUE(waitUntil([&] { return client.getState() == State::ACTIVE; }));

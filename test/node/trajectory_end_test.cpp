@@ -3,8 +3,10 @@
 
 #include <string>
 
+#include "common/latched_messages.h"
+#include "common/master_directory.h"
 #include "core/support/bench.h"
-#include "node/actions/action_statuses.h"
+#include "node/actions/action_topics.h"
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
 #include "support/control_msgs_client.h"
@@ -22,8 +24,10 @@ TEST(TrajectoryAtTheEnd, IsTheClientToldOfByTheThreadThatEndsTheNode) {
   const ros::NodeHandle node("trajectory_end");
   test::Bench bench({test::linearAxis("x")});
   ros_node::CallQueues queues(1);  // without threads
-  ros_node::ActionStatuses statuses(node, 5.0);
-  ros_node::TrajectoryAction action(node, *bench.machine, queues, statuses, false);
+  ros_node::MasterDirectory directory;
+  ros_node::LatchedMessages latched(directory);
+  ros_node::ActionTopics topics(node, 5.0, latched);
+  ros_node::TrajectoryAction action(node, *bench.machine, queues, topics, false);
   TrajectoryClient client(node.resolveName("follow_joint_trajectory"), false);
   const auto serve_until = [&](const auto& condition) {
     return waitUntil([&] {

@@ -74,9 +74,8 @@ Base::Base(ros::NodeHandle node, const std::string& driver, BaseConfig config, D
   updater_.setHardwareID(driver);
   updater_.add("wheels", [this](Status& status) { tell(status); });
   const auto no_delay = ros::TransportHints().tcpNoDelay();
-  command_subscriber_ = node.subscribe<geometry_msgs::Twist>(
-      "cmd_vel", kNewest,
-      [this](const geometry_msgs::Twist::ConstPtr& message) { takeCommand(*message); }, {},
+  command_subscriber_ = ros_node::subscribeToNew<geometry_msgs::Twist>(
+      node, "cmd_vel", kNewest, latched_, [this](const auto& message) { takeCommand(*message); },
       no_delay);
   states_subscriber_ = node.subscribe<AxisStates>(
       driver + "/axis_states", kSeveral,

@@ -17,6 +17,8 @@
 
 #include "base_config.h"
 #include "common/background_call.h"
+#include "common/latched_messages.h"
+#include "common/master_directory.h"
 #include "drive.h"
 #include "driver_wheels.h"
 #include "odometry.h"
@@ -70,6 +72,8 @@ class Base {
   bool steering_asked_ = false;
   client::BackgroundCall steering_call_;
 
+  ros_node::MasterDirectory directory_;
+  ros_node::LatchedMessages latched_{directory_};
   ros::Publisher jog_publisher_;
   ros::Publisher odom_publisher_;
   std::optional<tf2_ros::TransformBroadcaster> broadcaster_;

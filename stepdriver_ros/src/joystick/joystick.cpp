@@ -33,8 +33,8 @@ Joystick::Joystick(ros::NodeHandle node, const std::string& driver, JoystickConf
     axes_.push_back(std::move(jogged));
   }
   publisher_ = node.advertise<Jog>(driver + "/jog", kQueued);
-  subscriber_ = node.subscribe<sensor_msgs::Joy>(
-      "joy", kQueued, [this](const sensor_msgs::Joy::ConstPtr& message) { take(*message); }, {},
+  subscriber_ = ros_node::subscribeToNew<sensor_msgs::Joy>(
+      node, "joy", kQueued, latched_, [this](const auto& message) { take(*message); },
       ros::TransportHints().tcpNoDelay());
   timer_ = node.createSteadyTimer(ros::WallDuration(1.0 / config_.rate),
                                   [this](const ros::SteadyTimerEvent& /*event*/) {

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "common/background_call.h"
+#include "common/latched_messages.h"
+#include "common/master_directory.h"
 #include "jog_sequence.h"
 #include "joystick_config.h"
 
@@ -53,6 +55,8 @@ class Joystick {
   const JoystickConfig config_;
   std::vector<Jogged> axes_;
   ros::SteadyTime heard_;  // time of the last message; zero: there is none, or it has timed out
+  ros_node::MasterDirectory directory_;
+  ros_node::LatchedMessages latched_{directory_};
   ros::Publisher publisher_;
   ros::Subscriber subscriber_;
   ros::SteadyTimer timer_;

@@ -17,10 +17,12 @@
 #include <vector>
 
 #include "common/end_requests.h"
+#include "common/latched_messages.h"
 #include "common/loopback_only.h"
+#include "common/master_directory.h"
 #include "common/node_start.h"
 #include "common/xml_depth.h"
-#include "node/actions/action_statuses.h"
+#include "node/actions/action_topics.h"
 #include "node/actions/homing_action.h"
 #include "node/actions/line_action.h"
 #include "node/actions/move_actions.h"
@@ -202,7 +204,9 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
-  ActionStatuses statuses(private_node, parameters.action_status_frequency);
+  MasterDirectory directory;
+  LatchedMessages latched(directory);
+  ActionTopics topics(private_node, parameters.action_status_frequency, latched);
   std::deque<AxisServices> axis_services;
   for (std::size_t i = 0; i < machine.axes().size(); ++i) {
     axis_services.emplace_back(private_node, i, *machine.axes()[i], queues);
@@ -213,26 +217,28 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
     axis::Axis& axis = *machine.axes()[i];
     axis_home_services.emplace_back(private_node, i, axis, queues);
     homing_actions.emplace_back(
-        onQueue(queues.control(), ros::NodeHandle(private_node, axis.config().name)), axis,
-        statuses);
+        onQueue(queues.control(), ros::NodeHandle(private_node, axis.config().name)), axis, topics);
   }
-  const MachineHomingAction machine_homing_action(private_node, machine, statuses);
-  MoveActions move_actions(private_node, machine, queues, statuses);
-  LineAction line_action(private_node, machine, queues, statuses);
-  PathAction path_action(private_node, machine, queues, statuses);
+  const MachineHomingAction machine_homing_action(private_node, machine, topics);
+  MoveActions move_actions(private_node, machine, queues, topics);
+  LineAction line_action(private_node, machine, queues, topics);
+  PathAction path_action(private_node, machine, queues, topics);
   const MachineHomeService machine_home_service(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   recorder.advertise(private_node, queues);
-  const JogSubscriber jog_subscriber(private_node, machine, queues, config.jog_timeout);
-  const SetpointSubscriber setpoint_subscriber(private_node, machine, queues, config.setpoint_mode,
-                                               config.setpoint_timeout);
-  const TrajectoryCommand trajectory_command(private_node, machine, queues, config.allow_slower);
-  TrajectoryAction trajectory_action(private_node, machine, queues, statuses, config.allow_slower);
+  const JogSubscriber jog_subscriber(private_node, machine, queues, latched, config.jog_timeout);
+  const SetpointSubscriber setpoint_subscriber(private_node, machine, queues, latched,
+                                               config.setpoint_mode, config.setpoint_timeout);
+  const TrajectoryCommand trajectory_command(private_node, machine, queues, latched,
+                                             config.allow_slower);
+  TrajectoryAction trajectory_action(private_node, machine, queues, topics, config.allow_slower);
   const std::string description = hardware.description();
-  MasterWatch master_watch([&] {
-    if (config.stop_on_master_lost) stopForLostMaster(machine);
-  });
+  MasterWatch master_watch(
+      [&] {
+        if (config.stop_on_master_lost) stopForLostMaster(machine);
+      },
+      [&] { return latched.lookAgain(); });
   DescriptorWatch descriptors;
   const Diagnostics diagnostics(
       node, private_node, machine, queues, master_watch, descriptors,

@@ -12,7 +12,8 @@
 #include <functional>
 #include <string>
 
-#include "action_statuses.h"
+#include "action_topics.h"
+#include "common/latched_messages.h"
 #include "node/calls/bounded.h"
 
 namespace stepdriver::ros_node {
@@ -33,11 +34,11 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   using GoalHandle = typename Base::GoalHandle;
 
   /// @param node with the queue of the goals and cancels.
-  /// @param statuses outlives the server.
-  ActionServer(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
+  /// @param topics outlives the server.
+  ActionServer(const ros::NodeHandle& node, const std::string& name, ActionTopics& topics,
                const std::function<void(const GoalHandle&)>& take,
                const std::function<void(const GoalHandle&)>& cancel)
-      : Base(take, cancel), node_(node, name), statuses_(statuses) {}
+      : Base(take, cancel), node_(node, name), topics_(topics) {}
 
  private:
   using Lock = boost::recursive_mutex::scoped_lock;
@@ -64,9 +65,9 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
           arrived->stamp = std::min(id->stamp, ros::Time::now());
           this->cancelCallback(arrived);
         };
-    goal_subscriber_ = node_.subscribe("goal", kQueueSize, take);
+    goal_subscriber_ = subscribeToNew(node_, "goal", kQueueSize, topics_.latched(), take);
     cancel_subscriber_ = node_.subscribe("cancel", kQueueSize, cancel);
-    statuses_.add([this] { beat(); });
+    topics_.addStatus([this] { beat(); });
   }
   // Without goals or subscribers nothing is published: later subscribers get the last status.
   void beat() {
@@ -112,7 +113,7 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   }
 
   ros::NodeHandle node_;
-  ActionStatuses& statuses_;
+  ActionTopics& topics_;
   ros::Publisher result_publisher_;
   ros::Publisher feedback_publisher_;
   ros::Publisher status_publisher_;

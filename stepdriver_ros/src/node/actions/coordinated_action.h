@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "action_statuses.h"
+#include "action_topics.h"
 #include "motion_action.h"
 #include "move_end.h"
 #include "node/calls/call_queues.h"
@@ -47,10 +47,10 @@ class CoordinatedAction : public MotionAction<Action, FollowingTogether<Action>>
   /// each.
   ///
   /// @param node the node's private handle.
-  /// @param machine, queues, statuses outlive the action.
+  /// @param machine, queues, topics outlive the action.
   CoordinatedAction(const ros::NodeHandle& node, const std::string& name, machine::Machine& machine,
-                    CallQueues& queues, ActionStatuses& statuses)
-      : Base(onQueue(queues.lines(), node), name, statuses, [this] { poll_.begin(); }),
+                    CallQueues& queues, ActionTopics& topics)
+      : Base(onQueue(queues.lines(), node), name, topics, [this] { poll_.begin(); }),
         machine_(machine),
         poll_(onQueue(queues.control(), node), kPollPeriod, [this] { return this->poll(); }) {}
 

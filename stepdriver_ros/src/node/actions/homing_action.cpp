@@ -22,8 +22,8 @@ bool HomingReports::due(const std::vector<axis::HomingPhase>& phases) {
 
 // ---- one axis ----
 
-HomingAction::HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses)
-    : axis_(axis), goals_(node, "homing", statuses, [this](auto& goal, const auto& cancelled) {
+HomingAction::HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionTopics& topics)
+    : axis_(axis), goals_(node, "homing", topics, [this](auto& goal, const auto& cancelled) {
         home(goal, cancelled);
       }) {}
 
@@ -62,10 +62,10 @@ void HomingAction::home(Goals::GoalHandle& goal, const std::function<bool()>& ca
 // ---- all axes ----
 
 MachineHomingAction::MachineHomingAction(const ros::NodeHandle& node, machine::Machine& machine,
-                                         ActionStatuses& statuses)
-    : machine_(machine),
-      goals_(node, "homing", statuses,
-             [this](auto& goal, const auto& cancelled) { home(goal, cancelled); }) {}
+                                         ActionTopics& topics)
+    : machine_(machine), goals_(node, "homing", topics, [this](auto& goal, const auto& cancelled) {
+        home(goal, cancelled);
+      }) {}
 
 MachineHomingAction::~MachineHomingAction() = default;
 

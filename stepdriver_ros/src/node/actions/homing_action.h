@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "action_statuses.h"
+#include "action_topics.h"
 #include "serial_action.h"
 #include "stepdriver_core/machine/machine.h"
 
@@ -32,8 +32,8 @@ class HomingReports {
 class HomingAction {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
-  /// @param axis, statuses outlive the action; before its end the machine has been shut down.
-  HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses);
+  /// @param axis, topics outlive the action; before its end the machine has been shut down.
+  HomingAction(const ros::NodeHandle& node, axis::Axis& axis, ActionTopics& topics);
   ~HomingAction();
 
  private:
@@ -49,9 +49,8 @@ class HomingAction {
 class MachineHomingAction {
  public:
   /// @param node the node's private handle, with the queue of the goals and cancels.
-  /// @param machine, statuses outlive the action; before its end the machine has been shut down.
-  MachineHomingAction(const ros::NodeHandle& node, machine::Machine& machine,
-                      ActionStatuses& statuses);
+  /// @param machine, topics outlive the action; before its end the machine has been shut down.
+  MachineHomingAction(const ros::NodeHandle& node, machine::Machine& machine, ActionTopics& topics);
   ~MachineHomingAction();
 
  private:

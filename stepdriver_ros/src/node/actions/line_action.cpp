@@ -9,8 +9,8 @@
 namespace stepdriver::ros_node {
 
 LineAction::LineAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-                       ActionStatuses& statuses)
-    : CoordinatedAction(node, "move_line", machine, queues, statuses) {
+                       ActionTopics& topics)
+    : CoordinatedAction(node, "move_line", machine, queues, topics) {
   start();
 }
 

@@ -11,9 +11,9 @@ namespace stepdriver::ros_node {
 class LineAction : public CoordinatedAction<MoveLineAction> {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues, statuses outlive the action.
+  /// @param machine, queues, topics outlive the action.
   LineAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-             ActionStatuses& statuses);
+             ActionTopics& topics);
   ~LineAction() override;
 
  private:

@@ -58,12 +58,12 @@ class MotionAction {
 
   /// @param node with the queue of the goals and cancels.
   /// @param begun is called when a goal has begun.
-  MotionAction(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
+  MotionAction(const ros::NodeHandle& node, const std::string& name, ActionTopics& topics,
                std::function<void()> begun)
       : name_(node.resolveName(name)),
         begun_(std::move(begun)),
         server_(
-            node, name, statuses, [this](const GoalHandle& handle) { take(handle); },
+            node, name, topics, [this](const GoalHandle& handle) { take(handle); },
             [this](const GoalHandle& handle) { cancel(handle); }) {}
 
   /// Call it when the action is fully constructed.

@@ -6,9 +6,9 @@
 
 namespace stepdriver::ros_node {
 
-AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis,
-                               ActionStatuses& statuses, std::function<void()> begun)
-    : MotionAction(node, "move", statuses, std::move(begun)), axis_(axis) {
+AxisMoveAction::AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, ActionTopics& topics,
+                               std::function<void()> begun)
+    : MotionAction(node, "move", topics, std::move(begun)), axis_(axis) {
   start();
 }
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "action_statuses.h"
+#include "action_topics.h"
 #include "motion_action.h"
 #include "stepdriver_core/axis/axis.h"
 
@@ -25,9 +25,9 @@ struct FollowingMove {
 class AxisMoveAction : public MotionAction<MoveAction, FollowingMove> {
  public:
   /// @param node a handle below the axis's name, with the queue of the goals and cancels.
-  /// @param axis, statuses outlive the action.
+  /// @param axis, topics outlive the action.
   /// @param begun is called when a goal has begun: from then on poll() must be called.
-  AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, ActionStatuses& statuses,
+  AxisMoveAction(const ros::NodeHandle& node, axis::Axis& axis, ActionTopics& topics,
                  std::function<void()> begun);
   ~AxisMoveAction() override;
 

@@ -4,7 +4,7 @@
 
 #include <deque>
 
-#include "action_statuses.h"
+#include "action_topics.h"
 #include "move_action.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/periodic_poll.h"
@@ -16,14 +16,14 @@ namespace stepdriver::ros_node {
 class MoveActions {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues, statuses outlive the actions.
+  /// @param machine, queues, topics outlive the actions.
   MoveActions(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-              ActionStatuses& statuses)
+              ActionTopics& topics)
       : poll_(onQueue(queues.control(), node), kPollPeriod, [this] { return poll(); }) {
     for (std::size_t i = 0; i < machine.axes().size(); ++i) {
       axis::Axis& axis = *machine.axes()[i];
       actions_.emplace_back(onQueue(queues.ofAxis(i), ros::NodeHandle(node, axis.config().name)),
-                            axis, statuses, [this] { poll_.begin(); });
+                            axis, topics, [this] { poll_.begin(); });
     }
   }
   MoveActions(const MoveActions&) = delete;

@@ -8,8 +8,8 @@
 namespace stepdriver::ros_node {
 
 PathAction::PathAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-                       ActionStatuses& statuses)
-    : CoordinatedAction(node, "follow_path", machine, queues, statuses) {
+                       ActionTopics& topics)
+    : CoordinatedAction(node, "follow_path", machine, queues, topics) {
   start();
 }
 

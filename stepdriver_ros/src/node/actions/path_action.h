@@ -11,9 +11,9 @@ namespace stepdriver::ros_node {
 class PathAction : public CoordinatedAction<FollowPathAction> {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues, statuses outlive the action.
+  /// @param machine, queues, topics outlive the action.
   PathAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-             ActionStatuses& statuses);
+             ActionTopics& topics);
   ~PathAction() override;
 
  private:

@@ -25,13 +25,12 @@ class SerialAction {
   using Run = std::function<void(GoalHandle&, const std::function<bool()>&)>;
 
   /// @param node with the queue of the goals and cancels.
-  /// @param statuses outlives the action.
+  /// @param topics outlives the action.
   /// @param run must return soon if the action is destroyed.
-  SerialAction(const ros::NodeHandle& node, const std::string& name, ActionStatuses& statuses,
-               Run run)
+  SerialAction(const ros::NodeHandle& node, const std::string& name, ActionTopics& topics, Run run)
       : run_(std::move(run)),
         server_(
-            node, name, statuses, [this](const GoalHandle& goal) { take(goal); },
+            node, name, topics, [this](const GoalHandle& goal) { take(goal); },
             [this](const GoalHandle& goal) { cancel(goal); }) {
     server_.start();
   }

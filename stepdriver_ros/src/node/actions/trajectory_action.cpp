@@ -48,8 +48,8 @@ std::string slowerText(const FollowingTrajectory& following) {
 }  // namespace
 
 TrajectoryAction::TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine,
-                                   CallQueues& queues, ActionStatuses& statuses, bool allow_slower)
-    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory", statuses,
+                                   CallQueues& queues, ActionTopics& topics, bool allow_slower)
+    : MotionAction(onQueue(queues.trajectories(), node), "follow_joint_trajectory", topics,
                    [this] { poll_.begin(); }),
       machine_(machine),
       axes_(axisOfJoint(machine)),

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "action_statuses.h"
+#include "action_topics.h"
 #include "follow_joint_trajectory.h"
 #include "motion_action.h"
 #include "node/calls/call_queues.h"
@@ -41,10 +41,10 @@ class TrajectoryAction
     : public MotionAction<action_msgs::FollowJointTrajectoryAction, FollowingTrajectory> {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues, statuses outlive the action.
+  /// @param machine, queues, topics outlive the action.
   /// @param allow_slower see machine::TrajectoryRequest.
   TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
-                   ActionStatuses& statuses, bool allow_slower);
+                   ActionTopics& topics, bool allow_slower);
   ~TrajectoryAction() override;
 
  private:

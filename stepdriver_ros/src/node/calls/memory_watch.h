@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cstddef>
 
-#include "descriptor.h"
+#include "common/descriptor.h"
 
 namespace stepdriver::ros_node {
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "descriptor.h"
+#include "common/descriptor.h"
 #include "trigger_session.h"
 
 namespace stepdriver::ros_node {

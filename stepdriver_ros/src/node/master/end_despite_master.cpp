@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "xmlrpc_caller.h"
+#include "common/xmlrpc_caller.h"
 
 namespace stepdriver::ros_node {
 namespace {

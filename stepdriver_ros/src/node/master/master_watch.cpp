@@ -15,8 +15,9 @@ constexpr std::chrono::milliseconds kAskPeriod{1000};
 
 }  // namespace
 
-MasterWatch::MasterWatch(std::function<void()> on_lost)
+MasterWatch::MasterWatch(std::function<void()> on_lost, std::function<bool()> on_restarted)
     : on_lost_(std::move(on_lost)),
+      on_restarted_(std::move(on_restarted)),
       master_(ros::master::getHost(), ros::master::getPort(), kMasterPatience) {}
 
 MasterWatch::~MasterWatch() { stop(); }
@@ -110,8 +111,8 @@ void MasterWatch::registerAgain() {
                              "is registered: start the node again");
     return;
   }
-  registered_ =
-      registrations_->registerAgain(master_, ros::XMLRPCManager::instance()->getServerURI());
+  registered_ = on_restarted_() && registrations_->registerAgain(
+                                       master_, ros::XMLRPCManager::instance()->getServerURI());
   if (!registered_) return;
   {
     const std::lock_guard<std::mutex> lock(mutex_);

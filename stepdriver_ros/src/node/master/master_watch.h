@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
+#include "common/xmlrpc_caller.h"
 #include "registrations.h"
-#include "xmlrpc_caller.h"
 
 namespace stepdriver::ros_node {
 
@@ -20,7 +20,9 @@ namespace stepdriver::ros_node {
 class MasterWatch {
  public:
   /// @param on_lost called in the watch's thread each time the master no longer answers.
-  explicit MasterWatch(std::function<void()> on_lost);
+  /// @param on_restarted called in the watch's thread before this node registers with a master that
+  ///   has forgotten it; false: it must be called again a second later.
+  MasterWatch(std::function<void()> on_lost, std::function<bool()> on_restarted);
   ~MasterWatch();
   MasterWatch(const MasterWatch&) = delete;
   MasterWatch& operator=(const MasterWatch&) = delete;
@@ -50,6 +52,7 @@ class MasterWatch {
   void registerAgain();
 
   const std::function<void()> on_lost_;
+  const std::function<bool()> on_restarted_;
   XmlRpcCaller master_;
   // Of the watch's thread.
   std::optional<Registrations> registrations_;

@@ -20,7 +20,7 @@ constexpr double kTimeoutPart = 0.05;
 }  // namespace
 
 JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
-                             double timeout)
+                             LatchedMessages& latched, double timeout)
     : machine_(machine),
       timeout_(timeout),
       streams_(machine.axes().size()),
@@ -28,8 +28,9 @@ JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, Ca
       poll_(onQueue(queues.control(), node), ros::WallDuration(timeout * kTimeoutPart),
             [this] { return endWhatIsOver(); }) {
   node.setCallbackQueue(&queues.control());
-  subscriber_ = node.subscribe("jog", kQueuedJogs, &JogSubscriber::take, this,
-                               ros::TransportHints().tcpNoDelay());
+  subscriber_ = subscribeToNew<Bounded<Jog>>(
+      node, "jog", kQueuedJogs, latched, [this](const auto& message) { take(message); },
+      ros::TransportHints().tcpNoDelay());
 }
 
 void JogSubscriber::take(const boost::shared_ptr<const Bounded<Jog>>& message) {

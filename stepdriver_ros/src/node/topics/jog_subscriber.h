@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/latched_messages.h"
 #include "message_stream.h"
 #include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
@@ -25,10 +26,10 @@ namespace stepdriver::ros_node {
 class JogSubscriber {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the subscriber.
+  /// @param machine, queues, latched outlive the subscriber.
   /// @param timeout [s] on the steady clock, after which an axis without a message comes to rest.
   JogSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
-                double timeout);
+                LatchedMessages& latched, double timeout);
   JogSubscriber(const JogSubscriber&) = delete;
   JogSubscriber& operator=(const JogSubscriber&) = delete;
 

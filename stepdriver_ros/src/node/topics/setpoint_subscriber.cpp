@@ -19,23 +19,23 @@ constexpr std::chrono::seconds kWarnPeriod{1};
 }  // namespace
 
 SetpointSubscriber::SetpointSubscriber(ros::NodeHandle node, machine::Machine& machine,
-                                       CallQueues& queues, machine::SetpointMode mode,
-                                       double timeout)
+                                       CallQueues& queues, LatchedMessages& latched,
+                                       machine::SetpointMode mode, double timeout)
     : machine_(machine),
       mode_(mode),
       timeout_(timeout),
       warnings_(kWarnPeriod),
       axes_(machine.axes().size()) {
   node.setCallbackQueue(&queues.streams());
+  const auto no_delay = ros::TransportHints().tcpNoDelay();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
-    const boost::function<void(const std_msgs::Float64ConstPtr&)> take_one =
-        [this, i](const std_msgs::Float64ConstPtr& message) { take(i, {message->data}); };
-    subscribers_.push_back(node.subscribe<std_msgs::Float64>(
-        machine.axes()[i]->config().name + "/setpoint", kQueuedSetpoints, take_one,
-        ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(subscribeToNew<std_msgs::Float64>(
+        node, machine.axes()[i]->config().name + "/setpoint", kQueuedSetpoints, latched,
+        [this, i](const auto& message) { take(i, {message->data}); }, no_delay));
   }
-  subscribers_.push_back(node.subscribe("setpoint", kQueuedSetpoints, &SetpointSubscriber::takeAll,
-                                        this, ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(subscribeToNew<Bounded<std_msgs::Float64MultiArray>>(
+      node, "setpoint", kQueuedSetpoints, latched,
+      [this](const auto& message) { takeAll(message); }, no_delay));
 }
 
 void SetpointSubscriber::takeAll(

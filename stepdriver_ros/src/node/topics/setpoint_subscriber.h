@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/latched_messages.h"
 #include "common/log_throttle.h"
 #include "message_stream.h"
 #include "node/calls/bounded.h"
@@ -26,10 +27,10 @@ namespace stepdriver::ros_node {
 class SetpointSubscriber {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the subscriber.
+  /// @param machine, queues, latched outlive the subscriber.
   /// @param timeout [s] without a message until an axis comes to rest.
   SetpointSubscriber(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
-                     machine::SetpointMode mode, double timeout);
+                     LatchedMessages& latched, machine::SetpointMode mode, double timeout);
   SetpointSubscriber(const SetpointSubscriber&) = delete;
   SetpointSubscriber& operator=(const SetpointSubscriber&) = delete;
 

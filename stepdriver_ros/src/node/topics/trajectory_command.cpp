@@ -13,11 +13,13 @@ constexpr std::uint32_t kQueuedTrajectories = 10;
 }  // namespace
 
 TrajectoryCommand::TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine,
-                                     CallQueues& queues, bool allow_slower)
+                                     CallQueues& queues, LatchedMessages& latched,
+                                     bool allow_slower)
     : machine_(machine), axes_(axisOfJoint(machine)), allow_slower_(allow_slower) {
   node.setCallbackQueue(&queues.trajectories());
-  subscriber_ = node.subscribe("command", kQueuedTrajectories, &TrajectoryCommand::take, this,
-                               ros::TransportHints().tcpNoDelay());
+  subscriber_ = subscribeToNew<Message>(
+      node, "command", kQueuedTrajectories, latched, [this](const auto& message) { take(message); },
+      ros::TransportHints().tcpNoDelay());
 }
 
 void TrajectoryCommand::take(const boost::shared_ptr<const Message>& message) {

@@ -4,6 +4,7 @@
 #include <ros/subscriber.h>
 #include <trajectory_msgs/JointTrajectory.h>
 
+#include "common/latched_messages.h"
 #include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
 #include "refusal_log.h"
@@ -17,10 +18,10 @@ namespace stepdriver::ros_node {
 class TrajectoryCommand {
  public:
   /// @param node the node's private handle.
-  /// @param machine, queues outlive the subscriber.
+  /// @param machine, queues, latched outlive the subscriber.
   /// @param allow_slower see machine::TrajectoryRequest.
   TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
-                    bool allow_slower);
+                    LatchedMessages& latched, bool allow_slower);
   TrajectoryCommand(const TrajectoryCommand&) = delete;
   TrajectoryCommand& operator=(const TrajectoryCommand&) = delete;
 

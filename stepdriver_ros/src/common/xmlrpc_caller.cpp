@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <memory>
 
-#include "../calls/descriptor.h"
+#include "descriptor.h"
 
 namespace stepdriver::ros_node {
 namespace {
