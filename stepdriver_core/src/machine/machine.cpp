@@ -249,7 +249,7 @@ class Machine::Impl {
                                           continued,
                                           longer.same_from,
                                           longer.same_until,
-                                          !request.segments.empty(),
+                                          longer.moves_on,
                                           continued->targets()};
       const activity::Reply reply = shell_->call(ExtendPath{*id, path.move, extension});
       const bool outdated =

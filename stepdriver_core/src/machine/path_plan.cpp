@@ -67,30 +67,41 @@ double resolutionOf(const std::vector<PathAxis>& axes) {
   return resolution;
 }
 
-void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& axes) {
+void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& axes,
+                  const std::vector<motion::ContourSegment>& segments) {
   for (std::size_t i = 0; i < contour.size(); ++i) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       const auto [low, high] = contour.range(i, k);
-      const auto text = [i] { return segmentText(i) + " at"; };
+      const auto text = [&] { return segmentText(segments[i].number) + " at"; };
       axes[k].refuseBeyondLimits(low, text);
       axes[k].refuseBeyondLimits(high, text);
     }
   }
 }
 
+// [microsteps] By how much a position may be off that was calculated in doubles.
+double roundingOf(double count) {
+  return 4.0 * std::numeric_limits<double>::epsilon() * std::abs(count);
+}
+
 // [s] How long an axis takes to move by a part of a microstep from rest to rest: on a quintic,
 // which has a speed of 1.875 way/T, an acceleration of 5.77 way/T^2 and a jerk of 60 way/T^3, or on
 // a cubic, which has a speed of 1.5 way/T and an acceleration of 6 way/T^2. A part of the limits is
-// left for the backlash.
-double restTime(double way, const PathAxis& axis, bool smooth) {
+// left for the backlash. A very short way takes longer: a rounded position may add a thousandth of
+// the limits, and the rounded time of a point after a hundred years half a percent of the duration.
+double restTime(double way, const PathAxis& axis, double count, bool smooth) {
+  constexpr double kShortest = 1e-4;      // s
+  constexpr double kMostRounding = 1e-3;  // of a limit
   const motion::MotionLimits& limits = axis.limits;
+  way = std::max(way, roundingOf(count) / kMostRounding);
   const double wanted = way / shareOf(axis);
   const double acceleration = std::min(limits.acceleration, limits.deceleration);
   if (!smooth) {
-    return std::max(1.5 * wanted / limits.max_speed, std::sqrt(6.0 * wanted / acceleration));
+    return std::max(
+        {kShortest, 1.5 * wanted / limits.max_speed, std::sqrt(6.0 * wanted / acceleration)});
   }
-  const double time =
-      std::max(1.875 * wanted / limits.max_speed, std::sqrt(5.78 * wanted / acceleration));
+  const double time = std::max(
+      {kShortest, 1.875 * wanted / limits.max_speed, std::sqrt(5.78 * wanted / acceleration)});
   return limits.jerk > 0.0 ? std::max(time, std::cbrt(60.0 * wanted / limits.jerk)) : time;
 }
 
@@ -99,11 +110,12 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const double count = axes[k].countOf(end[k]);
     const auto whole = static_cast<double>(motion::restingCount(count));
-    rest.duration = std::max(rest.duration, restTime(std::abs(whole - count), axes[k], smooth));
+    const double way = std::abs(whole - count);
+    if (way > roundingOf(count)) {
+      rest.duration = std::max(rest.duration, restTime(way, axes[k], count, smooth));
+    }
     rest.positions[k] = axes[k].positionOf(whole);
   }
-  constexpr double kRounding = 1e-6;  // s
-  if (rest.duration < kRounding) rest.duration = 0.0;
   return rest;
 }
 
@@ -132,7 +144,7 @@ BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
     if (!arc || std::abs(away) < kRounding || std::abs(away) > 0.5 + kRounding) continue;
     const double way = std::clamp(away, -kBeforeStep, kBeforeStep);
     begin.place.back() = axes[k].positionOf(rest + way);
-    duration = std::max(duration, restTime(std::abs(way), axes[k], smooth));
+    duration = std::max(duration, restTime(std::abs(way), axes[k], rest, smooth));
   }
   begin.delay_ns = static_cast<std::int64_t>(std::ceil(duration * 1e9));
   return begin;
@@ -140,13 +152,14 @@ BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
 
 std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
                                       const std::vector<PathAxis>& axes,
-                                      const std::vector<double>& end, std::size_t first) {
+                                      const std::vector<double>& end,
+                                      const std::vector<motion::ContourSegment>& segments) {
   std::vector<TrajectoryPoint> points;
   points.reserve(knots.size() + 1);
   for (motion::ContourKnot& knot : knots) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       axes[k].refuseBeyondLimits(knot.positions[k], [&] {
-        return segmentText(first + knot.segment) + ", rounded at its corners, at";
+        return segmentText(segments[knot.segment].number) + ", rounded at its corners, at";
       });
     }
     points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),
@@ -180,6 +193,34 @@ void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Cont
   }
 }
 
+// @param segments will have the `blend` of the plan if more follows and there is a jerk limit.
+motion::ContourPlan planAlong(std::vector<motion::ContourSegment>& segments,
+                              const std::vector<double>& start, const std::vector<PathAxis>& axes,
+                              bool more_follows) {
+  const bool smooth = isSmooth(axes);
+  const motion::Contour contour(
+      start, segments, resolutionOf(axes),
+      smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection, more_follows);
+  requireRange(contour, axes, segments);
+  const std::vector<motion::ContourLimits> limits =
+      contourLimits(axes, more_follows ? QueuedPath::kShareOfLimits : 1.0);
+  if (more_follows && smooth) setBlends(segments, contour, 0);
+  return smooth ? motion::planSmoothContour(contour, limits) : motion::planContour(contour, limits);
+}
+
+// The way to rest if no segment makes a step: the axes stay at rest.
+motion::ContourPlan restAt(const std::vector<double>& place, bool smooth) {
+  motion::ContourPlan plan;
+  const std::vector<double> none(place.size(), 0.0);
+  motion::ContourKnot& knot = plan.knots.emplace_back();
+  knot.positions = place;
+  knot.velocities = none;
+  if (smooth) knot.accelerations = none;
+  plan.knots.push_back(knot);
+  plan.knots.back().time_ns = 1;
+  return plan;
+}
+
 PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
                   const std::vector<PathOrigin>& origins) {
   requireRequest(request);
@@ -194,35 +235,27 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
   }
   PathReader reader(window.frame, axes, window.start);
   window.segments.reserve(request.segments.size());
-  for (const PathSegment& given : request.segments) window.segments.push_back(reader.read(given));
+  for (const PathSegment& given : request.segments) reader.read(given, window.segments);
   try {
-    const motion::Contour contour(
-        window.start, window.segments, resolutionOf(axes),
-        smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection,
-        request.more_follows);
-    requireRange(contour, axes);
-    const double share = request.more_follows ? QueuedPath::kShareOfLimits : 1.0;
-    const std::vector<motion::ContourLimits> limits = contourLimits(axes, share);
     motion::ContourPlan planned;
-    if (smooth) {
-      planned = motion::planSmoothContour(contour, limits);
+    if (window.segments.empty()) {
+      planned = restAt(window.start, smooth);
     } else {
-      planned = motion::planContour(contour, limits);
+      planned = planAlong(window.segments, window.start, axes, request.more_follows);
     }
     for (motion::ContourKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
     planned.settled_ns += begin.delay_ns;
-    const std::vector<double> end = window.segments.back().end;
+    const std::vector<double> end = window.end();
     PathPlan plan;
     for (std::size_t k = 0; k < axes.size(); ++k) {
       plan.targets.push_back(axes[k].countOf(end[k]));
     }
+    plan.points = pointsOf(planned.knots, axes, end, window.segments);
     if (request.more_follows) {
-      if (smooth) setBlends(window.segments, contour, 0);
       window.settled_ns = planned.settled_ns;
       appendKnots(window.knots, planned.knots, 0, 0);
       plan.window = std::make_shared<const PathWindow>(std::move(window));
     }
-    plan.points = pointsOf(std::move(planned.knots), axes, end, 0);
     if (begin.delay_ns > 0) {
       TrajectoryPoint first = plan.points.front();
       first.time = 0.0;

@@ -42,8 +42,10 @@ std::vector<motion::ContourLimits> contourLimits(const std::vector<axis::PathAxi
 bool isSmooth(const std::vector<axis::PathAxis>& axes);
 /// [unit] A microstep of the finest axis.
 double resolutionOf(const std::vector<axis::PathAxis>& axes);
+/// @param segments of the contour: a refusal names their numbers.
 /// @throw Refused if a segment leads beyond a soft limit.
-void requireRange(const motion::Contour& contour, const std::vector<axis::PathAxis>& axes);
+void requireRange(const motion::Contour& contour, const std::vector<axis::PathAxis>& axes,
+                  const std::vector<motion::ContourSegment>& segments);
 
 /// From the end of a path to the microsteps at which the axes come to rest. That is half a
 /// microstep or less: no step.
@@ -59,11 +61,12 @@ RestOfPath restOf(const std::vector<axis::PathAxis>& axes, const std::vector<dou
 ///
 /// @param end [unit] of the path, as given: the last knot is there to within rounding, which would
 ///   decide between two microsteps if the end is in their middle.
-/// @param first the number of the first segment.
+/// @param segments of the knots: a refusal names their numbers.
 /// @throw Refused if a rounded corner leads beyond a soft limit.
 std::vector<axis::TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
                                             const std::vector<axis::PathAxis>& axes,
-                                            const std::vector<double>& end, std::size_t first);
+                                            const std::vector<double>& end,
+                                            const std::vector<motion::ContourSegment>& segments);
 
 /// Sets how far the corners of segments are rounded. @param first the number of the first of them
 ///   in the contour.

@@ -17,29 +17,32 @@ using Shape = PathSegment::Shape;
 
 namespace {
 
-constexpr double kShortestSegment = 1e-3;  // microsteps of one of its axes
+// [microsteps] of one of its axes: a shorter one is left out. What is left out adds up, because the
+// next one begins where the last one that counts ends.
+constexpr double kShortestSegment = 1e-3;
 // [microsteps] The ends of an arc are the same if they differ by this in each axis of its plane:
 // senders calculate them. A path may also begin that far from its place, see planPath().
 constexpr double kSameEnds = 2e-3;
-constexpr double kHalfTurn = 3.14159265358979323846;  // rad
-
-// More than half a turn around the given centre. The angle of the arc is that around its moved
-// centre, which may be between the ends where the given one is in line with them.
-bool isLargeArc(const std::array<double, 2>& from, const std::array<double, 2>& centre,
-                const std::array<double, 2>& to, bool clockwise) {
-  const double begin = std::atan2(from[1] - centre[1], from[0] - centre[0]);
-  const double end = std::atan2(to[1] - centre[1], to[0] - centre[0]);
-  double turn = clockwise ? begin - end : end - begin;
-  if (turn <= 0.0) turn += 2.0 * kHalfTurn;
-  return turn > kHalfTurn;
-}
+constexpr double kFullTurn = 2.0 * 3.14159265358979323846;  // rad
 
 }  // namespace
 
 std::string segmentText(std::size_t index) { return fmt::format("segment {} of the path", index); }
 
-ContourSegment PathReader::read(const PathSegment& given) {
+void PathReader::read(const PathSegment& given, std::vector<ContourSegment>& segments) {
+  ContourSegment segment = segmentOf(given);
+  ++index_;
+  if (!leadsNowhere(given, segment)) {
+    before_ = segment.end;
+    segments.push_back(std::move(segment));
+  } else if (!segments.empty()) {
+    segments.back().tolerance = std::min(segments.back().tolerance, segment.tolerance);
+  }
+}
+
+ContourSegment PathReader::segmentOf(const PathSegment& given) const {
   ContourSegment segment;
+  segment.number = index_;
   segment.end = positions(given.end, "positions");
   switch (given.shape) {
     case Shape::kLine:
@@ -54,12 +57,9 @@ ContourSegment PathReader::read(const PathSegment& given) {
       segment.control2 = positions(given.control2, "numbers in control2");
       break;
   }
-  requireLength(given, segment);
   readSpeed(given, segment);
   segment.tolerance = given.tolerance.value_or(frame_.tolerance);
   requirePositive("tolerance", segment.tolerance);
-  before_ = segment.end;
-  ++index_;
   return segment;
 }
 
@@ -116,9 +116,14 @@ void PathReader::readArc(const PathSegment& given, ContourSegment& segment) cons
                     given.plane[0], given.plane[1]));
   }
   const bool around = given.shape == Shape::kArcAround;
-  if (around) requireCircle(axes_[a], given.clockwise, from, point, to);
-  const motion::Arc arc = around ? motion::arcAround(from, point, to, given.clockwise)
-                                 : motion::arcThrough(from, point, to);
+  if (around) requireCircle(axes_[a], from, point, to);
+  motion::Arc arc = around ? motion::arcAround(from, point, to, given.clockwise)
+                           : motion::arcThrough(from, point, to);
+  const double turned = std::abs(arc.angle) * std::hypot(from[0] - point[0], from[1] - point[1]);
+  // Its ends are in the same direction, but not equally far from the centre.
+  if (around && turned * axes_[a].steps_per_unit < kSameEnds) {
+    arc.angle += std::copysign(kFullTurn, arc.angle);
+  }
   if (arc.angle == 0.0) {
     refuse("is an arc through three points that are in line, or of which two are the same");
   }
@@ -135,8 +140,7 @@ std::size_t PathReader::axisOf(const std::string& name) const {
                      listText(frame_.names, "and")));
 }
 
-void PathReader::requireCircle(const PathAxis& axis, bool clockwise,
-                               const std::array<double, 2>& from,
+void PathReader::requireCircle(const PathAxis& axis, const std::array<double, 2>& from,
                                const std::array<double, 2>& centre,
                                const std::array<double, 2>& to) const {
   const double begin = std::hypot(from[0] - centre[0], from[1] - centre[1]);
@@ -145,21 +149,12 @@ void PathReader::requireCircle(const PathAxis& axis, bool clockwise,
     refuse(fmt::format("is an arc with a radius of {}, but it must be a microstep or more",
                        axis.show(std::min(begin, end))));
   }
-  // The centre is moved along the chord. The far side of an arc of more than half a turn deviates
-  // by as much; a smaller arc deviates the most at its ends.
-  const double chord = std::hypot(to[0] - from[0], to[1] - from[1]);
-  const double moved = chord > 0.0 ? std::abs(begin - end) * (begin + end) / (2.0 * chord) : 0.0;
-  const bool large = moved > kArcMismatch && isLargeArc(from, centre, to, clockwise);
   const double most =
-      large ? std::min(kArcMismatch, 2.0 * kArcMismatch * chord / (begin + end)) : kArcMismatch;
+      std::max(kArcMismatch, std::min(kArcMismatchShare * begin, kLargestArcMismatch));
   if (std::abs(begin - end) <= most) return;
   refuse(fmt::format(
-      "is an arc that begins {} from its centre and ends {} from it; these may differ by {}{}",
-      axis.show(begin), axis.show(end), axis.show(most),
-      large ? fmt::format(", because it turns by more than half a round, and its ends are only {} "
-                          "apart",
-                          axis.show(chord))
-            : ""));
+      "is an arc that begins {} from its centre and ends {} from it; these may differ by {}",
+      axis.show(begin), axis.show(end), axis.show(most)));
 }
 
 bool PathReader::areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
@@ -170,8 +165,8 @@ bool PathReader::areSame(const std::array<std::size_t, 2>& plane, const std::arr
   return true;
 }
 
-void PathReader::requireLength(const PathSegment& given, const ContourSegment& segment) const {
-  if (segment.shape == ContourSegment::Shape::kArc) return;
+bool PathReader::leadsNowhere(const PathSegment& given, const ContourSegment& segment) const {
+  if (segment.shape == ContourSegment::Shape::kArc) return false;
   double longest = 0.0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const auto take = [&](double position) {
@@ -183,7 +178,7 @@ void PathReader::requireLength(const PathSegment& given, const ContourSegment& s
     take(segment.control1[i]);
     take(segment.control2[i]);
   }
-  if (longest < kShortestSegment) refuse("has a length of 0, but must lead away from its begin");
+  return longest < kShortestSegment;
 }
 
 void PathReader::readSpeed(const PathSegment& given, ContourSegment& segment) const {

@@ -27,21 +27,25 @@ class PathReader {
              std::vector<double> from)
       : frame_(frame), axes_(axes), before_(std::move(from)) {}
 
+  /// Appends a segment to those of its path, unless it makes no step because it leads nowhere: then
+  /// the corner before it is rounded by no more than its own tolerance.
+  ///
   /// @throw Refused naming the segment, by the number of those that were read before it.
-  motion::ContourSegment read(const PathSegment& given);
+  void read(const PathSegment& given, std::vector<motion::ContourSegment>& segments);
 
  private:
   [[noreturn]] void refuse(const std::string& why) const;
   std::vector<double> positions(const std::vector<double>& given, const char* what) const;
   double place(std::size_t axis, double given, const char* what) const;
   void requirePositive(const char* what, double value) const;
+  motion::ContourSegment segmentOf(const PathSegment& given) const;
   void readArc(const PathSegment& given, motion::ContourSegment& segment) const;
   std::size_t axisOf(const std::string& name) const;
-  void requireCircle(const axis::PathAxis& axis, bool clockwise, const std::array<double, 2>& from,
+  void requireCircle(const axis::PathAxis& axis, const std::array<double, 2>& from,
                      const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
   bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
                const std::array<double, 2>& to) const;
-  void requireLength(const PathSegment& given, const motion::ContourSegment& segment) const;
+  bool leadsNowhere(const PathSegment& given, const motion::ContourSegment& segment) const;
   void readSpeed(const PathSegment& given, motion::ContourSegment& segment) const;
   bool isLinear(std::size_t axis) const { return axes_[axis].kind == config::Kind::kLinear; }
   bool moves(const motion::ContourSegment& segment, std::size_t axis) const;

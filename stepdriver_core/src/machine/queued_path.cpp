@@ -109,25 +109,27 @@ PathAhead QueuedPath::aheadOf(double position) const {
   ahead.time = std::max(0.0, motion_->end().value() - position);
   ahead.passed = position;
   ahead.more_follows = more_follows_;
-  ahead.targets = window_->segments.back().end;
+  ahead.targets = window_->end();
   return ahead;
 }
 
 std::vector<double> QueuedPath::targets() const {
   std::vector<double> targets;
   for (std::size_t k = 0; k < window_->axes.size(); ++k) {
-    targets.push_back(window_->axes[k].countOf(window_->segments.back().end[k]));
+    targets.push_back(window_->axes[k].countOf(window_->end()[k]));
   }
   return targets;
 }
 
 std::vector<ContourSegment> QueuedPath::read(const std::vector<PathSegment>& given) const {
-  const std::vector<double>& end = window_->segments.back().end;
+  const std::vector<double>& end = window_->end();
   PathReader reader(window_->frame, window_->axes, end);
   std::vector<ContourSegment> added;
   added.reserve(given.size());
-  for (const PathSegment& segment : given) added.push_back(reader.read(segment));
-  requireRange(motion::Contour(end, added, resolutionOf(window_->axes)), window_->axes);
+  for (const PathSegment& segment : given) reader.read(segment, added);
+  if (!added.empty()) {
+    requireRange(motion::Contour(end, added, resolutionOf(window_->axes)), window_->axes, added);
+  }
   return added;
 }
 
@@ -156,7 +158,7 @@ QueuedPath::Start QueuedPath::atKnot(const PathWindow::Knot& knot) {
 }
 
 QueuedPath::Start QueuedPath::atRest() const {
-  const std::vector<double>& end = window_->segments.back().end;
+  const std::vector<double>& end = window_->end();
   const double duration = restOf(window_->axes, end, isSmooth(window_->axes)).duration;
   const auto end_ns = static_cast<std::int64_t>(std::ceil(motion_->end().value() * 1e9));
   return {end_ns, window_->segments.size(), {}, duration, false};
@@ -198,7 +200,7 @@ std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t from_ns) cons
     step *= 2;
   }
   const PathWindow::Knot& end = knots.back();
-  if (time_ns <= end.time_ns) {
+  if (time_ns <= end.time_ns && !window_->segments.empty()) {
     starts.push_back(atKnot(end));
   }
   starts.push_back(atRest());
@@ -345,7 +347,7 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
 QueuedPath::JointPlace QueuedPath::jointAt(const Start& start,
                                            const motion::ContourPoint& place) const {
   if (start.from_rest) {
-    const std::vector<double>& end = window_->segments.back().end;
+    const std::vector<double>& end = window_->end();
     return {restOf(window_->axes, end, isSmooth(window_->axes)).positions,
             std::vector<double>(end.size(), 0.0)};
   }
@@ -405,10 +407,11 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
 
 QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments, bool more_follows,
                                         double passed, double changeable) const {
-  if (segments.empty()) {
+  const auto unchanged = [&]() -> Longer {
     return {std::make_shared<const QueuedPath>(motion_, window_, more_follows), passed,
             motion_->end().value()};
-  }
+  };
+  if (segments.empty()) return unchanged();
   if (!more_follows_) throw Refused("the path is complete: it was told that no more follows");
   const std::int64_t passed_ns =
       std::max(nanoseconds(passed), motion::splitNanoseconds(motion_->origin()).whole);
@@ -420,6 +423,7 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
   }
   try {
     const std::vector<ContourSegment> added = read(segments);
+    if (added.empty()) return unchanged();
     const std::int64_t changeable_ns = std::max(nanoseconds(changeable), passed_ns);
     const std::vector<Start> starts = startsFrom(changeable_ns);
     // With a jerk limit, a later start is better than a corner that is rounded less.
@@ -475,18 +479,17 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
   window.settled_ns = start.time_ns + continuation.plan.settled_ns;
   // Refusals count the segments from the first appended one.
   const std::size_t old = continuation.segments.size() - added.size();
-  for (motion::ContourKnot& knot : continuation.plan.knots) {
-    knot.segment -= std::min(knot.segment, old);
-  }
+  for (std::size_t i = 0; i < old; ++i) continuation.segments[i].number = 0;
   const std::vector<TrajectoryPoint> points =
-      pointsOf(std::move(continuation.plan.knots), window_->axes, window.segments.back().end, 0);
+      pointsOf(std::move(continuation.plan.knots), window_->axes, window.segments.back().end,
+               continuation.segments);
   continuation.plan.knots.clear();
   auto motion = joined(start, continuation, points, passed_ns);
   if (!motion) return {};
   return {
       std::make_shared<const QueuedPath>(
           std::move(motion), std::make_shared<const PathWindow>(std::move(window)), more_follows),
-      static_cast<double>(passed_ns) * 1e-9, static_cast<double>(start.time_ns) * 1e-9};
+      static_cast<double>(passed_ns) * 1e-9, static_cast<double>(start.time_ns) * 1e-9, true};
 }
 
 }  // namespace stepdriver::machine

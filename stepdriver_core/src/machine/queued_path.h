@@ -42,6 +42,9 @@ struct PathWindow {
   std::vector<motion::ContourSegment> segments;
   std::vector<Knot> knots;      ///< the last one is the end of the path
   std::int64_t settled_ns = 0;  ///< see motion::ContourPlan
+
+  /// The end of the last segment; the start if none has made a step yet.
+  const std::vector<double>& end() const { return segments.empty() ? start : segments.back().end; }
 };
 
 /// A path to which segments can be appended while axes follow it. Immutable: the longer path is
@@ -65,6 +68,7 @@ class QueuedPath : public axis::SharedPath {
     std::shared_ptr<const QueuedPath> path;
     double same_from = 0.0;   ///< [s]
     double same_until = 0.0;  ///< [s]
+    bool moves_on = false;    ///< whether it leads beyond the end of this one
   };
   /// Takes time in proportion to the segments that are planned again: those between the point from
   /// which the axes slow down to rest at the present end, and the new end. With a jerk limit, the

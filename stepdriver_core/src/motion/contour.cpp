@@ -22,6 +22,7 @@ constexpr double kGentle = 30.0 / 180.0 * kPi;     // rad: roundings may overlap
 constexpr double kLeastBlend = 0.01;               // of the resolution
 constexpr double kLeastRate = 1e-4;                // of a Bezier, of the sum of its handles
 constexpr double kHandle = 0.2;                    // of the resolution, of a Bezier at least
+constexpr double kRoundRadius = 1e-12;             // of a radius: rounding
 constexpr double kInLine = 1e-9;                   // sine of the angle of three points
 
 double norm(const std::vector<double>& vector) {
@@ -136,7 +137,7 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
     : start_(std::move(start)), resolution_(resolution) {
   segments_.reserve(segments.size());
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    segments_.push_back(placed(i == 0 ? start_ : segments[i - 1].end, segments[i], i));
+    segments_.push_back(placed(i == 0 ? start_ : segments[i - 1].end, segments[i]));
   }
   for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
     round(i, segments[i], continuity);
@@ -145,8 +146,8 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
   if (continuity == Continuity::kCurvature) widen(segments, continues);
 }
 
-Contour::Segment Contour::placed(const std::vector<double>& from, const ContourSegment& given,
-                                 std::size_t index) const {
+Contour::Segment Contour::placed(const std::vector<double>& from,
+                                 const ContourSegment& given) const {
   Segment segment;
   segment.shape = given.shape;
   segment.speed = given.speed;
@@ -170,7 +171,8 @@ Contour::Segment Contour::placed(const std::vector<double>& from, const ContourS
     const double least = std::min(kLeastRate * handles, kHandle * resolution_);
     if (leastRate(segment.powers, axes()) < least) {
       throw std::invalid_argument(fmt::format(
-          "segment {} is a Bezier with a cusp: its derivative is 0 there, and must not be", index));
+          "segment {} is a Bezier with a cusp: its derivative is 0 there, and must not be",
+          given.number));
     }
   } else {
     segment.powers.resize(2 * axes());
@@ -187,6 +189,10 @@ Contour::Segment Contour::placed(const std::vector<double>& from, const ContourS
     const double y = from[given.plane[1]] - given.centre[1];
     segment.radius = std::hypot(x, y);
     segment.from = std::atan2(y, x);
+    const double end = std::hypot(given.end[given.plane[0]] - given.centre[0],
+                                  given.end[given.plane[1]] - given.centre[1]);
+    const double growth = end - segment.radius;
+    if (std::abs(growth) > kRoundRadius * segment.radius) segment.growth = growth;
   }
   return segment;
 }
@@ -198,7 +204,9 @@ double Contour::sharpest(const Segment& segment, double rate) const {
     case ContourSegment::Shape::kLine:
       return 0.0;
     case ContourSegment::Shape::kArc:
-      return segment.radius * segment.angle * segment.angle / (rate * rate);
+      return ((segment.radius + std::max(0.0, segment.growth)) * std::abs(segment.angle) +
+              2.0 * std::abs(segment.growth)) *
+             std::abs(segment.angle) / (rate * rate);
     case ContourSegment::Shape::kBezier: {
       // The second derivative is linear: largest at an end.
       double begin = 0.0;
@@ -388,8 +396,9 @@ void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) co
   }
   if (segment.shape == ContourSegment::Shape::kLine) return;
   const double angle = segment.from + u * segment.angle;
-  const double x = segment.radius * std::cos(angle);
-  const double y = segment.radius * std::sin(angle);
+  const double radius = segment.radius + u * segment.growth;
+  const double x = radius * std::cos(angle);
+  const double y = radius * std::sin(angle);
   const auto [a, b] = segment.plane;
   point.position[a] = segment.centre[0] + x;
   point.position[b] = segment.centre[1] + y;
@@ -397,6 +406,12 @@ void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) co
   point.first[b] = x * segment.angle;
   point.second[a] = -x * segment.angle * segment.angle;
   point.second[b] = -y * segment.angle * segment.angle;
+  if (segment.growth == 0.0) return;
+  const double rate = segment.growth / radius;  // of the radius, in parts of it
+  point.first[a] += x * rate;
+  point.first[b] += y * rate;
+  point.second[a] -= 2.0 * y * rate * segment.angle;
+  point.second[b] += 2.0 * x * rate * segment.angle;
 }
 
 void Contour::evaluate(std::size_t index, double u, ContourPoint& point) const {
@@ -466,8 +481,18 @@ std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) co
       if (segment.plane[k] != axis) continue;
       const double quarter = k == 0 ? 0.0 : kPi / 2.0;  // the angle of an extreme
       const auto [least, most] = std::minmax({segment.from, segment.from + segment.angle});
-      for (double turn = std::ceil((least - quarter) / kPi); turn * kPi + quarter < most; ++turn) {
-        take((turn * kPi + quarter - segment.from) / segment.angle);
+      // If the radius changes by g and the angle by b, the extremes are ahead of that by
+      // atan(g/(r b)).
+      for (double turn = std::floor((least - quarter) / kPi); turn * kPi + quarter < most + kPi;
+           ++turn) {
+        double u = (turn * kPi + quarter - segment.from) / segment.angle;
+        constexpr int kCorrections = 4;
+        for (int i = 0; i < kCorrections; ++i) {
+          const double radius = segment.radius + std::clamp(u, 0.0, 1.0) * segment.growth;
+          const double ahead = std::atan(segment.growth / (radius * segment.angle));
+          u = (turn * kPi + quarter + ahead - segment.from) / segment.angle;
+        }
+        take(u);
       }
     }
   }
@@ -476,19 +501,9 @@ std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) co
 
 Arc arcAround(const std::array<double, 2>& from, const std::array<double, 2>& centre,
               const std::array<double, 2>& to, bool clockwise) {
-  Arc arc{centre, clockwise ? -2.0 * kPi : 2.0 * kPi};
-  const double x = to[0] - from[0];
-  const double y = to[1] - from[1];
-  const double chord = std::hypot(x, y);
-  if (chord == 0.0) return arc;
-  // The part of the centre's offset from the middle of the chord that is along the chord.
-  const double along =
-      ((centre[0] - (from[0] + to[0]) / 2.0) * x + (centre[1] - (from[1] + to[1]) / 2.0) * y) /
-      (chord * chord);
-  arc.centre = {centre[0] - along * x, centre[1] - along * y};
-  const double begin = std::atan2(from[1] - arc.centre[1], from[0] - arc.centre[0]);
-  const double end = std::atan2(to[1] - arc.centre[1], to[0] - arc.centre[0]);
-  arc.angle = end - begin;
+  const double begin = std::atan2(from[1] - centre[1], from[0] - centre[0]);
+  const double end = std::atan2(to[1] - centre[1], to[0] - centre[0]);
+  Arc arc{centre, end - begin};
   if (clockwise && arc.angle >= 0.0) arc.angle -= 2.0 * kPi;
   if (!clockwise && arc.angle <= 0.0) arc.angle += 2.0 * kPi;
   return arc;
@@ -505,8 +520,14 @@ Arc arcThrough(const std::array<double, 2>& from, const std::array<double, 2>& t
   const double bb = bx * bx + by * by;
   const double gap = std::hypot(bx - ax, by - ay);
   if (!(std::abs(cross) > kInLine * std::sqrt(aa) * std::sqrt(bb)) || gap == 0.0) return {};
-  const std::array<double, 2> centre{from[0] + (by * aa - ay * bb) / (2.0 * cross),
-                                     from[1] + (ax * bb - bx * aa) / (2.0 * cross)};
+  std::array<double, 2> centre{from[0] + (by * aa - ay * bb) / (2.0 * cross),
+                               from[1] + (ax * bb - bx * aa) / (2.0 * cross)};
+  // Rounding has moved it along the chord.
+  const double along =
+      ((centre[0] - (from[0] + to[0]) / 2.0) * bx + (centre[1] - (from[1] + to[1]) / 2.0) * by) /
+      bb;
+  centre[0] -= along * bx;
+  centre[1] -= along * by;
   return arcAround(from, centre, to, cross < 0.0);
 }
 

@@ -22,8 +22,9 @@ struct ContourSegment {
   std::vector<double> end;
 
   std::array<std::size_t, 2> plane{};  ///< of an arc: its axes
-  std::array<double, 2> centre{};      ///< of an arc, as far from its begin as from its end
-  double angle = 0.0;                  ///< [rad] of an arc, from plane[0] towards plane[1]
+  /// Of an arc. If its begin and its end aren't equally far from it, the radius changes evenly.
+  std::array<double, 2> centre{};
+  double angle = 0.0;  ///< [rad] of an arc, from plane[0] towards plane[1]
 
   std::vector<double> control1;  ///< of a Bezier
   std::vector<double> control2;
@@ -37,6 +38,7 @@ struct ContourSegment {
   double tolerance = 0.0;
   /// Up to this parameter the corner at its end leaves it as it is, and so do all later corners.
   double kept = 0.0;
+  std::size_t number = 0;  ///< its number in a refusal
   /// [unit] How far the corner at its end is rounded, as Contour::blendAfter() told of the same
   /// corner, whatever else allows. Empty: as far as possible.
   std::optional<double> blend;
@@ -170,8 +172,9 @@ class Contour {
     std::vector<double> powers;
     std::array<std::size_t, 2> plane{};
     std::array<double, 2> centre{};
-    double radius = 0.0;
-    double from = 0.0;  // rad
+    double radius = 0.0;  // at its begin
+    double growth = 0.0;  // of the radius, up to its end
+    double from = 0.0;    // rad
     double angle = 0.0;
     End begin;
     End end;
@@ -186,8 +189,7 @@ class Contour {
     std::vector<bool> measured;
   };
 
-  Segment placed(const std::vector<double>& from, const ContourSegment& given,
-                 std::size_t index) const;
+  Segment placed(const std::vector<double>& from, const ContourSegment& given) const;
   void round(std::size_t corner, const ContourSegment& given, Continuity continuity);
   bool isGentle(std::size_t corner) const;
   void widen(const std::vector<ContourSegment>& given, bool continues);
@@ -209,8 +211,8 @@ struct Arc {
   double angle = 0.0;  ///< [rad]
 };
 
-/// From one point around a centre to another; a full turn if they are the same. If their distances
-/// from the centre differ, the centre is moved to the nearest place that is equally far from both.
+/// From one point around a centre to another; a full turn if they are in the same direction from
+/// it.
 Arc arcAround(const std::array<double, 2>& from, const std::array<double, 2>& centre,
               const std::array<double, 2>& to, bool clockwise);
 

@@ -132,15 +132,10 @@ class SmoothSection {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double duration = parts.back().time;
     double speed = 0.0;
-    double jerk = 0.0;
-    for (const SmoothPart& part : parts) {
-      speed = std::max(speed, part.speed);
-      jerk = std::max(jerk, std::abs(part.jerk));
-    }
+    for (const SmoothPart& part : parts) speed = std::max(speed, part.speed);
     double closest = 9.0 * std::max(0.5e-9, kEpsilon * duration) / kMostRoundingOfTimes;
     // The speed is a difference of places at times that are rounded.
     const double speed_rounding = kEpsilon * duration * speed / time;
-    closest = std::max(closest, std::sqrt(24.0 * speed_rounding / (kMostRounding * jerk)));
     const double sums = std::sqrt(static_cast<double>(parts.size())) * parts.back().distance;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
       double farthest = sums;
@@ -150,8 +145,10 @@ class SmoothSection {
         moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
       }
       const double rounding = kEpsilon * farthest;
-      const double cube = 60.0 * rounding / (kMostRounding * limits_[j].jerk);
-      if (moves) closest = std::max(closest, std::cbrt(cube));
+      const double most = kMostRounding * limits_[j].jerk;
+      if (!moves) continue;
+      closest = std::max(
+          {closest, std::cbrt(60.0 * rounding / most), std::sqrt(24.0 * speed_rounding / most)});
     }
     return closest;
   }

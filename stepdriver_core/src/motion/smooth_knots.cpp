@@ -92,8 +92,13 @@ class KnotMaker {
   void beginPart(std::size_t index) {
     const SmoothPart& part = parts_[index];
     const bool becomes_even = index > 0 && part.even && !parts_[index - 1].even;
-    const double since = part.time - knots_.back().time;
     const double duration = parts_[index + 1].time - part.time;
+    const double jump = index > 0 ? jumpBefore(index) : 0.0;
+    if (!isSmall(jump, part.time + duration - knots_.back().time) && !isTooClose(part.time)) {
+      appendWithin(index - 1, part.time);
+    }
+    off_ += jump;
+    const double since = part.time - knots_.back().time;
     const double change = std::abs(part.jerk - jerk_);
     const bool small = change <= kSmallChange * highestJerk(grid_, interval_, limits_, time_);
     if (small && !becomes_even && isSmall(off_ + change * duration, since + duration)) {
@@ -104,6 +109,13 @@ class KnotMaker {
     } else {
       appendWithin(index, part.time);
     }
+  }
+
+  // [unit/s^2] Of the acceleration: the part in which it changes is shorter than rounded times are.
+  double jumpBefore(std::size_t index) const {
+    const SmoothPart& before = parts_[index - 1];
+    const SmoothPart& part = parts_[index];
+    return std::abs(part.acceleration - stateOf(before, part.time - before.time).acceleration);
   }
 
   bool leavesOut() const { return turns_ || off_ > 0.0; }
@@ -127,7 +139,8 @@ class KnotMaker {
   bool endsOtherwise(std::size_t index) const {
     double off = off_;
     for (std::size_t k = index + 1; k + 1 < parts_.size(); ++k) {
-      off += std::abs(parts_[k].jerk - jerk_) * (parts_[k + 1].time - parts_[k].time);
+      off +=
+          jumpBefore(k) + std::abs(parts_[k].jerk - jerk_) * (parts_[k + 1].time - parts_[k].time);
     }
     const bool straight = interval_ + 1 == grid_.size() || grid_[interval_].straight;
     return !straight || !isSmall(off, parts_.back().time - knots_.back().time);

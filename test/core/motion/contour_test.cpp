@@ -253,9 +253,36 @@ TEST(Contour, FindsTheCircleOfAnArc) {
   EXPECT_EQ(motion::arcThrough({0.0, 0.0}, {3.0, 3.0}, {3.0, 3.0}).angle, 0.0);
   EXPECT_NEAR(motion::arcAround({1.0, 0.0}, {0.0, 0.0}, {1.0, 0.0}, true).angle, -2.0 * kPi, 1e-12);
   EXPECT_NEAR(motion::arcAround({1.0, 0.0}, {0.0, 0.0}, {0.0, 1.0}, true).angle, -1.5 * kPi, 1e-12);
-  // 1 and 1.002 from the centre: it moves by 0.001 along the chord.
-  const motion::Arc moved = motion::arcAround({1.0, 0.0}, {0.0, 0.0}, {-1.002, 0.0}, false);
-  EXPECT_NEAR(moved.centre[0], -0.001, 1e-12);
+}
+
+// 1000 and 1001 from the centre: the radius changes evenly, and so does the angle.
+TEST(Contour, OfAnArcWhoseEndsAreNotEquallyFarHasARadiusThatChangesEvenly) {
+  ContourSegment segment = lineTo({-1001.0, 0.0}, 0.0);
+  segment.shape = ContourSegment::Shape::kArc;
+  segment.plane = {0, 1};
+  segment.angle = motion::arcAround({1000.0, 0.0}, {0.0, 0.0}, {-1001.0, 0.0}, false).angle;
+  EXPECT_NEAR(segment.angle, kPi, 1e-12);
+  const Contour contour({1000.0, 0.0}, {segment}, 1.0);
+  ContourPoint before;
+  ContourPoint point;
+  ContourPoint after;
+  double most = 0.0;
+  for (int i = 0; i <= 1000; ++i) {
+    const double u = i / 1000.0;
+    contour.evaluate(0, u, point);
+    EXPECT_NEAR(std::hypot(point.position[0], point.position[1]), 1000.0 + u, 1e-9);
+    most = std::max(most, point.position[1]);
+    constexpr double kStep = 1e-4;
+    contour.evaluate(0, u - kStep, before);
+    contour.evaluate(0, u + kStep, after);
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_NEAR(point.first[k], (after.position[k] - before.position[k]) / (2.0 * kStep), 1e-3);
+      EXPECT_NEAR(point.second[k], (after.first[k] - before.first[k]) / (2.0 * kStep), 1e-3);
+    }
+  }
+  EXPECT_NEAR(contour.range(0, 1).second, most, 1e-2);
+  EXPECT_GE(contour.range(0, 1).second, most);
+  EXPECT_NEAR(contour.range(0, 0).first, -1001.0, 1e-9);
 }
 
 TEST(Contour, RefusesACusp) {

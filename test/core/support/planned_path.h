@@ -12,6 +12,7 @@
 #include "axis/prepared_trajectory.h"
 #include "axis/trajectory_path.h"
 #include "machine/path_plan.h"
+#include "machine/queued_path.h"
 #include "motion/profile.h"
 #include "support/steps_of.h"
 
@@ -56,7 +57,7 @@ struct PlannedPath {
   double duration() const { return curves.front()->duration().value(); }
 };
 
-/// The path as the machine plans it.
+/// The path as the machine plans it, from rest at 0.
 inline PlannedPath planned(const machine::PathRequest& request,
                            const std::vector<axis::PathAxis>& axes) {
   PlannedPath made;
@@ -67,6 +68,20 @@ inline PlannedPath planned(const machine::PathRequest& request,
   made.path = axis::PreparedTrajectory::join(prepared, std::vector<axis::PathStart>(axes.size()));
   const auto& trajectory = dynamic_cast<const axis::TrajectoryPath&>(*made.path);
   for (const auto& member : trajectory.members()) made.curves.push_back(member.curve);
+  return made;
+}
+
+/// The same if segments are appended, and the motion may change from a time [s] on.
+inline PlannedPath fed(const PlannedPath& path, const std::vector<machine::PathSegment>& segments,
+                       double changeable) {
+  const machine::QueuedPath queued(path.path, path.plan.window, true);
+  const machine::QueuedPath::Longer longer = queued.extended(segments, false, 0.0, changeable);
+  PlannedPath made;
+  made.path = longer.path;
+  const motion::Profile along = made.path->plan(0, made.path->begin(), 1.0);
+  for (std::size_t i = 0; i < path.curves.size(); ++i) {
+    made.curves.push_back(std::make_shared<const motion::Profile>(made.path->profileOf(i, along)));
+  }
   return made;
 }
 

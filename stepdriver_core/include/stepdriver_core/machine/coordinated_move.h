@@ -49,8 +49,9 @@ struct PathSegment {
     kLine,  ///< straight
     /// A circular arc around a centre, or a full turn if both ends are the same in its plane, to
     /// within 0.002 microsteps; axes outside of the plane move in proportion to its angle. The
-    /// distances from the centre to its begin and to its end may differ by kArcMismatch: the centre
-    /// is then moved. An arc of more than half a turn must not need its centre to be moved by more.
+    /// distances from the centre to its begin and to its end may differ by kArcMismatch, or by
+    /// kArcMismatchShare of the radius up to kLargestArcMismatch if that is more: the radius then
+    /// changes evenly along the arc, which ends at its end.
     kArcAround,
     kArcThrough,  ///< the same through a point between its begin and its end
     kBezier,      ///< cubic
@@ -74,14 +75,20 @@ struct PathSegment {
   std::optional<double> tolerance;
 };
 
-/// [unit] See PathSegment::Shape::kArcAround.
-constexpr double kArcMismatch = 5e-6;
+/// @name See PathSegment::Shape::kArcAround
+/// @{
+constexpr double kArcMismatch = 5e-6;         ///< [unit]
+constexpr double kArcMismatchShare = 1e-3;    ///< of the radius
+constexpr double kLargestArcMismatch = 5e-4;  ///< [unit]
+/// @}
 
 /// Segments that several axes follow without stopping, as Machine::followPath() takes them. A unit
 /// is m on a linear axis, rad on a rotary one.
 struct PathRequest {
-  std::vector<std::string> names;     ///< of the axes, each once; need not be all
-  std::vector<PathSegment> segments;  ///< 1 to kMostPathSegments, each longer than 0
+  std::vector<std::string> names;  ///< of the axes, each once; need not be all
+  /// 1 to kMostPathSegments. A line or a Bezier all of whose points are within a thousandth of a
+  /// microstep of its begin makes no step and is left out, as doubled points are.
+  std::vector<PathSegment> segments;
   bool relative = false;  ///< all positions count from the commanded positions at the begin
   /// Highest speed along the path; 0: as fast as the limits of all axes allow. In segments in which
   /// a linear axis moves, it is the root of the sum of the squared speeds of the linear axes [m/s],
