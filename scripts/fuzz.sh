@@ -6,7 +6,7 @@ source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/fuzz.sh [--build] [--seconds SECONDS] [--seed SEED] [TARGET...]
+usage: scripts/fuzz.sh [--build] [--repeatable | [--seconds SECONDS] [--seed SEED]] [TARGET...]
 
 Installs missing packages, builds the targets of test/fuzz with clang, and runs each of them for SECONDS
 (default: 60) from SEED (default: a new one each time, which is printed), as many at a time as there are
@@ -21,6 +21,9 @@ earlier runs have found, which remain in the folder fuzz of the build folder. Pr
 target. If one breaks a promise, it also prints why, and the file of the input. To try such a file again,
 give it as the argument of the target's program. With --build it only builds.
 
+With --repeatable, as in scripts/test.sh, each computer plays the same inputs: as many for each target as
+test/fuzz/repeatable.txt says, from seed 1, without those that earlier runs have found, and regardless of time.
+
 Exit code 0: nothing was found.
 END
 }
@@ -28,14 +31,16 @@ END
 # A target has a folder of inputs. Those without a C++ source are in test/fuzz/readers_fuzz.py.
 targets() { (cd "$root/test/fuzz/corpus" && printf '%s\n' *); }
 
-seconds=60 seed=$((RANDOM * 32768 + RANDOM)) only_build='' wanted=()
+repeatable='' chosen='' seconds=60 seed=$((RANDOM * 32768 + RANDOM)) only_build='' wanted=()
 while (($# > 0)); do
   case $1 in
     -h | --help) usage && exit ;;
     --build) only_build=1 ;;
+    --repeatable) repeatable=1 ;;
     --seconds | --seed)
       [[ ${2:-} =~ ^[0-9]+$ ]] || { usage >&2 && exit 2; }
       printf -v "${1#--}" %s "$2"
+      chosen=1
       shift
       ;;
     *)
@@ -45,6 +50,10 @@ while (($# > 0)); do
   esac
   shift
 done
+if [[ -n $repeatable ]]; then
+  [[ -z $chosen ]] || { usage >&2 && exit 2; }
+  seed=1
+fi
 ((${#wanted[@]} > 0)) || mapfile -t wanted <<<"$(targets)"
 
 choose_build_folder
@@ -56,25 +65,49 @@ build_targets() {
     cmake --build "$build/catkin-fuzz" -j "$jobs" --target fuzz_targets
 }
 
+# How many inputs a target plays.
+runs_of() {
+  sed -n "s/^$1 *//p" "$src/test/fuzz/repeatable.txt" | grep -x '[1-9][0-9]*' ||
+    die "test/fuzz/repeatable.txt has no number for $1"
+}
+
+# Memory that was freed is kept for a while, to find its use; the limit of 1 GB is for the rest.
+sanitizer_options=(ASAN_OPTIONS=quarantine_size_mb=16:detect_stack_use_after_return=1
+  UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS=suppressions=sources/../sanitizers/leaks.supp:print_suppressions=0)
+common_options=(-rss_limit_mb=1024 -print_final_stats=1)
+
 fuzz_cpp() {
-  local name=$1 options=()
-  [[ ! -f $src/test/fuzz/$name.dict ]] || options+=("-dict=$src/test/fuzz/$name.dict")
-  # Memory that was freed is kept for a while, to find its use; the limit is for the rest.
-  ASAN_OPTIONS=quarantine_size_mb=16:detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1 \
-    LSAN_OPTIONS="suppressions=$src/test/sanitizers/leaks.supp:print_suppressions=0" \
-    "$build/catkin-fuzz/test/fuzz/${name}_fuzz" "${options[@]}" "-max_total_time=$seconds" "-seed=$seed" \
-    -timeout=120 -rss_limit_mb=1024 -print_final_stats=1 "-artifact_prefix=$build/fuzz/found/$name-" \
-    "$build/fuzz/$name" "$src/test/fuzz/corpus/$name"
+  local name=$1 runs
+  cd "$build/fuzz" || return
+  [[ ! -f sources/$name.dict ]] || common_options+=("-dict=sources/$name.dict")
+  common_options+=("-seed=$seed" "-artifact_prefix=found/$name-")
+  if [[ -n $repeatable ]]; then
+    runs=$(runs_of "$name") || return
+    # libFuzzer also looks at the depth of the stack, which depends on its address: on the environment, on the
+    # paths and on the kernel's randomization. Nothing may depend on the time either, or on the order of a
+    # folder's files. What is found stays in memory.
+    "${at_fixed_addresses[@]}" env -i PATH=/usr/bin:/bin "${sanitizer_options[@]}" "programs/${name}_fuzz" \
+      "${common_options[@]}" "-runs=$runs" -max_total_time=0 -reload=0 -timeout=1200 \
+      "-seed_inputs=$(printf '%s\n' "sources/corpus/$name"/* | LC_ALL=C sort | paste -s -d ,)"
+  else
+    env "${sanitizer_options[@]}" "programs/${name}_fuzz" "${common_options[@]}" "-max_total_time=$seconds" \
+      -timeout=120 "$name" "sources/corpus/$name"
+  fi
 }
 fuzz_python() {
-  /usr/bin/python3 -B "$src/test/fuzz/readers_fuzz.py" "$1" --seconds "$seconds" --seed "$seed" \
-    --kept "$build/fuzz/$1" --found "$build/fuzz/found/$1-" "$build/fuzz/$1" "$src/test/fuzz/corpus/$1"
+  local options=(--seconds "$seconds" --kept "$build/fuzz/$1" "$build/fuzz/$1") runs
+  if [[ -n $repeatable ]]; then
+    runs=$(runs_of "$1") || return
+    options=(--runs "$runs")
+  fi
+  PYTHONHASHSEED=0 /usr/bin/python3 -B "$src/test/fuzz/readers_fuzz.py" "$1" --seed "$seed" \
+    --found "$build/fuzz/found/$1-" "${options[@]}" "$src/test/fuzz/corpus/$1"
 }
 
 # run_target NAME: writes a line for the summary.
 run_target() {
   local name=$1 log=$build/log/fuzz-$1.log status=0 language=python verdict="nothing found"
-  mkdir -p "$build/fuzz/$name" "$build/fuzz/found"
+  mkdir -p "$build/fuzz/$name"
   [[ ! -f $src/test/fuzz/${name}_fuzz.cpp ]] || language=cpp
   "fuzz_$language" "$name" >"$log" 2>&1 || status=$?
   ((status == 0)) || verdict="FAILED, see $log"
@@ -89,6 +122,15 @@ show_failure() {
   say "" "==== $1"
   grep -m 1 -A 40 -E '^broken promise|^==[0-9]+==|runtime error|^ALARM' "$log" || tail -n 40 "$log"
   grep 'Test unit written' "$log" || true
+}
+
+prepare() {
+  mkdir -p "$build/fuzz/found"
+  ln -sfn "$src/test/fuzz" "$build/fuzz/sources"
+  ln -sfn "$build/catkin-fuzz/test/fuzz" "$build/fuzz/programs"
+  # Some containers don't allow it.
+  at_fixed_addresses=()
+  if setarch -R true 2>/dev/null; then at_fixed_addresses=(setarch -R); fi
 }
 
 run_targets() {
@@ -112,6 +154,9 @@ run_targets() {
 say "Building"
 quietly fuzz-build build_targets
 [[ -z $only_build ]] || exit 0
-say "Seed $seed, $seconds seconds for each target"
+much="$seconds seconds for each target"
+[[ -z $repeatable ]] || much="as many inputs as test/fuzz/repeatable.txt says"
+say "Seed $seed, $much"
+prepare
 run run_targets
 ((run_status == 0))

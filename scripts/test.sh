@@ -477,9 +477,9 @@ test_bad_days() {
   ! grep -qF '[  FAILED  ]' "$build/log/bad-days.log"
 }
 
-# The same inputs each time: new ones are tried by hand, so that a change fails only for what it did. The
-# inputs that are kept come first.
-check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --seed 1 --seconds 20; }
+# The same inputs each time and on each computer: new ones are tried by hand, so that a change fails only for
+# what it did.
+check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --repeatable; }
 # All of it stays in the group that an interrupt ends.
 build_fuzz() { in_group=1 bash "$root/scripts/fuzz.sh" --build; }
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Gives random files to the readers of draw and plot_motion, as libFuzzer does to those in C++.
 
-usage: readers_fuzz.py drawing|recording [--seconds S] [--seed N] [--kept FOLDER] [--found PREFIX]
-           FILE_OR_FOLDER...
+usage: readers_fuzz.py drawing|recording [--seconds S | --runs N] [--seed N] [--kept FOLDER]
+           [--found PREFIX] FILE_OR_FOLDER...
 
 drawing: SVG files and lists of points; recording: pin traces and bags. The inputs begin with the given
 files. One that reaches a new line of the readers is kept, and changed again. Each must be read, or refused
-with a message of one line, within 20 s of processor time and 2 GB.
+with a message of one line, within 20 s of processor time and 2 GB. With --runs, the same seed and files give
+the same N inputs, if PYTHONHASHSEED is set.
 
 Exit code 0: nothing was found.
 """
@@ -211,7 +212,7 @@ class Fuzzer:
         self.inputs = beginnings + self.inputs
         randomly = random.Random(self.options.seed)
         end = time.monotonic() + self.options.seconds
-        while time.monotonic() < end:
+        while self.tried < self.options.runs or time.monotonic() < end:
             if self.fails(changed(randomly.choice(self.inputs), self.inputs, randomly)):
                 return True
         return False
@@ -221,6 +222,7 @@ def main(words):
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("target", choices=sorted(TARGETS))
     parser.add_argument("--seconds", type=float, default=0.0)
+    parser.add_argument("--runs", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kept", type=pathlib.Path)
     parser.add_argument("--found", default="found-")
