@@ -67,7 +67,10 @@ motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
           velocity * seconds(at - wanted.reach_ns),
       velocity};
   std::vector<motion::Piece> pieces = motion::joinPoint(from, point, within, wanted.period);
+  // If it hasn't caught up with the point by then, it returns all the same: the stream may have
+  // ended.
   motion::DoubleDouble left = seconds(wanted.return_ns - at);
+  pieces = motion::firstPart(std::move(pieces), left);
   for (const motion::Piece& piece : pieces) left = left - piece.duration;
   const motion::MotionState joined = motion::endOf(pieces, from);
   if (left.hi > 0.0) {

@@ -71,9 +71,9 @@ void MotionJudge::rest(const Edge& last, Edge& next, double step) const {
   next.since_ns = may_have_rested ? next.time_ns : last.since_ns;
 }
 
-// A motion that begins where another one has ended at once begins at the whole step, up to half a
-// step ahead of where that one was. (Never twice in a window: each of these ends would have to come
-// right after a step, and a new request after it.)
+// If steps end at once, the next motion begins at a whole step, up to half a step ahead of the one
+// before it. (Never twice in a window: each of these ends would have to come right after a step,
+// and a new request after it.)
 bool MotionJudge::isTooFast(const Edge& from, const Edge& to, double step) const {
   const double ahead = from.rests != to.rests ? 0.5 : 0.0;
   const double way = std::abs(to.place - from.place) - (ahead + 2.0 * kPlaceError) * step;

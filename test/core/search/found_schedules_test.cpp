@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -156,6 +157,34 @@ TEST(FoundSchedules, AHeldMoveWhoseResumeComesDuringAnEmergencyStopEndsWithThatR
         does(0, 4, "release the emergency stop"), does(0, 0, "move y by 7 mm"), does(1, 16, "hold"),
         does(1, 16, "emergency stop can't be read"), does(0, 1, "resume")},
        {{27, Who::kNews, 40}}});
+}
+
+// The stream seems to be nearly as fast as the axis, which follows it more slowly at first. The
+// axis continued at full speed until the timeout, and met its switch.
+TEST(FoundSchedules, AStreamThatTheAxisHasNotCaughtUpWithIsNotFollowedBeyondItsEnd) {
+  expectGood({0,
+              {does(0, 0, "stream setpoints of x and z")},
+              {{10, Who::kRequest, 10}, {583, Who::kEngine, 10}}});
+}
+
+// The accelerations of the parts cancelled each other out but for rounding, and all steps of such a
+// stretch came at once.
+TEST(FoundSchedules, AnAxisThatIsShapedTwiceMakesNoBursts) {
+  for (const char* ending : {"stop x", "gentle limits of x", "emergency stop can't be read"}) {
+    expectGood({4, {does(0, 0, "move x by -6 mm"), does(1, 16, ending)}, {}});
+  }
+}
+
+// Its ramps are so short that their ends were dropped, and the second line began with the speed of
+// the first.
+TEST(FoundSchedules, ASlowPathStaysWhereItIsSentTo) {
+  const auto slow_path =
+      std::make_shared<const Act>(Act{"slow path of x and y", [](Participants& all, int client) {
+                                        all.postSlowPath(client, {0, 1});
+                                      }});
+  for (int variant = 0; variant < 5; ++variant) {
+    expectGood({variant, {{0, 0, 0, slow_path}}, {}});
+  }
 }
 
 }  // namespace

@@ -28,6 +28,13 @@ struct Meaning {
   bool ends_hold = false;   ///< whatever its answer, motions may begin in spite of an earlier hold
   std::uint64_t as_of = 0;  ///< nothing must have stopped it since this Oracle::moment(); 0: any
   std::array<bool, kAxes> axes{};  ///< the axes of the call
+  /// [m] Between which positions the request itself leads an axis, if its answer doesn't say that.
+  struct Reach {
+    double low = 0.0;
+    double high = 0.0;
+    bool from_path = false;  ///< they count from where a path has begun
+  };
+  std::array<std::optional<Reach>, kAxes> reaches{};
   /// How many times as long as alone its axes may take to stop on its curve.
   int longer_stop = 1;
 };

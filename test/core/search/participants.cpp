@@ -35,6 +35,9 @@ constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
 constexpr pulse::Nanoseconds kLossIsSeen = kInputPeriod + 2 * kLatestPass;
 constexpr pulse::Nanoseconds kQuietIsWatched = 250 * kMillisecond;
 constexpr std::size_t kMostSteps = 200'000;
+/// [microsteps] A motion may be outside of its hull by one, and half of one is between a target and
+/// the place nearest to it. Motors that axes share step one after the other.
+constexpr double kHullTolerance = 1.51;
 /// Of an axis with a brake. [mm/s]
 constexpr double kLoadFalls = 20.0;
 /// How far the second motor of an axis is ahead at the start. [mm]
@@ -85,7 +88,10 @@ std::vector<config::AxisConfig> configsOf(int variant) {
     for (std::size_t i = 0; i < sharing.size(); ++i) configs[i].kinematics = sharing[i].kinematics;
   }
   if (variant == kShaped) {
-    configs[0].input_shaper = {{config::ShaperType::kZv, 30.0, 0.1}};
+    // Parts of two such shapers that cancel each other out have made bursts of steps.
+    configs[0].input_shaper = {{config::ShaperType::kZv, 7.0, 0.0},
+                               {config::ShaperType::kZv, 14.0, 0.0}};
+    configs[0].jerk = 50.0;
     configs[2].input_shaper = {{config::ShaperType::kEi, 40.0, 0.05}};
   }
   if (variant == 2) {
@@ -127,15 +133,25 @@ machine::MachineOptions optionsOf(int variant) {
   return options;
 }
 
-std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& configs) {
+/// The schedule lets the engine be late.
+bool isEngineLate(const Schedule& schedule) {
+  return std::any_of(schedule.deviations.begin(), schedule.deviations.end(),
+                     [](const Deviation& deviation) { return deviation.who == Who::kEngine; });
+}
+
+std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& configs,
+                                    const Schedule& schedule) {
   std::vector<sim::RigAxisSpec> specs;
-  for (const config::AxisConfig& config : configs) {
+  for (std::size_t axis = 0; axis < configs.size(); ++axis) {
+    const config::AxisConfig& config = configs[axis];
     for (sim::RigAxisSpec& spec : test::rigMotors(config)) {
       spec.min_switch->position = -9.0;
       spec.max_switch->position = 16.0;
       spec.settling_ns = 5 * kMillisecond;
       if (config.brake) spec.load_falls = kLoadFalls;
       if (spec.name != config.name) spec.start = kRacked;
+      spec.limits = setup::motorLimits(configs, axis);
+      spec.limits->exact_times = !isEngineLate(schedule);
       specs.push_back(spec);
     }
   }
@@ -152,9 +168,7 @@ std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs)
 /// For each axis, the longest deceleration and 10 %, and the time of its shaper.
 std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
                                                 const Schedule& schedule) {
-  const bool late =
-      std::any_of(schedule.deviations.begin(), schedule.deviations.end(),
-                  [](const Deviation& deviation) { return deviation.who == Who::kEngine; });
+  const bool late = isEngineLate(schedule);
   std::array<pulse::Nanoseconds, kAxes> slowing{};
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const config::AxisConfig& config = configs[axis];
@@ -186,7 +200,7 @@ Participants::Participants(const Schedule& schedule)
       oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
       clock_(0.0),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
-      rig_(rigOf(configs_), trace_, test::Bench::couplings(configs_),
+      rig_(rigOf(configs_, schedule), trace_, test::Bench::couplings(configs_),
            test::Bench::motorPowerOf(optionsOf(schedule.variant))),
       backend_(rig_, [this] { return clock_.now(); }),
       wiring_(configs_, optionsOf(schedule.variant)),
@@ -206,9 +220,15 @@ Participants::Participants(const Schedule& schedule)
   const machine::InputReading first = readInputs();
   watched_ = first.levels;
   queue(first);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    hulls_[axis].begin(0.0, kHullTolerance);
+    lowest_limits_[axis].deceleration = configs_[axis].deceleration;
+    lowest_limits_[axis].jerk = configs_[axis].jerk;
+  }
   trace_->rose = [this](std::size_t axis, std::int64_t time) {
     oracle_.rose(axis, time);
     checkPowered(axis, time);
+    passes(axis);
   };
 }
 
@@ -297,6 +317,12 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
     std::size_t next = 0;
     for (std::size_t axis = 0; axis < kAxes && next < moves->size(); ++axis) {
       if (asked.meaning.axes[axis]) last_move_[axis] = (*moves)[next++].id;
+    }
+    for (std::size_t i = 0; i < asked.goals.size() && i < moves->size(); ++i) {
+      const std::size_t axis = asked.goals[i];
+      const double rest = onRig(axis, (*moves)[i].rest);
+      const double overshoot = (*moves)[i].overshoot * configs_[axis].steps_per_unit;
+      hulls_[axis].allow(rest - overshoot, rest + overshoot);
     }
   }
   if (const auto* homing = std::get_if<activity::AcceptedHoming>(&reply.value)) {
@@ -639,6 +665,8 @@ void Participants::noteGoals(Ask& asked) {
 
 // Now it is handed to the controller.
 void Participants::noteServed(Ask& asked) {
+  beginHulls(asked);
+  if (const auto* set = std::get_if<machine::SetLimits>(&asked.request)) noteLimits(*set);
   const auto found = open_.find(asked.id);
   if (found == open_.end()) return;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -677,6 +705,141 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
   }
   move_to(made.endPosition());
   return now.origin + static_cast<double>(motor - slack) / now.steps_per_unit;
+}
+
+// ---- the ways of the axes ----
+
+double Participants::placeOnRig(std::size_t axis) const {
+  const auto& shared = configs_[axis].kinematics;
+  if (shared == nullptr) return static_cast<double>(trace_->place(axis));
+  double place = 0.0;
+  for (std::size_t motor = 0; motor < shared->axes.size(); ++motor) {
+    place += shared->inverse[axis][motor] * static_cast<double>(trace_->place(motor));
+  }
+  return place;
+}
+
+double Participants::onRig(std::size_t axis, double position) {
+  const auto snapshot = controller_->snapshot();
+  const pulse::ChannelState live = engine_->channel(static_cast<int>(axis));
+  const axis::AxisState now =
+      machine::stateOf(snapshot->axes.at(axis), live, clock_.now(), clock_.now());
+  return placeOnRig(axis) + (position - now.position) * configs_[axis].steps_per_unit;
+}
+
+// Nothing that was asked before this call moves it any more.
+bool Participants::mayRest(std::size_t axis, std::uint64_t call) {
+  const auto snapshot = controller_->snapshot();
+  const axis::AxisState& state = snapshot->axes.at(axis).state;
+  if (waits_[axis] || state.moving || state.held || state.homing != axis::HomingPhase::kNone) {
+    return false;
+  }
+  if (engine_->channel(static_cast<int>(axis)).following != 0 || !outbox_.empty()) return false;
+  return std::none_of(open_.begin(), open_.end(), [&](const auto& other) {
+    const Meaning& meaning = other.second.meaning;
+    return other.first != call && meaning.axes[axis] && (meaning.moves || meaning.resumes);
+  });
+}
+
+// From the top speed, at the lowest limits that the axis ever had: each new setpoint is followed
+// within those of its time.
+double Participants::stoppingWay(std::size_t axis) const {
+  const config::AxisConfig& config = configs_[axis];
+  const axis::AxisLimits& lowest = lowest_limits_[axis];
+  double time = 0.5 * config.max_speed / lowest.deceleration + motor::shapingTimeOf(config) +
+                static_cast<double>(kLongestLead) * 1e-9;
+  if (lowest.jerk > 0.0) time += (config.deceleration + config.acceleration) / lowest.jerk;
+  return config.max_speed * time * config.steps_per_unit;
+}
+
+void Participants::noteLimits(const machine::SetLimits& set) {
+  axis::AxisLimits& lowest = lowest_limits_.at(set.axis);
+  const auto lower = [](double& limit, double wanted) {
+    if (wanted > 0.0 && (limit == 0.0 || wanted < limit)) limit = wanted;
+  };
+  lower(lowest.deceleration, std::min(set.limits.deceleration, set.limits.acceleration));
+  lower(lowest.jerk, set.limits.jerk);
+  // They apply to the motion under way too.
+  const bool moves = controller_->snapshot()->axes.at(set.axis).state.moving;
+  if (moves || had_setpoints_[set.axis]) hulls_[set.axis].widen(stoppingWay(set.axis));
+}
+
+void Participants::passes(std::size_t motor) {
+  const auto& shared = configs_[motor].kinematics;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const bool moves = axis == motor || (shared && configs_[axis].kinematics == shared);
+    if (moves) hulls_[axis].pass(placeOnRig(axis));
+  }
+}
+
+void Participants::beginHulls(const Ask& asked) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const bool moves = asked.meaning.moves && asked.meaning.axes[axis];
+    if (!moves) continue;
+    if (mayRest(axis, asked.id)) {
+      checkHull(axis);
+      const double backlash = configs_[axis].backlash * configs_[axis].steps_per_unit;
+      const auto snapshot = controller_->snapshot();
+      const double step = configs_[axis].steps_per_unit / snapshot->axes.at(axis).steps_per_unit;
+      hulls_[axis].begin(placeOnRig(axis), kHullTolerance * step + backlash);
+    }
+    widenHull(asked, axis);
+  }
+}
+
+void Participants::widenHull(const Ask& asked, std::size_t axis) {
+  Hull& hull = hulls_[axis];
+  const double here = placeOnRig(axis);
+  const double scale = configs_[axis].steps_per_unit;
+  // A motion that takes over may first have to turn.
+  if (waits_[axis] || !mayRest(axis, asked.id)) {
+    hull.allow(here - stoppingWay(axis), here + stoppingWay(axis));
+  }
+  if (asked.begins_later) {
+    waits_[axis] = true;
+    // Wherever it moves when its first segment of 0.4 s begins.
+    const double swing = 0.4 * configs_[axis].max_speed * scale / 4.0;
+    hull.widen(swing + stoppingWay(axis));
+  }
+  if (const auto& reach = asked.meaning.reaches[axis]) {
+    if (reach->from_path) {
+      const auto* begun = std::get_if<machine::FollowTrajectory>(&asked.request);
+      if (begun != nullptr) path_begins_[axis].push_back(here);
+      for (const double begin : path_begins_[axis]) {
+        hull.allow(begin + reach->low * scale, begin + reach->high * scale);
+      }
+    } else {
+      hull.allow(onRig(axis, reach->low), onRig(axis, reach->high));
+    }
+  }
+  if (const auto* setpoints = std::get_if<machine::FollowSetpoints>(&asked.request)) {
+    if (setpoints->mode == machine::SetpointMode::kVelocity) return hull.allowAnything();
+    for (const machine::Setpoint& setpoint : setpoints->setpoints) {
+      if (setpoint.axis != axis) continue;
+      const double place = onRig(axis, setpoint.value);
+      hull.allow(place - stoppingWay(axis), place + stoppingWay(axis));
+    }
+  }
+  if (std::holds_alternative<machine::Jog>(asked.request) ||
+      std::holds_alternative<machine::JogTogether>(asked.request)) {
+    hull.allowAnything();
+  }
+  if (std::holds_alternative<machine::Home>(asked.request)) {
+    const config::HomingConfig& homing = *configs_[axis].homing;
+    const double way = (homing.max_travel + homing.pull_off) * scale + stoppingWay(axis);
+    hull.allow(here - way, here + way);
+  }
+  if (std::holds_alternative<machine::SetMicrosteps>(asked.request)) {
+    const double full_step = configs_[axis].microsteps;
+    hull.widen(kHullTolerance * full_step + configs_[axis].backlash * scale);
+    hull.allow(here - full_step, here + full_step);
+  }
+}
+
+void Participants::checkHull(std::size_t axis) {
+  if (steps_failed_[axis]) return;
+  const std::string broken = hulls_[axis].broken();
+  if (!broken.empty()) oracle_.complain(configs_[axis].name + " " + broken + " microsteps");
 }
 
 // Checks the motions that a call has begun against its answer.
@@ -841,6 +1004,10 @@ void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
   for (const std::size_t axis : axes) {
     facts.push_back(snapshot->axes.at(axis).path_axis);
     meaning.axes[axis] = true;
+    // Its curve swings out by up to half of its size beyond its points.
+    const double swing = 0.5 * std::abs(wish.size);
+    meaning.reaches[axis] =
+        Meaning::Reach{std::min(0.0, wish.size) - swing, std::max(0.0, wish.size) + swing};
   }
   // Forward and a little back; smooth, because an axis without a start speed can't jump.
   static constexpr std::array<double, 3> places = {0.4, 1.0, 0.7};
@@ -888,11 +1055,40 @@ machine::PathSegment lineTo(std::vector<double> end) {
   return segment;
 }
 
+// Of any path that is posted here.
+constexpr double kPathTolerance = 0.0012;  // m
+
+Meaning::Reach reachOfPath(double size, double tolerance) {
+  return {std::min(0.0, size) - tolerance, std::max(0.0, size) + tolerance, true};
+}
+
 }  // namespace
 
 void Participants::postPath(int client, const std::vector<std::size_t>& axes, double size) {
+  const machine::PathRequest request{
+      {}, {lineTo({size, 0.0}), lineTo({size, size})}, true, 0.0, size / 10.0, true};
+  followPath(client, axes, size, request, [this, client, axes] {
+    Client& feeds = clients_[static_cast<std::size_t>(client)];
+    feeds.from = clock_.now() + static_cast<pulse::Nanoseconds>(1 + steps_ % 7 * 30) * 1'000'000;
+    feeds.next = [this, client, axes] { appendToPath(client, axes.front(), 0.0, true); };
+  });
+}
+
+void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes) {
+  constexpr double kSize = 0.0001;  // m
+  machine::PathRequest request{{}, {lineTo({kSize, 0.0}), lineTo({2.0 * kSize, 0.0})}, true};
+  request.segments[0].velocity = 20e-6;
+  request.segments[1].velocity = 1e-6;
+  followPath(client, axes, 2.0 * kSize, request, [this, client] {
+    Client& waits = clients_[static_cast<std::size_t>(client)];
+    waits.from = clock_.now() + 60 * kSecond;
+    waits.next = [] {};
+  });
+}
+
+void Participants::followPath(int client, const std::vector<std::size_t>& axes, double size,
+                              machine::PathRequest request, std::function<void()> begun) {
   const auto snapshot = controller_->snapshot();
-  machine::PathRequest request{{}, {}, true, 0.0, size / 10.0, true};
   machine::FollowTrajectory wanted{axes, nullptr, {}, machine::FollowTrajectory::Path{}};
   std::vector<axis::PathAxis> facts;
   std::vector<machine::PathOrigin> origins;
@@ -909,8 +1105,8 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
     wanted.stops.push_back(now.state.stops);
     wanted.path->from.push_back(now.rest);
     meaning.axes[axis] = true;
+    meaning.reaches[axis] = reachOfPath(size, request.tolerance);
   }
-  request.segments = {lineTo({size, 0.0}), lineTo({size, size})};
   try {
     machine::PathPlan plan = machine::planPath(request, facts, origins);
     wanted.path->targets = plan.targets;
@@ -926,9 +1122,8 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
     post(client, "follow path", wanted, meaning);
     clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
       if (reply.failure) return;
-      Client& feeds = clients_[static_cast<std::size_t>(client)];
-      feeds.from = clock_.now() + static_cast<pulse::Nanoseconds>(1 + steps_ % 7 * 30) * 1'000'000;
-      feeds.next = [=] { appendToPath(client, axes.front(), 0.0, true); };
+      for (const std::size_t axis : axes) path_axes_[axis] = axes;
+      begun();
     };
   };
 }
@@ -960,24 +1155,28 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
   Meaning meaning;
   meaning.moves = true;
   meaning.longer_stop = kLongerStopOnCurve;
-  meaning.axes[0] = meaning.axes[1] = true;
+  for (const std::size_t own : path_axes_[axis]) {
+    meaning.axes[own] = true;
+    meaning.reaches[own] = reachOfPath(size, kPathTolerance);
+  }
   meaning.as_of = oracle_.moment();
   clients_[static_cast<std::size_t>(client)].next = [=] {
     post(client, "append to the path", wanted, meaning);
     clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
-      if (!reply.failure) moveEnds(*snapshot, wanted.extension.targets);
+      if (!reply.failure) moveEnds(*snapshot, path_axes_[axis], wanted.extension.targets);
     };
   };
 }
 
-// The path of x and y leads somewhere else now.
+// The path leads somewhere else now.
 void Participants::moveEnds(const machine::MachineSnapshot& before,
+                            const std::vector<std::size_t>& axes,
                             const std::vector<double>& targets) {
-  for (std::size_t axis = 0; axis < targets.size(); ++axis) {
-    const machine::AxisSnapshot& own = before.axes.at(axis);
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const machine::AxisSnapshot& own = before.axes.at(axes.at(i));
     for (auto& [name, move] : moves_) {
       if (!own.path || move.id != own.path->move) continue;
-      move.rest = own.path_axis.positionOf(std::nearbyint(targets[axis]));
+      move.rest = own.path_axis.positionOf(std::nearbyint(targets[i]));
     }
   }
 }
@@ -1366,12 +1565,14 @@ std::vector<std::string> Participants::run() {
   if (oracle_.complaints.empty()) checkOutcomes();
   if (oracle_.complaints.empty()) checkCounts("at rest");
   if (oracle_.complaints.empty()) checkRest();
+  for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);
   if (oracle_.complaints.empty()) {
     loses_edges_ = false;
     note("probe");
     probe();
   }
   if (oracle_.complaints.empty()) checkCounts("in the end");
+  for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);
   return oracle_.complaints;
 }
 

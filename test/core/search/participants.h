@@ -18,6 +18,7 @@
 #include "machine/wiring.h"
 #include "pulse/pulse_engine.h"
 #include "search/failing_reads.h"
+#include "search/hull.h"
 #include "search/oracle.h"
 #include "search/rise_watch.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
@@ -116,6 +117,8 @@ class Participants {
   void postLaterTrajectory(int client, std::vector<std::size_t> axes, double size);
   /// A path of several axes at rest that is fed while they follow it.
   void postPath(int client, const std::vector<std::size_t>& axes, double size);
+  /// Two short lines, the second one at a twentieth of the first one's speed.
+  void postSlowPath(int client, const std::vector<std::size_t>& axes);
   /// Appends to the path that an axis follows, if it is one; a last segment ends it.
   void appendToPath(int client, std::size_t axis, double size, bool is_last);
   void emergencyStop(int client);
@@ -202,7 +205,8 @@ class Participants {
   void advanceTo(pulse::Nanoseconds time);
   machine::InputReading readInputs();
   void queue(const machine::InputReading& reading);
-  void moveEnds(const machine::MachineSnapshot& before, const std::vector<double>& targets);
+  void moveEnds(const machine::MachineSnapshot& before, const std::vector<std::size_t>& axes,
+                const std::vector<double>& targets);
   /// What a trajectory is prepared from.
   struct Wish {
     std::vector<std::size_t> axes;
@@ -212,6 +216,9 @@ class Participants {
   };
   void wish(int client, std::vector<std::size_t> axes, double size, pulse::Nanoseconds begin_in);
   void prepareAndPost(int client, const Wish& wish, int tries);
+  /// @param begun called when it has been accepted
+  void followPath(int client, const std::vector<std::size_t>& axes, double size,
+                  machine::PathRequest request, std::function<void()> begun);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
                        int left);
   void postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,
@@ -227,6 +234,18 @@ class Participants {
   /// Plays on until the condition is true. @return false if that takes too long.
   bool playUntil(const std::function<bool()>& ready, pulse::Nanoseconds longest);
   bool atRest();
+  /// @name Where the pulses may lead, on the rig [configured microsteps]
+  /// @{
+  double placeOnRig(std::size_t axis) const;
+  double onRig(std::size_t axis, double position);
+  bool mayRest(std::size_t axis, std::uint64_t call);
+  double stoppingWay(std::size_t axis) const;
+  void noteLimits(const machine::SetLimits& set);
+  void passes(std::size_t motor);
+  void beginHulls(const Ask& asked);
+  void widenHull(const Ask& asked, std::size_t axis);
+  void checkHull(std::size_t axis);
+  /// @}
   void checkCounts(const std::string& when);
   void checkCount(std::size_t axis, const std::string& when);
   void checkPowered(std::size_t axis, pulse::Nanoseconds now);
@@ -295,6 +314,11 @@ class Participants {
   bool engine_reads_inputs_ = false;
   std::vector<activity::AcceptedHoming> homings_;
   bool position_changed_ = false;
+  std::array<Hull, kAxes> hulls_;
+  std::array<axis::AxisLimits, kAxes> lowest_limits_{};
+  std::array<bool, kAxes> waits_{};  // something that begins later was asked of it
+  std::array<std::vector<double>, kAxes> path_begins_;     // on the rig
+  std::array<std::vector<std::size_t>, kAxes> path_axes_;  // of the last path of each axis
 
   std::size_t steps_ = 0;
   std::size_t script_began_ = 0;

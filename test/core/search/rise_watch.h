@@ -1,41 +1,87 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/sim/pin_trace.h"
 
 namespace stepdriver::search {
 
-/// Reports each rising STEP edge of the rig, with the number of its axis.
+/// Reports each rising STEP edge of the rig, with the number of its axis, and counts them. The
+/// chips are A4988s.
 class RiseWatch : public sim::PinTrace {
  public:
-  explicit RiseWatch(std::vector<std::string> axes) : axes_(std::move(axes)) {}
+  explicit RiseWatch(std::vector<std::string> axes) : axes_(std::move(axes)) {
+    motors_.resize(axes_.size());
+  }
 
   std::function<void(std::size_t axis, std::int64_t time_ns)> rose;
 
-  void begin(const std::vector<sim::TracePin>& pins, const std::vector<bool>& /*levels*/,
+  /// [1/16 steps] Where the pulses have taken the motor of an axis.
+  std::int64_t place(std::size_t axis) const { return motors_.at(axis).place; }
+
+  void begin(const std::vector<sim::TracePin>& pins, const std::vector<bool>& levels,
              std::int64_t /*time_ns*/) override {
-    axis_of_.assign(pins.size(), axes_.size());
+    pins_.assign(pins.size(), {});
     for (std::size_t i = 0; i < pins.size(); ++i) {
-      if (pins[i].variable != "step") continue;
       for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
-        if (pins[i].scope == axes_[axis]) axis_of_[i] = axis;
+        if (pins[i].scope == axes_[axis]) pins_[i] = {axis, roleOf(pins[i].variable)};
       }
+      if (pins_[i].role == Role::kDir) motors_[pins_[i].axis].forward = *pins[i].active;
+      if (pins_[i].role != Role::kOther) set(pins_[i], levels[i]);
     }
   }
 
   void edge(int pin, bool level, std::int64_t time_ns) override {
-    const std::size_t axis = axis_of_[static_cast<std::size_t>(pin)];
-    if (level && axis < axes_.size() && rose) rose(axis, time_ns);
+    const Pin& changed = pins_[static_cast<std::size_t>(pin)];
+    if (changed.role == Role::kOther) return;
+    if (changed.role != Role::kStep) return set(changed, level);
+    if (!level) return;
+    Motor& motor = motors_[changed.axis];
+    motor.place += motor.dir == motor.forward ? motor.step : -motor.step;
+    if (rose) rose(changed.axis, time_ns);
   }
 
  private:
+  enum class Role { kOther, kStep, kDir, kMs1, kMs2, kMs3 };
+  struct Pin {
+    std::size_t axis = 0;
+    Role role = Role::kOther;
+  };
+  struct Motor {
+    bool dir = false;
+    bool forward = true;  // the level of DIR
+    driver::ModeCode code{};
+    std::int64_t step = 16;
+    std::int64_t place = 0;
+  };
+
+  static Role roleOf(const std::string& variable) {
+    if (variable == "step") return Role::kStep;
+    if (variable == "dir") return Role::kDir;
+    if (variable == "ms1") return Role::kMs1;
+    if (variable == "ms2") return Role::kMs2;
+    return variable == "ms3" ? Role::kMs3 : Role::kOther;
+  }
+
+  void set(const Pin& pin, bool level) {
+    Motor& motor = motors_[pin.axis];
+    if (pin.role == Role::kDir) motor.dir = level;
+    if (pin.role < Role::kMs1) return;
+    motor.code.at(static_cast<std::size_t>(pin.role) - static_cast<std::size_t>(Role::kMs1)) =
+        level;
+    static const driver::DriverChip& chip = driver::driverChip("a4988");
+    motor.step = 16 / driver::microstepsOf(chip, motor.code).value_or(16);
+  }
+
   const std::vector<std::string> axes_;
-  std::vector<std::size_t> axis_of_;
+  std::vector<Pin> pins_;
+  std::vector<Motor> motors_;
 };
 
 }  // namespace stepdriver::search

@@ -87,6 +87,12 @@ Request messageOf(int client, AxisSet axes, const std::string& text) {
   return request;
 }
 
+/// A request that leads an axis to a position, or by a way.
+Request leadingTo(Request request, std::size_t axis, double place, bool relative) {
+  request.reaches.push_back({axis, place, place, relative});
+  return request;
+}
+
 Request requestOf(Kind kind, AxisSet axes, const std::string& text, bool wait = false) {
   Request request;
   request.kind = kind;
@@ -253,8 +259,9 @@ bool DriverCalls::moveTo(std::size_t axis, double position, bool relative, bool 
   service.request.relative = relative;
   service.request.wait = wait;
   const std::string name = kAxisNames.at(axis) + "/move_to";
-  return call(requestOf(Kind::kMotion, 1U << axis,
-                        name + (relative ? " by " : " ") + shown(position), wait),
+  return call(leadingTo(requestOf(Kind::kMotion, 1U << axis,
+                                  name + (relative ? " by " : " ") + shown(position), wait),
+                        axis, position, relative),
               name, service, [&](const MoveTo::Response& response) {
                 if (relative || !wait) return std::vector<Arrival>();
                 return std::vector<Arrival>{{axis, position, response.position}};
@@ -279,19 +286,22 @@ bool DriverCalls::moveLine(const std::vector<std::size_t>& axes,
   service.request.relative = relative;
   service.request.duration = duration;
   service.request.wait = wait;
-  return call(
+  Request request =
       requestOf(Kind::kMotion, setOf(axes),
                 std::string("move_line") + (relative ? " by" : "") + shown(axes, positions) +
                     (duration > 0.0 ? " in " + shown(duration) + " s" : ""),
-                wait),
-      "move_line", service, [&](const MoveLine::Response& response) {
-        std::vector<Arrival> arrivals;
-        if (relative || !wait) return arrivals;
-        for (std::size_t i = 0; i < axes.size(); ++i) {
-          arrivals.push_back({axes[i], positions[i], response.position.at(i)});
-        }
-        return arrivals;
-      });
+                wait);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    request = leadingTo(std::move(request), axes[i], positions[i], relative);
+  }
+  return call(std::move(request), "move_line", service, [&](const MoveLine::Response& response) {
+    std::vector<Arrival> arrivals;
+    if (relative || !wait) return arrivals;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      arrivals.push_back({axes[i], positions[i], response.position.at(i)});
+    }
+    return arrivals;
+  });
 }
 
 namespace {
@@ -309,15 +319,22 @@ std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size) {
 }  // namespace
 
 std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, double size,
-                                      bool more_follows) {
+                                      bool more_follows, double velocity) {
   stepdriver::FollowPath service;
   for (const std::size_t axis : axes) service.request.name.push_back(kAxisNames.at(axis));
   service.request.segments = zigzag(axes.size(), size);
   service.request.relative = true;
   service.request.tolerance = 0.0005;
+  service.request.velocity = velocity;
   service.request.more_follows = more_follows;
-  Request request = requestOf(Kind::kMotion, setOf(axes), "follow_path of " + shown(size), false);
+  Request request = requestOf(Kind::kMotion, setOf(axes),
+                              "follow_path of " + shown(size) + " at " + shown(velocity), false);
   request.is_path = true;
+  for (const std::size_t axis : axes) {
+    // A corner is rounded on the inside, and the path may deviate by its tolerance.
+    request.reaches.push_back({axis, std::min(size, -size / 2.0) - service.request.tolerance,
+                               std::max(size, -size / 2.0) + service.request.tolerance, true});
+  }
   std::uint64_t path = 0;
   call(request, "follow_path", service, [&path](const stepdriver::FollowPath::Response& response) {
     path = response.path;

@@ -71,8 +71,11 @@ class DriverCalls {
   bool moveRounds(std::size_t axis, double rounds, bool wait);
   bool moveLine(const std::vector<std::size_t>& axes, const std::vector<double>& positions,
                 bool relative, double duration, bool wait);
-  /// A zigzag of three lines around the positions of the axes. @return its number; 0: refused
-  std::uint64_t followPath(const std::vector<std::size_t>& axes, double size, bool more_follows);
+  /// A zigzag of three lines around the positions of the axes.
+  ///
+  /// @param velocity [m/s] 0: the highest @return its number; 0: refused
+  std::uint64_t followPath(const std::vector<std::size_t>& axes, double size, bool more_follows,
+                           double velocity = 0.0);
   bool appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
                   bool more_follows);
   bool home(std::size_t axis, bool wait);

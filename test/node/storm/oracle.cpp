@@ -23,6 +23,8 @@ constexpr std::int64_t kLongestTrajectory = 20'000 * kMillisecond;
 constexpr double kPositionError = 0.05;  // [1/16 steps]
 /// Half a step of the coarsest mode in use, and a margin.
 constexpr double kArrivalError = 1.05;  // [1/16 steps]
+/// A microstep of that mode, and half a one between a target and the place nearest to it.
+constexpr double kWayError = 3.05;  // [1/16 steps]
 
 double inSeconds(std::int64_t time) { return static_cast<double>(time) * 1e-9; }
 
@@ -106,6 +108,11 @@ class Judge {
       }
     }
     judgePositions();
+    for (std::size_t i = 1; i < seen_.rests.size(); ++i) {
+      for (std::size_t axis = 0; axis < seen_.axes.size(); ++axis) {
+        judgeWay(axis, seen_.rests[i - 1], seen_.rests[i]);
+      }
+    }
     return std::move(broken_);
   }
 
@@ -347,6 +354,69 @@ class Judge {
         anchor = &rest;
       }
     }
+  }
+
+  struct Way {
+    double low;
+    double high;
+  };
+
+  /// [m] The places to which the requests between two moments of rest may lead an axis.
+  Way allowedWay(std::size_t axis, const RestPoint& from, const RestPoint& to) const {
+    const AxisFacts& facts = seen_.axes[axis];
+    const double begin = from.positions[axis];
+    // An axis that is outside may move back inside.
+    Way way{std::min(facts.min_position, begin), std::max(facts.max_position, begin)};
+    const Request* only = nullptr;
+    auto next = std::partition_point(
+        seen_.requests.begin(), seen_.requests.end(),
+        [&](const Request& request) { return request.sent < from.time - kArrival; });
+    for (; next != seen_.requests.end() && next->sent <= to.time; ++next) {
+      const Request& request = *next;
+      if (!isOf(request, axis) || (request.answered && *request.answered < from.time)) continue;
+      if (!moves(request.kind) && request.kind != Kind::kResume) continue;
+      if (only != nullptr || request.reaches.empty()) return way;
+      only = &request;
+    }
+    if (only == nullptr) return way;
+    way = {begin, begin};
+    for (const Reach& reach : only->reaches) {
+      if (reach.axis != axis) continue;
+      const double origin = reach.relative ? begin : 0.0;
+      way = {std::min(way.low, origin + reach.low), std::max(way.high, origin + reach.high)};
+    }
+    return way;
+  }
+
+  void judgeWay(std::size_t axis, const RestPoint& from, const RestPoint& to) {
+    if (mayBeRenamed(axis, from.time, to.time)) return;
+    const AxisFacts& facts = seen_.axes[axis];
+    const std::int64_t before = countAt(axis, from.time);
+    std::int64_t lowest = before;
+    std::int64_t highest = before;
+    const auto& pulses = seen_.pulses[axis];
+    const auto first =
+        std::upper_bound(pulses.begin(), pulses.end(), clock_.latestAt(from.time),
+                         [](std::int64_t time, const Pulse& pulse) { return time < pulse.time; });
+    const std::int64_t end = clock_.earliestAt(to.time);
+    for (auto pulse = first; pulse != pulses.end() && pulse->time <= end; ++pulse) {
+      lowest = std::min(lowest, pulse->count);
+      highest = std::max(highest, pulse->count);
+    }
+    const Way allowed = allowedWay(axis, from, to);
+    const double begin = from.positions[axis];
+    const double error = kWayError + facts.backlash * facts.steps_per_metre;
+    const double below = (begin - allowed.low) * facts.steps_per_metre -
+                         static_cast<double>(before - lowest) + error;
+    const double above = (allowed.high - begin) * facts.steps_per_metre -
+                         static_cast<double>(highest - before) + error;
+    if (below >= 0.0 && above >= 0.0) return;
+    broken_.push_back(facts.name + ": from " + formatted("%.5f m", begin) +
+                      " its pulses led it from " + std::to_string(lowest - before) + " to " +
+                      std::to_string(highest - before) + " steps, but its requests only from " +
+                      formatted("%.5f m", allowed.low) + " to " +
+                      formatted("%.5f m", allowed.high) +
+                      "; requests:" + requestsText(seen_.requests, from.time, to.time, from.time));
   }
 
   const Observation& seen_;

@@ -15,6 +15,8 @@ struct AxisFacts {
   double longest_stop = 0.0;     ///< [s] from its maximum speed and its maximum acceleration
   double steps_per_metre = 0.0;  ///< in 1/16 steps
   double backlash = 0.0;         ///< [m]
+  double min_position = 0.0;     ///< [m] its soft limits
+  double max_position = 0.0;     ///< [m]
 };
 
 /// A pulse that the rig saw.
@@ -53,6 +55,8 @@ struct Observation {
 ///   any longer.
 /// - If an answer says that a position was reached, it was reached.
 /// - The reported position is the count of the pulses.
+/// - Pulses never lead an axis beyond its soft limits. If only one request for motion comes between
+///   two moments of rest, they never leave the way that this request describes.
 ///
 /// Requests that were under way at the same time may have been handled in either order, so neither
 /// is compared with the other.

@@ -36,6 +36,8 @@ class OneAxis {
     facts.name = "x";
     facts.longest_stop = 0.2;
     facts.steps_per_metre = kStepsPerMetre;
+    facts.min_position = -0.05;
+    facts.max_position = 0.15;
     seen_.axes = {facts};
     seen_.pulses.resize(1);
     for (std::int64_t time = kOffset; time <= 6000; time += 10) {
@@ -48,6 +50,13 @@ class OneAxis {
     for (std::int64_t time = begin; time < end; ++time) {
       seen_.pulses[0].push_back(
           {time * kMs, static_cast<std::int64_t>(seen_.pulses[0].size()) + 1});
+    }
+  }
+  /// A pulse each millisecond, that many forward and as many back.
+  void moveAndReturn(std::int64_t begin, std::int64_t count) {
+    const auto before = static_cast<std::int64_t>(seen_.pulses[0].size());
+    for (std::int64_t i = 1; i <= 2 * count; ++i) {
+      seen_.pulses[0].push_back({(begin + i) * kMs, before + (i <= count ? i : 2 * count - i)});
     }
   }
   void ask(const Request& request) { seen_.requests.push_back(request); }
@@ -197,6 +206,37 @@ TEST(Oracle, HoldsPositionsAgainstTheCountOfThePulses) {
     axis.move(1005, 1105);
     axis.rest(2500, position);
     EXPECT_EQ(axis.broken(), position == 0.015 ? 0U : 1U);
+  }
+}
+
+// The position at the end is right both times.
+TEST(Oracle, HoldsTheWayAgainstTheOnlyRequest) {
+  for (const bool relative : {false, true}) {
+    for (const std::int64_t steps : {200, 204}) {
+      OneAxis axis;
+      axis.rest(1500, 0.01);
+      Request path = requestOf(Kind::kMotion, 2000, 2005);
+      path.reaches = {{0, relative ? -0.001 : 0.009, relative ? 0.01 : 0.02, relative}};
+      axis.ask(path);
+      axis.moveAndReturn(1005, steps);
+      axis.rest(2900, 0.01);
+      EXPECT_EQ(axis.broken(), steps == 200 ? 0U : 1U);
+    }
+  }
+}
+
+TEST(Oracle, HoldsTheWayOfSeveralRequestsAgainstTheSoftLimits) {
+  for (const std::int64_t steps : {200, 204}) {
+    OneAxis axis;
+    axis.rest(1500, 0.14);
+    for (const std::int64_t sent : {2000, 2010}) {
+      Request path = requestOf(Kind::kMotion, sent, sent + 5);
+      path.reaches = {{0, 0.0, 0.001, true}};
+      axis.ask(path);
+    }
+    axis.moveAndReturn(1015, steps);
+    axis.rest(2900, 0.14);
+    EXPECT_EQ(axis.broken(), steps == 200 ? 0U : 1U);
   }
 }
 

@@ -37,6 +37,14 @@ struct Arrival {
   double told = 0.0;    ///< [m]
 };
 
+/// Between which positions a request itself leads an axis.
+struct Reach {
+  std::size_t axis = 0;
+  double low = 0.0;       ///< [m]
+  double high = 0.0;      ///< [m]
+  bool relative = false;  ///< they count from where the axis rests before it
+};
+
 /// A request and its result. Times are in nanoseconds of CLOCK_MONOTONIC.
 struct Request {
   int client = 0;
@@ -52,6 +60,7 @@ struct Request {
   bool success = false;
   std::string message;
   std::vector<Arrival> arrivals;
+  std::vector<Reach> reaches;  ///< of all its axes; empty if that isn't known
 };
 
 std::int64_t steadyNow();

@@ -32,6 +32,8 @@ AxisFacts setUpAxis(node_test::NodeUnderTest& node, const std::string& name,
   AxisFacts facts;
   facts.name = name;
   facts.steps_per_metre = kStepsPerMm * 1e3;
+  facts.min_position = -0.05;
+  facts.max_position = 0.15;
   // A stop first has to reduce the present acceleration.
   facts.longest_stop = dynamics.max_speed / dynamics.acceleration;
   if (dynamics.jerk > 0.0) facts.longest_stop += 2.5 * dynamics.acceleration / dynamics.jerk;

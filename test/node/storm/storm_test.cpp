@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
@@ -128,6 +129,8 @@ class Storm : public testing::Test {
   void stopAll();
   void repair();
   void noteRest();
+  /// One motion from rest to rest, of which the oracle knows the whole way; often a slow one.
+  void moveAlone();
   void end();
   void judge();
 
@@ -241,6 +244,23 @@ void Storm::noteRest() {
   memory_.push_back(static_cast<double>(node_.process().kilobytes("VmRSS")) / 1024.0);
 }
 
+void Storm::moveAlone() {
+  const std::vector<std::size_t> axes{chance(0.5) ? std::size_t{0} : std::size_t{1}, 2};
+  const double velocity = std::pow(10.0, between(-4.0, -1.7));
+  switch (std::uniform_int_distribution<int>(0, 3)(random_)) {
+    case 0:
+      ender_->moveTo(axes[0], between(0.0, 0.06), false, true);
+      break;
+    case 1:
+      ender_->moveLine(axes, {between(-0.005, 0.005), between(-0.005, 0.005)}, true, 0.0, true);
+      break;
+    default:
+      // For two seconds or so.
+      ender_->followPath(axes, 0.4 * velocity, false, velocity);
+      break;
+  }
+}
+
 void Storm::end() {
   weather_ = Weather::kOver;
   seen_.clock = clock_watch_->end();
@@ -303,6 +323,10 @@ TEST_F(Storm, KeepsThePromises) {
     repair();
     storm();
     calm();
+    if (isAlive() && !failed_) noteRest();
+    if (!isAlive() || failed_ || !chance(0.5)) continue;
+    repair();
+    moveAlone();
     if (isAlive() && !failed_) noteRest();
   }
   if (!isAlive()) {
