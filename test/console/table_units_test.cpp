@@ -35,6 +35,8 @@ TEST(TableUnits, LeaveEverythingElseAsItIs) {
 TEST(TableUnits, AMoveIsToldByItsNumbers) {
   const TableUnits mm{1000.0, "mm"};
   EXPECT_EQ(moveText("x", mm, 0.02, 0.02, 1.25), "x moves to 20.0000 mm in 1.25 s");
+  EXPECT_EQ(moveText("x", mm, 0.02, 0.02, 0.0447214), "x moves to 20.0000 mm in 0.04 s");
+  EXPECT_EQ(moveText("x", mm, 0.02, 0.02, 0.0), "x is already at 20.0000 mm");
   EXPECT_EQ(moveText("x", mm, 0.00001, 0.0000125, 1.0),
             "x moves to 0.0100 mm in 1 s; it comes to rest at 0.0125 mm, the nearest microstep");
 }

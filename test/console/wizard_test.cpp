@@ -238,11 +238,7 @@ TEST(WizardMoves, TheDirectionIsToldByTheEndThatTheUserSaw) {
     checkDirection(person, machine, axisConfig("x"), findings);
     EXPECT_EQ(findings.wrong_way, wanted.wrong_way) << person.heard;
     EXPECT_EQ(machine.moves.front(), wanted.plus_blocked ? -2.0 : 2.0) << person.heard;
-    EXPECT_TRUE(person.heardOf("the end that you call plus, or the end that you call minus?"));
-    EXPECT_TRUE(person.heardOf(wanted.plus_blocked ? "- keeps the direction as it is configured, +"
-                                                     " inverts it"
-                                                   : "+ keeps the direction as it is configured, -"
-                                                     " inverts it"))
+    EXPECT_TRUE(person.heardOf("Which way did x move? [+ plus end, - minus end, a again]"))
         << person.heard;
   }
 }
@@ -254,7 +250,7 @@ TEST(WizardMoves, ARotaryAxisTurns) {
   Person person({"y", "+"});
   Findings findings;
   checkDirection(person, machine, config, findings);
-  EXPECT_TRUE(person.heardOf("Which way did r turn: the way that you call plus")) << person.heard;
+  EXPECT_TRUE(person.heardOf("Which way did r turn? [+ plus, - minus, a again]")) << person.heard;
 }
 
 TEST(WizardMoves, TheReasonsToRefuseAMoveAreKnown) {
@@ -327,7 +323,7 @@ TEST(WizardDistance, OffersOnlyTheWayThatHasRoom) {
   checkDistance(person, machine, config, findings);
   EXPECT_EQ(machine.moves, (std::vector<double>{-2.0, -20.0})) << person.heard;
   EXPECT_TRUE(person.heardOf("x can't move 22 mm towards plus: it stands at 190.0000 mm"));
-  EXPECT_TRUE(person.heardOf("Is there room for 22 mm towards minus?")) << person.heard;
+  EXPECT_TRUE(person.heardOf("Is there room for 22 mm towards your minus end?")) << person.heard;
 
   Person far({"300", "n"});
   checkDistance(far, machine, config, findings);
@@ -386,9 +382,8 @@ TEST(WizardDistance, IsTriedAgainWhereAMoveIsRefused) {
   EXPECT_EQ(machine.moves, (std::vector<double>{2.0, -2.0, -20.0})) << person.heard;
   EXPECT_TRUE(findings.scale) << person.heard;
   EXPECT_TRUE(person.heardOf("its plus is your minus")) << person.heard;
-  EXPECT_TRUE(
-      person.heardOf("Is there room for 22 mm towards plus, which is now what you call minus"))
-      << person.heard;
+  EXPECT_TRUE(person.heardOf("Is there room for 22 mm towards your minus end?")) << person.heard;
+  EXPECT_TRUE(person.heardOf("If you answer n, it moves towards your plus end.")) << person.heard;
 }
 
 TEST(WizardDistance, KnowsTheMicrostepsByTheirFactor) {

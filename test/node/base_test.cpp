@@ -429,7 +429,7 @@ TEST_F(BaseTest, DoesNotStartWithParametersThatAreWrong) {
   set("driver", "my node");
   launch();
   EXPECT_EQ(base->waitForExit(kBound).value_or(-1), 1);
-  expectSays(base->output(), "Not started: 3 things are wrong in the parameters");
+  expectSays(base->output(), "Not started: 3 errors in the parameters");
   expectSays(base->output(), node.beside("base/separation_mm") + " is -1.0, but must be above 0");
   expectSays(base->output(), "did you mean diameter_mm?");
   expectSays(base->output(), "is \"my node\", but must be the name of a node");

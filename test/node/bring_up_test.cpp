@@ -261,7 +261,7 @@ TEST(BringUpWithManyMistakes, ListsThemAllAtOnce) {
                           "axes/x/min_position_mm", "axes/x/speed", "simulation/axes/x/bounces"}) {
     EXPECT_FALSE(lineWith(output, node.full(key)).empty()) << key << " isn't in\n" << output;
   }
-  expectSays(output, "6 things are wrong");
+  expectSays(output, "6 errors");
 }
 
 TEST(BringUpWithAStatusFrequency, OutOfItsRangeIsRefused) {

@@ -271,7 +271,7 @@ TEST_F(JoystickTest, DoesNotStartWithParametersThatAreWrong) {
   set("driver", "my node");
   launch();
   EXPECT_EQ(joystick->waitForExit(kBound).value_or(-1), 1);
-  expectSays(joystick->output(), "Not started: 3 things are wrong in the parameters");
+  expectSays(joystick->output(), "Not started: 3 errors in the parameters");
   expectSays(joystick->output(),
              node.beside("joystick/axes/x/dead_band") + " is 1.5, but must be from 0 to 0.99");
   expectSays(joystick->output(), "did you mean max_speed_mm_s?");

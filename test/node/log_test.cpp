@@ -26,7 +26,9 @@ class LogTest : public testing::Test {
     node.start();
     jogs = ros::NodeHandle().advertise<Jog>(node.full("jog"), 10);
     ASSERT_TRUE(waitUntil([&] { return jogs.getNumSubscribers() > 0; }));
-    ASSERT_TRUE(waitUntil([&] { return count("Ready: ") > 0; }));
+    const std::string ready =
+        "Ready: 1 axis on the simulated rig (virtual clock, no real-time priority needed)";
+    ASSERT_TRUE(waitUntil([&] { return count(ready) > 0; })) << node.process().output();
   }
 
   std::vector<std::string> lines() {

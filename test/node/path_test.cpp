@@ -212,7 +212,7 @@ TEST_F(PathTest, IsFedWhileItIsFollowed) {
     EXPECT_GE(answer.segments_ahead, 1U);
     EXPECT_GT(answer.time_ahead, 0.0);
     EXPECT_EQ(answer.target, kSquare[i % 4].end);
-    expectSays(answer.message, i < 7 ? "lie ahead" : "to the end of the path");
+    expectSays(answer.message, i < 7 ? " s) ahead" : "to the end of the path");
   }
   const auto more = append(begun.path, {kSquare[0]}, true);
   EXPECT_FALSE(more.success);

@@ -1,4 +1,7 @@
 #include <gtest/gtest.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/HomeAxes.h>
 #include <stepdriver/Plan.h>
 
 #include "support/node_under_test.h"
@@ -33,6 +36,19 @@ TEST(PlanService, AnswersWithThePiecesOfAMoveAndMovesNothing) {
   const auto moved = node.moveTo(0.1, true);
   EXPECT_TRUE(moved.success) << moved.message;
   EXPECT_EQ(node.pulses(), 8000) << "the plan has moved nothing";
+}
+
+TEST(PlanService, SaysThatTheAxisIsAlreadyThere) {
+  NodeUnderTest node;
+  node.start();
+  EXPECT_EQ(plan(node, 0.0).message, "x: is already at 0 m");
+  EXPECT_EQ(node.moveTo(0.0, false).message, "x: is already at 0 m");
+  expectSays(plan(node, 0.0002).message, "to 0.0002 m in 0.04 s");
+  EXPECT_EQ(node.call<std_srvs::Trigger>("recover").message, "all faults cleared");
+  EXPECT_EQ(node.call<HomeAxes>("home").message, "no axis has homing configured (axes: x)");
+  std_srvs::SetBool::Request release;
+  EXPECT_EQ(node.call<std_srvs::SetBool>("rig/x/press_min", release).message,
+            "x: the switch at the min end is released");
 }
 
 TEST(PlanService, RefusesWhatTheMoveRefuses) {

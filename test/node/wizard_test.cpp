@@ -109,12 +109,12 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
   ASSERT_NO_FATAL_FAILURE(answer("About which position is it?", "50"));
   // min reads active: the driver wouldn't move towards it, and the wizard doesn't ask it to.
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
-  ASSERT_NO_FATAL_FAILURE(answer("Towards which end did the carriage of x move", "-"));
+  ASSERT_NO_FATAL_FAILURE(answer("Which way did x move?", "-"));
   ASSERT_NO_FATAL_FAILURE(answer("Invert its direction?", ""));
   EXPECT_NEAR(carriage(), 0.1 - 0.0016, 1e-9);
   ASSERT_NO_FATAL_FAILURE(answer("How far should x move", ""));
   ASSERT_TRUE(terminal.waitFor("x can't move 22 mm towards minus: the min switch ahead of it"));
-  ASSERT_NO_FATAL_FAILURE(answer("towards plus, which is now what you call minus?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("towards your minus end?", ""));
   ASSERT_TRUE(terminal.waitFor("take up the play"));
   terminal.type("y");
   ASSERT_TRUE(terminal.waitFor("Mark where x stands"));
@@ -168,9 +168,9 @@ TEST_F(WizardTest, KeepsTheCommentsOfTheDriversFile) {
   terminal.type("y");
   ASSERT_NO_FATAL_FAILURE(answer("About which position is it?", "50"));
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
-  ASSERT_NO_FATAL_FAILURE(answer("Towards which end did the carriage of x move", "+"));
+  ASSERT_NO_FATAL_FAILURE(answer("Which way did x move?", "+"));
   ASSERT_NO_FATAL_FAILURE(answer("How far should x move", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("Is there room for 22 mm towards plus?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("Is there room for 22 mm towards your plus end?", ""));
   ASSERT_NO_FATAL_FAILURE(answer("take up the play", "y"));
   ASSERT_NO_FATAL_FAILURE(answer("Mark where x stands", ""));
   ASSERT_NO_FATAL_FAILURE(answer("will move 20 mm", "y"));

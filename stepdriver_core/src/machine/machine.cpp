@@ -370,7 +370,7 @@ class Machine::Impl {
     for (MachineAxis* axis : own_axes_) {
       if (axis->config().homing) axes.push_back(axis);
     }
-    if (axes.empty()) throw Refused("no axis has a homing; there are " + allNames());
+    if (axes.empty()) throw Refused("no axis has homing configured (axes: " + allNames() + ")");
     return axes;
   }
 

@@ -100,7 +100,7 @@ int lockMemory() {
 }
 
 std::string RealtimeRights::text() const {
-  if (scheduler_error < 0) return "real-time rights are not needed: the clock is virtual";
+  if (scheduler_error < 0) return "virtual clock, no real-time priority needed";
   static_assert(kRealtimePriority == 50, "the limit below allows that priority, and no higher one");
   std::string text = scheduler_error == 0
                          ? fmt::format("SCHED_FIFO {}", kRealtimePriority)

@@ -184,8 +184,8 @@ int run(const std::vector<std::string>& arguments) {
     }
     return Check(std::move(options), std::move(config)).run();
   } catch (const ConfigError& error) {
-    std::fprintf(stderr, "stepdriver_check: %s: %zu %s wrong\n", options.config.c_str(),
-                 error.issues().size(), error.issues().size() == 1 ? "thing is" : "things are");
+    std::fprintf(stderr, "stepdriver_check: %s: %zu %s\n", options.config.c_str(),
+                 error.issues().size(), error.issues().size() == 1 ? "error" : "errors");
     for (const ConfigIssue& issue : error.issues()) {
       std::fprintf(stderr, "  %s %s\n", issue.key.c_str(), issue.message.c_str());
     }

@@ -46,8 +46,8 @@ config::ConfigValue privateParameters(const std::string& node_name) {
 void explain(const ConfigError& error, const std::string& node_name,
              const std::string& what_follows) {
   const std::size_t count = error.issues().size();
-  ROS_FATAL_NAMED("node", "%s: %zu %s wrong in the parameters", what_follows.c_str(), count,
-                  count == 1 ? "thing is" : "things are");
+  ROS_FATAL_NAMED("node", "%s: %zu %s in the parameters", what_follows.c_str(), count,
+                  count == 1 ? "error" : "errors");
   bool left_over = false;
   for (const ConfigIssue& issue : error.issues()) {
     ROS_ERROR_NAMED("node", "%s %s", issue.key.c_str(), issue.message.c_str());

@@ -15,4 +15,12 @@ inline std::string roundedText(double number) {
   return text;
 }
 
+/// A duration for messages [s]: to 0.01 s, and one digit of a shorter one.
+inline std::string durationText(double seconds) {
+  char text[32];
+  if (std::abs(seconds) >= 0.01) return roundedText(std::round(seconds * 100.0) / 100.0);
+  std::snprintf(text, sizeof text, "%.1g", seconds);
+  return text;
+}
+
 }  // namespace stepdriver::ros_node

@@ -21,8 +21,9 @@ std::string moveText(const std::string& axis, const TableUnits& units, double ta
                      double duration) {
   const std::string place = units.place(target);
   const std::string nearest = units.place(rest);
+  if (duration == 0.0) return fmt::format("{} is already at {}", axis, nearest);
   return fmt::format(
-      "{} moves to {} in {} s{}", axis, place, ros_node::roundedText(duration),
+      "{} moves to {} in {} s{}", axis, place, ros_node::durationText(duration),
       nearest == place ? "" : "; it comes to rest at " + nearest + ", the nearest microstep");
 }
 

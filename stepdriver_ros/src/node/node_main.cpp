@@ -251,7 +251,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   master_watch.start();
   const ServiceManager service_manager(machine);
   ServiceManager::tellReady();
-  ROS_INFO_NAMED("node", "Ready: %zu %s on %s; pulse thread: %s", machine.axes().size(),
+  ROS_INFO_NAMED("node", "Ready: %zu %s on %s (%s)", machine.axes().size(),
                  machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
                  machine.figures().realtime.c_str());
 

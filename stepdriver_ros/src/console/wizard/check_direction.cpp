@@ -29,19 +29,11 @@ bool findPossibleWay(Dialogue& dialogue, HandMove& hand_move, const config::Axis
 }
 
 /// @return the end towards which the user saw it move; empty: the move has to be made again.
-std::optional<bool> askPlusEnd(Dialogue& dialogue, const config::AxisConfig& config,
-                               bool commanded_plus) {
+std::optional<bool> askPlusEnd(Dialogue& dialogue, const config::AxisConfig& config) {
   const bool linear = config.kind == config::Kind::kLinear;
-  const std::string question = fmt::format(
-      "{} Type + or -; a makes the move again. {} keeps the direction as it is configured, {} "
-      "inverts it. [+/-/a] ",
-      linear ? fmt::format("Towards which end did the carriage of {} move: the end that you call "
-                           "plus, or the end that you call minus?",
-                           config.name)
-             : fmt::format("Which way did {} turn: the way that you call plus, or the way that you "
-                           "call minus?",
-                           config.name),
-      commanded_plus ? "+" : "-", commanded_plus ? "-" : "+");
+  const std::string question =
+      fmt::format("Which way did {} {}? [+ plus{end}, - minus{end}, a again] ", config.name,
+                  linear ? "move" : "turn", fmt::arg("end", linear ? " end" : ""));
   for (;;) {
     const std::string answer = dialogue.ask(question);
     if (answer == "+" || answer == "plus") return true;
@@ -72,7 +64,7 @@ void checkDirection(Dialogue& dialogue, MachineAtHand& machine, const config::Ax
       continue;
     }
     const bool commanded_plus = moved > 0.0;
-    const auto plus = askPlusEnd(dialogue, config, commanded_plus);
+    const auto plus = askPlusEnd(dialogue, config);
     if (!plus) continue;
     if (*plus == commanded_plus) {
       findings.wrong_way = false;

@@ -53,10 +53,13 @@ std::optional<double> askWay(Dialogue& dialogue, HandMove& hand_move,
   const bool minus = possible(-1.0);
   if (!plus && !minus) return {};
   const double way = plus ? 1.0 : -1.0;
+  const auto end = [wrong_way](bool is_plus) {
+    return fmt::format("your {} end", is_plus != wrong_way ? "plus" : "minus");
+  };
   const std::string question = fmt::format(
-      "Is there room for {}{}?{}", distanceText(config, way * distance),
-      wrong_way ? fmt::format(", which is now what you call {}", plus ? "minus" : "plus") : "",
-      plus && minus ? " If you answer n, it moves towards minus." : "");
+      "Is there room for {} {} towards {}?{}", roundedText(distance), configUnitOf(config.kind),
+      end(plus),
+      plus && minus ? fmt::format(" If you answer n, it moves towards {}.", end(false)) : "");
   if (askYesNo(dialogue, question, true)) return way;
   return plus && minus ? std::optional(-1.0) : std::nullopt;
 }

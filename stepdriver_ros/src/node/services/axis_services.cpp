@@ -87,7 +87,7 @@ bool AxisServices::plan(Plan::Request& request, Plan::Response& response) {
     response.duration = planned.move.duration;
     response.overshoot = planned.move.overshoot;
     response.steps_per_unit = planned.steps_per_unit;
-    response.message = fmt::format("{}: would move {}", axis_.config().name, wayText(planned.move));
+    response.message = moveText("would move", planned.move);
     for (const axis::MovePiece& piece : planned.pieces) {
       response.pieces.emplace_back();
       Piece& shown = response.pieces.back();
@@ -117,10 +117,13 @@ std::string AxisServices::placeText(double position) const {
   return config::placeText(position, axis_.config().kind, stepsPerUnit());
 }
 
-std::string AxisServices::wayText(const axis::Move& move) const {
+std::string AxisServices::moveText(const char* moves, const axis::Move& move) const {
   const std::string target = placeText(move.target);
   const std::string rest = placeText(move.rest);
-  std::string text = fmt::format("to {} in {} s", target, roundedText(move.duration));
+  const std::string& name = axis_.config().name;
+  if (move.duration == 0.0) return fmt::format("{}: is already at {}", name, rest);
+  std::string text =
+      fmt::format("{}: {} to {} in {} s", name, moves, target, durationText(move.duration));
   if (rest != target) text += fmt::format("; it comes to rest at {}, the nearest microstep", rest);
   if (move.overshoot > 0.0) {
     text += fmt::format("; it can't stop before that, overshoots by {}, and comes back",
@@ -135,7 +138,7 @@ void AxisServices::respondToMove(const axis::Move& move, bool wait, Response& re
   if (!wait) {
     response.position = move.rest;
     response.duration = move.duration;
-    response.message = fmt::format("{}: moves {}", axis_.config().name, wayText(move));
+    response.message = moveText("moves", move);
     return;
   }
   const axis::MoveResult result = axis_.wait(move);

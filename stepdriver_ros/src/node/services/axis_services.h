@@ -54,8 +54,10 @@ class AxisServices {
   double stepsPerUnit() const;
   /// Rounded to a microstep of the current mode.
   std::string placeText(double position) const;
-  /// "to 0.1 m in 1.2 s"
-  std::string wayText(const axis::Move& move) const;
+  /// "moves to 0.1 m in 1.2 s", or "is already at 0.1 m"
+  ///
+  /// @param moves "moves" or "would move".
+  std::string moveText(const char* moves, const axis::Move& move) const;
 
   axis::Axis& axis_;
   ros::NodeHandle node_;

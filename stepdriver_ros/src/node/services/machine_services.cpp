@@ -48,7 +48,7 @@ void tell(machine::Machine& machine, const machine::CoordinatedMove& move, bool 
     response.position.push_back(own.rest);
   }
   response.message =
-      fmt::format("{}: {} in {} s", what, response.message, roundedText(move.duration));
+      fmt::format("{}: {} in {} s", what, response.message, durationText(move.duration));
   response.duration = move.duration;
 }
 
@@ -127,7 +127,7 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
                                               [&machine] { machine.emergencyStop(); }));
   node_.setCallbackQueue(&queues.control());
   servers_.push_back(node_.advertiseService(
-      "recover", triggerHandler("all faults are ended", [&machine] { machine.recover(); })));
+      "recover", triggerHandler("all faults cleared", [&machine] { machine.recover(); })));
   servers_.push_back(node_.advertiseService(
       "resume",
       triggerHandler("the hold is over: held motions continue", [&machine] { machine.resume(); })));
@@ -165,7 +165,7 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
           response.room = static_cast<std::uint32_t>(ahead.room);
           response.time_ahead = ahead.time;
           response.message =
-              fmt::format("{} segments, {} s, lie ahead{}", ahead.segments, roundedText(ahead.time),
+              fmt::format("{} segments ({} s) ahead{}", ahead.segments, durationText(ahead.time),
                           ahead.more_follows ? "" : " to the end of the path");
         });
       };
@@ -229,7 +229,7 @@ void MachineServices::advertiseEndstop(setup::Simulation& simulation, const std:
         return respond(response, [&] {
           simulation.pressEndstop(axis, end, request.data != 0);
           response.message = fmt::format("{}: the switch at the {} end is {}", axis, name,
-                                         request.data != 0 ? "pressed" : "let go");
+                                         request.data != 0 ? "pressed" : "released");
         });
       };
   servers_.push_back(node_.advertiseService(fmt::format("rig/{}/press_{}", axis, name), press));
