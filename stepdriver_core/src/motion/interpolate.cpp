@@ -131,6 +131,8 @@ std::vector<Waypoint> interpolate(const MotionState& from, std::vector<Waypoint>
   const bool complete = std::all_of(waypoints.begin(), waypoints.end(),
                                     [](const Waypoint& each) { return each.velocity.has_value(); });
   if (complete) return waypoints;
+  // The curve leads there: planSpline().
+  waypoints.back().position = static_cast<double>(restingCount(waypoints.back().position));
   const std::size_t first = waypoints.size() > 1 && waypoints.front().time_ns == 0 ? 1 : 0;
   const KnotSequence knots(from, waypoints, first);
   // Gaussian elimination from the first knot to the last: x = value - next x+.

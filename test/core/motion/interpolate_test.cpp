@@ -91,10 +91,10 @@ TEST(Interpolate, ReproducesACubicAndAQuinticFromTheirPositions) {
   // Between known ends, a spline through points of one cubic or one quintic is that curve.
   const auto cubic = [](double t) { return 5.0 * t * t * t - 30.0 * t * t + 7.0 * t + 2.0; };
   std::vector<Waypoint> waypoints;
-  for (const double t : {0.5, 0.9, 2.0, 3.5}) {
+  for (const double t : {0.5, 0.9, 2.0, 4.0}) {
     waypoints.push_back({std::llround(t * 1e9), cubic(t), {}, {}});
   }
-  waypoints.back().velocity = 15.0 * 3.5 * 3.5 - 60.0 * 3.5 + 7.0;
+  waypoints.back().velocity = 15.0 * 4.0 * 4.0 - 60.0 * 4.0 + 7.0;
   for (const Waypoint& point :
        interpolate({2.0, 7.0, -60.0}, waypoints, Smoothness::kAcceleration)) {
     const double t = 1e-9 * static_cast<double>(point.time_ns);
@@ -107,8 +107,8 @@ TEST(Interpolate, ReproducesACubicAndAQuinticFromTheirPositions) {
     const double t = 1e-9 * static_cast<double>(point.time_ns);
     point = {point.time_ns, quintic(t), {}, {}};
   }
-  waypoints.back().velocity = slope(3.5);
-  waypoints.back().acceleration = curvature(3.5);
+  waypoints.back().velocity = slope(4.0);
+  waypoints.back().acceleration = curvature(4.0);
   for (const Waypoint& point : interpolate({0.0, 0.0, 2.0}, waypoints, Smoothness::kJerk)) {
     const double t = 1e-9 * static_cast<double>(point.time_ns);
     EXPECT_NEAR(*point.velocity, slope(t), 1e-8) << t;
@@ -158,6 +158,21 @@ TEST(Interpolate, EndsAtRest) {
     const auto made = interpolate({}, randomPositions(random, 5), smoothness);
     EXPECT_EQ(*made.back().velocity, 0.0);
     EXPECT_EQ(made.back().acceleration.value_or(0.0), 0.0);
+  }
+}
+
+// The curve ends on a whole microstep, wherever the last waypoint is.
+TEST(Interpolate, KeepsTheAccelerationContinuousIfTheEndIsRounded) {
+  std::mt19937 random(9);
+  for (int i = 0; i < 100; ++i) {
+    const std::vector<Waypoint> waypoints =
+        interpolate({}, randomPositions(random, 5), Smoothness::kAcceleration);
+    const Profile curve = planSpline(0, {}, waypoints);
+    ASSERT_EQ(curve.pieceCount(), 5U);
+    for (std::size_t k = 0; k + 1 < 5; ++k) {
+      const Piece before = curve.piece(k);
+      EXPECT_NEAR(before.accelerationAt(before.duration).value(), curve.piece(k + 1).a, 1e-6);
+    }
   }
 }
 
