@@ -59,13 +59,17 @@ Steps BringUp::plan() {
 
 Steps Enable::plan() {
   axis::AxisModel& axis = *axes().front();
-  if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+  refuseUnlessCurrentStays(context(), axis);
   Steps steps = wakeSteps(context(), axis);
-  if (axis.motor.power().wantsEnabled()) return steps;
-  append(steps, powerSteps(context(), axis));
-  Steps enabling;
-  add(enabling, powerStep(context(), axis, true));
-  append(steps, braked(context(), axis, std::move(enabling)));
+  if (!axis.motor.power().wantsEnabled()) {
+    append(steps, powerSteps(context(), axis));
+    Steps enabling;
+    add(enabling, powerStep(context(), axis, true));
+    append(steps, braked(context(), axis, std::move(enabling)));
+  }
+  // Its success says that the motor holds the load, whatever came while its pins were written.
+  add(steps,
+      std::make_unique<RunStep>([this, &axis] { refuseUnlessCurrentStays(context(), axis); }));
   return steps;
 }
 
@@ -268,20 +272,17 @@ PinsStep::Writes ChangeMicrosteps::writes() {
   axis::AxisModel& axis = *axes().front();
   const pulse::ChannelState& state = axis.motor.state();
   const auto change = axis.motor.translator().changeTo(wanted_, state.count);
-  const double kept = axis.positionNow();
-  const double per_unit = axis.stepsPerUnit(wanted_);
-  const std::int64_t play = std::llround(axis.config.backlash * per_unit);
-  const double scale = static_cast<double>(wanted_) / axis.motor.microsteps();
-  const std::int64_t slack =
-      std::min<std::int64_t>(std::llround(static_cast<double>(state.slack) * scale), play);
-  // If Home has no count in the new mode, the counting restarts from Home, at the same position;
-  // and the part of the backlash that is taken up need not be whole microsteps of the new mode.
-  const bool rescales = !change.home_stays || state.slack != 0;
-  const double origin = rescales ? kept - static_cast<double>(change.count - slack) / per_unit
-                                 : axis.position.origin();
+  // If Home has no count in the new mode, the counting restarts from Home, with the motor at the
+  // same position. What is taken up of the backlash stays too, in parts of a microstep.
+  double origin = axis.position.origin();
+  if (!change.home_stays) {
+    origin += static_cast<double>(state.count) / axis.stepsPerUnit() -
+              static_cast<double>(change.count) / axis.stepsPerUnit(wanted_);
+  }
   PinsStep::Writes writes;
   writes.sequence = axis.motor.pins().mode(axis.motor.microsteps(), wanted_);
-  writes.scale = pulse::Command::Scale{change.count, slack, play};
+  writes.scale = pulse::Command::Scale{change.count, axis.takenUpIn(wanted_, axis.takenUp()),
+                                       axis.exactBacklash(wanted_)};
   writes.then = [&axis, change, origin] {
     axis.motor.translator().changed(change);
     axis.position.rescale(origin);
@@ -292,14 +293,15 @@ PinsStep::Writes ChangeMicrosteps::writes() {
 
 Steps RestorePosition::plan() {
   axis::AxisModel& axis = *axes().front();
-  const std::int64_t play = axis.backlash();
   Steps steps;
-  if (play != 0) {
-    add(steps, std::make_unique<PinsStep>(context(), axis, [this, &axis, play] {
+  if (axis.config.backlash > 0.0) {
+    add(steps, std::make_unique<PinsStep>(context(), axis, [this, &axis] {
+          const int microsteps = axis.motor.microsteps();
           PinsStep::Writes writes;
-          const auto slack = std::llround(
-              std::clamp(kept_.slack * axis.stepsPerUnit(), 0.0, static_cast<double>(play)));
-          writes.scale = pulse::Command::Scale{axis.motor.state().count, slack, play};
+          writes.scale =
+              pulse::Command::Scale{axis.motor.state().count,
+                                    axis.takenUpIn(microsteps, kept_.slack / axis.config.backlash),
+                                    axis.exactBacklash(microsteps)};
           return writes;
         }));
   }

@@ -94,10 +94,10 @@ void FollowLine::check() const {
 }
 
 const std::shared_ptr<const axis::LinePath>& FollowLine::linePath() {
-  std::vector<std::int64_t> targets;
+  std::vector<double> targets;
   std::vector<axis::PathAxis> facts;
   for (const Order& order : orders_) {
-    targets.push_back(*order.goal.target);
+    targets.push_back(order.goal.end(*order.axis));
     facts.push_back(order.axis->pathAxis());
   }
   const std::vector<axis::PathStart> starts = startsOf(axes(), 0);

@@ -57,6 +57,15 @@ struct Goal {
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
   pulse::Nanoseconds slipped_ns = 0;  ///< how far the timeline had slid by then
 
+  /// [microsteps] The commanded position minus the count at which its motion ends. An axis that
+  /// shares motors has no counts of its own, and its motions end at the commanded position.
+  double between(const axis::AxisModel& axis) const {
+    return axis.sharers().empty() ? 0.0 : remainder;
+  }
+  /// [microsteps] The end of its motion. @pre it has a target.
+  double end(const axis::AxisModel& axis) const {
+    return static_cast<double>(*target) + between(axis);
+  }
   /// It is a velocity, not a position.
   bool runs() const {
     return kind == Kind::kJog || (kind == Kind::kSetpoint && !setpoint.of_position);

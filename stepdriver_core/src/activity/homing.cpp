@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "message_text.h"
+#include "motion/resting_count.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
 #include "steps.h"
@@ -257,7 +258,8 @@ void Homing::enter(HomingPhase phase) {
   phase_ = phase;
   phase_began_ = context().now;
   const double direction = leaves() ? -towards_ : towards_;
-  bound_ = axis_.jointCount() + std::llround(direction * config_.max_travel * axis_.stepsPerUnit());
+  bound_ = axis_.jointCount() +
+           motion::restingCount(direction * config_.max_travel * axis_.stepsPerUnit());
   goOn();
 }
 
@@ -376,7 +378,7 @@ void Homing::align() {
   while (!to_align_.empty()) {
     const std::size_t side = to_align_.back();
     to_align_.pop_back();
-    const std::int64_t steps = std::llround((farthest - away(side)) * axis_.stepsPerUnit());
+    const std::int64_t steps = motion::restingCount((farthest - away(side)) * axis_.stepsPerUnit());
     if (steps == 0) continue;
     const std::int64_t by = towards_ > 0.0 ? -steps : steps;
     trigger_ += static_cast<double>(by);
@@ -398,7 +400,7 @@ void Homing::align() {
 
 void Homing::pullOff() {
   Goal goal;
-  goal.target = std::llround(trigger_ - towards_ * config_.pull_off * axis_.stepsPerUnit());
+  goal.target = motion::restingCount(trigger_ - towards_ * config_.pull_off * axis_.stepsPerUnit());
   goal.velocity = config_.seek_speed;
   goal.motors.are_square = squares_;
   stroke(std::move(goal));

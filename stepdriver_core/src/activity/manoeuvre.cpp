@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "message_text.h"
-#include "motion/spline.h"
+#include "motion/resting_count.h"
 #include "point_motion.h"
 #include "stepdriver_core/error.h"
 
@@ -27,8 +27,7 @@ bool isAt(const axis::AxisModel& axis, const Goal& goal) {
   if (goal.waits_at_target) return false;
   if (!axis.sharers().empty() && goal.target) {
     constexpr double kRounding = 1e-6;
-    return std::abs(static_cast<double>(*goal.target) - axis.exactCount()) <=
-           axis.reach() + kRounding;
+    return std::abs(goal.end(axis) - axis.exactCount()) <= axis.reach() + kRounding;
   }
   return goal.target == (goal.of_motor ? axis.motor.state().count : axis.jointCount());
 }
@@ -39,8 +38,9 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
                                             bool slowed_down, const Why& left_by) {
   switch (axis.motor.state().end) {
     case pulse::EndReason::kDone:
-      if (slowed_down || !isAt(axis, goal)) return {left_by.end, left_by.text};
-      return {axis::MoveEnd::kReached, ""};
+      if (!slowed_down && isAt(axis, goal)) return {axis::MoveEnd::kReached, ""};
+      if (!left_by.text.empty()) return {left_by.end, left_by.text};
+      return {left_by.end, "its motion ended before its target"};
     case pulse::EndReason::kEndstopMin:
       return {axis::MoveEnd::kEndstopMin, "the min endstop was met"};
     case pulse::EndReason::kEndstopMax:
@@ -78,15 +78,20 @@ axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis,
   return result;
 }
 
-void tell(const Goal& goal, axis::MoveResult result) {
+void tell(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
+  if (goal.kind == Goal::Kind::kTogether) {
+    axis.ended_path =
+        std::make_shared<const axis::EndedPath>(axis::EndedPath{goal.move, result.message});
+  }
   if (goal.outcome) goal.outcome->set(std::move(result));
 }
 
 /// For a goal that no other goal has replaced: the axis is at rest.
 void conclude(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
   const bool reached = result.end == axis::MoveEnd::kReached;
-  axis.position.reached(reached ? goal.remainder / axis.stepsPerUnit() : 0.0);
-  tell(goal, std::move(result));
+  axis.position.reached(reached ? (goal.remainder - goal.between(axis)) / axis.stepsPerUnit()
+                                : 0.0);
+  tell(axis, goal, std::move(result));
 }
 
 // Motors that square stop at their own endstops.
@@ -214,7 +219,8 @@ std::vector<axis::Move> Manoeuvre::prepare() {
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Planned& planned = prepared_->planned[i];
     const Goal& goal = orders_[i].goal;
-    axis::Move move = moveOf(*orders_[i].axis, goal, planned.motion->made(), planned.overshoot);
+    axis::Move move =
+        moveOf(*orders_[i].axis, goal, planned.motion->made(), planned.overshoot, orders_);
     move.id = goal.move;
     move.outcome = goal.outcome;
     moves.push_back(std::move(move));
@@ -343,7 +349,8 @@ void Manoeuvre::refuseUnlessResumable() const {
 
 void Manoeuvre::resume(const Ack& call) {
   if (over_ || mode_ != Mode::kHold) return;
-  from_rest_ = !anyMoves();
+  // A path that awaits its continuation orders nothing now.
+  from_rest_ = !anyMoves() && !awaits_;
   change(Mode::kRun, call);
   held_ = false;
 }
@@ -365,14 +372,20 @@ Failure outdated(const axis::AxisModel& axis) {
 
 void Manoeuvre::extend(Extension extension, const Ack& call) {
   const axis::AxisModel& axis = *orders_.front().axis;
-  if (over_ || mode_ == Mode::kStop) {
-    const std::string why = why_.text.empty() ? "it has ended" : why_.text;
-    return call->fail(
-        {Failure::Kind::kRefused, axis.name() + ": the path doesn't continue: " + why});
-  }
+  if (over_ || mode_ == Mode::kStop) return call->fail(noContinuation());
   if (extension_ || course_.path != extension.of) return call->fail(outdated(axis));
   extension_.emplace(std::move(extension), call);
   if (open_.empty()) tryExtension();
+}
+
+// Why its path can't be continued.
+Failure Manoeuvre::noContinuation() const {
+  const axis::AxisModel& axis = *orders_.front().axis;
+  return {
+      Failure::Kind::kRefused,
+      axis.name() + ": the path doesn't continue: " +
+          (why_.text.empty() ? axis::howItEnded(axis.ended_path.get(), orders_.front().goal.move)
+                             : why_.text)};
 }
 
 bool Manoeuvre::mayExtend(const Extension& extension) const {
@@ -492,7 +505,8 @@ void Manoeuvre::accept(const OpenOrder& order) {
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     for (std::size_t i = 0; i < orders_.size(); ++i) {
       if (orders_[i].axis != before.axis || !order.plans.planned[i].motion) continue;
-      tell(before.goal, replacedResult(before, orders_[i], *order.plans.planned[i].motion->plan()));
+      tell(*before.axis, before.goal,
+           replacedResult(before, orders_[i], *order.plans.planned[i].motion->plan()));
     }
   }
   call_.reset();
@@ -625,10 +639,7 @@ void Manoeuvre::finish() {
   over_ = true;
   held_ = false;
   awaits_ = false;
-  const Failure ended{Failure::Kind::kRefused,
-                      orders_.front().axis->name() + ": the path doesn't continue: " +
-                          (why_.text.empty() ? "it has ended" : why_.text)};
-  if (extension_) extension_->second->fail(ended);
+  if (extension_) extension_->second->fail(noContinuation());
   extension_.reset();
   call_.reset();
   calls_.clear();
@@ -701,7 +712,8 @@ std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
     const pulse::EndReason end = other.axis->motor.state().end;
     if (other.axis != &axis && end != pulse::EndReason::kDone &&
         end != pulse::EndReason::kCompanion) {
-      return fmt::format("it moved together with {}, which was stopped", other.axis->name());
+      return fmt::format("it moved together with {}, which was stopped: {}", other.axis->name(),
+                         endOf(*other.axis, other.goal, false, why_).second);
     }
   }
   return "an axis that it moved together with was stopped";

@@ -121,6 +121,7 @@ class Manoeuvre {
   void follow(Course course);
   void tryExtension();
   bool mayExtend(const Extension& extension) const;
+  Failure noContinuation() const;
   void orderExtension(const Extension& extension, const Ack& call);
   /// It stands at a place of its path from which it will continue.
   bool isParked() const { return held_ || awaits_; }

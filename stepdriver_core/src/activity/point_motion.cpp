@@ -5,8 +5,10 @@
 #include <optional>
 #include <stdexcept>
 
+#include "axis/move_between.h"
 #include "motion/extent.h"
 #include "motion/level_off.h"
+#include "motion/resting_count.h"
 #include "setpoint_motion.h"
 
 namespace stepdriver::activity {
@@ -36,15 +38,23 @@ std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goa
 
 namespace {
 
-motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
-                      const motion::MotionState& from, std::int64_t at,
-                      const motion::MotionLimits& within) {
+motion::Plan planToCount(const axis::AxisModel& axis, const Goal& goal,
+                         const motion::MotionState& from, std::int64_t at,
+                         const motion::MotionLimits& within) {
   if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
   if (goal.kind == Goal::Kind::kJog) {
     return motion::planVelocity(at, from, std::copysign(within.max_speed, goal.velocity), within,
                                 standAt(axis, goal));
   }
   return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
+}
+
+motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
+                      const motion::MotionState& from, std::int64_t at,
+                      const motion::MotionLimits& within) {
+  return axis::planBetween(goal.between(axis), from, [&](const motion::MotionState& seen) {
+    return planToCount(axis, goal, seen, at, within);
+  });
 }
 
 // How far a motion goes beyond its target or a soft limit [microsteps].
@@ -116,7 +126,7 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   const double way = (end - from.position).value();
   const bool ends_ahead = way * from.velocity > 0.0 || std::abs(way) < 0.5;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
-  return motion::planStop(at, from, stopping, std::llround(end.value()));
+  return motion::planStop(at, from, stopping, motion::restingCount(end.value()));
 }
 
 std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
@@ -135,17 +145,30 @@ std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
   return *goal.target - axis.jointCount();
 }
 
+// Of an axis that shares motors: its place between the steps of all of them.
+double restOf(const axis::AxisModel& axis, double end, const std::vector<Order>& together) {
+  if (axis.sharers().empty()) return end;
+  return axis.restWith([&](const axis::AxisModel& sharer) {
+    if (&sharer == &axis) return end;
+    for (const Order& order : together) {
+      if (order.axis == &sharer && order.goal.target) return order.goal.end(sharer);
+    }
+    return sharer.plannedEnd();
+  });
+}
+
 axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal,
-                  const motion::ShapedProfile& motion, double overshoot) {
+                  const motion::ShapedProfile& motion, double overshoot,
+                  const std::vector<Order>& together) {
   axis::Move move;
   // A motion may reverse, which takes up the backlash again: the motor's end doesn't determine the
   // joint's.
   const bool jogs = goal.runs();
-  const double rest = jogs || goal.of_motor ? axis.jointAt(motion.endPosition().value())
-                                            : static_cast<double>(*goal.target);
-  move.rest = axis.positionOf(rest);
-  move.target =
-      jogs ? move.rest : axis.positionOf(static_cast<double>(*goal.target) + goal.remainder);
+  const double rest =
+      jogs || goal.of_motor ? axis.jointAt(motion.endPosition().value()) : goal.end(axis);
+  move.rest = axis.positionOf(restOf(axis, rest, together));
+  move.target = jogs ? axis.positionOf(rest)
+                     : axis.positionOf(static_cast<double>(*goal.target) + goal.remainder);
   move.duration = static_cast<double>(motion.endNs() - motion.startNs()) / 1e9;
   move.overshoot = overshoot / axis.stepsPerUnit();
   return move;

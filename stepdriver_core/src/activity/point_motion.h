@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "context.h"
 #include "goal.h"
@@ -47,8 +48,12 @@ std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
 /// The steps of a goal; of a jog only their sign.
 std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal);
 
-/// The answer for a caller about a planned goal, without an outcome. @param overshoot [microsteps]
+/// The answer for a caller about a planned goal, without an outcome.
+///
+/// @param overshoot [microsteps]
+/// @param together the goals of all axes that begin with it, which may share motors.
 axis::Move moveOf(const axis::AxisModel& axis, const Goal& goal,
-                  const motion::ShapedProfile& motion, double overshoot);
+                  const motion::ShapedProfile& motion, double overshoot,
+                  const std::vector<Order>& together = {});
 
 }  // namespace stepdriver::activity

@@ -109,7 +109,8 @@ std::vector<axis::Move> Schedule::add(LaterMotion motion) {
   for (std::size_t i = 0; i < entry.motion.orders.size(); ++i) {
     const Order& order = entry.motion.orders[i];
     const motion::PlannedMotion planned = order.axis->motor.shaped(*entry.plans[i]);
-    axis::Move& move = moves.emplace_back(moveOf(*order.axis, order.goal, planned.made(), 0.0));
+    axis::Move& move = moves.emplace_back(
+        moveOf(*order.axis, order.goal, planned.made(), 0.0, entry.motion.orders));
     move.id = order.goal.move;
     move.outcome = order.goal.outcome;
   }

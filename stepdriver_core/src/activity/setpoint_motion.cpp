@@ -8,6 +8,7 @@
 
 #include "motion/extent.h"
 #include "motion/pursuit.h"
+#include "motion/resting_count.h"
 #include "point_motion.h"
 
 namespace stepdriver::activity {
@@ -29,13 +30,15 @@ void append(std::vector<motion::Piece>& pieces, const motion::Profile& more) {
   for (const motion::Piece& piece : more.pieces()) pieces.push_back(piece);
 }
 
-bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& profile) {
+// @param between see axis::planBetween().
+bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& profile,
+                        double between) {
   const motion::Extent extent = motion::extentOf(profile);
   const auto& lowest = axis.config.min_position;
   const auto& highest = axis.config.max_position;
-  const auto backlash = static_cast<double>(axis.backlash());
-  return (!lowest || extent.lowest >= axis.countOf(*lowest) - motion::kNoStep) &&
-         (!highest || extent.highest <= axis.countOf(*highest) + backlash + motion::kNoStep);
+  const double slack = static_cast<double>(axis.backlash()) - between;
+  return (!lowest || extent.lowest >= axis.countOf(*lowest) - between - motion::kNoStep) &&
+         (!highest || extent.highest <= axis.countOf(*highest) + slack + motion::kNoStep);
 }
 
 // The motor's target for coming to rest on the position after it was passed, or before it is
@@ -46,7 +49,7 @@ std::int64_t returnTarget(const axis::AxisModel& axis, const Goal& goal,
                           const motion::MotionLimits& within) {
   if (axis.backlash() == 0) return *goal.target;
   const std::int64_t rest =
-      std::llround(motion::planStop(0, from, within).endPosition().value()) - taken_up;
+      motion::restingCount(motion::planStop(0, from, within).endPosition().value()) - taken_up;
   if (rest == *goal.target) return *goal.target + taken_up;
   return rest < *goal.target ? *goal.target + axis.backlash() : *goal.target;
 }
@@ -63,7 +66,7 @@ motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
   if (velocity == 0.0) return motion::planMove(at, from, target, within).profile;
   const std::int64_t taken_up = target - *goal.target;
   const motion::MovingPoint point{
-      motion::DoubleDouble(wanted.position + static_cast<double>(taken_up)) +
+      motion::DoubleDouble(wanted.position - goal.between(axis) + static_cast<double>(taken_up)) +
           velocity * seconds(at - wanted.reach_ns),
       velocity};
   std::vector<motion::Piece> pieces = motion::joinPoint(from, point, within, wanted.period);
@@ -84,7 +87,7 @@ motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
   const std::int64_t rest = returnTarget(axis, goal, last, taken_up, within);
   append(pieces, motion::planMove(0, last, rest, within).profile);
   motion::Profile profile = profileOf(at, from, std::move(pieces));
-  if (isWithinSoftLimits(axis, profile)) return profile;
+  if (isWithinSoftLimits(axis, profile, goal.between(axis))) return profile;
   return motion::planMove(at, from, target, within).profile;
 }
 
@@ -98,7 +101,7 @@ motion::Profile velocityProfile(const axis::AxisModel& axis, const Goal& goal,
   const bool up = from.velocity > 0.0;
   const auto& limit = up ? axis.config.max_position : axis.config.min_position;
   std::optional<std::int64_t> not_beyond;
-  if (limit) not_beyond = std::llround(axis.countOf(*limit)) + (up ? axis.backlash() : 0);
+  if (limit) not_beyond = motion::restingCount(axis.countOf(*limit)) + (up ? axis.backlash() : 0);
   return motion::planStop(at, from, within, not_beyond);
 }
 
@@ -112,7 +115,7 @@ motion::Profile untilTimeout(const axis::AxisModel& axis, const Goal& goal,
   pieces = motion::firstPart(std::move(pieces), seconds(until - profile.startNs()));
   std::optional<std::int64_t> not_beyond;
   if (goal.target && motion::overshootOf(profile) == 0.0) {
-    not_beyond = std::llround(profile.endPosition().value());
+    not_beyond = motion::restingCount(profile.endPosition().value());
   }
   append(pieces,
          motion::planStop(until, motion::endOf(pieces, from), axis.stopLimits(), not_beyond));

@@ -137,18 +137,28 @@ Steps wakeSteps(Context& context, axis::AxisModel& axis) {
 
 // ---- the motor power ----
 
-void PowerStep::begin() {
-  if (context_.stops_asked != context_.stops_cleared) {
-    axis_.refuse("an emergency stop has come meanwhile");
+void refuseIfStopped(const Context& context, const axis::AxisModel& axis) {
+  axis.refuseUnlessOpen();
+  if (context.stops_asked != context.stops_cleared) {
+    axis.refuse("an emergency stop has come meanwhile");
   }
-  axis_.refuseUnlessOpen();
+}
+
+void refuseUnlessCurrentStays(const Context& context, const axis::AxisModel& axis) {
+  refuseIfStopped(context, axis);
+  if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+}
+
+void PowerStep::begin() {
+  refuseIfStopped(context_, axis_);
   context_.motor_power.switchOn();
 }
 
 bool PowerStep::look() {
   const MotorPower& power = context_.motor_power;
   if (power.isWanted()) return power.isThere();
-  if (power.failure().empty()) axis_.refuse("an emergency stop has come meanwhile");
+  refuseIfStopped(context_, axis_);
+  if (power.failure().empty()) axis_.refuse("the motor power was switched off meanwhile");
   throw GpioError(axis_.name() + ": " + power.failure());
 }
 

@@ -155,6 +155,11 @@ class FollowStep : public Step {
   std::function<Ack()> call_;
 };
 
+/// @throw Refused if there was an emergency stop, or if the machine was closed.
+void refuseIfStopped(const Context& context, const axis::AxisModel& axis);
+/// @throw Refused as above, and if there is a fault: the motor won't keep its current.
+void refuseUnlessCurrentStays(const Context& context, const axis::AxisModel& axis);
+
 /// @name Pins that several scripts write
 /// @{
 

@@ -10,6 +10,7 @@
 #include "config/restart_speed.h"
 #include "message_text.h"
 #include "motion/backlash.h"
+#include "motion/resting_count.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
@@ -28,10 +29,23 @@ AxisModel::AxisModel(config::AxisConfig axis_config, const motor::MotorLines& mo
 // ---- scales ----
 
 double AxisModel::stepsPerUnit(int microsteps) const {
-  return config.steps_per_unit * microsteps / config.microsteps;
+  return config.steps_per_unit * (static_cast<double>(microsteps) / config.microsteps);
 }
 
-std::int64_t AxisModel::backlash() const { return std::llround(config.backlash * stepsPerUnit()); }
+std::int64_t AxisModel::backlash() const {
+  return motion::restingCount(exactBacklash(motor.microsteps()));
+}
+
+double AxisModel::takenUp() const {
+  const double whole = exactBacklash(motor.microsteps());
+  return whole > 0.0 ? motor.state().taken_up / whole : 0.0;
+}
+
+double AxisModel::takenUpIn(int microsteps, double part) const {
+  const double whole = exactBacklash(microsteps);
+  // In this sum the digits are lost that steps would lose later, when they are added.
+  return (std::clamp(part, 0.0, 1.0) * whole + whole) - whole;
+}
 
 double AxisModel::jointAt(double motor_count) const {
   const pulse::ChannelState& state = motor.state();
@@ -44,6 +58,7 @@ PathAxis AxisModel::pathAxis() const {
   PathAxis facts;
   facts.name = config.name;
   facts.kind = config.kind;
+  facts.shares_motors = !sharers_.empty();
   facts.microsteps = motor.microsteps();
   facts.steps_per_unit = stepsPerUnit();
   facts.origin = position.origin();
@@ -115,6 +130,16 @@ pulse::Nanoseconds AxisModel::restartInterval() const {
   return static_cast<pulse::Nanoseconds>(1e9 / (config::restartSpeed(config) * stepsPerUnit()));
 }
 
+void AxisModel::refuseTooLow(const char* what, double wanted, double lowest,
+                             const char* per) const {
+  // The bound must not be below itself after the configuration's rounding.
+  const double bound = lowest / config.steps_per_unit;
+  if (wanted == 0.0 || wanted * (1.0 + 1e-9) >= bound) return;
+  refuse(fmt::format("the {0} {1} is below the lowest, {2} {3}{4}, which is {5} steps{4}", what,
+                     show(wanted, per), lowerBoundText(bound), config::unitOf(config.kind), per,
+                     numberText(lowest)));
+}
+
 double AxisModel::checkedLimit(const char* what, double wanted, double configured, double lowest,
                                const char* per, config::LimitSource source) const {
   if (!std::isfinite(wanted) || wanted < 0.0) {
@@ -122,13 +147,7 @@ double AxisModel::checkedLimit(const char* what, double wanted, double configure
         "the {} is {}, but must be a finite number above 0, or 0 for the configured one", what,
         show(wanted, per)));
   }
-  // The bound must not be below itself after the configuration's rounding.
-  const double bound = lowest / config.steps_per_unit;
-  if (wanted > 0.0 && wanted * (1.0 + 1e-9) < bound) {
-    refuse(fmt::format("the {0} {1} is below the lowest, {2} {3}{4}, which is {5} steps{4}", what,
-                       show(wanted, per), lowerBoundText(bound), config::unitOf(config.kind), per,
-                       numberText(lowest)));
-  }
+  refuseTooLow(what, wanted, lowest, per);
   // If no jerk limit is configured, any jerk is allowed.
   if (configured > 0.0 && wanted > configured * (1.0 + 1e-12)) {
     refuse(fmt::format("the {} {} is above {}", what, show(wanted, per),
@@ -200,6 +219,7 @@ double AxisModel::checkedVelocity(double velocity) const {
         fmt::format("the velocity is {}, but must be a finite number above 0, or 0 for the maximum",
                     show(velocity, "/s")));
   }
+  refuseTooLow("velocity", velocity, config::kLowestRate, "/s");
   refuseTooFast(velocity);
   return velocity > 0.0 ? std::min(velocity, maxSpeed()) : maxSpeed();
 }
@@ -302,12 +322,37 @@ void AxisModel::shareMotors(const std::vector<AxisModel*>& axes) {
         "it shares its motors, and can't have motors of its own, a backlash, an idle timeout or a "
         "brake");
   }
+  sharing_ = axes;
   const std::size_t own = config.kinematics->numberOf(name());
   for (std::size_t i = 0; i < axes.size(); ++i) {
     if (i != own) sharers_.push_back(axes[i]);
     reach_ += 0.5 * std::abs(config.kinematics->inverse[own][i]) * config.steps_per_unit /
               axes[i]->config.steps_per_unit;
   }
+}
+
+double AxisModel::plannedEnd() const {
+  const motor::Motion* last = motor.motions().latest();
+  return last != nullptr ? last->planned.plan()->endPosition().value() : restCount();
+}
+
+// Each motor makes a step when the sum of the axes' motions has crossed its half.
+double AxisModel::restWith(const std::function<double(const AxisModel&)>& end_of) const {
+  const std::size_t own = config.kinematics->numberOf(name());
+  double rest = 0.0;
+  for (std::size_t i = 0; i < sharing_.size(); ++i) {
+    const AxisModel& driven = *sharing_[i];
+    double end = 0.0;  // of the motor with the pins of that axis
+    for (std::size_t k = 0; k < sharing_.size(); ++k) {
+      end += config.kinematics->matrix[i][k] * end_of(*sharing_[k]) * driven.config.steps_per_unit /
+             sharing_[k]->config.steps_per_unit;
+    }
+    const bool forward = end > static_cast<double>(driven.motor.state().own);
+    const double count = forward ? std::ceil(end - 0.5) : std::floor(end + 0.5);
+    rest += config.kinematics->inverse[own][i] * count * config.steps_per_unit /
+            driven.config.steps_per_unit;
+  }
+  return rest;
 }
 
 pulse::Nanoseconds AxisModel::turnTime() const {
@@ -399,7 +444,7 @@ void AxisModel::rememberRest() {
   rest_.kind = config.kind;
   rest_.steps_per_unit = config.steps_per_unit;
   rest_.position = positionNow();
-  rest_.slack = static_cast<double>(motor.state().slack) / stepsPerUnit();
+  rest_.slack = takenUp() * config.backlash;
   rest_.valid = position.isValid();
   rest_.homed = position.isHomed();
   rest_.at_home = motor.areAtHome() &&

@@ -2,11 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "axis/axis_memory.h"
+#include "ended_path.h"
 #include "fault.h"
 #include "input_levels.h"
 #include "line_failure.h"
@@ -53,7 +56,13 @@ class AxisModel {
   double stepsPerUnit(int microsteps) const;  ///< [microsteps/unit] in that mode
   double positionOf(double count) const { return position.origin() + count / stepsPerUnit(); }
   double countOf(double at) const { return (at - position.origin()) * stepsPerUnit(); }
-  std::int64_t backlash() const;  ///< [microsteps]
+  std::int64_t backlash() const;  ///< [microsteps] the nearest whole number of them
+  /// [microsteps] The same in a mode, of which it need not be whole microsteps.
+  double exactBacklash(int microsteps) const { return config.backlash * stepsPerUnit(microsteps); }
+  /// The part of the backlash that is taken up, at rest: from 0 to 1.
+  double takenUp() const;
+  /// [microsteps] In a mode. @param part see takenUp().
+  double takenUpIn(int microsteps, double part) const;
   std::int64_t jointCount() const { return motor.state().count - motor.state().slack; }
   /// [microsteps] The same of an axis that shares motors, whose steps may be parts of its own.
   double exactCount() const { return static_cast<double>(jointCount()) + motor.state().between; }
@@ -64,6 +73,12 @@ class AxisModel {
   /// [microsteps] How far it may be from a target that it has reached. Each motor is on the whole
   /// microstep that is nearest to its part of the target.
   double reach() const { return reach_; }
+  /// [microsteps] Where it will be at rest if its motion, and those of its sharers, have come to
+  /// their ends.
+  /// @param end_of [microsteps] the end of each of them.
+  double restWith(const std::function<double(const AxisModel&)>& end_of) const;
+  /// [microsteps] The end of its motion as it is planned, or its place at rest.
+  double plannedEnd() const;
   /// [microsteps] The position of the joint when the motor has moved to a count without a reversal.
   double jointAt(double motor_count) const;
   double positionNow() const { return positionOf(exactCount()); }
@@ -111,6 +126,8 @@ class AxisModel {
   void refuseUnlessReady() const;
   void refuseUnlessFinite(const char* what, double value, const char* per = "") const;
   void refuseTooFast(double speed) const;
+  /// @param lowest [steps] 0 is never refused.
+  void refuseTooLow(const char* what, double wanted, double lowest, const char* per) const;
   void refuseBeyondLimits(double at, const std::string& what) const {
     pathAxis().refuseBeyondLimits(at, what);
   }
@@ -188,6 +205,8 @@ class AxisModel {
     position.dropRemainder();
   }
 
+  /// The last path of several axes that it has followed to an end; nullptr if there is none.
+  std::shared_ptr<const EndedPath> ended_path;
   /// Clock time at which its last activity ended.
   pulse::Nanoseconds rest_since = 0;
   /// How often something stopped it, other than the end of its motion.
@@ -207,7 +226,8 @@ class AxisModel {
   /// A chip's translator follows STEP without current.
   bool countsWhileDisabled() const;
 
-  std::vector<AxisModel*> sharers_;
+  std::vector<AxisModel*> sharing_;  // in the order of the kinematics
+  std::vector<AxisModel*> sharers_;  // without itself
   double reach_ = 0.0;
   AxisMemory rest_;  // when it was last at rest
   AxisLimits limits_;

@@ -13,6 +13,7 @@
 #include "motion/compose.h"
 #include "motion/level_off.h"
 #include "motion/planner.h"
+#include "motion/resting_count.h"
 #include "motion/root.h"
 
 namespace stepdriver::axis {
@@ -27,13 +28,12 @@ constexpr double kLongestDuration = motion::Profile::kLongest / 4.0;
 }  // namespace
 
 LinePath::LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
-                   const std::vector<std::int64_t>& targets, double velocity, double duration)
+                   const std::vector<double>& targets, double velocity, double duration)
     : axes_(std::move(axes)) {
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     origins_.push_back(starts[i].motor.position);
     // The backlash is taken up, so the motor moves the same distance as the joint.
-    const std::int64_t slack = std::llround(starts[i].slack);
-    ways_.push_back(motion::fromInteger(targets[i] + slack) - origins_[i]);
+    ways_.push_back(DoubleDouble(targets[i]) + starts[i].slack - origins_[i]);
     length_ = std::max(length_, static_cast<std::int64_t>(std::ceil(std::abs(ways_[i].value()))));
   }
   limits_ = tightest(&PathAxis::limits);
@@ -85,6 +85,14 @@ double LinePath::pathSpeed(double velocity) const {
 
 double LinePath::checkedSpeed(double velocity) const {
   const double speed = pathSpeed(velocity);
+  if (speed * (1.0 + 1e-9) < config::kLowestRate) {
+    axes_.front().refuse(fmt::format(
+        "the velocity {0} {2} of the line is below the lowest in its direction, {1} {2}, at which "
+        "the axis with the most steps makes {3} steps/s",
+        numberText(velocity), lowerBoundText(velocity / speed * config::kLowestRate),
+        kindOfVelocity() == config::Kind::kLinear ? "m/s" : "rad/s",
+        numberText(config::kLowestRate)));
+  }
   if (speed <= limits_.max_speed * (1.0 + 1e-12)) return std::min(speed, limits_.max_speed);
   axes_.front().refuse(fmt::format(
       "the velocity {0} {2} of the line is above the {1} {2} that the limits of its axes "

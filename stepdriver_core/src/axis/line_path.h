@@ -13,12 +13,13 @@ namespace stepdriver::axis {
 /// the axis that makes the most of them.
 class LinePath : public SharedPath {
  public:
-  /// @param starts at rest; the backlash is taken up. @param targets [microsteps] of each joint.
+  /// @param starts at rest; the backlash is taken up.
+  /// @param targets [microsteps] of each joint, see PathAxis::restAt().
   /// @param velocity along the path, see machine::LineRequest; 0: as fast as the limits allow.
   /// @param duration [s] of the line; 0: determined by the velocity.
   /// @throw Refused if the limits of the axes don't allow that velocity, or that duration.
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
-           const std::vector<std::int64_t>& targets, double velocity, double duration);
+           const std::vector<double>& targets, double velocity, double duration);
 
   /// [s] From rest to rest, as fast as the limits allow.
   double shortestDuration() const;

@@ -17,10 +17,10 @@ auto tied(const motion::MotionLimits& limits) {
 }
 
 auto tied(const PathAxis& axis) {
-  return std::tie(axis.name, axis.kind, axis.microsteps, axis.steps_per_unit, axis.origin,
-                  axis.continuous, axis.min_position, axis.max_position, axis.configured_backlash,
-                  axis.backlash, axis.max_speed_source, axis.min_position_source,
-                  axis.max_position_source);
+  return std::tie(axis.name, axis.kind, axis.shares_motors, axis.microsteps, axis.steps_per_unit,
+                  axis.origin, axis.continuous, axis.min_position, axis.max_position,
+                  axis.configured_backlash, axis.backlash, axis.max_speed_source,
+                  axis.min_position_source, axis.max_position_source);
 }
 
 }  // namespace

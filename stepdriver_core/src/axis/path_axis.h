@@ -8,6 +8,7 @@
 
 #include "motion/limits.h"
 #include "motion/profile.h"
+#include "motion/resting_count.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::axis {
@@ -17,6 +18,8 @@ namespace stepdriver::axis {
 struct PathAxis {
   std::string name;  ///< refusals begin with it
   config::Kind kind = config::Kind::kLinear;
+  /// It shares motors, and may come to rest between its own counts.
+  bool shares_motors = false;
   int microsteps = 1;           ///< of a full step
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] the position at count 0
@@ -44,6 +47,10 @@ struct PathAxis {
   double turnsTowards(double other, double position) const {
     if (!continuous || isTooFar(position)) return 0.0;
     return config::kTurn * std::round((other - position) / config::kTurn);
+  }
+  /// [microsteps] Where a motion ends that is to bring it to a position.
+  double restAt(double count) const {
+    return shares_motors ? count : static_cast<double>(motion::restingCount(count));
   }
   /// [microsteps/s^2] The larger of acceleration and deceleration.
   double mostAcceleration() const;

@@ -15,7 +15,9 @@
 #include "motion/interpolate.h"
 #include "motion/planner.h"
 #include "motion/profile_parts.h"
+#include "motion/resting_count.h"
 #include "motion/spline_refusals.h"
+#include "move_between.h"
 #include "nanoseconds.h"
 
 namespace stepdriver::axis {
@@ -131,7 +133,8 @@ std::string remedyText(double shortest, double wanted) {
 
 // At rest, a first point at time 0 gives the position that the trajectory assumes for the axis.
 void requireStart(const PathAxis& axis, const motion::Waypoint& first, const PathStart& start) {
-  const double count = std::round(start.motor.position.value()) - start.slack;
+  const double count =
+      static_cast<double>(motion::restingCount(start.motor.position.value())) - start.slack;
   if (std::abs(first.position - count) <= axis.microsteps) return;
   axis.refuse(fmt::format(
       "the trajectory begins at {}, but the axis stands at {}; they may differ by one full step",
@@ -294,6 +297,7 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
                               (source.slowdown * source.slowdown);
     }
   }
+  waypoints.back().may_rest = axis.shares_motors;
   try {
     motion::requireWaypoints(waypoints);
   } catch (const std::invalid_argument& error) {
@@ -391,8 +395,7 @@ std::vector<motion::Piece> PreparedTrajectory::quickestTo(std::size_t member,
   const motion::MotionState from = jointOf(start);
   std::vector<motion::Piece> pieces;
   try {
-    const Profile plan =
-        motion::planMove(0, from, motion::restingCount(point.position), limits).profile;
+    const Profile plan = planMove(0, from, axis.restAt(point.position), limits).profile;
     for (const motion::Piece& piece : plan.pieces()) pieces.push_back(piece);
   } catch (const std::range_error& error) {
     axis.refuse(error.what());
@@ -464,14 +467,15 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
 
 std::shared_ptr<const SharedPath> PreparedTrajectory::lineTo(
     const std::vector<PathStart>& starts) const {
-  std::vector<std::int64_t> targets;
+  std::vector<double> targets;
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const motion::Waypoint& point = parts_[i].ends.back();
-    const std::int64_t joint = motion::restingCount(point.position);
-    const std::int64_t slack = std::llround(starts[i].slack);
-    const std::int64_t way = joint + slack - std::llround(starts[i].motor.position.value());
+    const double joint = axes_[i].restAt(point.position);
+    const double slack = starts[i].slack;
+    const double way = joint + slack - starts[i].motor.position.value();
+    const auto backlash = static_cast<double>(axes_[i].backlash);
     // The backlash is taken up during the motion.
-    targets.push_back(joint + (way > 0 ? axes_[i].backlash : way < 0 ? 0 : slack) - slack);
+    targets.push_back(joint + (way > 0.0 ? backlash : way < 0.0 ? 0.0 : slack) - slack);
   }
   const double duration = wantedDuration();
   auto quickest = std::make_shared<const LinePath>(axes_, starts, targets, 0.0, 0.0);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bounds.h"
 #include "message_text.h"
 #include "motion_keys.h"
 #include "read_motion.h"
@@ -13,10 +14,8 @@
 namespace stepdriver::config {
 namespace {
 
-constexpr double kLongestTimeout = 86'400.0;  // [s]
 constexpr double kLongestDebounceMs = 1000.0;
 constexpr int kHighestOrder = 1000;
-constexpr double kFarthest = 1099511627776.0;  // 2^40 steps, as for any move
 
 class HomingReader {
  public:
@@ -28,7 +27,7 @@ class HomingReader {
     const bool has_switch = readSwitch(homing);
     readSpeeds(homing);
     readDistances(homing, has_switch);
-    homing.timeout = homing_.number("timeout_s", {0.0, kLongestTimeout, true}, homing.timeout);
+    homing.timeout = homing_.number("timeout_s", {0.0, kLongestTime, true}, homing.timeout);
     homing.debounce =
         homing_.number("debounce_ms", {0.0, kLongestDebounceMs}, homing.debounce * 1e3) * 1e-3;
     homing.order = homing_.integer("order", 0, kHighestOrder, homing.order);
@@ -62,6 +61,11 @@ class HomingReader {
 
   std::optional<double> readSpeed(const std::string& key, double highest, const std::string& what) {
     const auto speed = homing_.findNumber(key, Range::positive(), Presence::kRequired);
+    const double steps = config_.steps_per_unit / units(1.0);
+    if (speed && steps > 0.0 && *speed * steps * kSlack < kLowestRate) {
+      mustBe(key, fmt::format("at least {}, which is {} steps/s",
+                              lowerBoundText(kLowestRate / steps), numberText(kLowestRate)));
+    }
     if (speed && highest > 0.0 && *speed > highest * kSlack) mustBe(key, "at most " + what);
     return speed;
   }
@@ -91,9 +95,9 @@ class HomingReader {
     const std::string pull_off_key = inUnit("pull_off");
     const auto travel = homing_.findNumber(travel_key, Range::positive(), Presence::kRequired);
     const double steps = config_.steps_per_unit / units(1.0);
-    if (travel && steps > 0.0 && *travel * steps > kFarthest) {
+    if (travel && steps > 0.0 && *travel * steps > kFarthestTravel) {
       mustBe(travel_key,
-             fmt::format("at most {}, which is 2^40 steps", upperBoundText(kFarthest / steps)));
+             fmt::format("at most {}, which is 2^40 steps", upperBoundText(kFarthestTravel / steps)));
     }
     const auto pull_off =
         homing_.findNumber(pull_off_key, Range::notNegative(), Presence::kRequired);

@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kSlack = 1.0 + 1e-9;  // for the rounding of decimal numbers
 constexpr double kWorstCondition = 100.0;
+constexpr double kMostRatio = 100.0;  // of the ways of a motor and an axis, either way
 
 /// The named arrangements of two axes: what each motor moves by for a unit of each axis.
 struct NamedMatrix {
@@ -42,6 +43,17 @@ std::optional<double> numberOf(const ConfigValue& value) {
   return std::nullopt;
 }
 
+/// The condition of a matrix says nothing about its scale.
+std::optional<std::size_t> axisThatMovesNoMotor(const Matrix& matrix) {
+  for (std::size_t axis = 0; axis < matrix.size(); ++axis) {
+    const bool moves = std::any_of(matrix.begin(), matrix.end(), [axis](const auto& motor) {
+      return std::abs(motor[axis]) * kMostRatio >= 1.0;
+    });
+    if (!moves) return axis;
+  }
+  return std::nullopt;
+}
+
 class KinematicsReader {
  public:
   KinematicsReader(ConfigReader& reader, bool axes_are_right, std::vector<AxisConfig>& axes)
@@ -62,6 +74,12 @@ class KinematicsReader {
       return issue("matrix",
                    "is singular, but must be one with which each axis can be moved "
                    "alone; no rows may be multiples of each other");
+    }
+    if (const auto slow = axisThatMovesNoMotor(*matrix)) {
+      return issue("matrix",
+                   fmt::format("moves no motor by {0} or more for 1 of {1}, but must move one: an "
+                               "axis must not make more than {2} times the way of its motors",
+                               numberText(1.0 / kMostRatio), names[*slow], numberText(kMostRatio)));
     }
     if (const double condition = conditionOf(*matrix, *inverse); condition > kWorstCondition) {
       return issue("matrix",
@@ -152,7 +170,7 @@ class KinematicsReader {
       std::vector<double>& numbers = matrix.emplace_back();
       for (const ConfigValue& value : *values) {
         const auto number = numberOf(value);
-        if (!number || std::abs(*number) > kWorstCondition) return wrong();
+        if (!number || std::abs(*number) > kMostRatio) return wrong();
         numbers.push_back(*number);
       }
     }

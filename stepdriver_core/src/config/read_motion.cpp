@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bounds.h"
 #include "message_text.h"
 #include "motion_keys.h"
 #include "read_scale.h"
@@ -16,11 +17,6 @@
 
 namespace stepdriver::config {
 namespace {
-
-// Far beyond any machine, and well within what the motion can count and time in 64 bits.
-constexpr double kHighestAcceleration = 1e12;
-constexpr double kMostBacklash = 1e6;  // steps
-constexpr double kHighestJerk = 1e15;
 
 const char* const kContinuous = "continuous";
 
@@ -97,8 +93,17 @@ class MotionReader {
                                                  axis_.shown(keys_.max_speed)));
     }
     if (max) checkRate(*max);
+    if (min) checkStart(*min);
     config.max_speed = si(max.value_or(0.0));
     config.start_speed = si(min.value_or(0.0));
+  }
+
+  void checkStart(double start_speed) {
+    if (!steps_per_unit_ || start_speed == 0.0) return;
+    if (start_speed * *steps_per_unit_ * kSlack >= kLowestRate) return;
+    mustBe(keys_.start_speed,
+           fmt::format("0 or at least {}, which is {} steps/s",
+                       lowerBoundText(kLowestRate / *steps_per_unit_), numberText(kLowestRate)));
   }
 
   void checkRate(double max_speed) {

@@ -6,14 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "bounds.h"
 #include "message_text.h"
 
 namespace stepdriver::config {
 namespace {
 
-// Far beyond any machine, and well within what the motion can count in 64 bits.
-constexpr double kLowestScale = 1e-9;  // [steps/unit]
-constexpr double kHighestScale = 1e9;
 constexpr int kMostFullSteps = 1'000'000;
 
 const char* const kFullSteps = "full_steps_per_round";

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "bounds.h"
 #include "message_text.h"
 #include "motion_keys.h"
 
@@ -14,9 +15,8 @@ namespace stepdriver::config {
 namespace {
 
 constexpr const char* kKey = "input_shaper";
-// From a crane to a tool: the parts of a motion are a second to half a millisecond apart.
-constexpr Range kFrequencies{0.5, 1000.0};
-constexpr Range kDampings{0.0, 0.9};
+constexpr Range kFrequencies{kLowestShaperFrequency, kHighestShaperFrequency};
+constexpr Range kDampings{0.0, kMostShaperDamping};
 constexpr int kMostParts = 16;
 
 struct ShaperName {

@@ -11,9 +11,10 @@
 #include "activity/follow_goal.h"
 #include "activity/homing.h"
 #include "activity/point_motion.h"
+#include "activity/steps.h"
 #include "axis/setpoint_stream.h"
 #include "message_text.h"
-#include "motion/spline.h"
+#include "motion/resting_count.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
@@ -27,7 +28,6 @@ using activity::Order;
 using activity::Why;
 
 const Why kStopped{axis::MoveEnd::kStopped, "it was stopped"};
-constexpr const char* kPathEnded = "the path doesn't continue: it has ended";
 constexpr const char* kMovedMeanwhile = "it moved while its path was planned";
 const Why kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
 
@@ -407,7 +407,7 @@ void Controller::setTarget(Goal& goal, axis::AxisModel& axis, double position, b
   const double count =
       relative ? relativeOrigin(axis) + position * axis.stepsPerUnit() : axis.countOf(position);
   axis.refuseBeyondLimits(relative ? axis.positionOf(count) : position, "the position");
-  goal.target = std::llround(count);
+  goal.target = motion::restingCount(count);
   goal.remainder = count - static_cast<double>(*goal.target);
 }
 
@@ -492,7 +492,7 @@ const Goal* Controller::streamedGoal(const axis::AxisModel& axis) const {
 void Controller::limitVelocity(Goal& goal, const axis::AxisModel& axis, const char* moves) const {
   const bool up = goal.velocity > 0.0;
   const auto& limit = up ? axis.config.max_position : axis.config.min_position;
-  if (limit) goal.target = std::llround(axis.countOf(*limit));
+  if (limit) goal.target = motion::restingCount(axis.countOf(*limit));
   if (axis.moving()) return;
   const std::int64_t sign = up ? 1 : -1;
   if (goal.target && (*goal.target - axis.jointCount()) * sign <= 0) {
@@ -551,7 +551,7 @@ Controller::MayBegin Controller::positionGoal(const Setpoint& wanted, double tim
   activity::Setpoint& setpoint = goal.setpoint;
   setpoint.of_position = true;
   setpoint.position = moved.countOf(position);
-  goal.target = std::llround(setpoint.position);
+  goal.target = motion::restingCount(setpoint.position);
   goal.remainder = setpoint.position - static_cast<double>(*goal.target);
   const axis::SetpointStream::Course course =
       moved.setpoints.take(setpoint.position, now, nanoseconds(timeout), moved.stops);
@@ -687,20 +687,27 @@ void Controller::serve(const MoveLine& wanted, const Ack& call) {
 
 void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
   std::vector<axis::AxisModel*> axes;
-  std::vector<Order> orders;
   for (std::size_t i = 0; i < wanted.axes.size(); ++i) {
     axis::AxisModel& moved = axis(wanted.axes[i]);
     refuseUnlessReadyToMove(moved);
     moved.refuseUnlessHomed();
     if (moved.stops != wanted.stops[i]) moved.refuse("it was stopped while this was prepared");
+    if (!wanted.prepared) activity::refuseIfStopped(context_, moved);
     axes.push_back(&moved);
+  }
+  if (!wanted.prepared) {
+    return call->fail(
+        {activity::Failure::Kind::kOutdated, axes.front()->name() + ": not prepared"});
+  }
+  std::vector<Order> orders;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
     Goal goal;
     goal.kind = Goal::Kind::kTogether;
     const double target = wanted.path ? wanted.path->targets[i] : wanted.prepared->target(i);
     goal.target = motion::restingCount(target);
     goal.remainder = target - static_cast<double>(*goal.target);
     goal.path_limits = wanted.prepared->axes()[i].limits;
-    orders.push_back({&moved, goalWithOutcome(goal)});
+    orders.push_back({axes[i], goalWithOutcome(goal)});
   }
   for (std::size_t i = 0; i < axes.size(); ++i) {
     if (axes[i]->pathAxis() != wanted.prepared->axes()[i]) {
@@ -744,7 +751,10 @@ void Controller::serve(const ExtendPath& wanted, const Ack& call) {
   axis::AxisModel& extended = axis(wanted.axis);
   Activity* owner = activities_.owner(extended);
   const Goal* goal = goalOf(extended);
-  if (goal == nullptr || goal->move != wanted.move) extended.refuse(kPathEnded);
+  if (goal == nullptr || goal->move != wanted.move) {
+    extended.refuse("the path doesn't continue: " +
+                    axis::howItEnded(extended.ended_path.get(), wanted.move));
+  }
   owner->extend(wanted.extension, call);
 }
 
@@ -892,7 +902,7 @@ void Controller::serve(const Enable& wanted, const Ack& call) {
 }
 
 bool Controller::mustEnable(const axis::AxisModel& axis) const {
-  if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+  activity::refuseUnlessCurrentStays(context_, axis);
   for (const Activity* busy : {activities_.owner(axis), activities_.heir(axis)}) {
     if (busy != nullptr && busy->work() == Activity::Work::kDisables) {
       axis.refuse("busy: it is being disabled");
@@ -1071,6 +1081,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
       shown.path = {goal->move, motion->sharedPath(), motion->motionAlong(), motion->slowsDown()};
     }
   }
+  shown.ended_path = axis.ended_path;
   shown.path_axis = axis.pathAxis();
   shown.commanded = axis.positionOf(axis.restCount()) + axis.position.remainder();
   if (!axis.moving()) shown.rest = restOf(axis.pathStart(0));

@@ -12,6 +12,7 @@
 
 #include "controller.h"
 #include "flight_recorder.h"
+#include "give_way.h"
 #include "machine/disposer.h"
 #include "machine_axis.h"
 #include "message_text.h"
@@ -22,6 +23,7 @@
 #include "pulse/pulse_engine.h"
 #include "shell.h"
 #include "state_keeper.h"
+#include "stepdriver_core/config/check_axes.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "wiring.h"
@@ -49,6 +51,7 @@ class Machine::Impl {
   Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options)
       : clock_(clock), disposer_(options.threaded) {
+    config::checkAxes(configs);
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
     lines_ = backend.request(wiring.outputs, wiring.inputs);
@@ -231,7 +234,8 @@ class Machine::Impl {
       const auto snapshot = shell_->snapshot();
       const auto id = followerOf(*snapshot, request.path);
       if (!id) {
-        throw Refused(fmt::format("the path {} doesn't continue: it has ended", request.path));
+        throw Refused(fmt::format("the path {} doesn't continue: {}", request.path,
+                                  howItEnded(*snapshot, request.path)));
       }
       const AxisSnapshot::Path& path = *snapshot->axes[*id].path;
       const auto queued = std::dynamic_pointer_cast<const QueuedPath>(path.shared);
@@ -242,15 +246,21 @@ class Machine::Impl {
       if (!path.slows_down && i < kMostExtensions) {
         changeable = path.along->stateAt(shell_->motionNow() + lead).position.value();
       }
-      QueuedPath::Longer longer = queued->extended(request.segments, request.more_follows,
-                                                   std::max(0.0, passed - kKept), changeable);
-      const std::shared_ptr<const QueuedPath> continued = disposer_.keep(std::move(longer.path));
-      const activity::Extension extension{queued,
-                                          continued,
-                                          longer.same_from,
-                                          longer.same_until,
-                                          longer.moves_on,
-                                          continued->targets()};
+      std::shared_ptr<const QueuedPath> continued;
+      activity::Extension extension;
+      try {
+        const Interruptible extending([&] { return isLost(*shell_->snapshot(), request.path); });
+        QueuedPath::Longer longer = queued->extended(request.segments, request.more_follows,
+                                                     std::max(0.0, passed - kKept), changeable);
+        continued = disposer_.keep(std::move(longer.path));
+        extension = {queued,
+                     continued,
+                     longer.same_from,
+                     longer.same_until,
+                     longer.moves_on,
+                     continued->targets()};
+      } catch (const Interrupted&) {  // NOLINT(bugprone-empty-catch): the controller knows why
+      }
       const activity::Reply reply = shell_->call(ExtendPath{*id, path.move, extension});
       const bool outdated =
           reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
@@ -273,6 +283,14 @@ class Machine::Impl {
     return queued->aheadOf(path.along->stateAt(shell_->motionNow()).position.value());
   }
 
+  // Whether a path can't be continued any more: it has ended, or it comes to rest for good.
+  static bool isLost(const MachineSnapshot& now, std::uint64_t path) {
+    const auto id = followerOf(now, path);
+    if (!id) return true;
+    const auto& motions = now.axes[*id].motions;
+    return !motions.empty() && motions.back().slows_down;
+  }
+
   // The axis by whose move a path is numbered.
   static std::optional<AxisId> followerOf(const MachineSnapshot& snapshot, std::uint64_t path) {
     for (AxisId id = 0; id < snapshot.axes.size(); ++id) {
@@ -280,6 +298,15 @@ class Machine::Impl {
       if (followed && followed->move == path) return id;
     }
     return std::nullopt;
+  }
+
+  static std::string howItEnded(const MachineSnapshot& snapshot, std::uint64_t path) {
+    const auto followed =
+        std::find_if(snapshot.axes.begin(), snapshot.axes.end(), [path](const AxisSnapshot& axis) {
+          return axis.ended_path != nullptr && axis.ended_path->move == path;
+        });
+    return axis::howItEnded(followed != snapshot.axes.end() ? followed->ended_path.get() : nullptr,
+                            path);
   }
 
   // The motion under way, now: about where a trajectory will begin.
@@ -322,8 +349,24 @@ class Machine::Impl {
     FollowTrajectory wanted{axes, nullptr, {}, std::nullopt};
     wanted.stops.reserve(axes.size());
     for (const AxisId axis : axes) wanted.stops.push_back(begun->axes.at(axis).state.stops);
+    const std::uint64_t stops_asked = engine_->stopsAsked();
+    const auto is_stopped = [&] {
+      if (engine_->stopsAsked() != stops_asked) return true;
+      const auto now = shell_->snapshot();
+      for (std::size_t i = 0; i < axes.size(); ++i) {
+        const axis::AxisState& state = now->axes.at(axes[i]).state;
+        if (state.stops != wanted.stops[i] || !state.fault.empty()) return true;
+      }
+      return false;
+    };
     for (int i = 0;; ++i) {
-      prepare(*shell_->snapshot(), wanted);
+      wanted.prepared.reset();
+      try {
+        const Interruptible preparing(is_stopped);
+        prepare(*shell_->snapshot(), wanted);
+      } catch (const Interrupted&) {
+        wanted.prepared.reset();  // the controller knows why
+      }
       const activity::Reply reply = shell_->call(wanted);
       const bool outdated =
           reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
@@ -551,6 +594,7 @@ CoordinatedResult Machine::wait(const CoordinatedMove& move) const {
 
 // All axes of a path stop with one of them.
 void Machine::stop(const CoordinatedMove& move) {
+  if (move.members.empty()) throw Refused("the motion has no axes");
   const CoordinatedMove::Member& first = move.members.front();
   axis(first.axis).stop(first.move);
 }

@@ -11,7 +11,6 @@
 
 #include "message_text.h"
 #include "motion/smooth_contour_motion.h"
-#include "motion/spline.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -109,7 +108,7 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
   RestOfPath rest{0.0, end};
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const double count = axes[k].countOf(end[k]);
-    const auto whole = static_cast<double>(motion::restingCount(count));
+    const double whole = axes[k].restAt(count);
     const double way = std::abs(whole - count);
     if (way > roundingOf(count)) {
       rest.duration = std::max(rest.duration, restTime(way, axes[k], count, smooth));

@@ -190,9 +190,21 @@ void PathReader::readSpeed(const PathSegment& given, ContourSegment& segment) co
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     linear_moves = linear_moves || (isLinear(i) && moves(segment, i));
   }
+  double finest = 0.0;  // [microsteps/unit]
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     segment.measured.push_back(isLinear(i) == linear_moves);
+    if (segment.measured.back()) finest = std::max(finest, axes_[i].steps_per_unit);
   }
+  requireRate(velocity, finest, linear_moves ? "m/s" : "rad/s");
+}
+
+void PathReader::requireRate(double velocity, double finest, const char* unit) const {
+  if (velocity * finest * (1.0 + 1e-9) >= config::kLowestRate) return;
+  refuse(
+      fmt::format("has the velocity {} {}, but it must be 0, or at least {} {}, which is {} "
+                  "steps/s of the axis with the most steps",
+                  numberText(velocity), unit, lowerBoundText(config::kLowestRate / finest), unit,
+                  numberText(config::kLowestRate)));
 }
 
 bool PathReader::moves(const ContourSegment& segment, std::size_t axis) const {

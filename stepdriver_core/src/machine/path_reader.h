@@ -46,6 +46,7 @@ class PathReader {
   bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
                const std::array<double, 2>& to) const;
   bool leadsNowhere(const PathSegment& given, const motion::ContourSegment& segment) const;
+  void requireRate(double velocity, double finest, const char* unit) const;
   void readSpeed(const PathSegment& given, motion::ContourSegment& segment) const;
   bool isLinear(std::size_t axis) const { return axes_[axis].kind == config::Kind::kLinear; }
   bool moves(const motion::ContourSegment& segment, std::size_t axis) const;

@@ -10,6 +10,7 @@
 #include "motion/backlash.h"
 #include "motion/profile_parts.h"
 #include "motion/profile_peaks.h"
+#include "motion/resting_count.h"
 #include "motion/smooth_contour_motion.h"
 #include "motion/spline.h"
 #include "nanoseconds.h"
@@ -220,7 +221,7 @@ std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
     const double slack = state.motor.position.value() - axis.countOf(joint.position[k]);
     const double still = axis.limits.jerk > 0.0 ? kStillGently : kStill;
     const double taking_up = state.motor.velocity - joint.velocity[k] * axis.steps_per_unit;
-    state.slack = std::nearbyint(slack);
+    state.slack = static_cast<double>(motion::restingCount(slack));
     const bool rests = std::abs(slack - state.slack) < kNear &&
                        std::abs(taking_up) <= still * axis.limits.max_speed;
     if (!rests) return std::nullopt;
@@ -381,6 +382,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
       waypoint.velocity = point.velocities[k] * axis.steps_per_unit;
       if (smooth) waypoint.acceleration = point.accelerations[k] * axis.steps_per_unit;
     }
+    if (!waypoints.empty()) waypoints.back().may_rest = axis.shares_motors;
     motion::MotionState joint_state{state.motor.position - state.slack, state.motor.velocity, 0.0};
     if (smooth) joint_state.acceleration = points.front().accelerations[k] * axis.steps_per_unit;
     Profile motor = motion::planSpline(0, joint_state, waypoints, {axis.mostAcceleration()});

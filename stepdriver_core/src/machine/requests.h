@@ -70,6 +70,7 @@ struct MoveLine {
 };
 struct FollowTrajectory {
   std::vector<AxisId> axes;
+  /// nullptr if something has ended the preparation: the request is refused for that, or outdated.
   std::shared_ptr<const axis::PreparedTrajectory> prepared;
   /// AxisState::stops of each axis at the time of the request: if one was stopped since, it isn't
   /// begun.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "axis/axis_memory.h"
+#include "axis/ended_path.h"
 #include "axis/path_axis.h"
 #include "axis/shared_path.h"
 #include "motion/shaped_profile.h"
@@ -46,6 +47,7 @@ struct AxisSnapshot {
     bool slows_down = false;                       ///< that motion
   };
   std::optional<Path> path;
+  std::shared_ptr<const axis::EndedPath> ended_path;  ///< the last one; nullptr if there is none
   std::vector<Motion> motions;
   axis::PathAxis path_axis;
   pulse::ChannelState channel;  ///< from the engine's last news

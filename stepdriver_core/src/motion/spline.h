@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "motion/profile.h"
 #include "motion/profile_peaks.h"
+#include "motion/resting_count.h"
 
 namespace stepdriver::motion {
 
@@ -18,6 +18,7 @@ struct Waypoint {
   double position = 0.0;               ///< [microsteps] within kFarthest of 0
   std::optional<double> velocity;      ///< [microsteps/s]
   std::optional<double> acceleration;  ///< [microsteps/s^2] counts only together with a velocity
+  bool may_rest = false;               ///< the motion may come to rest here, between two microsteps
 };
 
 /// [microsteps] No waypoint is farther from 0, so that curves between waypoints stay within
@@ -30,10 +31,6 @@ constexpr double kQuinticError = 0.01;
 /// The part of a limit by which the acceleration of the cubics may exceed it, if that of their
 /// quintic doesn't.
 constexpr double kQuinticAccelerationError = 0.0025;
-
-/// [microsteps] Where a trajectory comes to rest if its last waypoint is at `position`: on the
-/// nearest whole microstep, halves to even.
-inline std::int64_t restingCount(double position) { return std::llround(std::nearbyint(position)); }
 
 /// What the curve of a trajectory should keep to, if its points allow it.
 struct SplineLimits {
@@ -76,8 +73,8 @@ struct SplineLimits {
 /// Each segment starts from its waypoint as given, so that errors don't accumulate: where two
 /// pieces meet, the positions differ by less than 2^-52 of the piece's distance.
 ///
-/// It ends at the restingCount() of the last waypoint; a velocity there other than 0 ends in a jump
-/// to rest.
+/// It ends at the restingCount() of the last waypoint, or there if it may_rest; a velocity there
+/// other than 0 ends in a jump to rest.
 ///
 /// @param from finite; its position is within kFarthest of 0.
 /// @param waypoints at least one, at increasing times from 0 on, all numbers finite.

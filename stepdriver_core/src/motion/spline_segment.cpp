@@ -72,8 +72,9 @@ void Segments::advance(Segment& segment) const {
 Knot Segments::knot(std::size_t index) const {
   const Waypoint& waypoint = waypoints_[index];
   const bool last = index + 1 == waypoints_.size();
-  const double position =
-      last ? static_cast<double>(restingCount(waypoint.position)) : waypoint.position;
+  const double position = last && !waypoint.may_rest
+                              ? static_cast<double>(restingCount(waypoint.position))
+                              : waypoint.position;
   return {waypoint.time_ns, position, waypoint.velocity, waypoint.acceleration};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "motion/resting_count.h"
 #include "nanoseconds.h"
 
 namespace stepdriver::motor {
@@ -157,8 +158,8 @@ pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const Motor
   channel.step_low = timing.step_low_ns;
   channel.dir_setup = timing.dir_setup_ns;
   channel.dir_hold = timing.dir_hold_ns;
-  channel.backlash = std::llround(config.backlash * config.steps_per_unit);
-  channel.max_skew = std::llround(config.max_skew * config.steps_per_unit);
+  channel.backlash = config.backlash * config.steps_per_unit;
+  channel.max_skew = motion::restingCount(config.max_skew * config.steps_per_unit);
   return channel;
 }
 

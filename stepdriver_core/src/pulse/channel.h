@@ -71,7 +71,8 @@ struct ChannelConfig : MotorSignals {
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
-  std::int64_t backlash = 0;  ///< [microsteps] of the motor at a reversal before the joint moves
+  /// [microsteps] Of the motor at a reversal before the joint moves. It need not be a whole number.
+  double backlash = 0.0;
 };
 
 /// Axes that share motors, as on a CoreXY: each motor moves by a sum of the motions of the axes.
@@ -110,12 +111,13 @@ struct ChannelState {
   /// @name All that a step changes, if the axis has one motor
   /// @{
   std::int64_t count = 0;  ///< [microsteps] active STEP edges forward minus those backward
-  /// The part of the backlash that is taken up towards max: from 0 to all of it. The position of
-  /// the joint is count minus this.
+  /// The part of the backlash that is taken up towards max, as the nearest whole number: from 0 to
+  /// all of it. The position of the joint is count minus this.
   std::int64_t slack = 0;
   std::uint64_t pulses = 0;  ///< active STEP edges
   Nanoseconds rose = 0;      ///< clock time by which the last active STEP edge had happened
   /// @}
+  double taken_up = 0.0;        ///< [microsteps] at rest: the exact part of the backlash, see slack
   std::uint64_t taken = 0;      ///< serial of the last command that was handled
   std::uint64_t accepted = 0;   ///< serial of the last command that was not refused
   std::uint64_t following = 0;  ///< serial of the current profile; 0: at rest
@@ -148,6 +150,6 @@ struct ChannelState {
 };
 
 /// The beginning of a ChannelState that a step of an axis with one motor changes.
-constexpr std::size_t kStepBytes = offsetof(ChannelState, taken);
+constexpr std::size_t kStepBytes = offsetof(ChannelState, taken_up);
 
 }  // namespace stepdriver::pulse

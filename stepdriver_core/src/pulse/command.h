@@ -65,8 +65,8 @@ struct Command {
   /// The position of the motor in the microsteps of a new mode.
   struct Scale {
     std::int64_t count = 0;
-    std::int64_t slack = 0;
-    std::int64_t backlash = 0;
+    double taken_up = 0.0;  ///< of the backlash, see ChannelState
+    double backlash = 0.0;
   };
   std::optional<Scale> scale;  ///< of kRelease
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "motion/resting_count.h"
 #include "shared_motors.h"
 
 namespace stepdriver::pulse {
@@ -97,15 +98,22 @@ void EngineChannel::release(const Command& command) {
   if (shared != nullptr) shared->noteReady(command.ready);
   if (const auto& scale = command.scale) {
     state.count = scale->count;
-    state.slack = scale->slack;
     config.backlash = scale->backlash;
+    takeUp(scale->taken_up);
     ++state.epoch;
   }
 }
 
+// In a mode whose microsteps don't divide the backlash, the last step that takes it up is a part of
+// one: without the exact sum, each change of the mode would move the joint by what was rounded.
+void EngineChannel::takeUp(double of_backlash) {
+  state.taken_up = std::clamp(of_backlash, 0.0, config.backlash);
+  state.slack = motion::restingCount(state.taken_up);
+}
+
 void EngineChannel::countStep() {
   state.count += direction;
-  state.slack = std::clamp<std::int64_t>(state.slack + direction, 0, config.backlash);
+  if (config.backlash > 0.0) takeUp(state.taken_up + direction);
   ++state.pulses;
   state.rose = rose;
   running = true;

@@ -93,6 +93,8 @@ struct EngineChannel {
   /// @return whether it could be reserved: it is at rest, and not reserved yet.
   bool reserve();
   void release(const Command& command);
+  /// @param of_backlash [microsteps] is taken up now, of that which there is.
+  void takeUp(double of_backlash);
   /// A pulse has gone out.
   void countStep();
   void endMotion(EndReason reason, Nanoseconds motion_now);

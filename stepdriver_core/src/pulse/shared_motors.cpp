@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "motion/resting_count.h"
+
 namespace stepdriver::pulse {
 
 SharedMotors::SharedMotors(const SharedAxes& shared, std::vector<EngineChannel*> axes,
@@ -207,7 +209,7 @@ void SharedMotors::stepped(const EngineChannel& motor) {
     EngineChannel& axis = *axes_[i];
     ChannelState& state = axis.state;
     const double place = placeOf(i);
-    state.count = std::llround(place);
+    state.count = motion::restingCount(place);
     state.between = place - static_cast<double>(state.count);
     axis.running = axis.follows();
     if (motors_[i] == &motor) {

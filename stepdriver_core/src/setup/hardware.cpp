@@ -1,5 +1,6 @@
 #include "stepdriver_core/setup/hardware.h"
 
+#include "stepdriver_core/config/check_axes.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 
@@ -20,6 +21,7 @@ std::unique_ptr<Simulation> makeSimulation(const MachineConfig& config, const st
 }  // namespace
 
 Hardware::Hardware(const MachineConfig& config, const std::string& name) {
+  config::checkAxes(config.axes);
   if (config.backend == GpioBackend::kSimulated) {
     simulation_ = makeSimulation(config, name);
   } else {

@@ -119,6 +119,13 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
   return spec;
 }
 
+// An axis that a program has added is as configured.
+const SimulatedAxis& simulatedOf(const SimulationConfig& config, const AxisConfig& axis) {
+  static const SimulatedAxis kAsConfigured;
+  const auto found = config.axes.find(axis.name);
+  return found != config.axes.end() ? found->second : kAsConfigured;
+}
+
 std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
                                     const SimulationConfig& config) {
   std::vector<sim::RigAxisSpec> rig;
@@ -126,7 +133,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
   for (std::size_t number = 0; number < axes.size(); ++number) {
     const AxisConfig& axis = axes[number];
     for (std::size_t i = 0; i < axis.motors(); ++i) {
-      const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(axis.motorAt(i).motor);
+      const SimulatedAxis& simulated = simulatedOf(config, axis).ofMotor(axis.motorAt(i).motor);
       rig.push_back(rigAxisOf(motorAlone(axis, i), simulated));
       rig.back().limits = motorLimits(axes, number);
       rig.back().motor = motorOf(axes, number, simulated.motor);
@@ -212,7 +219,7 @@ void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const config::MotorConfig& motor = axis.motorAt(i);
       if (!motor.endstop_min || !motor.endstop_max) continue;
-      const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(motor.motor);
+      const SimulatedAxis& simulated = simulatedOf(config, axis).ofMotor(motor.motor);
       const SwitchPlaces places = switchPlaces(motorAlone(axis, i), simulated);
       if (places.min < places.max) continue;
       issues.push_back(
@@ -237,7 +244,7 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
   for (const AxisConfig& axis : axes) {
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const config::MotorConfig& motor = axis.motorAt(i);
-      const SimulatedAxis& simulated = config.axes.at(axis.name).ofMotor(motor.motor);
+      const SimulatedAxis& simulated = simulatedOf(config, axis).ofMotor(motor.motor);
       faults_[axis.traceName(i)] = simulated.faults;
       rig_.setFaults(axis.traceName(i), simulated.faults);
       if (simulated.fail_step_write_after) {

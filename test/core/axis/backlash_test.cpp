@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <random>
+#include <string>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
@@ -171,6 +175,95 @@ TEST_F(Backlash, KeepsThePositionOverAMicrostepChange) {
   EXPECT_EQ(motor() - 784, 16 + kBacklash);
   EXPECT_REFUSED(x().setMicrosteps(4), "1/4 has no position at 0.01 m");
   expectClean();
+}
+
+// The change to full steps takes up half of the backlash, which is half a full step.
+TEST_F(Backlash, KeepsItsPartThatIsTakenUpOverMicrostepChanges) {
+  config::AxisConfig config = linearAxis("x");
+  config.backlash = 16.0 / config.steps_per_unit;
+  config.align_on_microstep_change = true;
+  for (const std::vector<int>& modes : std::vector<std::vector<int>>{{1, 16}, {1, 2, 1, 8, 16}}) {
+    bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config});
+    x().setPosition(0.0);
+    moveTo(0.001);
+    moveTo(8.0 / config.steps_per_unit);
+    EXPECT_EQ(motor(), 8);
+    x().setMicrosteps(modes.front());
+    EXPECT_EQ(motor(), 16) << "8 of 16 are taken up";
+    for (const int mode : modes) x().setMicrosteps(mode);
+    EXPECT_NEAR(position(), 8.0 / config.steps_per_unit, 1e-12);
+    moveTo(0.010);
+    EXPECT_EQ(motor(), 816);
+    EXPECT_TRUE(x().state().position_valid);
+    expectClean();
+  }
+}
+
+/// A joint behind a backlash, as the motor moves it.
+class Joint {
+ public:
+  explicit Joint(double backlash) : backlash_(backlash) {}
+  /// The motor has moved to a place, without a turn.
+  void follow(double motor) {
+    slack_ = std::clamp(slack_ + motor - motor_, 0.0, backlash_);
+    motor_ = motor;
+  }
+  double place() const { return motor_ - slack_; }
+
+ private:
+  const double backlash_;
+  double motor_ = 0.0;
+  double slack_ = 0.0;
+};
+
+// Moves that end at their targets or on the way, and changes between all modes: what is rounded in
+// one mode must not be there in another one.
+TEST(BacklashInAllModes, LeavesThePositionValidAndWithinHalfAMicrostepOfTheMode) {
+  constexpr std::array<int, 6> kModes{1, 2, 4, 8, 16, 32};
+  constexpr double kScale = 80'000.0;
+  double worst = 0.0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    std::mt19937 random(seed);
+    config::AxisConfig config = linearAxis("x", "drv8825");
+    config.align_on_microstep_change = true;
+    const double backlash =
+        std::array<double, 7>{16.0, 30.0, 8.0, 7.3, 1.0, 0.4, 21.5}.at(random() % 7) / kScale;
+    config.backlash = backlash;
+    Bench bench({config});
+    axis::Axis& x = bench.axis();
+    x.setPosition(0.0);
+    Joint joint(1e3 * backlash);  // mm, like the carriage
+    std::string done;
+    for (int i = 0; i < 40; ++i) {
+      const double way = static_cast<double>(static_cast<int>(random() % 121) - 60) / kScale;
+      const bool changes = random() % 3 == 0;
+      const int mode = kModes.at(random() % kModes.size());
+      if (changes) {
+        x.setMicrosteps(mode);
+        done += " 1/" + std::to_string(mode);
+      } else {
+        const bool stops = random() % 2 == 0;
+        const axis::Move move = x.moveTo(way, true);
+        if (stops) {
+          bench.machine->advance(1e-4 * static_cast<double>(random() % 80));
+          x.stop();
+        }
+        x.wait(move);
+        while (x.state().moving) bench.machine->advance(1e-3);
+        done += (stops ? " stopped " : " by ") + std::to_string(way * kScale);
+      }
+      joint.follow(bench.report().carriage);
+      const axis::AxisState state = x.state();
+      ASSERT_TRUE(state.position_valid);
+      const double off = std::abs(1e3 * state.position - joint.place()) * kScale / 1e3;
+      worst = std::max(worst, off * state.microsteps / 16.0);
+      ASSERT_LE(off, 0.5 * 16.0 / state.microsteps + 1e-6)
+          << "microsteps of 1/16 off in 1/" << state.microsteps << " after" << done
+          << ", with a backlash of " << backlash * kScale;
+    }
+    EXPECT_EQ(violationsOf(bench.report()), "");
+  }
+  EXPECT_GT(worst, 0.1) << "a test that rounds nothing shows nothing";
 }
 
 }  // namespace

@@ -85,6 +85,19 @@ TEST(ReadHoming, ChecksEachValue) {
                   {"homing/" + key, kNan, "is nan, but must be a finite number above 0"},
                   {"homing/" + key, "far", "is \"far\" (a string), but must be a number above 0"}});
   }
+  for (const std::string key : {"seek_speed_mm_s", "latch_speed_mm_s"}) {
+    ConfigValue axis = homingAxis();
+    put(axis, "homing/seek_speed_mm_s", 1.25e-5);
+    put(axis, "homing/latch_speed_mm_s", 1.25e-5);
+    EXPECT_EQ(issuesOfX(axis), Lines{});
+    put(axis, "homing/latch_speed_mm_s", 1e-300);
+    put(axis, "homing/" + key, 1e-300);
+    const Lines issues = issuesOfX(axis);
+    ASSERT_FALSE(issues.empty());
+    EXPECT_EQ(issues.front(), "/axes/x/homing/" + key +
+                                  ": is 1e-300, but must be at least 1.25e-05, which is 0.001 "
+                                  "steps/s");
+  }
   expectIssues(homingAxis(),
                {{"homing/switch", "left", "is \"left\", but must be min or max"},
                 {"homing/switch", "max",

@@ -86,6 +86,15 @@ TEST(ReadKinematics, RefusesMatricesThatDontMoveEachAxisAlone) {
       issues_of_matrix(ConfigValue::List{row(1.0, 1.0), row(1.0, 1.01)}),
       (Lines{"/kinematics/matrix: has the condition 404.01, but must have one of at most 100: a "
              "microstep of a motor would move an axis too far"}));
+  for (const double small : {5e-324, 1e-300, 0.009}) {
+    EXPECT_EQ(issues_of_matrix(ConfigValue::List{row(small, small), row(small, -small)}),
+              (Lines{"/kinematics/matrix: moves no motor by 0.01 or more for 1 of x, but must move "
+                     "one: an axis must not make more than 100 times the way of its motors"}));
+    EXPECT_EQ(issues_of_matrix(ConfigValue::List{row(1.0, small), row(1.0, -small)}),
+              (Lines{"/kinematics/matrix: moves no motor by 0.01 or more for 1 of y, but must move "
+                     "one: an axis must not make more than 100 times the way of its motors"}));
+  }
+  EXPECT_EQ(issues_of_matrix(ConfigValue::List{row(0.01, 0.01), row(0.01, -0.01)}), Lines());
   EXPECT_EQ(issues_of_matrix(ConfigValue::List{row(1.0, 1.0)}),
             (Lines{"/kinematics/matrix: is a list of 1, but must be a list of as many lists of "
                    "numbers as each has: [[1, 1], [1, -1]]"}));

@@ -24,6 +24,10 @@ TEST(ReadMotion, ChecksEachNumberOfTheMotion) {
   expectIssues(
       linearAxis(),
       {{"start_speed_mm_s", -0.1, "is -0.1, but must be 0 or more"},
+       {"start_speed_mm_s", 5e-324,
+        "is 4.94065645841247e-324, but must be 0 or at least 1.25e-05, which is 0.001 steps/s"},
+       {"start_speed_mm_s", 1.25e-5, ""},
+       {"start_speed_mm_s", 0.0, ""},
        {"start_speed_mm_s", 100.0, ""},
        {"start_speed_mm_s", 101, "is 101, but must be at most max_speed_mm_s, which is 100.0"},
        {"min_position_mm", kNan, "is nan, but must be a finite number"},

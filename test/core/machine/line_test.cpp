@@ -327,6 +327,67 @@ TEST_F(Line, EndsAtOnceForAllWhereOneMeetsItsEndstop) {
   expectClean();
 }
 
+// As after a homing, whose place is between two microsteps: all targets are in their middle.
+TEST_F(Line, ReachesTargetsInTheMiddleOfTwoMicrosteps) {
+  build({axisOf("x", 1000.0, 1.0, 2.0), axisOf("y", 500.0, 1.0, 4.0)});
+  bench->axis("x").setPosition(0.0005);
+  bench->axis("y").setPosition(-0.001);
+  const auto expect_reached = [&](const CoordinatedMove& move, const std::string& what) {
+    const CoordinatedResult result = machine().wait(move);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << what << ": " << result.message;
+    for (std::size_t i = 0; i < move.members.size(); ++i) {
+      EXPECT_NEAR(result.positions[i], move.members[i].move.rest, 1e-12) << what;
+    }
+  };
+  for (const double target : {0.078, 0.079, 0.08, -0.013, -0.014, 0.001, 0.0, -0.001}) {
+    const std::string what = "to " + std::to_string(target);
+    expect_reached(start({{"x", "y"}, {target, 2.0 * target}}), "a line " + what);
+    expect_reached(start({{"x", "y"}, {0.002, -0.004}, true}), "a relative line after " + what);
+    machine::PathSegment segment;
+    segment.end = {target, 2.0 * target};
+    expect_reached(machine().followPath({{"x", "y"}, {segment}}), "a path " + what);
+    expect_reached(machine().followTrajectory({{"x", "y"}, {{0.9, {0.01, 0.01}, {}, {}}}}),
+                   "a trajectory before " + what);
+    expect_reached(machine().followTrajectory({{"x", "y"},
+                                               {{0.5, {0.5 * target, target}, {}, {}},
+                                                {1.0, {target, 2.0 * target}, {}, {}}}}),
+                   "a trajectory " + what);
+    const axis::MoveResult result = bench->move(target + 0.001);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << "a move by a microstep: " << result.message;
+  }
+  for (const std::string name : {"x", "y"}) EXPECT_EQ(violationsOf(bench->report(name)), "");
+}
+
+// 0.001 steps/s are the lowest rate of any motion: of x 1e-6 m/s.
+TEST_F(Line, RefusesAVelocityWithoutAStepInAQuarterOfAnHour) {
+  for (const double velocity : {5e-324, 1e-300, 1e-12, 0.9e-6}) {
+    EXPECT_REFUSED(start({{"x", "y"}, {1.0, 0.0}, false, velocity}),
+                   "m/s of the line is below the lowest in its direction, 1e-06 m/s, at which the "
+                   "axis with the most steps makes 0.001 steps/s");
+    EXPECT_REFUSED(bench->axis("x").moveTo(1.0, false, velocity), "is below the lowest, 1e-06 m/s");
+    EXPECT_REFUSED(bench->axis("x").plan(1.0, false, velocity), "is below the lowest, 1e-06 m/s");
+    EXPECT_REFUSED(bench->axis("x").moveRounds(1.0, velocity), "is below the lowest, 1e-06 m/s");
+    machine::PathSegment segment;
+    segment.end = {1.0, 0.0};
+    machine::PathRequest path{{"x", "y"}, {segment}, false, velocity};
+    const std::string why = "m/s, but it must be 0, or at least 1e-06 m/s, which is 0.001 steps/s";
+    EXPECT_REFUSED(machine().followPath(path), "segment 0 of the path has the velocity");
+    EXPECT_REFUSED(machine().followPath(path), why);
+    path.velocity = 0.0;
+    path.segments.push_back(segment);
+    path.segments.back().end = {1.0, 1.0};
+    path.segments.back().velocity = velocity;
+    EXPECT_REFUSED(machine().followPath(path), "segment 1 of the path has the velocity");
+    EXPECT_REFUSED(machine().followPath(path), why);
+  }
+  machine().stop(start({{"x", "y"}, {1.0, 0.0}, false, 1e-6}));
+  awaitRest();
+  bench->axis("x").moveTo(1.0, false, 1e-6);
+  bench->axis("x").stop();
+  awaitRest();
+  EXPECT_EQ(bench->pulses("x"), 0);
+}
+
 TEST_F(Line, FollowsTheSpeedOverrideTogether) {
   const CoordinatedMove move = start({{"x", "y"}, {2.0, 1.4}});
   advance(0.7);

@@ -310,6 +310,30 @@ TEST_F(PathQueue, IsToldItsEndDuringAHold) {
   EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
 }
 
+// At rest a hold and a resume order nothing, whatever comes before and after them.
+TEST_F(PathQueue, IsToldItsEndAfterAHoldAtRest) {
+  for (const bool held_twice : {false, true}) {
+    for (const bool fed_between : {false, true}) {
+      for (const bool fed_after : {false, true}) {
+        build({plotterAxis("x"), plotterAxis("y")});
+        begin(test::circle(), 40);
+        awaitRest();
+        machine().hold();
+        if (fed_between) feed(20);
+        machine().resume();
+        if (held_twice) {
+          machine().hold();
+          machine().resume();
+        }
+        if (fed_after) feed(20);
+        append({}, false);
+        EXPECT_EQ(machine().wait(move_).end, MoveEnd::kReached);
+        bench->axis("x").setPosition(0.0);
+      }
+    }
+  }
+}
+
 TEST_F(PathQueue, RunsMoreSlowlyAtASpeedOverride) {
   const PathRequest path = test::circle();
   machine().setSpeedOverride(0.5);
@@ -332,14 +356,19 @@ TEST_F(PathQueue, EndsWithEverythingThatEndsAPath) {
     const char* name;
     std::function<void()> end;
     MoveEnd how;
+    const char* why;  // of the refusal of an append
   };
   const std::vector<Ending> endings = {
-      {"stop", [this] { machine().stop(); }, MoveEnd::kStopped},
-      {"stop y", [this] { bench->axis("y").stop(); }, MoveEnd::kStopped},
-      {"cancel", [this] { machine().stop(move_); }, MoveEnd::kStopped},
-      {"disable y", [this] { bench->axis("y").enable(false); }, MoveEnd::kStopped},
-      {"emergency stop", [this] { machine().emergencyStop(); }, MoveEnd::kEmergencyStop},
-      {"a move of y", [this] { bench->axis("y").moveTo(0.0); }, MoveEnd::kStopped},
+      {"stop", [this] { machine().stop(); }, MoveEnd::kStopped, "it was stopped"},
+      {"stop y", [this] { bench->axis("y").stop(); }, MoveEnd::kStopped, "it was stopped"},
+      {"cancel", [this] { machine().stop(move_); }, MoveEnd::kStopped, "it was stopped"},
+      {"disable y", [this] { bench->axis("y").enable(false); }, MoveEnd::kStopped, "disabled"},
+      {"emergency stop", [this] { machine().emergencyStop(); }, MoveEnd::kEmergencyStop,
+       "emergency stop"},
+      {"a move of y", [this] { bench->axis("y").moveTo(0.0); }, MoveEnd::kStopped,
+       "y, which it moved together with, was given another goal"},
+      {"a move of x", [this] { bench->axis("x").moveTo(0.0); }, MoveEnd::kReplaced,
+       "a move to 0 m took over"},
   };
   for (const bool starved : {false, true}) {
     for (const Ending& ending : endings) {
@@ -353,9 +382,14 @@ TEST_F(PathQueue, EndsWithEverythingThatEndsAPath) {
       }
       ending.end();
       const CoordinatedResult result = machine().wait(move_);
-      EXPECT_EQ(result.end, ending.how) << result.message;
+      if (ending.how == MoveEnd::kReplaced) {
+        EXPECT_NE(result.end, MoveEnd::kReached) << result.message;
+      } else {
+        EXPECT_EQ(result.end, ending.how) << result.message;
+      }
       EXPECT_REFUSED(feed(20), "doesn't continue");
       awaitRest();
+      EXPECT_REFUSED(append({}), ending.why);
       advance(0.2);
       const auto x = bench->pulses("x");
       EXPECT_REFUSED(feed(20), "doesn't continue");
@@ -377,9 +411,11 @@ TEST_F(PathQueue, EndsAtAnEndstopOfOneOfItsAxes) {
   EXPECT_EQ(result.end, MoveEnd::kEndstopMax);
   EXPECT_NE(result.message.find("y stands at"), std::string::npos) << result.message;
   const auto x = bench->pulses("x");
-  EXPECT_REFUSED(feed(20), "doesn't continue");
+  const auto why = "it moved together with y, which was stopped: the max endstop was met";
+  EXPECT_REFUSED(feed(20), why);
   advance(0.5);
   EXPECT_EQ(bench->pulses("x"), x);
+  EXPECT_REFUSED(append({}, false), why);
   // The next path begins from there.
   bench->rig.setFaults("y", {});
   EXPECT_EQ(finish({{"x", "y"}, {lineTo({0.0, 0.0})}}).end, MoveEnd::kReached);

@@ -128,6 +128,8 @@ std::vector<Act> makeActs() {
        [](Participants& all, int client) { all.appendToPath(client, kX, 0.004, false); }},
       {"append to the path, and end it",
        [](Participants& all, int client) { all.appendToPath(client, kX, 0.002, true); }},
+      {"tell the end of the path",
+       [](Participants& all, int client) { all.appendToPath(client, kX, 0.0, true); }},
       request("jog x", machine::Jog{kX, 0.05, {}}, moving({kX})),
       request("jog z back", machine::Jog{kZ, -0.05, {}}, moving({kZ})),
       request("end the jog of x", machine::Jog{kX, 0.0, {}}, {}),

@@ -187,5 +187,24 @@ TEST(FoundSchedules, ASlowPathStaysWhereItIsSentTo) {
   }
 }
 
+// In variants 1 and 2, x has a brake.
+TEST(FoundSchedules, AnEnableDoesNotSucceedIfAStopComesWhileTheBrakeIsReleased) {
+  for (const int variant : {1, 2}) {
+    for (const char* stop : {"emergency stop", "shut down", "the motor power is lost"}) {
+      for (std::size_t after = 0; after < 60; ++after) {
+        expectGood(
+            {variant, {does(0, 0, "disable x"), does(0, 0, "enable x"), does(1, after, stop)}, {}});
+      }
+    }
+  }
+}
+
+TEST(FoundSchedules, APathThatIsToldItsEndAfterAHoldAtRestEnds) {
+  expectGood({0,
+              {does(0, 0, "path of x and y that is fed"), does(1, 500, "hold"),
+               does(1, 200, "resume"), does(1, 8, "tell the end of the path")},
+              {}});
+}
+
 }  // namespace
 }  // namespace stepdriver::search

@@ -295,6 +295,9 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   answered_[call] = asked.name;
   note("answer of " + asked.name +
        (reply.failure ? ": " + reply.failure->text : std::string(": done")));
+  if (reply.failure && (reply.failure->text.empty() || endsWith(reply.failure->text, ": "))) {
+    oracle_.complain(asked.name + " fails without a reason: " + reply.failure->text);
+  }
   std::array<bool, kAxes> at_fault{};
   const auto snapshot = controller_->snapshot();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -306,6 +309,7 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   oracle_.answered(call, !reply.failure, clock_.now(), at_fault);
   if (!reply.failure && asked.meaning.quiet == Meaning::Quiet::kSlowsDown) checkSlowing(asked);
   const auto* moves = std::get_if<std::vector<axis::Move>>(&reply.value);
+  if (!reply.failure && asked.enables) checkEnabled(asked);
   if (!reply.failure && !asked.goals.empty()) {
     checkMoves(asked, moves != nullptr ? *moves : std::vector<axis::Move>());
   }
@@ -621,6 +625,8 @@ void Participants::post(int client, const std::string& name, machine::Request re
     bool& y = asked.meaning.axes[1];
     x = y = x || y;
   }
+  const auto* enable = std::get_if<machine::Enable>(&request);
+  if (enable != nullptr && enable->on) asked.enables = enable->axis;
   asked.request = std::move(request);
   noteGoals(asked);
   asked.reading = readInputs();
@@ -668,6 +674,7 @@ void Participants::noteServed(Ask& asked) {
   beginHulls(asked);
   if (const auto* set = std::get_if<machine::SetLimits>(&asked.request)) noteLimits(*set);
   const auto found = open_.find(asked.id);
+  close_was_served_ |= std::holds_alternative<machine::Close>(asked.request);
   if (found == open_.end()) return;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     found->second.orders[axis] = ordered_[axis].size();
@@ -894,6 +901,18 @@ void Participants::checkSlowing(const Ask& asked) {
       oracle_.complain(configs_[axis].name + " doesn't slow down after " + asked.name);
     }
   }
+}
+
+// The motor holds the load, and nothing that is known takes its current away.
+void Participants::checkEnabled(const Ask& asked) {
+  const axis::AxisState& state = controller_->snapshot()->axes.at(*asked.enables).state;
+  const bool stopped = engine_->emergencyStopped() || close_was_served_;
+  const bool braked = state.brake_engaged && !state.asleep;
+  if (state.enabled && state.fault.empty() && !stopped && !braked) return;
+  oracle_.complain(configs_[*asked.enables].name + " isn't enabled after " + asked.name + ": " +
+                   (stopped  ? "it was stopped"
+                    : braked ? "its brake is engaged"
+                             : "it has no current or a fault " + state.fault));
 }
 
 void Participants::postInTurn(int client, std::deque<Turn> turns) {
@@ -1142,8 +1161,11 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
                                 : path->along->stateAt(now + kAppendLead).position.value();
   machine::ExtendPath wanted{axis, path->move, {queued, nullptr, passed, passed, true, {}}};
   try {
+    std::vector<machine::PathSegment> segments;
+    if (size != 0.0) segments.push_back(lineTo({size, size / 2.0}));
+    wanted.extension.moves_on = !segments.empty();
     const machine::QueuedPath::Longer longer =
-        queued->extended({lineTo({size, size / 2.0})}, !is_last, passed, changeable);
+        queued->extended(segments, !is_last, passed, changeable);
     wanted.extension.path = longer.path;
     wanted.extension.same_from = longer.same_from;
     wanted.extension.same_until = longer.same_until;
@@ -1176,7 +1198,7 @@ void Participants::moveEnds(const machine::MachineSnapshot& before,
     const machine::AxisSnapshot& own = before.axes.at(axes.at(i));
     for (auto& [name, move] : moves_) {
       if (!own.path || move.id != own.path->move) continue;
-      move.rest = own.path_axis.positionOf(std::nearbyint(targets[i]));
+      move.rest = own.path_axis.positionOf(own.path_axis.restAt(targets[i]));
     }
   }
 }

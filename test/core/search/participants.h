@@ -120,6 +120,7 @@ class Participants {
   /// Two short lines, the second one at a twentieth of the first one's speed.
   void postSlowPath(int client, const std::vector<std::size_t>& axes);
   /// Appends to the path that an axis follows, if it is one; a last segment ends it.
+  /// @param size of the segment; 0: none, only that this is the end.
   void appendToPath(int client, std::size_t axis, double size, bool is_last);
   void emergencyStop(int client);
   void shutDown(int client);
@@ -150,10 +151,11 @@ class Participants {
     machine::Request request;
     machine::InputReading reading;  // before it was posted
     Meaning meaning;
-    std::vector<std::size_t> goals;  ///< axes for which it has a goal
-    std::vector<std::size_t> parts;  ///< axes that it may move, or refuse, one by one
-    bool together = false;           ///< along one path
-    bool begins_later = false;       ///< not when it is answered
+    std::vector<std::size_t> goals;      ///< axes for which it has a goal
+    std::vector<std::size_t> parts;      ///< axes that it may move, or refuse, one by one
+    bool together = false;               ///< along one path
+    bool begins_later = false;           ///< not when it is answered
+    std::optional<std::size_t> enables;  ///< this axis
     bool relative = false;
     std::vector<double> ways;  ///< of a relative goal, by goal
     std::vector<std::optional<double>> targets;
@@ -229,6 +231,7 @@ class Participants {
   std::optional<double> relativeOrigin(std::size_t axis);
   void checkMoves(const Ask& asked, const std::vector<axis::Move>& moves);
   void checkSlowing(const Ask& asked);
+  void checkEnabled(const Ask& asked);
   void serveEngine();
   activity::Reply ask(const std::string& name, machine::Request request, const Meaning& meaning);
   /// Plays on until the condition is true. @return false if that takes too long.
@@ -301,6 +304,7 @@ class Participants {
   std::size_t next_item_ = 0;
   std::size_t item_step_ = 0;
   bool closed_ = false;
+  bool close_was_served_ = false;
   std::vector<std::pair<std::string, axis::Move>> moves_;
   std::optional<std::size_t> never_in_position_;  // how many moves there were by then
   std::array<std::uint64_t, kAxes> last_move_{};
