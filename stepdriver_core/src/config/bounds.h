@@ -2,7 +2,7 @@
 
 #include "stepdriver_core/config/axis_config.h"
 
-/// What numbers of an axis may be, in steps, whoever has set them. The highest are far beyond any
+/// What numbers of an axis may be, in steps, from any source. The highest are far beyond any
 /// machine, and well within what the motion can count and time in 64 bits.
 namespace stepdriver::config {
 
