@@ -204,7 +204,6 @@ void checkKinematics(const AxisConfig& axis, const std::vector<AxisConfig>& axes
 
 void checkAxes(const std::vector<AxisConfig>& axes) {
   std::vector<ConfigIssue> issues;
-  if (axes.empty()) issues.push_back({"axes", "is empty, but must have at least one axis"});
   std::set<std::string> names;
   for (const AxisConfig& axis : axes) {
     if (axis.name.empty() || !names.insert(axis.name).second) {

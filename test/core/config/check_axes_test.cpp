@@ -80,7 +80,6 @@ const std::vector<Wrong>& wrongs() {
        },
        "x/input_shaper: is for 0 Hz"},
       {[](Axes& axes) { axes[1].name = "x"; }, "axes: has an axis named \"x\", but each"},
-      {[](Axes& axes) { axes.clear(); }, "axes: is empty, but must have at least one axis"},
       {[](Axes& axes) {
          axes[0].kinematics = std::make_shared<Kinematics>(
              Kinematics{{"x", "z"}, {{1.0, 1.0}, {1.0, -1.0}}, {{0.5, 0.5}, {0.5, -0.5}}});
