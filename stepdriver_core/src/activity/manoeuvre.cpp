@@ -79,7 +79,9 @@ axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis,
 }
 
 void tell(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
-  if (goal.kind == Goal::Kind::kTogether) {
+  // It may have come to rest alone, after another axis had left the path.
+  const bool along_path = goal.kind == Goal::Kind::kTogether || goal.path_limits.acceleration > 0.0;
+  if (along_path) {
     axis.ended_path =
         std::make_shared<const axis::EndedPath>(axis::EndedPath{goal.move, result.message});
   }

@@ -145,8 +145,9 @@ void refuseIfStopped(const Context& context, const axis::AxisModel& axis) {
 }
 
 void refuseUnlessCurrentStays(const Context& context, const axis::AxisModel& axis) {
-  refuseIfStopped(context, axis);
+  axis.refuseUnlessOpen();
   if (axis.fault) axis.refuse("at fault: " + axis.fault.what() + "; call recover first");
+  refuseIfStopped(context, axis);
 }
 
 void PowerStep::begin() {
