@@ -905,7 +905,7 @@ void Participants::checkSlowing(const Ask& asked) {
 
 // The motor holds the load, and nothing that is known takes its current away.
 void Participants::checkEnabled(const Ask& asked) {
-  const axis::AxisState& state = controller_->snapshot()->axes.at(*asked.enables).state;
+  const axis::AxisState state = controller_->snapshot()->axes.at(*asked.enables).state;
   const bool stopped = engine_->emergencyStopped() || close_was_served_;
   const bool braked = state.brake_engaged && !state.asleep;
   if (state.enabled && state.fault.empty() && !stopped && !braked) return;
@@ -1088,8 +1088,10 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
       {}, {lineTo({size, 0.0}), lineTo({size, size})}, true, 0.0, size / 10.0, true};
   followPath(client, axes, size, request, [this, client, axes] {
     Client& feeds = clients_[static_cast<std::size_t>(client)];
-    feeds.from = clock_.now() + static_cast<pulse::Nanoseconds>(1 + steps_ % 7 * 30) * 1'000'000;
-    feeds.next = [this, client, axes] { appendToPath(client, axes.front(), 0.0, true); };
+    // In motion, or when it waits at its end; with a segment, or with nothing but the end.
+    feeds.from = clock_.now() + static_cast<pulse::Nanoseconds>(1 + steps_ % 13 * 30) * 1'000'000;
+    const double more = steps_ % 2 == 0 ? 0.0 : 0.002;
+    feeds.next = [this, client, axes, more] { appendToPath(client, axes.front(), more, true); };
   });
 }
 
