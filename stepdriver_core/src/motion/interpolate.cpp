@@ -132,7 +132,8 @@ std::vector<Waypoint> interpolate(const MotionState& from, std::vector<Waypoint>
                                     [](const Waypoint& each) { return each.velocity.has_value(); });
   if (complete) return waypoints;
   // The curve leads there: planSpline().
-  waypoints.back().position = static_cast<double>(restingCount(waypoints.back().position));
+  Waypoint& last = waypoints.back();
+  if (!last.may_rest) last.position = static_cast<double>(restingCount(last.position));
   const std::size_t first = waypoints.size() > 1 && waypoints.front().time_ns == 0 ? 1 : 0;
   const KnotSequence knots(from, waypoints, first);
   // Gaussian elimination from the first knot to the last: x = value - next x+.
