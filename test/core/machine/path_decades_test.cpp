@@ -64,7 +64,7 @@ class Decades {
                                        limits.acceleration, limits.jerk);
     }
     drawn.request.tolerance = often(0.3) ? 0.0 : decades(-6.0, 3.0);
-    drawn.request.velocity = often(0.2) ? 0.0 : decades(-6.0, 6.0);
+    drawn.request.velocity = often(0.2) ? 0.0 : decades(-3.0, 6.0);
     drawn.request.more_follows = fed;
     drawn.text += fmt::format("tolerance {:.3g}, velocity {:.3g}; ", drawn.request.tolerance,
                               drawn.request.velocity);
@@ -90,7 +90,7 @@ class Decades {
     const Point way{along_x ? length : length * std::cos(angle),
                     along_x ? 0.0 : length * std::sin(angle)};
     made.end = {place_[0] + way[0], place_[1] + way[1]};
-    if (often(0.3)) made.velocity = decades(-6.0, 6.0);
+    if (often(0.3)) made.velocity = decades(-3.0, 6.0);
     const char* shape = "line";
     if (length > 10.0 && often(0.2)) {
       shape = "arc";
