@@ -14,7 +14,8 @@ enum class Smoothness {
 };
 
 /// Gives a velocity to each waypoint without one and, for kJerk, an acceleration. The last waypoint
-/// gets 0 and, if one has no velocity, the restingCount() of its position. At the others, the curve of planSpline() for the result
+/// gets 0 and, if one has no velocity, the restingCount() of its position. At the others, the curve
+/// of planSpline() for the result
 /// - has a continuous acceleration (kAcceleration): the cubic spline with given end slopes of
 ///   C. de Boor, A Practical Guide to Splines, chapter IV. For slopes m = (p1 - p0)/T of the two
 ///   segments, v- /T- + 2 v (1/T- + 1/T+) + v+ /T+ = 3 (m- /T- + m+ /T+);

@@ -199,12 +199,5 @@ TEST(FoundSchedules, AnEnableDoesNotSucceedIfAStopComesWhileTheBrakeIsReleased) 
   }
 }
 
-TEST(FoundSchedules, APathThatIsToldItsEndAfterAHoldAtRestEnds) {
-  expectGood({0,
-              {does(0, 0, "path of x and y that is fed"), does(1, 500, "hold"),
-               does(1, 200, "resume"), does(1, 8, "tell the end of the path")},
-              {}});
-}
-
 }  // namespace
 }  // namespace stepdriver::search
