@@ -185,8 +185,9 @@ class Machine {
   /// in the calling thread and delays no other call.
   ///
   /// @throw Refused as moveTo(), and if one of the axes moves, if the request is malformed, if a
-  ///   segment leads beyond a soft limit, if an arc has no circle, if a Bezier has a cusp, or if one of the axes was stopped while this was planned; the message names the
-  ///   segment (the first is 0). Then nothing moves.
+  ///   segment leads beyond a soft limit, if an arc has no circle, if a Bezier has a cusp, or if
+  ///   one of the axes was stopped while this was planned; the message names the segment (the first
+  ///   is 0). Then nothing moves.
   CoordinatedMove followPath(const PathRequest& request);
 
   /// Appends segments to a path that began with PathRequest::more_follows: the axes don't stop at
