@@ -112,7 +112,7 @@ class PreparedTrajectory {
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
-  bool lone_position_ = false;  // of its only point, only the positions count
+  bool lone_position_ = false;   // of its only point, only the positions count
   bool has_velocities_ = false;  // at all points
   bool allow_slower_ = false;
 };

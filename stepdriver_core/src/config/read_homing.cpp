@@ -96,8 +96,8 @@ class HomingReader {
     const auto travel = homing_.findNumber(travel_key, Range::positive(), Presence::kRequired);
     const double steps = config_.steps_per_unit / units(1.0);
     if (travel && steps > 0.0 && *travel * steps > kFarthestTravel) {
-      mustBe(travel_key,
-             fmt::format("at most {}, which is 2^40 steps", upperBoundText(kFarthestTravel / steps)));
+      mustBe(travel_key, fmt::format("at most {}, which is 2^40 steps",
+                                     upperBoundText(kFarthestTravel / steps)));
     }
     const auto pull_off =
         homing_.findNumber(pull_off_key, Range::notNegative(), Presence::kRequired);

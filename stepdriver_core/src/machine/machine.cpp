@@ -253,12 +253,8 @@ class Machine::Impl {
         QueuedPath::Longer longer = queued->extended(request.segments, request.more_follows,
                                                      std::max(0.0, passed - kKept), changeable);
         continued = disposer_.keep(std::move(longer.path));
-        extension = {queued,
-                     continued,
-                     longer.same_from,
-                     longer.same_until,
-                     longer.moves_on,
-                     continued->targets()};
+        extension = {queued,          continued,           longer.same_from, longer.same_until,
+                     longer.moves_on, continued->targets()};
       } catch (const Interrupted&) {  // NOLINT(bugprone-empty-catch): the controller knows why
       }
       const activity::Reply reply = shell_->call(ExtendPath{*id, path.move, extension});

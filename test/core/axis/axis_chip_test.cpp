@@ -185,8 +185,9 @@ TEST(AxisChip, CountsTheTranslatorFromHomeAfterAReset) {
 
 TEST(AxisChip, RefusesToSetTheMicrostepsOfATb6600) {
   Bench bench({linearAxis("x", "tb6600")});
-  EXPECT_REFUSED(bench.axis().setMicrosteps(8),
-                 "it can't change to 8 microsteps: those of the TB6600 are set by its DIP switches");
+  EXPECT_REFUSED(
+      bench.axis().setMicrosteps(8),
+      "it can't change to 8 microsteps: those of the TB6600 are set by its DIP switches");
   EXPECT_REFUSED(bench.axis().sleep(true), "no SLEEP pin");
   EXPECT_REFUSED(bench.axis().reset(), "no RESET pin");
 }

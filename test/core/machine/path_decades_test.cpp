@@ -20,8 +20,8 @@
 #include "support/constants.h"
 #include "support/planned_path.h"
 
-// Paths whose lengths, speeds, accelerations, jerks and tolerances are drawn over many decades: what
-// their steps say, not their plans.
+// Paths whose lengths, speeds, accelerations, jerks and tolerances are drawn over many decades:
+// what their steps say, not their plans.
 
 namespace stepdriver {
 namespace {
@@ -180,8 +180,8 @@ class Hull {
 
 // The microstep itself, half a one of each axis, and what the plan may deviate by.
 constexpr double kNear = 1.0 + 0.71 + 0.2;
-// Of a speed: each of two steps may come too soon or too late by a hundredth of a microstep, in which
-// cubics replace a quintic, and by as much where a plan leaves out what makes no difference.
+// Of a speed: each of two steps may come too soon or too late by a hundredth of a microstep, in
+// which cubics replace a quintic, and by as much where a plan leaves out what makes no difference.
 constexpr double kMostOver = 1.05;
 constexpr double kRounding = 2e-9;  // s, of the times of two steps
 

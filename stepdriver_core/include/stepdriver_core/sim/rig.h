@@ -118,7 +118,7 @@ struct RigAxisSpec {
   double load_falls = 0.0;
   std::optional<SpringSpec> spring;
   std::optional<MotorLimits> limits;  ///< empty: its motor may do anything
-  std::optional<MotorSpec> motor;  ///< empty: its rotor follows the field whatever comes
+  std::optional<MotorSpec> motor;     ///< empty: its rotor follows the field whatever comes
 };
 
 /// Axes whose motors together move their carriages, as on a CoreXY. A turn of the n-th axis's motor
