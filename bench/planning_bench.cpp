@@ -89,7 +89,7 @@ void planCase(const Case& one) {
 struct Line {
   std::vector<axis::PathAxis> axes;
   std::vector<axis::PathStart> starts;
-  std::vector<std::int64_t> targets;
+  std::vector<double> targets;
 };
 
 Line randomLine(std::mt19937_64& random) {
@@ -106,7 +106,7 @@ Line randomLine(std::mt19937_64& random) {
     axis::PathStart start;
     start.motor = one.from;
     line.starts.push_back(start);
-    line.targets.push_back(one.target);
+    line.targets.push_back(static_cast<double>(one.target));
   }
   return line;
 }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/AxisStates.h>
+#include <stepdriver/SetPosition.h>
 
 #include <algorithm>
 #include <cmath>
