@@ -558,7 +558,9 @@ void Manoeuvre::tryAgain() {
   lead_ *= 2;
   try {
     if (!started_ && mode_ != Mode::kRun) {
-      throw Refused(orders_.front().axis->name() + ": " + why_.text);
+      const std::string why =
+          mode_ == Mode::kHold ? "a hold came before its motion began" : why_.text;
+      throw Refused(orders_.front().axis->name() + ": " + why);
     }
     if (!slowsDown()) {
       for (const Order& order : orders_) {

@@ -121,9 +121,9 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
 
 // An axis that a program has added is as configured.
 const SimulatedAxis& simulatedOf(const SimulationConfig& config, const AxisConfig& axis) {
-  static const SimulatedAxis kAsConfigured;
+  static const SimulatedAxis as_configured;
   const auto found = config.axes.find(axis.name);
-  return found != config.axes.end() ? found->second : kAsConfigured;
+  return found != config.axes.end() ? found->second : as_configured;
 }
 
 std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,

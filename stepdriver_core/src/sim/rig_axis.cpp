@@ -12,8 +12,6 @@
 namespace stepdriver::sim {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const std::vector<int>& known = spec.chip.microsteps;
   const bool is_known =

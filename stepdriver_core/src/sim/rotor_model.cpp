@@ -6,7 +6,6 @@
 namespace stepdriver::sim {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kCycle = 2.0 * kPi;
 // A rotor beyond the middle between two cycles may still be carried back. It has lost its steps
 // when it is at the steepest place of the next cycle.

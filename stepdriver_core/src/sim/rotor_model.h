@@ -7,6 +7,8 @@
 
 namespace stepdriver::sim {
 
+constexpr double kPi = 3.14159265358979323846;
+
 /// The rotor of a hybrid stepper in the field of its coils.
 ///
 /// With e the electrical angle by which the field leads the rotor, w the frequency of its small

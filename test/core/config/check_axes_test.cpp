@@ -28,7 +28,7 @@ Axes goodAxes() {
   return axes;
 }
 
-std::string issuesOf(const std::function<void(Axes&)>& change) {
+std::string mistakesOf(const std::function<void(Axes&)>& change) {
   Axes axes = goodAxes();
   change(axes);
   try {
@@ -94,9 +94,9 @@ const std::vector<Wrong>& wrongs() {
 }
 
 TEST(CheckAxes, ReportsWhatNoMotionCanBePlannedWith) {
-  EXPECT_EQ(issuesOf([](Axes&) {}), "");
+  EXPECT_EQ(mistakesOf([](Axes&) {}), "");
   for (const Wrong& wrong : wrongs()) {
-    const std::string issues = issuesOf(wrong.change);
+    const std::string issues = mistakesOf(wrong.change);
     EXPECT_NE(issues.find(wrong.issue), std::string::npos) << wrong.issue << "\n" << issues;
   }
 }

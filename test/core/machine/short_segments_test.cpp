@@ -26,7 +26,7 @@ using test::pathAxis;
 using test::planned;
 using test::PlannedPath;
 
-constexpr double kScale = 80'000.0;  // microsteps/m
+constexpr double kPerMetre = 80'000.0;  // microsteps/m
 
 PathSegment lineTo(double x, double y) {
   PathSegment segment;
@@ -51,8 +51,8 @@ class ShortSegments : public testing::TestWithParam<double> {
  protected:
   PlannedPath follow(const PathRequest& request) const { return planned(request, axes()); }
   std::vector<axis::PathAxis> axes() const {
-    return {pathAxis("x", {kScale, 0.1, 1.0, GetParam()}),
-            pathAxis("y", {kScale, 0.1, 1.0, GetParam()})};
+    return {pathAxis("x", {kPerMetre, 0.1, 1.0, GetParam()}),
+            pathAxis("y", {kPerMetre, 0.1, 1.0, GetParam()})};
   }
   void expectSameSteps(const PathRequest& request, const PathRequest& plain) const {
     const PlannedPath path = follow(request);
@@ -120,7 +120,7 @@ TEST_P(ShortSegments, AnEndNextToAMicrostepIsReached) {
     for (const double off : {1e-17, -4.9e-18, 1e-14, 3e-11, -3e-11}) {
       SCOPED_TRACE(std::to_string(away) + " m and " + std::to_string(off * 1e15) + " fm");
       const PlannedPath path = follow(pathOf({lineTo(away + 0.01, 0.0), lineTo(away + off, 0.0)}));
-      EXPECT_EQ(path.endCount(0), std::llround(away * kScale));
+      EXPECT_EQ(path.endCount(0), std::llround(away * kPerMetre));
       EXPECT_NEAR(path.duration(), clean, 1e-3);
     }
   }
@@ -163,11 +163,11 @@ TEST_P(ShortSegments, AnArcWithTwoRadiiEndsAtItsEnd) {
         continue;
       }
       const PlannedPath path = follow(request);
-      EXPECT_EQ(path.endCount(0), std::llround(x * kScale));
-      EXPECT_EQ(path.endCount(1), std::llround(y * kScale));
+      EXPECT_EQ(path.endCount(0), std::llround(x * kPerMetre));
+      EXPECT_EQ(path.endCount(1), std::llround(y * kPerMetre));
       const auto steps = static_cast<double>(path.steps(1).size());
       if (turn < 1.0) continue;
-      EXPECT_NEAR(steps, 4.0 * given.radius * kScale, 6.0 + 0.004 * steps);
+      EXPECT_NEAR(steps, 4.0 * given.radius * kPerMetre, 6.0 + 0.004 * steps);
     }
   }
 }
