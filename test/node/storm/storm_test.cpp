@@ -227,8 +227,11 @@ void Storm::repair() {
 }
 
 void Storm::noteRest() {
-  if (!waitUntil([&] { return !isAlive() || states_->atRest(); })) {
-    fail("the axes don't come to rest after a stop");
+  // A state that is under way may be from before the last motion began.
+  const int known = states_->count();
+  if (!waitUntil(
+          [&] { return !isAlive() || (states_->count() > known + 1 && states_->atRest()); })) {
+    fail("the axes don't come to rest");
     return;
   }
   // States that are received from now on are states of rest. The rest is noted with the time of its
