@@ -199,5 +199,10 @@ TEST(FoundSchedules, AnEnableDoesNotSucceedIfAStopComesWhileTheBrakeIsReleased) 
   }
 }
 
+TEST(FoundSchedules, AHoldBeforeAMotionHasBegunIsNamedAsTheReason) {
+  expectGood(
+      {0, {does(0, 0, "trajectory of x and y"), does(1, 0, "hold")}, {{3, Who::kEngine, 4}}});
+}
+
 }  // namespace
 }  // namespace stepdriver::search
