@@ -783,12 +783,15 @@ void Participants::beginHulls(const Ask& asked) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const bool moves = asked.meaning.moves && asked.meaning.axes[axis];
     if (!moves) continue;
+    const double backlash = configs_[axis].backlash * configs_[axis].steps_per_unit;
+    const auto snapshot = controller_->snapshot();
+    const double step = configs_[axis].steps_per_unit / snapshot->axes.at(axis).steps_per_unit;
+    const double tolerance = kHullTolerance * step + backlash;
     if (mayRest(axis, asked.id)) {
       checkHull(axis);
-      const double backlash = configs_[axis].backlash * configs_[axis].steps_per_unit;
-      const auto snapshot = controller_->snapshot();
-      const double step = configs_[axis].steps_per_unit / snapshot->axes.at(axis).steps_per_unit;
-      hulls_[axis].begin(placeOnRig(axis), kHullTolerance * step + backlash);
+      hulls_[axis].begin(placeOnRig(axis), tolerance);
+    } else {
+      hulls_[axis].widen(tolerance);
     }
     widenHull(asked, axis);
   }
