@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "support/node_under_test.h"
+#include "support/rotary_axis.h"
 #include "support/says.h"
 #include "support/wait.h"
 
@@ -21,21 +22,6 @@ std::string robot(const std::string& type, const std::string& limit) {
 
 const char* const kTighter = R"(<limit lower="0.02" upper="0.05" velocity="0.05" effort="1"/>)";
 const char* const kLooser = R"(<limit lower="-9" upper="9" velocity="9" effort="1"/>)";
-
-/// An axis in degrees instead of the linear one.
-void makeRotary(NodeUnderTest& node) {
-  node.erase("axes/x");
-  node.set("axes/x/driver", "drv8825");
-  node.set("axes/x/joint", "x_joint");
-  node.set("axes/x/pins/step", "x_step");
-  node.set("axes/x/pins/dir", "x_dir");
-  node.set("axes/x/pins/enable", "x_enable");
-  node.set("axes/x/microsteps", 16);
-  node.set("axes/x/full_steps_per_round", 200);
-  node.set("axes/x/max_speed_deg_s", 180.0);
-  node.set("axes/x/acceleration_deg_s2", 360.0);
-  node.set("axes/x/enable_on_start", true);
-}
 
 TEST(RobotDescription, ThatIsAbsentIsSaidAndNoMistake) {
   NodeUnderTest node;

@@ -14,6 +14,7 @@
 #include "support/control_msgs_client.h"
 #include "support/node_under_test.h"
 #include "support/recorder.h"
+#include "support/rotary_axis.h"
 #include "support/says.h"
 #include "support/two_axes.h"
 #include "support/wait.h"
@@ -312,17 +313,7 @@ TEST_F(TrajectoryActionTest, EndsAbortedOutsideTheGoalTolerance) {
 }
 
 TEST_F(TrajectoryActionTest, GoesToTheNearestTurnOfAContinuousJoint) {
-  node.erase("axes/x");
-  node.set("axes/x/driver", "drv8825");
-  node.set("axes/x/joint", "x_joint");
-  node.set("axes/x/pins/step", "x_step");
-  node.set("axes/x/pins/dir", "x_dir");
-  node.set("axes/x/pins/enable", "x_enable");
-  node.set("axes/x/microsteps", 16);
-  node.set("axes/x/full_steps_per_round", 200);
-  node.set("axes/x/max_speed_deg_s", 180.0);
-  node.set("axes/x/acceleration_deg_s2", 360.0);
-  node.set("axes/x/enable_on_start", true);
+  makeRotary(node);
   node.set("axes/x/continuous", true);
   start();
   SetPosition::Request set;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kSlack = 1.0 + 1e-9;  // for the rounding of decimal numbers
 constexpr double kWorstCondition = 100.0;
-constexpr double kMostRatio = 100.0;  // of the ways of a motor and an axis, either way
+constexpr double kMostRatio = 100.0;  // between the ways of a motor and an axis, either way
 
 /// The named arrangements of two axes: what each motor moves by for a unit of each axis.
 struct NamedMatrix {

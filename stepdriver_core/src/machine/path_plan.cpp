@@ -90,7 +90,7 @@ double roundingOf(double count) {
 // the limits, and the rounded time of a point after a hundred years half a percent of the duration.
 double restTime(double way, const PathAxis& axis, double count, bool smooth) {
   constexpr double kShortest = 1e-4;      // s
-  constexpr double kMostRounding = 1e-3;  // of a limit
+  constexpr double kMostRounding = 1e-3;  // as a part of a limit
   const motion::MotionLimits& limits = axis.limits;
   way = std::max(way, roundingOf(count) / kMostRounding);
   const double wanted = way / shareOf(axis);
