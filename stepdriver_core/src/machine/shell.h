@@ -4,7 +4,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -14,25 +13,22 @@
 #include <unordered_map>
 #include <vector>
 
-#include "controller.h"
-#include "flight_recorder.h"
 #include "gpio/line_writers.h"
+#include "pulse/futex.h"
 #include "pulse/pulse_engine.h"
 #include "pulse/pulse_thread.h"
-#include "requests.h"
-#include "snapshot.h"
+#include "shell_core.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "told_levels.h"
 
 namespace stepdriver::machine {
 
-/// Runs a controller: passes all events to it in order, and carries out its outputs. It has threads
-/// of its own or, without threads, is a pump that the waiting caller drives.
+/// Puts threads around a controller's ShellCore: the controller's own, the pulse thread, the
+/// watcher of the inputs. Without threads it is a pump that the waiting caller drives.
 ///
 /// The calls of clients are safe from any thread. Mutexes protect what they write and read, and are
-/// never held for longer than a copy takes.
-class Shell : public pulse::NewsListener {
+/// never held for longer than a copy takes; the pulse thread takes none.
+class Shell : public pulse::NewsListener, private ShellCore::Host {
  public:
   struct Options {
     bool threaded = true;
@@ -92,82 +88,57 @@ class Shell : public pulse::NewsListener {
   struct Call {
     std::optional<activity::Reply> reply;
   };
-  struct Item {
-    activity::CallId call = 0;
-    Request request;
-  };
+
+  void turnEnded(const MachineSnapshot& before, const std::shared_ptr<const MachineSnapshot>& now,
+                 activity::Outputs& out) override;
+  void write(const activity::PinJob& job) override;
 
   void run();
+  bool beginRound();
   void watchInputs();
-  InputReading readInputs();
-  /// Queues what the controller must be told of it. Call it with the mutex. @return whether that is
-  /// anything.
-  bool queue(const InputReading& reading);
   bool feedInputs();
-  bool feedWhatIsWatched();
   bool turn();
-  bool takeNews();
-  void handle(decltype(Input::what) what);
-  void carryOut(const Input& input, activity::Outputs& out);
-  void postCommands();
-  bool ordersAreOpen() const;
   pulse::Nanoseconds alarm() const;
   void settle();
   bool isAwaited();
   bool mustWatchPulses() const;
   void watchPulses();
-  void answer(activity::CallId call, activity::Reply reply);
 
   Controller& controller_;
   pulse::PulseEngine& engine_;
   pulse::Clock& clock_;
   const std::shared_ptr<gpio::Lines> lines_;
-  const int inputs_;
+  const bool has_inputs_;
   const bool threaded_;
   const std::function<void()> on_motion_;
   const std::int64_t most_looks_in_vain_;
-  FlightRecorder* const recorder_;
   gpio::LineWriters writers_;
 
-  // From clients and watchers.
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::deque<Item> requests_;
-  std::vector<InputRead> reads_;
-  ToldLevels told_levels_;
-  std::atomic<std::uint64_t> readings_{0};  // that have begun
-  std::vector<gpio::EdgeEvent> edges_;
-  std::uint64_t rounds_ = 0;  // of the controller's thread
+  ShellCore core_;
+  pulse::WakeFlag wake_;  // of the controller's thread
+  std::atomic<bool> ending_{false};
+  std::atomic<activity::CallId> calls_{0};
+
+  std::mutex rounds_mutex_;
   std::condition_variable round_ended_;
-  bool ending_ = false;
-  bool woken_ = false;
-  activity::CallId calls_ = 0;
+  std::uint64_t rounds_ = 0;  // of the controller's thread
 
   // To clients.
   mutable std::mutex answers_mutex_;
   std::condition_variable answered_;
   std::unordered_map<activity::CallId, Call> answers_;
-  std::uint64_t turns_ = 0;
+  std::uint64_t changes_ = 0;      // that a waiting client may want to look at
   std::uint64_t turns_ended_ = 0;  // of the controller
   std::string why_hung_;
   std::shared_ptr<const MachineSnapshot> snapshot_;
 
-  // From the pulse thread.
-  std::atomic<bool> news_{true};
   std::atomic<bool> news_hold_{false};  // the clock is held for news that hasn't been handled yet
 
   // Of the thread that runs the controller.
-  std::atomic<std::uint64_t> turns_begun_{0};  // which others read
-  std::deque<pulse::Command> outbox_;
-  std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
-  EngineNews news_seen_;
   std::uint64_t passes_seen_ = 0;   // of the pulse thread
   std::int64_t looks_in_vain_ = 0;  // since it has begun or ended a pass
   std::int64_t next_look_ns_ = 0;
   pulse::Nanoseconds engine_due_ = 0;
-  // Of the controller, which changes only when it handles an input.
-  pulse::Nanoseconds due_;
-  bool watches_;  // the inputs
 
   std::optional<pulse::PulseThread> pulse_thread_;
   std::thread watcher_;

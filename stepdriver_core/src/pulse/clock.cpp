@@ -1,14 +1,10 @@
 #include "stepdriver_core/pulse/clock.h"
 
-#include <linux/futex.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 
+#include "pulse/futex.h"
 #include "pulse/hybrid_wait.h"
 #include "steady_now.h"
 
@@ -17,23 +13,6 @@ namespace {
 
 // How often a thread that waits for a paced clock looks at the time.
 constexpr Nanoseconds kLook = VirtualClock::kStall / 10;
-
-// The call that takes the C library's timespec. A computer of 32 bits has two.
-#ifdef SYS_futex_time64
-constexpr long kFutex = sizeof(timespec) == 2 * sizeof(long) ? SYS_futex : SYS_futex_time64;
-#else
-constexpr long kFutex = SYS_futex;
-#endif
-
-// Sleeps until the time of CLOCK_MONOTONIC or until the word changes from this value, or for a
-// shorter time.
-void sleepOnWord(Nanoseconds time, std::atomic<std::uint32_t>& word, std::uint32_t value) {
-  timespec deadline{};
-  deadline.tv_sec = static_cast<time_t>(time / 1'000'000'000);
-  deadline.tv_nsec = static_cast<decltype(deadline.tv_nsec)>(time % 1'000'000'000);
-  syscall(kFutex, reinterpret_cast<std::uint32_t*>(&word), FUTEX_WAIT_BITSET_PRIVATE, value,
-          time == kNever ? nullptr : &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
-}
 
 // The calling thread, as a system for HybridWait.
 struct WakeableThread {
@@ -69,8 +48,7 @@ void SteadyClock::wait(Nanoseconds time, bool may_spin) {
 
 void SteadyClock::wake() {
   wakes_.fetch_add(1, std::memory_order_release);
-  syscall(kFutex, reinterpret_cast<std::uint32_t*>(&wakes_), FUTEX_WAKE_PRIVATE, 1, nullptr,
-          nullptr, 0);
+  wakeSleeper(wakes_);
 }
 
 VirtualClock::VirtualClock(double speed) : speed_(speed), started_(steadyNow()) {}

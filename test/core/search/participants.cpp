@@ -198,7 +198,6 @@ Participants::Participants(const Schedule& schedule)
     : schedule_(schedule),
       configs_(configsOf(schedule.variant)),
       oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
-      clock_(0.0),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
       rig_(rigOf(configs_, schedule), trace_, test::Bench::couplings(configs_),
            test::Bench::motorPowerOf(optionsOf(schedule.variant))),
@@ -215,11 +214,12 @@ Participants::Participants(const Schedule& schedule)
       configs_, wiring_.motor_lines, std::move(names), wiring_.emergency_stop,
       emergencyDisableOf(schedule.variant), wiring_.motorPower(optionsOf(schedule.variant)));
   if (ramps()) engine_->rampStops(machine::longestRamp(configs_));
-  engine_->listen(news_);
-  told_levels_ = machine::ToldLevels(wiring_.inputs.size());
-  const machine::InputReading first = readInputs();
-  watched_ = first.levels;
-  queue(first);
+  core_ = std::make_unique<machine::ShellCore>(*controller_, *engine_, clock_, lines_,
+                                               wiring_.inputs.size(), static_cast<Host&>(*this),
+                                               nullptr);
+  news_ = std::make_unique<News>(*core_);
+  engine_->listen(*news_);
+  watched_ = readInputs();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     hulls_[axis].begin(0.0, kHullTolerance);
     lowest_limits_[axis].deceleration = configs_[axis].deceleration;
@@ -234,28 +234,11 @@ Participants::Participants(const Schedule& schedule)
 
 // ---- the shell ----
 
-void Participants::handle(decltype(machine::Input::what) what) {
-  activity::Outputs out;
-  machine::Input input;
-  input.now = clock_.now();
-  input.slipped = engine_->state().slipped;
-  input.stops_asked = engine_->stopsAsked();
-  input.what = std::move(what);
-  controller_->handle(input, out);
-  carryOut(out);
-}
-
-void Participants::carryOut(activity::Outputs& out) {
+void Participants::turnEnded(const machine::MachineSnapshot& /*before*/,
+                             const std::shared_ptr<const machine::MachineSnapshot>& /*now*/,
+                             activity::Outputs& out) {
   for (auto& [call, reply] : out.answers) answer(call, std::move(reply));
-  if (out.stops) {
-    engine_->stopAtOnce();
-    engine_called_ = true;
-  }
-  if (out.clear_stops != 0) {
-    engine_->clearEmergencyStop(out.clear_stops);
-    engine_->inputsChanged();
-    engine_called_ = engine_reads_inputs_ = true;
-  }
+  if (out.clear_stops != 0) engine_reads_inputs_ = true;
   for (const pulse::Command& command : out.commands) {
     for (std::size_t i = 0; i < command.follow_count; ++i) {
       const pulse::Follow& follow = command.follows[i];
@@ -263,24 +246,16 @@ void Participants::carryOut(activity::Outputs& out) {
           .push_back({follow.serial, follow.group != 0});
     }
   }
-  outbox_.insert(outbox_.end(), out.commands.begin(), out.commands.end());
-  postCommands();
-  for (const activity::PinJob& job : out.pin_jobs) {
-    Job written;
-    written.job = job;
-    written.deadline = clock_.now() + kWriteTimeout;
-    written.returns = clock_.now() + std::exchange(next_pin_hang_, 0);
-    written.error = std::exchange(next_pin_error_, 0);
-    pins_failed_ = pins_failed_ || written.error != 0 || written.returns != clock_.now();
-    jobs_.push_back(written);
-  }
 }
 
-void Participants::postCommands() {
-  while (!outbox_.empty() && engine_->post(outbox_.front())) {
-    outbox_.pop_front();
-    engine_called_ = true;
-  }
+void Participants::write(const activity::PinJob& job) {
+  Job written;
+  written.job = job;
+  written.deadline = clock_.now() + kWriteTimeout;
+  written.returns = clock_.now() + std::exchange(next_pin_hang_, 0);
+  written.error = std::exchange(next_pin_error_, 0);
+  pins_failed_ = pins_failed_ || written.error != 0 || written.returns != clock_.now();
+  jobs_.push_back(written);
 }
 
 void Participants::answer(std::uint64_t call, activity::Reply reply) {
@@ -348,17 +323,13 @@ void Participants::noteRefusals(std::uint64_t call, const Ask& asked,
   }
 }
 
-machine::InputReading Participants::readInputs() {
-  machine::InputReading reading{++readings_, {}};
-  reading.levels.reserve(wiring_.inputs.size());
+std::vector<int> Participants::readInputs() {
+  std::vector<int> levels;
+  levels.reserve(wiring_.inputs.size());
   for (int input = 0; input < static_cast<int>(wiring_.inputs.size()); ++input) {
-    reading.levels.push_back(lines_->read(input));
+    levels.push_back(lines_->read(input));
   }
-  return reading;
-}
-
-void Participants::queue(const machine::InputReading& reading) {
-  for (const machine::InputRead& read : told_levels_.differences(reading)) reads_.push_back(read);
+  return levels;
 }
 
 // ---- steps ----
@@ -370,17 +341,17 @@ bool Participants::canGo(Who who) {
   };
   switch (who) {
     case Who::kNews:
-      return news_.any;
+      return core_->hasNews();
     case Who::kPinDone:
       return !pins_done_.empty();
     case Who::kInput:
-      return !reads_.empty() || !edges_.empty();
+      return core_->hasInput();
     case Who::kRequest:
       return !requests_.empty();
     case Who::kTimer:
-      return clock_.now() >= controller_->due();
+      return clock_.now() >= core_->due();
     case Who::kEngine:
-      return engine_called_ || clock_.now() >= engine_due_;
+      return clock_.woken || clock_.now() >= engine_due_;
     case Who::kWriter:
       return !jobs_.empty() && (jobs_.front().returns <= clock_.now() ||
                                 std::any_of(jobs_.begin(), jobs_.end(), [this](const Job& job) {
@@ -388,7 +359,7 @@ bool Participants::canGo(Who who) {
                                 }));
     case Who::kWatcher: {
       if (watch_due_ != pulse::kNever) return clock_.now() >= watch_due_;
-      return readInputs().levels != watched_;
+      return readInputs() != watched_;
     }
     case Who::kClientA:
       return has_next(0);
@@ -437,16 +408,7 @@ void Participants::go(Who who) {
   if (log_ && who != Who::kEngine && who != Who::kClock) note(nameOf(who));
   switch (who) {
     case Who::kNews: {
-      news_.any = false;
-      machine::EngineNews news;
-      news.stops_ramping = engine_->stopsRamping();
-      news.stops_served = engine_->stopsServed();
-      news.input_stops = engine_->inputStops();
-      for (std::size_t i = 0; i < kAxes; ++i) {
-        news.channels.push_back(engine_->channel(static_cast<int>(i)));
-      }
-      handle(std::move(news));
-      postCommands();
+      core_->takeNews();
       for (Client& client : clients_) {
         if (!client.waits_for_stops) continue;
         if (controller_->snapshot()->stops_handled < *client.waits_for_stops) continue;
@@ -461,36 +423,28 @@ void Participants::go(Who who) {
     case Who::kPinDone: {
       const activity::PinDone done = pins_done_.front();
       pins_done_.pop_front();
-      return handle(done);
+      return core_->handle(done);
     }
-    case Who::kInput: {
-      if (!edges_.empty()) {
-        const machine::InputEdge edge{edges_.front()};
-        edges_.pop_front();
-        return handle(edge);
-      }
-      const machine::InputRead read = reads_.front();
-      reads_.pop_front();
-      return handle(read);
-    }
+    case Who::kInput:
+      core_->takeInput();
+      return;
     case Who::kRequest: {
-      // Everything that was seen before the request was handed over comes before it.
-      for (; !edges_.empty(); edges_.pop_front()) handle(machine::InputEdge{edges_.front()});
+      while (core_->takeInput()) {
+      }
       Ask asked = std::move(requests_.front());
       requests_.pop_front();
-      queue(asked.reading);
-      for (; !reads_.empty(); reads_.pop_front()) handle(reads_.front());
       oracle_.served(asked.id, asked.name, asked.meaning);
       noteServed(asked);
-      return handle(machine::Requested{asked.id, std::move(asked.request)});
+      core_->takeRequest();
+      return;
     }
     case Who::kTimer:
-      return handle(machine::TimerDue{});
+      core_->takeTime();
+      return;
     case Who::kEngine:
-      serveEngine();
-      return postCommands();
+      return serveEngine();
     case Who::kWriter:
-      return write();
+      return writeLines();
     case Who::kWatcher:
       return watch();
     case Who::kClientA:
@@ -506,7 +460,7 @@ void Participants::go(Who who) {
 
 void Participants::serveEngine() {
   const bool reads = std::exchange(engine_reads_inputs_, false);
-  engine_called_ = false;
+  clock_.woken = false;
   engine_waits_since_ = pulse::kNever;
   engine_due_ = engine_->serve();
   if (std::exchange(input_stops_, engine_->inputStops()) != input_stops_) {
@@ -518,7 +472,7 @@ void Participants::serveEngine() {
   }
 }
 
-void Participants::write() {
+void Participants::writeLines() {
   if (jobs_.front().returns <= clock_.now()) {
     const Job job = jobs_.front();
     jobs_.pop_front();
@@ -551,16 +505,14 @@ void Participants::watch() {
   }
   watch_due_ = pulse::kNever;
   engine_->inputsChanged();
-  engine_called_ = engine_reads_inputs_ = true;
-  const machine::InputReading reading = readInputs();
-  watched_ = reading.levels;
-  for (int i = 0; i < count; ++i) edges_.push_back(events.at(static_cast<std::size_t>(i)));
-  queue(reading);
+  engine_reads_inputs_ = true;
+  watched_ = readInputs();
+  core_->watchInputs(events.data(), count);
 }
 
 pulse::Nanoseconds Participants::nextDue() {
   const pulse::Nanoseconds now = clock_.now();
-  const bool engine_waits = engine_called_ || engine_due_ <= now;
+  const bool engine_waits = clock_.woken || engine_due_ <= now;
   if (!engine_waits) engine_waits_since_ = pulse::kNever;
   if (engine_waits) engine_waits_since_ = std::min(engine_waits_since_, now);
   pulse::Nanoseconds due = pulse::kNever;
@@ -568,7 +520,7 @@ pulse::Nanoseconds Participants::nextDue() {
     if (time > now) due = std::min(due, time);
   };
   look(engine_due_);
-  look(controller_->due());
+  look(core_->due());
   look(watch_due_);
   for (const Client& client : clients_) {
     if (client.next) look(client.from);
@@ -629,12 +581,14 @@ void Participants::post(int client, const std::string& name, machine::Request re
   if (enable != nullptr && enable->on) asked.enables = enable->axis;
   asked.request = std::move(request);
   noteGoals(asked);
-  asked.reading = readInputs();
   asked.posted = clock_.now();
   asked.posted_step = steps_;
   open_[asked.id] = asked;
   open_[asked.id].request = machine::StopAll{};
   clients_[static_cast<std::size_t>(client)].waits_for = asked.id;
+  if (const std::string why = core_->post(asked.id, asked.request); !why.empty()) {
+    oracle_.complain(name + " isn't taken: " + why);
+  }
   requests_.push_back(std::move(asked));
   if (std::holds_alternative<machine::SetPosition>(requests_.back().request) ||
       std::holds_alternative<machine::Home>(requests_.back().request)) {
@@ -741,7 +695,7 @@ bool Participants::mayRest(std::size_t axis, std::uint64_t call) {
   if (waits_[axis] || state.moving || state.held || state.homing != axis::HomingPhase::kNone) {
     return false;
   }
-  if (engine_->channel(static_cast<int>(axis)).following != 0 || !outbox_.empty()) return false;
+  if (engine_->channel(static_cast<int>(axis)).following != 0 || core_->isHeldUp()) return false;
   return std::none_of(open_.begin(), open_.end(), [&](const auto& other) {
     const Meaning& meaning = other.second.meaning;
     return other.first != call && meaning.axes[axis] && (meaning.moves || meaning.resumes);
@@ -1212,7 +1166,6 @@ void Participants::emergencyStop(int client) {
   Client& who = clients_[static_cast<std::size_t>(client)];
   who.waits_for_stops = engine_->emergencyStop();
   who.since = clock_.now();
-  engine_called_ = true;
   oracle_.emergencyStopped(clock_.now(), rampBegins());
 }
 
@@ -1354,7 +1307,7 @@ activity::Reply Participants::ask(const std::string& name, machine::Request requ
 
 bool Participants::atRest() {
   if (!open_.empty() || !requests_.empty() || !jobs_.empty() || !pins_done_.empty()) return false;
-  if (news_.any || engine_called_ || !outbox_.empty()) return false;
+  if (core_->hasNews() || clock_.woken || core_->isHeldUp()) return false;
   for (std::size_t i = 0; i < kAxes; ++i) {
     if (engine_->channel(static_cast<int>(i)).following != 0) return false;
   }

@@ -14,7 +14,7 @@
 
 #include "axis/prepared_trajectory.h"
 #include "machine/controller.h"
-#include "machine/told_levels.h"
+#include "machine/shell_core.h"
 #include "machine/wiring.h"
 #include "pulse/pulse_engine.h"
 #include "search/failing_reads.h"
@@ -88,9 +88,19 @@ const Act& actOf(const Item& item);
 /// @return its index. @throw std::out_of_range
 std::size_t actNamed(const std::string& name);
 
-/// A controller, an engine and a rig, without threads. In each step one participant acts; the
+/// A virtual clock that tells whether anybody has woken the thread that serves the engine.
+class WatchedClock : public pulse::VirtualClock {
+ public:
+  void wake() override {
+    woken = true;
+    VirtualClock::wake();
+  }
+  bool woken = true;
+};
+
+/// The shell's core, an engine and a rig, without threads. In each step one participant acts; the
 /// schedule determines which.
-class Participants {
+class Participants : private machine::ShellCore::Host {
  public:
   explicit Participants(const Schedule& schedule);
 
@@ -149,7 +159,6 @@ class Participants {
     int client = 0;
     std::string name;
     machine::Request request;
-    machine::InputReading reading;  // before it was posted
     Meaning meaning;
     std::vector<std::size_t> goals;      ///< axes for which it has a goal
     std::vector<std::size_t> parts;      ///< axes that it may move, or refuse, one by one
@@ -186,27 +195,30 @@ class Participants {
   };
   class News : public pulse::NewsListener {
    public:
-    void onNews() noexcept override { any = true; }
-    bool any = true;
+    explicit News(machine::ShellCore& core) : core_(core) {}
+    void onNews() noexcept override { core_.noteNews(); }
+
+   private:
+    machine::ShellCore& core_;
   };
 
   bool step();
   bool canGo(Who who);
   void go(Who who);
   bool isDelayed(Who who) const;
-  void handle(decltype(machine::Input::what) what);
-  void carryOut(activity::Outputs& out);
-  void postCommands();
+  void turnEnded(const machine::MachineSnapshot& before,
+                 const std::shared_ptr<const machine::MachineSnapshot>& now,
+                 activity::Outputs& out) override;
+  void write(const activity::PinJob& job) override;
   void answer(std::uint64_t call, activity::Reply reply);
   void note(const std::string& what);
   void watch();
-  void write();
+  void writeLines();
   void beginItem();
   bool itemReady() const;
   pulse::Nanoseconds nextDue();
   void advanceTo(pulse::Nanoseconds time);
-  machine::InputReading readInputs();
-  void queue(const machine::InputReading& reading);
+  std::vector<int> readInputs();
   void moveEnds(const machine::MachineSnapshot& before, const std::vector<std::size_t>& axes,
                 const std::vector<double>& targets);
   /// What a trajectory is prepared from.
@@ -266,7 +278,7 @@ class Participants {
   const Schedule schedule_;
   std::vector<config::AxisConfig> configs_;
   Oracle oracle_;
-  pulse::VirtualClock clock_;
+  WatchedClock clock_;
   std::shared_ptr<RiseWatch> trace_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;
@@ -274,18 +286,13 @@ class Participants {
   std::shared_ptr<FailingReads> lines_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<machine::Controller> controller_;
-  News news_;
+  std::unique_ptr<machine::ShellCore> core_;
+  std::unique_ptr<News> news_;
 
-  // Participants of the shell.
+  // Participants that the core has in the shell.
   std::deque<Ask> requests_;
-  std::deque<machine::InputRead> reads_;
-  std::deque<gpio::EdgeEvent> edges_;
-  machine::ToldLevels told_levels_{0};
-  std::uint64_t readings_ = 0;
   std::deque<activity::PinDone> pins_done_;
   std::deque<Job> jobs_;
-  std::deque<pulse::Command> outbox_;
-  bool engine_called_ = true;
   pulse::Nanoseconds engine_due_ = 0;
   pulse::Nanoseconds engine_waits_since_ = pulse::kNever;
   std::vector<int> watched_;

@@ -32,7 +32,7 @@ struct ThreadCalls {
   std::atomic<std::int64_t> page_faults{0};  ///< until the last call of notePageFaults()
   std::atomic<std::int64_t> page_faults_before{0};
   std::atomic<pid_t> thread{0};
-  std::atomic<int> memory_error{-1};  ///< errno of the request to lock the memory
+  std::atomic<bool> memory_locked{false};  ///< of the process
 };
 
 /// The counts of the process; set before a thread is watched.
@@ -58,9 +58,9 @@ inline void notePageFaults() {
 }
 
 /// From now on the calling thread has no system calls except ioctl(), waiting for a futex as a
-/// clock does (a contended lock does so in another way), and the end of the process. Others are
-/// counted, and not executed. clock_gettime() is allowed: if the kernel gives programs no clock to
-/// read (no vDSO), it is the read of the clock.
+/// clock does (a contended lock does so in another way), waking a thread that waits for one, and
+/// the end of the process. Others are counted, and not executed. clock_gettime() is allowed: if the
+/// kernel gives programs no clock to read (no vDSO), it is the read of the clock.
 ///
 /// This can't be undone: it is for threads that live as long as their process.
 inline void watchThisThread() {
@@ -76,13 +76,14 @@ inline void watchThisThread() {
   const auto futex_call = static_cast<unsigned>(offsetof(seccomp_data, args) + sizeof(__u64));
   sock_filter program[] = {
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, number),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 7, 0),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_clock_gettime, 6, 0),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_rt_sigreturn, 5, 0),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit_group, 4, 0),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_futex, 0, 2),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 8, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_clock_gettime, 7, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_rt_sigreturn, 6, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit_group, 5, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_futex, 0, 3),
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, futex_call),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, FUTEX_WAIT_BITSET_PRIVATE, 1, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, FUTEX_WAIT_BITSET_PRIVATE, 2, 0),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, FUTEX_WAKE_PRIVATE, 1, 0),
       BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP),
       BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
   };
