@@ -36,7 +36,7 @@ class ShellCore {
     virtual void turnEnded(const MachineSnapshot& before,
                            const std::shared_ptr<const MachineSnapshot>& now,
                            activity::Outputs& out) = 0;
-    /// A line that the pulse thread doesn't time is to be written. It ends with a PinDone.
+    /// Writes a line that the pulse thread doesn't time. The end of the write is a PinDone.
     virtual void write(const activity::PinJob& job) = 0;
   };
 
