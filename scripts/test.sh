@@ -349,7 +349,7 @@ check_install() {
     die "stepdriver_joystick --help doesn't work"
   rosrun stepdriver stepdriver_base --help >"$build/log/base-help.log" ||
     die "stepdriver_base --help doesn't work"
-  for program in console draw measure_resonance plot_motion; do
+  for program in console draw measure_resonance panel plot_motion; do
     rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
       die "$program --help doesn't work"
   done
@@ -505,7 +505,7 @@ check_board() { cross --board arm64; }
 choose_build_folder
 rm -rf "$build/ros"
 rm -f "$build"/log/*.times
-install_packages core ccache "${parts[@]}" "$(wants node && echo ros plots ros-tests)" \
+install_packages core ccache "${parts[@]}" "$(wants node && echo ros plots panel ros-tests browser)" \
   "$(wants ros && echo trace)" "$(wants core && echo pictures bench)" \
   "$(wants lint && echo ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \

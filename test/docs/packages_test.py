@@ -26,6 +26,7 @@ SYSTEM_KEYS = {
     "libsystemd-dev": "libsystemd-dev",
     "liburdfdom-dev": "liburdfdom-dev",
     "libxml2": "libxml2-dev",
+    "python3-aiohttp": "python3-aiohttp",
     "python3-matplotlib": "python3-matplotlib",
     "python3-shapely": "python3-shapely",
     "python3-yaml": "python3-yaml",
@@ -40,10 +41,11 @@ ROS_KEYS = set(
 )
 # Needed by an installed program, but rosdep has no key for them: docs/first_programs.md names them.
 WITHOUT_KEY = {"librsvg2-bin", "python3-svgelements"}
-# draw needs them for SVG files only, and says so.
-RECOMMENDED = WITHOUT_KEY | {"python3-shapely"}
+# draw and the panel need them for SVG files only, only the panel needs aiohttp, and both say so. Without the
+# messages of diagnostics, the panel shows no lateness.
+RECOMMENDED = WITHOUT_KEY | {"python3-shapely", "python3-aiohttp", "python3-diagnostic-msgs"}
 # In the Debian package itself, and one in whose place a program takes its own messages.
-OWN_MODULES = {"stepdriver", "stepdriver_plots"}
+OWN_MODULES = {"stepdriver", "stepdriver_panel", "stepdriver_plots"}
 WITH_SUBSTITUTE = {"control_msgs"}
 
 
@@ -70,7 +72,7 @@ def missing_from_control():
     for package in sorted(RECOMMENDED - recommends):
         yield f"debian/control: ros-stepdriver doesn't recommend {package}"
     for program in pages.own_files():
-        if not re.match(r"stepdriver_ros/scripts/(?!.*\.pyc$)|examples/first_programs/.*\.py$", program):
+        if not re.match(r"stepdriver_ros/scripts/(?!.*\.(?:pyc|html|css|js|svg)$)|examples/first_programs/.*\.py$", program):
             continue
         for package in sorted(python_packages_of(program) - depends - RECOMMENDED):
             yield f"debian/control: ros-stepdriver doesn't depend on {package}, which {program} needs"

@@ -137,6 +137,22 @@ TEST(AxisStatesTopic, ShowsAMoveUnderWay) {
   }));
 }
 
+TEST(AxisStatesTopic, SaysTheStateInWords) {
+  NodeUnderTest node;
+  node.start();
+  const Recorder<AxisStates> states(node.full("axis_states"));
+  const auto says = [&](const std::string& motor, const std::string& state, bool remedy) {
+    return states.waitForLatest([&](const AxisStates& s) {
+      return s.motor.at(0) == motor && s.state.at(0) == state && s.remedy.at(0).empty() != remedy;
+    });
+  };
+  EXPECT_TRUE(says("on", "rest unverified", false));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("hold").success);
+  EXPECT_TRUE(says("on", "HELD unverified", false));
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("emergency_stop").success);
+  EXPECT_TRUE(says("on", "FAULT", true));
+}
+
 TEST(WaitingClients, HoldUpNoOtherCall) {
   NodeUnderTest node;
   node.set("simulation/speed", 1.0);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/axis_words.h"
 #include "table_units.h"
 
 namespace stepdriver::console {
@@ -24,20 +25,6 @@ std::string switchText(bool there, bool known, bool active) {
   if (!there) return "-";
   if (!known) return "?";
   return active ? "PRESSED" : "open";
-}
-
-std::string motorText(const AxisView& axis) {
-  if (!axis.powered) return "no power";
-  if (axis.enabled) return "on";
-  if (axis.idle) return "idle";
-  return axis.asleep ? "asleep" : "off";
-}
-
-std::string stateText(const AxisView& axis) {
-  if (!axis.fault.empty()) return "FAULT";
-  const std::string motion = axis.held ? "HELD" : axis.moving ? "moving" : "rest";
-  if (axis.homed) return motion + " homed";
-  return axis.position_valid ? motion : motion + " unverified";
 }
 
 std::string fitted(const std::string& text, std::size_t width, bool right_aligned) {
@@ -64,8 +51,8 @@ std::vector<Column> columnsOf(const Session& session, bool live) {
                        axis.min_active)),
         old(switchText(config != nullptr && config->hasEndstop(true), axis.switches_known,
                        axis.max_active)),
-        old(motorText(axis)),
-        live ? stateText(axis) : "STALE"};
+        old(ros_node::motorWords(axis)),
+        live ? ros_node::stateWords(axis) : "STALE"};
     for (std::size_t i = 0; i < cells.size(); ++i) {
       all[i].width = std::max(all[i].width, cells[i].size());
       all[i].cells.push_back(cells[i]);

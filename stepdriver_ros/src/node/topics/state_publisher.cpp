@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "common/axis_words.h"
 #include "node/actions/follow_joint_trajectory.h"
 #include "stepdriver_core/error.h"
 
@@ -198,6 +199,9 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
     message.velocity.push_back(state.velocity);
     message.target.push_back(state.target);
     message.fault.push_back(state.fault);
+    message.remedy.push_back(state.remedy);
+    message.motor.push_back(motorWords(state));
+    message.state.push_back(stateWords(state));
     message.position_note.push_back(state.position_note);
   }
   axis_state_publisher_.publish(message);

@@ -1,0 +1,80 @@
+"""The commands of the page: each is one call of the driver, in its own words."""
+
+import math
+
+from std_srvs.srv import SetBool, Trigger
+
+from stepdriver.srv import Home, HomeAxes, MoveTo, SetPosition, SpeedOverride
+
+from .errors import Refusal
+from .units import in_page_units, position_text
+
+
+def axis_of(machine, message):
+    name = message.get("axis")
+    if not isinstance(name, str) or name not in machine.axes:
+        raise Refusal(f"the driver has no axis {name!r}; it has {', '.join(machine.axes) or 'none yet'}")
+    return machine.axes[name]
+
+
+def number(message, key):
+    value = message.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise Refusal(f"{key} is {value!r}, but must be a number")
+    return float(value)
+
+
+def enable(machine, message):
+    on = message.get("on") is True
+    if message.get("axis") is None and machine.driver.has("enable"):
+        return machine.driver.call("enable", SetBool, data=on).message
+    axes = list(machine.axes) if message.get("axis") is None else [axis_of(machine, message).name]
+    return "; ".join(machine.driver.call(f"{axis}/enable", SetBool, data=on).message for axis in axes)
+
+
+def home(machine, message):
+    if message.get("axis") is None:
+        return machine.driver.call("home", HomeAxes, wait=True).message
+    axis = axis_of(machine, message)
+    return machine.driver.call(f"{axis.name}/home", Home, wait=True).message
+
+
+def move(machine, message):
+    """By a distance, or to a position. The answer comes when the motion is accepted."""
+    axis = axis_of(machine, message)
+    relative = "by" in message
+    position = number(message, "by" if relative else "to") / axis.factor
+    return machine.driver.call(f"{axis.name}/move_to", MoveTo, position=position, relative=relative).message
+
+
+def set_zero(machine, message):
+    axis = axis_of(machine, message)
+    answer = machine.driver.call(f"{axis.name}/set_position", SetPosition, position=0.0)
+    return f"{axis.name}: this position is {position_text(answer.position * axis.factor, axis.unit)} from now on"
+
+
+def speed_override(machine, message):
+    return machine.driver.call("speed_override", SpeedOverride, factor=number(message, "factor")).message
+
+
+def trigger(service):
+    return lambda machine, message: machine.driver.call(service, Trigger).message
+
+
+COMMANDS = {
+    "enable": enable,
+    "home": home,
+    "move": move,
+    "set_zero": set_zero,
+    "speed_override": speed_override,
+    "hold": trigger("hold"),
+    "resume": trigger("resume"),
+    "recover": trigger("recover"),
+    "dump": trigger("dump"),
+}
+
+
+def carry_out(machine, message):
+    """Calls the driver, and returns what it says, in the units of the page. It may wait for long. Raises
+    Refusal."""
+    return in_page_units(COMMANDS[message["do"]](machine, message))

@@ -1,0 +1,188 @@
+"""The driver, as the panel sees it. Needs ROS.
+
+rospy calls the subscribers in threads of its own: they only keep the newest message. The server's thread
+reads it when it needs it, and never waits for ROS: calls of services run in threads.
+"""
+
+import math
+import threading
+import time
+from collections import deque
+from concurrent.futures import Future
+
+import rosgraph
+import rospy
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from stepdriver.msg import AxisStates, Endstops, Jog
+
+from .errors import Refusal
+from .units import UNITS, in_page_units
+
+EVENTS = 50  # kept
+PATIENCE = 1.0  # [s] an urgent call without an answer for this long is repeated on another connection
+MOST_HANGING = 4  # urgent calls without an answer
+ENGINE = "pulse engine"
+LATENESS = "lateness in the last second max [us]"
+LEVELS = {Log.WARN: "warning", Log.ERROR: "error", Log.FATAL: "error"}
+
+
+class Newest:
+    """The newest message of a topic, and when it came."""
+
+    def __init__(self):
+        self.message, self.at = None, -math.inf
+
+    def take(self, message):
+        self.message, self.at = message, time.monotonic()
+
+
+class Urgent:
+    """A service that only stops, on a connection that stays open: new ones need the ROS master. Callers that
+    come while a call is on its way share its answer."""
+
+    def __init__(self, service):
+        self._service = service
+        self._lock = threading.Lock()
+        self._idle = []  # proxies
+        self._last, self._since, self._hanging = None, 0.0, 0
+
+    def call(self):
+        """A Future of the service's answer."""
+        with self._lock:
+            now = time.monotonic()
+            waits = self._last is not None and not self._last.done()
+            if waits and (now - self._since < PATIENCE or self._hanging >= MOST_HANGING):
+                return self._last
+            self._last, self._since, self._hanging = Future(), now, self._hanging + 1
+            threading.Thread(target=self._run, args=(self._last,), daemon=True).start()
+            return self._last
+
+    def connect(self):
+        """Opens the connection ahead of the first call. It may wait: call it in a thread."""
+        proxy = rospy.ServiceProxy(self._service, Trigger, persistent=True)
+        proxy.wait_for_service(timeout=PATIENCE)
+        with self._lock:
+            self._idle.append(proxy)
+
+    def _run(self, future):
+        try:
+            future.set_result(self._answer())
+        except Exception as error:  # noqa: BLE001: whatever it is, the caller must be told
+            future.set_exception(error)
+        finally:
+            with self._lock:
+                self._hanging -= 1
+
+    def _answer(self):
+        with self._lock:
+            proxy = self._idle.pop() if self._idle else None
+        if proxy is not None:
+            try:
+                return self._asked(proxy)
+            except rospy.ServiceException:
+                pass  # the driver has closed an old connection, or is another one: a stop may be repeated
+        return self._asked(rospy.ServiceProxy(self._service, Trigger, persistent=True))
+
+    def _asked(self, proxy):
+        answer = proxy()
+        with self._lock:
+            if not self._idle:
+                self._idle.append(proxy)
+        return answer
+
+
+class Driver:
+    def __init__(self, name):
+        self.name = rospy.resolve_name(name)
+        self.stop = Urgent(f"{self.name}/stop")
+        self.emergency_stop = Urgent(f"{self.name}/emergency_stop")
+        self.events = deque(maxlen=EVENTS)
+        self.states, self.endstops, self.joints, self.engine = Newest(), Newest(), Newest(), Newest()
+        self._jog = rospy.Publisher(f"{self.name}/jog", Jog, queue_size=1, tcp_nodelay=True)
+        self._watched = []
+        # Always, so that a page shows what happened before it was opened; it is rare.
+        self._log = rospy.Subscriber("/rosout", Log, self._take_log)
+
+    def watch(self):
+        """Subscribes to what the page shows. Without a viewer, nothing is received."""
+        space = rospy.names.namespace(self.name)
+        self._watched = [
+            rospy.Subscriber(f"{self.name}/axis_states", AxisStates, self.states.take),
+            rospy.Subscriber(f"{self.name}/endstops", Endstops, self.endstops.take),
+            rospy.Subscriber(f"{space}joint_states", JointState, self.joints.take, queue_size=1)]
+        try:
+            from diagnostic_msgs.msg import DiagnosticArray
+        except ImportError:  # then the node doesn't publish them
+            return
+        self._watched.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._take_diagnostics))
+
+    def unwatch(self):
+        watched, self._watched = self._watched, []
+        for subscriber in watched:
+            subscriber.unregister()
+
+    def jog(self, axis, velocity):
+        """velocity: [m/s|rad/s]; 0 ends the jog."""
+        message = Jog(name=[axis], velocity=[velocity])
+        message.header.stamp = rospy.Time.now()
+        self._jog.publish(message)
+
+    def tell(self, level, text):
+        """Adds an event to those that the page lists."""
+        self.events.append({"time": time.time(), "level": level, "text": text})
+
+    def call(self, service, kind, **fields):
+        """Calls a service below the driver's name, and returns its answer; it may wait for long. Raises a
+        Refusal with the driver's words if the call is refused or fails."""
+        full = f"{self.name}/{service}"
+        try:
+            answer = rospy.ServiceProxy(full, kind)(**fields)
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            raise Refusal(f"the driver can't be reached: {error}") from error
+        if not answer.success:
+            raise Refusal(in_page_units(answer.message))
+        return answer
+
+    def has(self, service):
+        """Whether a service exists below the driver's name."""
+        try:
+            rosgraph.Master(rospy.get_name()).lookupService(f"{self.name}/{service}")
+        except (rosgraph.MasterException, OSError):
+            return False
+        return True
+
+    def parameters(self):
+        """The driver's parameters. It waits for the master: call it in a thread."""
+        return rospy.get_param(self.name, {})
+
+    def _take_log(self, message):
+        if message.name == self.name and message.level in LEVELS:
+            self.tell(LEVELS[message.level], in_page_units(message.msg))
+
+    def _take_diagnostics(self, message):
+        own = f"{self.name.rpartition('/')[2]}: {ENGINE}"
+        for status in message.status:
+            if status.name == own:
+                self.engine.take({value.key: value.value for value in status.values})
+
+
+class Axis:
+    """What the page has to know of an axis, from the driver's parameters."""
+
+    def __init__(self, name, parameters):
+        self.name = name
+        linear = "max_speed_mm_s" in parameters
+        self.factor, self.unit = UNITS["m" if linear else "rad"]  # of the page in one of the driver's
+        key = "mm" if linear else "deg"
+        self.joint = parameters.get("joint", name)
+        self.limits = tuple(parameters.get(f"{end}_position_{key}") for end in ("min", "max"))
+        self.max_speed = parameters.get(f"max_speed_{key}_s", 0.0)
+        self.has_homing = "homing" in parameters
+        self.switches = {end: end in parameters.get("endstops", {}) for end in ("min", "max")}
+
+    def shown(self):
+        return {"name": self.name, "unit": self.unit, "min": self.limits[0], "max": self.limits[1],
+                "maxSpeed": self.max_speed, "homing": self.has_homing, "switches": self.switches}

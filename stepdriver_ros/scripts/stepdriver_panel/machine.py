@@ -1,0 +1,86 @@
+"""What the page shows of the driver, in its units."""
+
+import math
+import time
+
+from .driver import LATENESS, Axis
+
+STALE_AFTER = 1.0  # [s] the driver publishes its states ten times a second
+
+
+class Machine:
+    def __init__(self, driver):
+        self.driver = driver
+        self.axes = {}  # by name, in the driver's order
+        self.jog_timeout = 0.5
+        self.recorder = {}
+        self._source, self._states = None, []
+
+    def age(self):
+        """[s] of the newest state; infinite if there is none."""
+        return time.monotonic() - self.driver.states.at
+
+    @property
+    def live(self):
+        return self.age() <= STALE_AFTER
+
+    def configure(self, parameters):
+        """parameters: the driver's."""
+        axes = parameters.get("axes", {})
+        names = self.driver.states.message.name if self.driver.states.message is not None else sorted(axes)
+        self.axes = {name: Axis(name, axes[name]) for name in names if name in axes}
+        self.jog_timeout = parameters.get("jog_timeout", 0.5)
+        self.recorder = parameters.get("recorder", {})
+
+    def settings(self):
+        return {"driver": self.driver.name, "jogTimeout": self.jog_timeout,
+                "axes": [axis.shown() for axis in self.axes.values()]}
+
+    def states(self):
+        """The states of the axes; the same object as before if no message has come."""
+        message, endstops = self.driver.states.message, self.driver.endstops.message
+        if message is None or not self.axes:
+            return []
+        source = (message, endstops, self.axes)
+        if self._source is None or any(now is not then for now, then in zip(source, self._source)):
+            self._source = source
+            self._states = [self._state(message, endstops, i, name) for i, name in enumerate(message.name)
+                            if name in self.axes]
+        return self._states
+
+    def _state(self, message, endstops, i, name):
+        axis = self.axes[name]
+        number = endstops.name.index(name) if endstops is not None and name in endstops.name else None
+        switches = {end: None if number is None or not there else getattr(endstops, end)[number]
+                    for end, there in axis.switches.items()}
+        return {
+            "name": name, "enabled": message.enabled[i], "moving": message.moving[i], "held": message.held[i],
+            "homed": message.homed[i], "valid": message.position_valid[i], "motor": message.motor[i],
+            "state": message.state[i], "fault": message.fault[i], "remedy": message.remedy[i],
+            "note": message.position_note[i], "target": message.target[i] * axis.factor,
+            "min": switches["min"], "max": switches["max"]}
+
+    def override(self):
+        message = self.driver.states.message
+        return message.speed_override if message is not None else None
+
+    def positions(self):
+        """[position, velocity] of each axis, counted from the pulses that went out."""
+        message = self.driver.joints.message
+        if message is None:
+            return []
+        numbers = {joint: i for i, joint in enumerate(message.name)}
+        return [[round(message.position[numbers[axis.joint]] * axis.factor, 6),
+                 round(message.velocity[numbers[axis.joint]] * axis.factor, 4)]
+                if axis.joint in numbers else None for axis in self.axes.values()]
+
+    def lateness(self):
+        """[us] of the latest pulse in the last second; None: unknown."""
+        values = self.driver.engine.message
+        if values is None or time.monotonic() - self.driver.engine.at > 3.0:
+            return None
+        try:
+            late = float(values[LATENESS])
+        except (KeyError, ValueError):
+            return None
+        return late if math.isfinite(late) else None

@@ -1,0 +1,372 @@
+"""Serves the page, and passes messages between its viewers and the driver. Everything here runs in one
+thread; calls of the driver run in others."""
+
+import asyncio
+import json
+import math
+import pathlib
+import secrets
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+from aiohttp import WSMsgType, web
+
+from .commands import COMMANDS, axis_of, carry_out, number
+from .errors import Refusal
+from .jog import HeldJog
+from .viewer import Viewer
+
+PAGE = pathlib.Path(__file__).resolve().parent / "page"
+TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+                               "img-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+UPDATES = 20.0  # [1/s]
+MOST_VIEWERS = 16
+MOST_STRANGERS = 16  # connections that have not shown the token yet
+MOST_CONNECTIONS = 128
+MOST_CALLS = 16  # calls of the driver at once
+LOGIN = 5.0  # [s] for the token, on a new connection
+LINGER = 2.0  # [s] without a viewer before nothing is received any more
+ALIVE = 4.0  # [s] between two pings; a page that misses one is gone
+LARGEST_MESSAGE = 4096  # [bytes]
+LARGEST_REQUEST = 4 << 20  # [bytes] a drawing
+FORBIDDEN = 4403  # the code with which a socket ends after a wrong token
+REFUSED_LOG_EVERY = 60.0  # [s]
+
+
+class Panel:
+    """The state of the server: its viewers, the one that has control, and what was last sent."""
+
+    def __init__(self, machine, gate, log):
+        """log: called with each text for the log."""
+        self.machine, self.gate, self.log = machine, gate, log
+        self.jog = HeldJog(self._publish_jog, machine.jog_timeout)
+        self.viewers = []
+        self.controller = None
+        self._strangers = []
+        self._parts = {}
+        self._pending = set()
+        self._numbers = 0
+        self._jog_timer = None
+        self._refused, self._refused_told = 0, -math.inf
+        self._calls = ThreadPoolExecutor(MOST_CALLS, "call")
+        self._tasks = set()
+        self._was_live = False
+        self._watching = False
+
+    # ---- what the viewers see
+
+    def publish(self, name, value):
+        """Sends a value to each viewer that doesn't have it yet."""
+        version, old = self._parts.get(name, (0, None))
+        if version == 0 or old is not value and old != value:
+            self._parts[name] = (version + 1, value)
+
+    def newest(self):
+        age = self.machine.age()
+        update = {"tick": round(time.monotonic(), 4), "age": round(age, 2) if age < 1e6 else None,
+                  "positions": self.machine.positions(), "late": self.machine.lateness()}
+        return update, self._parts
+
+    async def _beat(self):
+        """Updates the viewers, while there are any."""
+        while self.viewers:
+            self._look()
+            for viewer in self.viewers:
+                viewer.wake()
+            await asyncio.sleep(1.0 / UPDATES)
+
+    def _look(self):
+        live = self.machine.live
+        if live and not self._was_live:
+            self.begin(self._configure())  # it may be another driver, or have other parameters
+        if not live:
+            self.jog.end()
+        self._was_live = live
+        self.publish("states", self.machine.states())
+        self.publish("override", self.machine.override())
+        self.publish("events", list(self.machine.driver.events))
+        self.publish("control", {"controller": self.controller.number if self.controller else None,
+                                 "viewers": len(self.viewers)})
+
+    async def _configure(self):
+        try:
+            parameters = await self.in_thread(self.machine.driver.parameters)
+        except Exception as error:  # noqa: BLE001: the master may be gone in many ways
+            self.machine.driver.tell("error", f"the driver's parameters can't be read: {error}")
+            self._was_live = False
+            return
+        self.machine.configure(parameters)
+        self.jog.timeout = self.machine.jog_timeout
+        self.publish("settings", self.machine.settings())
+
+    def in_thread(self, function, *arguments):
+        return asyncio.get_running_loop().run_in_executor(self._calls, function, *arguments)
+
+    def begin(self, coroutine):
+        """Runs it without waiting for it."""
+        task = asyncio.get_running_loop().create_task(coroutine)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # ---- who may what
+
+    def enter(self, socket, transport):
+        self._numbers += 1
+        viewer = Viewer(socket, transport, self._numbers, secrets.token_urlsafe(16))
+        if len(self.viewers) >= MOST_VIEWERS:
+            oldest = next(other for other in self.viewers if other is not self.controller)
+            self.begin(oldest.socket.close(message=b"too many pages are open"))
+        self.viewers.append(viewer)
+        if self.controller is None:
+            self.controller = viewer
+        if not self._watching:
+            self._watching = True
+            self.begin(self._watch())
+        return viewer
+
+    async def _watch(self):
+        """Receives what the driver publishes while there are viewers, and a little longer: a page that is
+        loaded again is a new viewer."""
+        driver = self.machine.driver
+        # These ask the master, which may take long to answer.
+        await self.in_thread_quietly(driver.watch)
+        for urgent in (driver.stop, driver.emergency_stop):
+            self.begin(self.in_thread_quietly(urgent.connect))
+        while self.viewers:
+            await self._beat()
+            await asyncio.sleep(LINGER)
+        await self.in_thread_quietly(driver.unwatch)
+        self._watching = False
+        if self.viewers:  # one came during that
+            self._watching = True
+            self.begin(self._watch())
+
+    async def in_thread_quietly(self, function):
+        try:
+            await self.in_thread(function)
+        except Exception:  # noqa: BLE001: the call itself will say what is wrong
+            pass
+
+    def leave(self, viewer):
+        self.jog.forget(viewer)
+        self.viewers.remove(viewer)
+        if self.controller is viewer:
+            self.controller = None
+
+    def refuse_login(self):
+        """Says that logins were refused, at most once a minute."""
+        self._refused += 1
+        now = time.monotonic()
+        if now - self._refused_told >= REFUSED_LOG_EVERY:
+            self.log(f"refused {self._refused} connection(s) without the token or from a foreign page")
+            self._refused, self._refused_told = 0, now
+
+    # ---- commands
+
+    def take(self, viewer, text):
+        """A message of a viewer."""
+        try:
+            message = json.loads(text)
+            what, call = message["do"], message["id"]
+        except (ValueError, TypeError, KeyError, RecursionError):
+            return
+        if not isinstance(call, int):
+            return
+        if what in ("stop", "emergency_stop"):
+            self.jog.end()
+            self.begin(self._stop(viewer, call, getattr(self.machine.driver, what)))
+            return
+        if not viewer.rate.take():
+            viewer.answer(id=call, ok=False, text="not sent: too many messages")
+            return
+        try:
+            if what == "take_control":
+                self._take_control(viewer)
+                viewer.answer(id=call, ok=True, text="this page has control")
+                return
+            if what == "jog_end":
+                self.jog.end(viewer)
+                return
+            self._require_control(viewer)
+            if what == "jog":
+                self._press(viewer, message)
+            elif isinstance(what, str) and what in COMMANDS:
+                self._start(viewer, call, message)
+            else:
+                raise Refusal(f"there is no command {what!r}")
+        except Refusal as refusal:
+            viewer.answer(id=call, ok=False, text=str(refusal), jog=what == "jog")
+
+    def _require_control(self, viewer):
+        if viewer is not self.controller:
+            raise Refusal("nothing was sent: " + (
+                "another page has control; take it over first" if self.controller else
+                "no page has control; take it first"))
+        if not self.machine.live:
+            raise Refusal("nothing was sent: no state of the driver arrives")
+
+    def _take_control(self, viewer):
+        self.jog.end()
+        if self.controller not in (None, viewer):
+            self.machine.driver.tell("event", f"page {viewer.number} took control from page "
+                                              f"{self.controller.number}")
+        self.controller = viewer
+
+    def _press(self, viewer, message):
+        axis = axis_of(self.machine, message)
+        velocity, press = number(message, "velocity") / axis.factor, number(message, "press")
+        now = time.monotonic()
+        if not self.jog.press(viewer, press, axis.name, velocity, number(message, "tick"), now):
+            raise Refusal(f"{axis.name}: the jog ended: something stopped it, or no message came in time for "
+                          f"jog_timeout, {self.machine.jog_timeout:g} s. Press again")
+        self._end_jog_in_time(now)
+
+    def _end_jog_in_time(self, now):
+        if self._jog_timer is not None:
+            self._jog_timer.cancel()
+        self._jog_timer = asyncio.get_running_loop().call_later(
+            max(0.0, self.jog.until - now), self.jog.end)
+
+    def _publish_jog(self, axis, velocity):
+        self.machine.driver.jog(axis, velocity)
+
+    def _start(self, viewer, call, message):
+        name = (message["do"], message.get("axis") if isinstance(message.get("axis"), str) else None)
+        shown = (f"{name[1]}: " if name[1] else "") + name[0].replace("_", " ")
+        if name in self._pending:
+            raise Refusal(f"{shown}: not sent again, because the driver has not answered the last one yet")
+        if len(self._pending) >= MOST_CALLS:
+            raise Refusal(f"{shown}: not sent, because {MOST_CALLS} calls wait for the driver")
+        self._pending.add(name)
+        self.begin(self._carry_out(viewer, call, message, name, shown))
+
+    async def _carry_out(self, viewer, call, message, name, shown):
+        try:
+            text = await self.in_thread(carry_out, self.machine, message)
+        except Refusal as refusal:
+            self.machine.driver.tell("refused", f"{shown}: {refusal}")
+            viewer.answer(id=call, ok=False, text=str(refusal))
+        else:
+            viewer.answer(id=call, ok=True, text=text)
+        finally:
+            self._pending.discard(name)
+
+    async def _stop(self, viewer, call, urgent):
+        try:
+            answer = await asyncio.wrap_future(urgent.call())
+        except Exception as error:  # noqa: BLE001: whatever it is, the person must be told
+            text = f"THE DRIVER DID NOT ANSWER: {error}. Cut the power of the motors"
+            self.machine.driver.tell("error", text)
+            viewer.answer(id=call, ok=False, text=text)
+            return
+        viewer.answer(id=call, ok=bool(answer.success), text=answer.message)
+
+
+class Server:
+    """The addresses of the page."""
+
+    def __init__(self, panel):
+        self._panel = panel
+        self._files = {file.name: file.read_bytes() for file in PAGE.iterdir()}
+        self.application = web.Application(client_max_size=LARGEST_REQUEST, middlewares=[self._guard])
+        self.application.router.add_get("/", self._file)
+        self.application.router.add_get("/socket", self._socket)
+        self.application.router.add_get("/{name}", self._file)
+
+    @web.middleware
+    async def _guard(self, request, handler):
+        """Checks where each request comes from, and adds the headers that confine the page."""
+        try:
+            if not self._panel.gate.knows_host(request.headers.get("Host")):
+                raise web.HTTPForbidden(text="This address isn't one of the panel's: see `hosts` in its page\n")
+            response = await handler(request)
+        except web.HTTPException as refused:
+            refused.headers.update(HEADERS)
+            raise
+        if not response.prepared:
+            response.headers.update(HEADERS)
+        return response
+
+    async def _file(self, request):
+        # From memory: no path of a request reaches the file system.
+        name = request.match_info.get("name", "index.html")
+        if name not in self._files:
+            raise web.HTTPNotFound()
+        return web.Response(body=self._files[name], content_type=TYPES[pathlib.PurePath(name).suffix],
+                            charset="utf-8")
+
+    async def _socket(self, request):
+        panel = self._panel
+        if not panel.gate.is_own_origin(request.headers.get("Origin"), request.headers.get("Host")):
+            panel.refuse_login()
+            raise web.HTTPForbidden(text="Only the panel's own page may connect\n")
+        socket = web.WebSocketResponse(heartbeat=ALIVE, max_msg_size=LARGEST_MESSAGE)
+        await socket.prepare(request)
+        if not await self._logged_in(socket):
+            panel.refuse_login()
+            await socket.close(code=FORBIDDEN, message=b"wrong token")
+            return socket
+        await self._serve(socket, request.transport)
+        return socket
+
+    async def _logged_in(self, socket):
+        strangers = self._panel._strangers
+        if len(strangers) >= MOST_STRANGERS:
+            self._panel.begin(strangers.pop(0).close())
+        strangers.append(socket)
+        try:
+            message = await socket.receive(timeout=LOGIN)
+            return message.type == WSMsgType.TEXT and self._panel.gate.knows_token(
+                json.loads(message.data).get("token"))
+        except (asyncio.TimeoutError, ValueError, AttributeError, RecursionError):
+            return False
+        finally:
+            if socket in strangers:
+                strangers.remove(socket)
+
+    async def _serve(self, socket, transport):
+        panel = self._panel
+        viewer = panel.enter(socket, transport)
+        viewer.answer(welcome={"number": viewer.number, "key": viewer.key})
+        sender = asyncio.get_running_loop().create_task(self._send(viewer))
+        try:
+            async for message in socket:
+                if message.type == WSMsgType.TEXT:
+                    panel.take(viewer, message.data)
+        finally:
+            sender.cancel()
+            panel.leave(viewer)
+
+    async def _send(self, viewer):
+        try:
+            await viewer.send(self._panel.newest)
+        except (asyncio.TimeoutError, ConnectionError, RuntimeError):
+            await viewer.socket.close()
+
+
+class Connections:
+    """Makes the protocol of each new connection. If there are too many, the oldest one that shows no page is
+    closed, so that idle ones keep nobody out."""
+
+    def __init__(self, server, pages):
+        """server: of aiohttp. pages: a function that returns the transports of the viewers."""
+        self._server, self._pages = server, pages
+
+    def __call__(self):
+        connections = [handler for handler in self._server.connections if handler.transport is not None]
+        surplus = len(connections) + 1 - MOST_CONNECTIONS  # several may come at once
+        if surplus > 0:
+            pages = self._pages()
+            others = [handler.transport for handler in connections if handler.transport not in pages]
+            for transport in others[:surplus]:
+                transport.abort()
+        return self._server()

@@ -1,0 +1,263 @@
+"""The page in a real browser, against a node on the simulated rig."""
+
+import unittest
+
+from machine import Machine, Network, Page, browser, wait_until
+from selenium.webdriver.common.keys import Keys
+
+JOG_TIMEOUT = 0.5  # [s] of the machine
+SLOWING = 0.1  # [s] from the highest speed to rest
+LATE = 1.0  # [s] that a busy computer may take for a message
+
+
+def setUpModule():
+    global machine, network, chrome
+    machine = Machine()
+    unittest.addModuleCleanup(machine.end)
+    network = Network(machine.port)
+    unittest.addModuleCleanup(network.end)
+    chrome = browser()
+    unittest.addModuleCleanup(chrome.quit)
+
+
+def position(axis="x"):
+    """[mm]"""
+    return machine.state(axis)["position"] * 1000.0
+
+
+def close_other_tabs(kept):
+    for tab in chrome.window_handles:
+        if tab != kept:
+            chrome.switch_to.window(tab)
+            chrome.close()
+    chrome.switch_to.window(kept)
+
+
+class OnTheMachine(unittest.TestCase):
+    def setUp(self):
+        network.mend()
+        machine.calm()
+        self.page = Page(chrome).open_live(machine.link)
+        self.page.take_control()
+
+    def moves(self):
+        wait_until(lambda: machine.state("x")["moving"], "x moves")
+
+    def rests(self):
+        wait_until(lambda: not machine.state("x")["moving"], "x rests")
+
+    def begin_long_move(self):
+        """Of 4 s or more."""
+        far = 180 if position() < 100 else 5
+        self.page.find(self.page.axis("x", ".goto input")).send_keys(str(far))
+        self.page.click("#override")
+        self.page.click(self.page.axis("x", ".goto button"))
+        self.moves()
+
+
+class Controls(OnTheMachine):
+    def test_enabling_and_disabling(self):
+        self.page.click(self.page.axis("x", '[data-do="disable"]'))
+        wait_until(lambda: not machine.state("x")["enabled"], "x is disabled")
+        wait_until(lambda: self.page.find(self.page.axis("x", '[data-field="motor"]')).text == "off", "off is shown")
+        self.assertTrue(machine.state("y")["enabled"])
+        self.page.click(self.page.axis("x", '[data-do="enable"]'))
+        wait_until(lambda: machine.state("x")["enabled"], "x is enabled")
+        self.page.click("#disable-all")
+        wait_until(lambda: not machine.state("x")["enabled"] and not machine.state("y")["enabled"], "all disabled")
+        self.page.click("#enable-all")
+        wait_until(lambda: machine.state("x")["enabled"] and machine.state("y")["enabled"], "all enabled")
+
+    def test_steps_and_positions(self):
+        begin = position()
+        self.page.click(self.page.axis("x", '[data-by="1"]'))
+        wait_until(lambda: abs(position() - begin - 1.0) < 0.02, "one step of 1 mm")
+        self.page.click(self.page.axis("x", '[data-by="-0.1"]'))
+        wait_until(lambda: abs(position() - begin - 0.9) < 0.02, "one step of -0.1 mm")
+        self.page.find(self.page.axis("x", ".goto input")).send_keys("12.5", Keys.ENTER)
+        wait_until(lambda: abs(position() - 12.5) < 0.02, "at 12.5 mm")
+        shown = '[data-field="position"]'
+        wait_until(lambda: abs(float(self.page.find(self.page.axis("x", shown)).text) - 12.5) < 0.02,
+                   "the page shows the position")
+
+    def test_a_refusal_is_shown_in_the_words_and_units_of_the_page(self):
+        self.page.find(self.page.axis("x", ".goto input")).send_keys("300", Keys.ENTER)
+        self.page.wait_said("x: the position 300.0000 mm is above the soft limit max_position 200.0000 mm")
+        wait_until(lambda: "300.0000 mm" in self.page.find("#events").text, "the refusal is listed")
+        self.assertFalse(machine.state("x")["moving"])
+
+    def test_homing(self):
+        self.page.click(self.page.axis("x", '[data-do="home"]'))
+        wait_until(lambda: machine.state("x")["homed"], "x is homed")
+        wait_until(lambda: "homed" in self.page.find(self.page.axis("x", ".badge")).text, "homed is shown")
+        self.assertIn("valid", self.page.find(self.page.axis("x", '[data-field="validity"]')).text)
+        self.assertFalse(self.page.find(self.page.axis("y", '[data-do="home"]')).is_displayed())
+
+    def test_setting_zero_asks_first(self):
+        self.page.click(self.page.axis("y", '[data-by="1"]'))
+        machine.at_rest()
+        self.page.click(self.page.axis("y", '[data-do="zero"]'))
+        self.page.click(self.page.axis("y", '[data-do="zero-no"]'))
+        self.assertFalse(machine.state("y")["position_valid"] and position("y") == 0.0)
+        self.page.click(self.page.axis("y", '[data-do="zero"]'))
+        self.page.click(self.page.axis("y", '[data-do="zero-yes"]'))
+        wait_until(lambda: machine.state("y")["position_valid"] and position("y") == 0.0, "y is at 0")
+
+    def test_hold_resume_and_override(self):
+        self.page.driver.execute_script(
+            "const o = document.getElementById('override'); o.value = 20; o.dispatchEvent(new Event('change'))")
+        wait_until(lambda: abs(machine.override - 0.2) < 1e-6, "the override is 20 %")
+        self.begin_long_move()
+        self.page.click("#hold")
+        wait_until(lambda: machine.state("x")["held"] and not machine.state("x")["moving"], "x is held")
+        held = position()
+        self.page.click("#resume")
+        wait_until(lambda: position() != held, "x continues")
+        self.page.click("#stop")
+        self.rests()
+
+    def test_emergency_stop_shows_the_fault_and_what_ends_it(self):
+        self.page.click("#emergency")
+        wait_until(lambda: machine.state("x")["fault"], "x is at fault")
+        wait_until(lambda: "x: " in self.page.text("faults") and "recover" in self.page.text("faults"),
+                   "the fault and its remedy are shown")
+        self.page.click("#recover")
+        wait_until(lambda: not machine.state("x")["fault"], "no fault")
+        wait_until(lambda: self.page.text("faults") == "", "no fault is shown")
+
+
+class Stops(OnTheMachine):
+    def stops_by(self, act):
+        self.begin_long_move()
+        act()
+        self.rests()
+        self.page.wait_said("all axes stop")
+        self.assertTrue(5.0 < position() < 180.0, position())
+
+    def test_by_its_button(self):
+        self.stops_by(lambda: self.page.click("#stop"))
+
+    def test_by_escape_in_a_field(self):
+        def act():
+            self.page.find(self.page.axis("x", ".goto input")).send_keys(Keys.ESCAPE)
+        self.stops_by(act)
+
+    def test_by_space_also_if_another_button_has_the_focus(self):
+        def act():
+            pulses = machine.pulses("y")
+            self.page.driver.execute_script("arguments[0].focus()", self.page.find(self.page.axis("y", '[data-by="10"]')))
+            self.page.keys(Keys.SPACE)
+            self.assertEqual(machine.pulses("y"), pulses)
+        self.stops_by(act)
+
+
+class JogByPressAndHold(OnTheMachine):
+    def setUp(self):
+        super().setUp()
+        from stepdriver.srv import MoveTo
+        machine.call("x/move_to", MoveTo, position=0.02, wait=True)
+        self.page.click('[data-share="0.05"]')
+        self.plus = self.page.axis("x", '.jog[data-direction="1"]')
+
+    def jogs(self):
+        self.page.hold(self.plus)
+        self.moves()
+
+    def stays(self):
+        """Nothing moves by what was sent before."""
+        pulses = machine.pulses()
+        begin = machine.rig().time
+        wait_until(lambda: machine.rig().time > begin + 2 * JOG_TIMEOUT, "time passes")
+        self.assertEqual(machine.pulses(), pulses)
+
+    def test_lasts_while_it_is_held(self):
+        self.jogs()
+        begin, at = position(), machine.rig().time
+        # Three times as long as a single message would move it.
+        wait_until(lambda: machine.rig().time > at + 3 * JOG_TIMEOUT, "time passes")
+        self.assertTrue(machine.state("x")["moving"])
+        self.assertGreater(position(), begin + 5.0)
+        self.page.release()
+        self.rests()
+        self.stays()
+
+    def test_by_the_enter_key(self):
+        self.page.driver.execute_script("arguments[0].focus()", self.page.find(self.plus))
+        from selenium.webdriver import ActionChains
+        ActionChains(chrome, duration=0).key_down(Keys.ENTER).perform()
+        self.moves()
+        ActionChains(chrome, duration=0).key_up(Keys.ENTER).perform()
+        self.rests()
+
+    def test_ends_when_the_window_loses_the_focus(self):
+        self.jogs()
+        chrome.execute_script("window.dispatchEvent(new Event('blur'))")
+        self.rests()
+        self.page.release()
+
+    def test_ends_in_a_hidden_tab(self):
+        self.jogs()
+        self.addCleanup(close_other_tabs, chrome.current_window_handle)
+        chrome.switch_to.new_window("tab")
+        self.rests()
+
+    def test_ends_with_the_page(self):
+        self.jogs()
+        chrome.get("about:blank")
+        self.rests()
+
+    def test_ends_without_the_network_and_late_messages_move_nothing(self):
+        link = machine.link.replace(f":{machine.port}/", f":{network.port}/")
+        self.page.open_live(link)
+        self.page.take_control()
+        self.page.click('[data-share="0.05"]')
+        self.jogs()
+        network.cut()
+        cut = machine.rig().time
+        self.rests()
+        after = machine.last_pulse("x") - cut
+        print(f"the last pulse came {after:.3f} s after the network was cut; jog_timeout is {JOG_TIMEOUT} s")
+        self.assertLess(after, JOG_TIMEOUT + SLOWING + LATE)
+        network.mend()
+        self.stays()
+        wait_until(self.page.is_live, "the page is connected again")
+        self.assertFalse(machine.state("x")["moving"])
+        self.page.release()
+
+    def test_what_is_clicked_without_a_connection_does_nothing_later(self):
+        self.page.open_live(machine.link.replace(f":{machine.port}/", f":{network.port}/"))
+        self.page.take_control()
+        network.cut()
+        wait_until(lambda: self.page.text("connection") == "not connected", "the page notices")
+        pulses = machine.pulses()
+        self.page.click(self.page.axis("x", '[data-by="1"]'))
+        self.page.wait_said("nothing was sent")
+        network.mend()
+        wait_until(self.page.is_live, "the page is connected again")
+        self.stays()
+        self.assertEqual(machine.pulses(), pulses)
+
+
+class TwoPages(OnTheMachine):
+    def setUp(self):
+        super().setUp()
+        self.first = chrome.current_window_handle
+        chrome.switch_to.new_window("tab")
+        self.page.open_live(machine.link)
+
+    def tearDown(self):
+        close_other_tabs(self.first)
+
+    def test_the_second_watches_and_stops_and_takes_over(self):
+        pulses = machine.pulses()
+        self.assertIn("Another page has control", self.page.text("control-text"))
+        self.page.click(self.page.axis("x", '[data-by="1"]'))
+        self.page.wait_said("another page has control; take it over first")
+        self.assertEqual(machine.pulses(), pulses)
+        self.page.click("#stop")
+        self.page.wait_said("all axes stop")
+        self.page.take_control()
+        self.page.click(self.page.axis("x", '[data-by="1"]'))
+        wait_until(lambda: machine.pulses() > pulses, "the page moves x")
+        chrome.switch_to.window(self.first)
+        wait_until(lambda: "Another page has control" in self.page.text("control-text"), "the first one is told")
