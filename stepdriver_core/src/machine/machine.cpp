@@ -432,24 +432,13 @@ class Machine::Impl {
   }
 
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const {
-    CoordinatedResult result;
-    int worst = -1;
+    std::vector<axis::MoveResult> results;
     for (const CoordinatedMove::Member& member : move.members) {
       const auto own = axis(member.axis).result(member.move);
       if (!own) return std::nullopt;
-      result.positions.push_back(own->position);
-      result.duration = std::max(result.duration, own->duration);
-      // An axis's own reason says more than that it was ended together with another one.
-      const int weight = own->end == axis::MoveEnd::kReached     ? 0
-                         : own->end == axis::MoveEnd::kCompanion ? 1
-                                                                 : 2;
-      if (weight <= worst) continue;
-      worst = weight;
-      result.end = own->end;
-      result.message = own->message;
+      results.push_back(*own);
     }
-    if (result.end == axis::MoveEnd::kReached) result.message = "all axes reached their targets";
-    return result;
+    return combinedResult(results);
   }
 
   void shutdown() {
@@ -513,6 +502,25 @@ class Machine::Impl {
   std::unique_ptr<StateKeeper> keeper_;
   std::atomic<bool> shut_{false};
 };
+
+CoordinatedResult combinedResult(const std::vector<axis::MoveResult>& members) {
+  CoordinatedResult result;
+  int worst = -1;
+  for (const axis::MoveResult& own : members) {
+    result.positions.push_back(own.position);
+    result.duration = std::max(result.duration, own.duration);
+    // An axis's own reason says more than that it was ended together with another one.
+    const int weight = own.end == axis::MoveEnd::kReached     ? 0
+                       : own.end == axis::MoveEnd::kCompanion ? 1
+                                                              : 2;
+    if (weight <= worst) continue;
+    worst = weight;
+    result.end = own.end;
+    result.message = own.message;
+  }
+  if (result.end == axis::MoveEnd::kReached) result.message = "all axes reached their targets";
+  return result;
+}
 
 Machine::Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                  pulse::Clock& clock, const MachineOptions& options)
@@ -586,6 +594,17 @@ CoordinatedResult Machine::wait(const CoordinatedMove& move) const {
     return result.has_value();
   });
   return *result;
+}
+
+std::optional<CoordinatedResult> Machine::waitFor(const CoordinatedMove& move,
+                                                  std::chrono::nanoseconds longest) const {
+  std::optional<CoordinatedResult> result;
+  const auto has_ended = [&] {
+    result = impl_->result(move);
+    return result.has_value();
+  };
+  impl_->shell_->waitFor(has_ended, longest);
+  return result;
 }
 
 // All axes of a path stop with one of them.

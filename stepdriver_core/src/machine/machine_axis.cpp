@@ -70,15 +70,30 @@ std::optional<axis::MoveResult> MachineAxis::result(const axis::Move& move) cons
 }
 
 axis::MoveResult MachineAxis::wait(const axis::Move& move) {
-  if (move.outcome == nullptr) {
-    throw Refused(config().name + ": the move was only planned: it has no end to wait for");
-  }
+  requireAccepted(move);
   std::optional<axis::MoveResult> ended;
   shell_.wait([&] {
     ended = result(move);
     return ended.has_value();
   });
   return *ended;
+}
+
+std::optional<axis::MoveResult> MachineAxis::waitFor(const axis::Move& move,
+                                                     std::chrono::nanoseconds longest) {
+  requireAccepted(move);
+  std::optional<axis::MoveResult> ended;
+  const auto has_ended = [&] {
+    ended = result(move);
+    return ended.has_value();
+  };
+  shell_.waitFor(has_ended, longest);
+  return ended;
+}
+
+void MachineAxis::requireAccepted(const axis::Move& move) const {
+  if (move.outcome != nullptr) return;
+  throw Refused(config().name + ": the move was only planned: it has no end to wait for");
 }
 
 void MachineAxis::jog(double velocity, std::optional<std::uint64_t> unless_stopped_since) {

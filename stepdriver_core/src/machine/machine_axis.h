@@ -29,6 +29,8 @@ class MachineAxis : public axis::Axis {
   axis::Move moveRounds(double rounds, double velocity) override;
   std::optional<axis::MoveResult> result(const axis::Move& move) const override;
   axis::MoveResult wait(const axis::Move& move) override;
+  std::optional<axis::MoveResult> waitFor(const axis::Move& move,
+                                          std::chrono::nanoseconds longest) override;
   void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since) override;
   void setLimits(const axis::AxisLimits& wanted) override;
   axis::AxisLimits limits() const override;
@@ -46,6 +48,7 @@ class MachineAxis : public axis::Axis {
   axis::EndstopState endstops() const override;
 
  private:
+  void requireAccepted(const axis::Move& move) const;
   std::optional<bool> endstopActive(bool at_max) const;
 
   const config::AxisConfig config_;

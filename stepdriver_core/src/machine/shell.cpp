@@ -30,6 +30,11 @@ activity::Reply refused(const std::string& why) {
   return {activity::Failure{activity::Failure::Kind::kRefused, why}, {}};
 }
 
+/// So much later; pulse::kNever if that is too late for a clock.
+std::int64_t later(std::int64_t time_ns, std::chrono::nanoseconds by) {
+  return by.count() < pulse::kNever - time_ns ? time_ns + by.count() : pulse::kNever;
+}
+
 activity::Reply hung(const std::string& why) {
   return {activity::Failure{activity::Failure::Kind::kGpio, why}, {}};
 }
@@ -128,30 +133,61 @@ activity::Reply Shell::call(Request request) {
 }
 
 void Shell::wait(const std::function<bool()>& ready, bool often) {
-  if (threaded_) {
-    std::unique_lock<std::mutex> lock(answers_mutex_);
-    for (;;) {
-      const std::uint64_t changes = changes_;
-      lock.unlock();
-      if (ready()) return;
-      lock.lock();
-      if (!why_hung_.empty()) throw GpioError(why_hung_);
-      const auto another = [&] { return changes_ != changes; };
-      if (often) {
-        answered_.wait_for(lock, std::chrono::nanoseconds(kOften), another);
-      } else {
-        answered_.wait(lock, another);
-      }
+  Patience patience;
+  patience.often = often;
+  await(ready, patience);
+}
+
+bool Shell::waitFor(const std::function<bool()>& ready, std::chrono::nanoseconds longest) {
+  Patience patience;
+  patience.longest = longest;
+  patience.reads_inputs = true;
+  return await(ready, patience);
+}
+
+bool Shell::await(const std::function<bool()>& ready, const Patience& patience) {
+  return threaded_ ? awaitThreads(ready, patience) : pump(ready, patience);
+}
+
+bool Shell::awaitThreads(const std::function<bool()>& ready, const Patience& patience) {
+  const std::int64_t end = later(steadyNow(), patience.longest);
+  std::unique_lock<std::mutex> lock(answers_mutex_);
+  for (;;) {
+    const std::uint64_t changes = changes_;
+    lock.unlock();
+    if (ready()) return true;
+    lock.lock();
+    if (!why_hung_.empty()) throw GpioError(why_hung_);
+    if (end != pulse::kNever && steadyNow() >= end) return false;
+    const std::int64_t until = patience.often ? std::min(end, steadyNow() + kOften) : end;
+    const auto another = [&] { return changes_ != changes; };
+    if (until == pulse::kNever) {
+      answered_.wait(lock, another);
+    } else {
+      answered_.wait_until(
+          lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(until)), another);
     }
   }
+}
+
+bool Shell::pump(const std::function<bool()>& ready, const Patience& patience) {
+  const pulse::Nanoseconds end = later(clock_.now(), patience.longest);
+  pulse::Nanoseconds next_reading = patience.reads_inputs ? clock_.now() : pulse::kNever;
   for (;;) {
+    if (clock_.now() >= next_reading) {
+      engine_.inputsChanged();  // nothing watches them
+      feedInputs();
+      next_reading = clock_.now() + kVirtualInputPeriod;
+    }
     settle();
     const std::uint64_t changes = changes_;
-    if (ready()) return;
+    if (ready()) return true;
     if (changes != changes_) continue;  // it has made a request itself
-    const pulse::Nanoseconds due = std::min(engine_due_, core_.due());
+    if (clock_.now() >= end) return false;
+    const pulse::Nanoseconds due = std::min({engine_due_, core_.due(), end});
     if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
-    clock_.waitUntil(often ? std::min(due, clock_.now() + kOften) : due);
+    const pulse::Nanoseconds next_look = patience.often ? clock_.now() + kOften : pulse::kNever;
+    clock_.waitUntil(std::min({due, next_look, next_reading}));
   }
 }
 

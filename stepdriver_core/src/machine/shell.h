@@ -49,11 +49,15 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   /// Hands over a request and waits for its answer.
   activity::Reply call(Request request);
 
-  /// Returns when `ready` returns true. It is called after each event, in the calling thread.
+  /// Returns true when `ready` returns true. It is called after each event, in the calling thread.
   /// @param often `ready` is also called each millisecond.
   /// @throw Error without threads, if nothing is in progress that could change its answer.
   /// @throw GpioError if the pulse thread hangs.
   void wait(const std::function<bool()>& ready, bool often = false);
+  /// The same for at most this time: of the steady clock, or without threads of the machine's. Then
+  /// it also reads the inputs, like the thread that watches them.
+  /// @return whether `ready` has returned true.
+  bool waitFor(const std::function<bool()>& ready, std::chrono::nanoseconds longest);
 
   /// Returns once a turn of the controller that is under way has ended: what it has set an outcome
   /// for can be seen in state() and snapshot() then.
@@ -92,6 +96,15 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   void turnEnded(const MachineSnapshot& before, const std::shared_ptr<const MachineSnapshot>& now,
                  activity::Outputs& out) override;
   void write(const activity::PinJob& job) override;
+
+  struct Patience {
+    std::chrono::nanoseconds longest = std::chrono::nanoseconds::max();
+    bool often = false;         ///< `ready` is also called each millisecond
+    bool reads_inputs = false;  ///< without threads, each millisecond
+  };
+  bool await(const std::function<bool()>& ready, const Patience& patience);
+  bool awaitThreads(const std::function<bool()>& ready, const Patience& patience);
+  bool pump(const std::function<bool()>& ready, const Patience& patience);
 
   void run();
   bool beginRound();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -58,6 +59,12 @@ class Axis {
 
   /// Returns when the move has ended. @throw Refused for a move of plan().
   virtual MoveResult wait(const Move& move) = 0;
+
+  /// The same, for at most this time of the computer's clock, or of a virtual clock if the machine
+  /// has no threads; then it also notices, within a millisecond, what its inputs do meanwhile.
+  ///
+  /// @return empty if the move hasn't ended by then; it continues.
+  virtual std::optional<MoveResult> waitFor(const Move& move, std::chrono::nanoseconds longest) = 0;
 
   /// Moves at a velocity until another command comes, or up to the soft limit, and rests there. 0
   /// ends a jog. A motion under way is replaced. A call with the velocity that the jog has already

@@ -145,4 +145,8 @@ struct CoordinatedResult {
   double duration = 0.0;          ///< [s] that it took
 };
 
+/// How such a motion ended, from how each of its axes ended it: for a move that outlived its
+/// machine, whose axis::Move::outcome are still there.
+CoordinatedResult combinedResult(const std::vector<axis::MoveResult>& members);
+
 }  // namespace stepdriver::machine

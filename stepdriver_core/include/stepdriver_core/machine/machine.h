@@ -212,6 +212,9 @@ class Machine {
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;
   /// Returns when it has ended.
   CoordinatedResult wait(const CoordinatedMove& move) const;
+  /// The same for at most this time, as axis::Axis::waitFor(); empty if it hasn't ended by then.
+  std::optional<CoordinatedResult> waitFor(const CoordinatedMove& move,
+                                           std::chrono::nanoseconds longest) const;
   /// Stops the axes that still make this move or hold it; they decelerate along its path. A motion
   /// that has replaced the move continues.
   void stop(const CoordinatedMove& move);
