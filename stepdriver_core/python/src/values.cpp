@@ -1,0 +1,124 @@
+#include "values.h"
+
+#include <pybind11/stl.h>
+
+namespace stepdriver::python {
+namespace {
+
+namespace py = pybind11;
+using py::literals::operator""_a;
+
+const char* nameOf(axis::MoveEnd end) {
+  switch (end) {
+    case axis::MoveEnd::kReached:
+      return "reached";
+    case axis::MoveEnd::kStopped:
+      return "stopped";
+    case axis::MoveEnd::kReplaced:
+      return "replaced";
+    case axis::MoveEnd::kEndstopMin:
+      return "endstop_min";
+    case axis::MoveEnd::kEndstopMax:
+      return "endstop_max";
+    case axis::MoveEnd::kEmergencyStop:
+      return "emergency_stop";
+    case axis::MoveEnd::kFault:
+      return "fault";
+    case axis::MoveEnd::kCompanion:
+      return "companion";
+  }
+  return "";
+}
+
+const char* nameOf(axis::HomingEnd end) {
+  switch (end) {
+    case axis::HomingEnd::kHomed:
+      return "homed";
+    case axis::HomingEnd::kCancelled:
+      return "cancelled";
+    case axis::HomingEnd::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
+}  // namespace
+
+py::dict valueOf(const axis::AxisState& state) {
+  return py::dict(
+      "enabled"_a = state.enabled, "asleep"_a = state.asleep, "powered"_a = state.powered,
+      "brake_engaged"_a = state.brake_engaged, "idle"_a = state.idle, "moving"_a = state.moving,
+      "held"_a = state.held, "homed"_a = state.homed, "homing"_a = axis::nameOf(state.homing),
+      "position_valid"_a = state.position_valid, "microsteps"_a = state.microsteps,
+      "speed_override"_a = state.speed_override, "position"_a = state.position,
+      "planned"_a = state.planned, "velocity"_a = state.velocity, "slack"_a = state.slack,
+      "skew"_a = state.skew, "target"_a = state.target, "time_left"_a = state.time_left,
+      "fault"_a = state.fault, "remedy"_a = state.remedy, "stops"_a = state.stops,
+      "position_note"_a = state.position_note);
+}
+
+py::dict valueOf(const axis::AxisLimits& limits) {
+  return py::dict("max_speed"_a = limits.max_speed, "acceleration"_a = limits.acceleration,
+                  "deceleration"_a = limits.deceleration, "jerk"_a = limits.jerk);
+}
+
+py::dict valueOf(const axis::EndstopState& endstops) {
+  return py::dict("min"_a = endstops.min, "max"_a = endstops.max);
+}
+
+py::dict valueOf(const axis::MoveResult& result) {
+  return py::dict("end"_a = nameOf(result.end), "message"_a = result.message,
+                  "position"_a = result.position, "duration"_a = result.duration);
+}
+
+py::dict valueOf(const axis::HomingResult& result) {
+  return py::dict("axis"_a = result.axis, "end"_a = nameOf(result.end),
+                  "message"_a = result.message, "position"_a = result.position,
+                  "skew"_a = result.skew);
+}
+
+py::dict valueOf(const axis::MovePlan& plan) {
+  py::list pieces;
+  for (const axis::MovePiece& piece : plan.pieces) {
+    pieces.append(py::make_tuple(piece.duration, piece.position, piece.velocity, piece.acceleration,
+                                 piece.jerk));
+  }
+  py::list parts;
+  for (const axis::MotionPart& part : plan.parts) {
+    parts.append(py::make_tuple(part.part, part.delay));
+  }
+  return py::dict("target"_a = plan.move.target, "rest"_a = plan.move.rest,
+                  "duration"_a = plan.move.duration, "overshoot"_a = plan.move.overshoot,
+                  "steps_per_unit"_a = plan.steps_per_unit, "pieces"_a = pieces, "parts"_a = parts);
+}
+
+py::dict valueOf(const machine::CoordinatedResult& result) {
+  return py::dict("end"_a = nameOf(result.end), "message"_a = result.message,
+                  "positions"_a = result.positions, "duration"_a = result.duration);
+}
+
+py::dict valueOf(const machine::PathAhead& ahead) {
+  return py::dict("segments"_a = ahead.segments, "room"_a = ahead.room, "time"_a = ahead.time,
+                  "passed"_a = ahead.passed, "more_follows"_a = ahead.more_follows,
+                  "targets"_a = ahead.targets);
+}
+
+py::dict valueOf(const machine::EngineFigures& figures) {
+  return py::dict("pulses"_a = figures.pulses, "slips"_a = figures.slips,
+                  "slipped"_a = figures.slipped, "worst_lateness"_a = figures.worst_lateness,
+                  "realtime"_a = figures.realtime);
+}
+
+py::dict valueOf(const sim::RigAxisReport& report) {
+  py::dict violations;
+  for (const auto& [violation, count] : report.violations) {
+    violations[sim::nameOf(violation)] = count;
+  }
+  return py::dict("pulses_forward"_a = report.pulses_forward,
+                  "pulses_backward"_a = report.pulses_backward, "carriage"_a = report.carriage,
+                  "microsteps"_a = report.microsteps, "lost_steps"_a = report.lost_steps,
+                  "energized"_a = report.energized, "min_pressed"_a = report.min_pressed,
+                  "max_pressed"_a = report.max_pressed, "violations"_a = violations);
+}
+
+}  // namespace stepdriver::python
