@@ -4,6 +4,7 @@
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/FollowPathAction.h>
 #include <stepdriver/PathSegment.h>
+#include <stepdriver/PlanPath.h>
 
 #include <cmath>
 #include <csignal>
@@ -79,6 +80,28 @@ class PathTest : public testing::Test {
 
 const std::vector<PathSegment> kSquare = {line({0.02, 0.0}), line({0.02, 0.02}), line({0.0, 0.02}),
                                           line({0.0, 0.0})};
+
+TEST_F(PathTest, IsPlannedWithoutAMotion) {
+  node.set("axes/y/enable_on_start", false);
+  node.start();
+  PlanPath::Request request;
+  request.name = {"x", "y"};
+  request.segments = {line({0.05, 0.0}), line({0.05, 0.05})};
+  request.tolerance = 0.001;
+  const auto plan = node.call<PlanPath>("plan_path", request);
+  ASSERT_TRUE(plan.success) << plan.message;
+  expectSays(plan.message, "the path would take ");
+  EXPECT_GT(plan.duration, 1.5) << "100 mm, half of them at 50 mm/s";
+  EXPECT_LT(plan.duration, 2.5);
+  request.begin = {0.05, 0.0};
+  EXPECT_LT(node.call<PlanPath>("plan_path", request).duration, plan.duration);
+  request.segments.push_back(line({9.0, 0.0}));
+  const auto refused = node.call<PlanPath>("plan_path", request);
+  EXPECT_FALSE(refused.success);
+  expectSays(refused.message, "segment 2");
+  EXPECT_EQ(refused.duration, 0.0);
+  EXPECT_EQ(node.pulses(), 0);
+}
 
 TEST_F(PathTest, RoundsItsCornersWithinTheTolerance) {
   node.start();

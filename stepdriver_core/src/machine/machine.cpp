@@ -226,6 +226,23 @@ class Machine::Impl {
     });
   }
 
+  double pathDuration(const PathRequest& request, const std::vector<double>& from) const {
+    if (request.more_follows) throw Refused("a path is planned as a whole: no more may follow");
+    const std::vector<AxisId> axes = idsOf(axesOf(request.names));
+    const auto now = shell_->snapshot();
+    const std::vector<axis::PathAxis> facts = factsOf(*now, axes);
+    const std::vector<PathOrigin> origins =
+        from.empty() ? originsOf(*now, axes) : originsAt(from, facts);
+    const PathPlan plan = planPath(request, facts, origins);
+    std::vector<motion::MotionState> begin;
+    begin.reserve(origins.size());
+    for (const PathOrigin& origin : origins) {
+      begin.push_back({motion::DoubleDouble(origin.rest)});
+    }
+    const axis::PreparedTrajectory checked(facts, plan.points, begin);
+    return plan.points.back().time;
+  }
+
   // Replaces the path by a longer one, from some time ahead on; later if that was too soon.
   PathAhead appendPath(const PathAppend& request) {
     pulse::Nanoseconds lead = kLeastLead;
@@ -379,6 +396,25 @@ class Machine::Impl {
     return facts;
   }
 
+  static std::vector<PathOrigin> originsAt(const std::vector<double>& positions,
+                                           const std::vector<axis::PathAxis>& facts) {
+    if (positions.size() != facts.size()) {
+      throw Refused(fmt::format("there are {} names, but {} positions from which the path begins",
+                                facts.size(), positions.size()));
+    }
+    std::vector<PathOrigin> origins;
+    for (std::size_t i = 0; i < facts.size(); ++i) {
+      if (!std::isfinite(positions[i])) {
+        facts[i].refuse(
+            fmt::format("the position {} from which the path begins must be a finite "
+                        "number",
+                        positions[i]));
+      }
+      facts[i].refuseBeyondLimits(positions[i], "the position from which the path begins");
+      origins.push_back({facts[i].restAt(facts[i].countOf(positions[i])), positions[i]});
+    }
+    return origins;
+  }
   static std::vector<PathOrigin> originsOf(const MachineSnapshot& snapshot,
                                            const std::vector<AxisId>& axes) {
     std::vector<PathOrigin> origins;
@@ -575,6 +611,10 @@ CoordinatedMove Machine::followTrajectory(const TrajectoryRequest& request) {
 
 CoordinatedMove Machine::followPath(const PathRequest& request) {
   return impl_->followPath(request);
+}
+
+double Machine::pathDuration(const PathRequest& request, const std::vector<double>& from) const {
+  return impl_->pathDuration(request, from);
 }
 
 PathAhead Machine::appendPath(const PathAppend& request) { return impl_->appendPath(request); }

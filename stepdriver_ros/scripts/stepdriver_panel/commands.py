@@ -74,6 +74,10 @@ COMMANDS = {
 }
 
 
+# Those after which something moves, and the drawing.
+MOTIONS = {"home", "move", "resume", "draw"}
+
+
 def carry_out(machine, message):
     """Calls the driver, and returns what it says, in the units of the page. It may wait for long. Raises
     Refusal."""

@@ -22,6 +22,7 @@ from .errors import Refusal
 from .units import UNITS, in_page_units
 
 EVENTS = 50  # kept
+JOINT_STATES = 64  # at most between two updates
 PATIENCE = 1.0  # [s] an urgent call without an answer for this long is repeated on another connection
 MOST_HANGING = 4  # urgent calls without an answer
 ENGINE = "pulse engine"
@@ -30,13 +31,23 @@ LEVELS = {Log.WARN: "warning", Log.ERROR: "error", Log.FATAL: "error"}
 
 
 class Newest:
-    """The newest message of a topic, and when it came."""
+    """The newest message of a topic, and when it came; also the latest ones before it that nobody has taken."""
 
-    def __init__(self):
+    def __init__(self, most=1):
+        """most: messages that are kept."""
         self.message, self.at = None, -math.inf
+        self._kept = deque(maxlen=most)
 
     def take(self, message):
         self.message, self.at = message, time.monotonic()
+        self._kept.append(message)
+
+    def taken(self):
+        """The kept messages, which are then forgotten."""
+        messages = []
+        while self._kept:
+            messages.append(self._kept.popleft())
+        return messages
 
 
 class Urgent:
@@ -100,7 +111,7 @@ class Driver:
         self.stop = Urgent(f"{self.name}/stop")
         self.emergency_stop = Urgent(f"{self.name}/emergency_stop")
         self.events = deque(maxlen=EVENTS)
-        self.states, self.endstops, self.joints, self.engine = Newest(), Newest(), Newest(), Newest()
+        self.states, self.endstops, self.joints, self.engine = Newest(), Newest(), Newest(JOINT_STATES), Newest()
         self._jog = rospy.Publisher(f"{self.name}/jog", Jog, queue_size=1, tcp_nodelay=True)
         self._watched = []
         # Always, so that a page shows what happened before it was opened; it is rare.
@@ -112,7 +123,7 @@ class Driver:
         self._watched = [
             rospy.Subscriber(f"{self.name}/axis_states", AxisStates, self.states.take),
             rospy.Subscriber(f"{self.name}/endstops", Endstops, self.endstops.take),
-            rospy.Subscriber(f"{space}joint_states", JointState, self.joints.take, queue_size=1)]
+            rospy.Subscriber(f"{space}joint_states", JointState, self.joints.take)]
         try:
             from diagnostic_msgs.msg import DiagnosticArray
         except ImportError:  # then the node doesn't publish them

@@ -74,6 +74,16 @@ class Machine:
                  round(message.velocity[numbers[axis.joint]] * axis.factor, 4)]
                 if axis.joint in numbers else None for axis in self.axes.values()]
 
+    def way(self, names):
+        """The positions of some axes since the last call, as the pulses made them."""
+        axes = [self.axes[name] for name in names if name in self.axes]
+        points = []
+        for message in self.driver.joints.taken():
+            numbers = {joint: i for i, joint in enumerate(message.name)}
+            if all(axis.joint in numbers for axis in axes):
+                points.append([round(message.position[numbers[axis.joint]] * axis.factor, 4) for axis in axes])
+        return points
+
     def lateness(self):
         """[us] of the latest pulse in the last second; None: unknown."""
         values = self.driver.engine.message

@@ -11,9 +11,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 from aiohttp import WSMsgType, web
 
-from .commands import COMMANDS, axis_of, carry_out, number
+from .commands import COMMANDS, MOTIONS, axis_of, carry_out, number
+from .drawing import Drawing
 from .errors import Refusal
 from .jog import HeldJog
+from .recordings import Recordings
 from .viewer import Viewer
 
 PAGE = pathlib.Path(__file__).resolve().parent / "page"
@@ -39,6 +41,9 @@ ALIVE = 4.0  # [s] between two pings; a page that misses one is gone
 LARGEST_MESSAGE = 4096  # [bytes]
 LARGEST_REQUEST = 4 << 20  # [bytes] a drawing
 FORBIDDEN = 4403  # the code with which a socket ends after a wrong token
+STOP_AGAIN = 0.2  # [s]
+STOPS_AGAIN = 50
+CHUNK = 1 << 18  # [bytes] of a recording
 REFUSED_LOG_EVERY = 60.0  # [s]
 
 
@@ -49,11 +54,13 @@ class Panel:
         """log: called with each text for the log."""
         self.machine, self.gate, self.log = machine, gate, log
         self.jog = HeldJog(self._publish_jog, machine.jog_timeout)
+        self.drawing = Drawing(machine)
         self.viewers = []
         self.controller = None
         self._strangers = []
         self._parts = {}
-        self._pending = set()
+        self._pending = {}  # what the driver was asked, and has not answered
+        self._way = []
         self._numbers = 0
         self._jog_timer = None
         self._refused, self._refused_told = 0, -math.inf
@@ -74,6 +81,8 @@ class Panel:
         age = self.machine.age()
         update = {"tick": round(time.monotonic(), 4), "age": round(age, 2) if age < 1e6 else None,
                   "positions": self.machine.positions(), "late": self.machine.lateness()}
+        if self.drawing.shown["state"] == "drawing":
+            update["way"] = self._way
         return update, self._parts
 
     async def _beat(self):
@@ -91,11 +100,16 @@ class Panel:
         if not live:
             self.jog.end()
         self._was_live = live
+        self._way = self.machine.way(self.drawing.shown["axes"])
+        self.publish_drawing()
         self.publish("states", self.machine.states())
         self.publish("override", self.machine.override())
         self.publish("events", list(self.machine.driver.events))
         self.publish("control", {"controller": self.controller.number if self.controller else None,
                                  "viewers": len(self.viewers)})
+
+    def publish_drawing(self):
+        self.publish("drawing", self.drawing.shown)
 
     async def _configure(self):
         try:
@@ -184,6 +198,7 @@ class Panel:
         if what in ("stop", "emergency_stop"):
             self.jog.end()
             self.begin(self._stop(viewer, call, getattr(self.machine.driver, what)))
+            self.begin(self._stop_what_is_on_its_way())
             return
         if not viewer.rate.take():
             viewer.answer(id=call, ok=False, text="not sent: too many messages")
@@ -196,17 +211,17 @@ class Panel:
             if what == "jog_end":
                 self.jog.end(viewer)
                 return
-            self._require_control(viewer)
+            self.require_control(viewer)
             if what == "jog":
                 self._press(viewer, message)
-            elif isinstance(what, str) and what in COMMANDS:
+            elif isinstance(what, str) and (what == "draw" or what in COMMANDS):
                 self._start(viewer, call, message)
             else:
                 raise Refusal(f"there is no command {what!r}")
         except Refusal as refusal:
             viewer.answer(id=call, ok=False, text=str(refusal), jog=what == "jog")
 
-    def _require_control(self, viewer):
+    def require_control(self, viewer):
         if viewer is not self.controller:
             raise Refusal("nothing was sent: " + (
                 "another page has control; take it over first" if self.controller else
@@ -246,19 +261,33 @@ class Panel:
             raise Refusal(f"{shown}: not sent again, because the driver has not answered the last one yet")
         if len(self._pending) >= MOST_CALLS:
             raise Refusal(f"{shown}: not sent, because {MOST_CALLS} calls wait for the driver")
-        self._pending.add(name)
+        self._pending[name] = message
         self.begin(self._carry_out(viewer, call, message, name, shown))
 
     async def _carry_out(self, viewer, call, message, name, shown):
         try:
-            text = await self.in_thread(carry_out, self.machine, message)
+            if message["do"] == "draw":
+                self.drawing.begin(message.get("version"))
+                text = await self.in_thread(self.drawing.draw)
+            else:
+                text = await self.in_thread(carry_out, self.machine, message)
         except Refusal as refusal:
             self.machine.driver.tell("refused", f"{shown}: {refusal}")
             viewer.answer(id=call, ok=False, text=str(refusal))
         else:
             viewer.answer(id=call, ok=True, text=text)
         finally:
-            self._pending.discard(name)
+            del self._pending[name]
+
+    async def _stop_what_is_on_its_way(self):
+        """A motion that the driver was asked for before a stop may reach it after the stop: then it is stopped,
+        too."""
+        asked = {name: task for name, task in self._pending.items() if name[0] in MOTIONS}
+        for _ in range(STOPS_AGAIN):
+            await asyncio.sleep(STOP_AGAIN)
+            if all(self._pending.get(name) is not task for name, task in asked.items()):
+                return
+            await asyncio.wait([asyncio.wrap_future(self.machine.driver.stop.call())])
 
     async def _stop(self, viewer, call, urgent):
         try:
@@ -280,6 +309,10 @@ class Server:
         self.application = web.Application(client_max_size=LARGEST_REQUEST, middlewares=[self._guard])
         self.application.router.add_get("/", self._file)
         self.application.router.add_get("/socket", self._socket)
+        self.application.router.add_post("/drawing", self._read_drawing)
+        self.application.router.add_get("/drawing", self._drawing)
+        self.application.router.add_get("/recordings", self._recordings)
+        self.application.router.add_get("/recordings/{name}", self._recording)
         self.application.router.add_get("/{name}", self._file)
 
     @web.middleware
@@ -303,6 +336,63 @@ class Server:
             raise web.HTTPNotFound()
         return web.Response(body=self._files[name], content_type=TYPES[pathlib.PurePath(name).suffix],
                             charset="utf-8")
+
+    def _require_page(self, request):
+        """A request of an open page: its script adds the token, which no foreign page has. Returns its viewer."""
+        key = request.headers.get("X-Page", "")
+        scheme, _, token = request.headers.get("Authorization", "").partition(" ")
+        viewer = next((viewer for viewer in self._panel.viewers if viewer.key == key), None)
+        if viewer is None or scheme != "Bearer" or not self._panel.gate.knows_token(token):
+            self._panel.refuse_login()
+            raise web.HTTPForbidden(text="Only the panel's own page may ask for this\n")
+        return viewer
+
+    async def _read_drawing(self, request):
+        viewer = self._require_page(request)
+        if not self._panel.gate.is_own_origin(request.headers.get("Origin"), request.headers.get("Host")):
+            raise web.HTTPForbidden(text="Only the panel's own page may ask for this\n")
+        try:
+            self._panel.require_control(viewer)
+            await self._panel.drawing.read(await request.read(), request.query, self._panel.in_thread,
+                                           self._panel.publish_drawing)
+        except Refusal as refusal:
+            return web.json_response({"problem": str(refusal)})
+        return web.json_response({"problem": ""})
+
+    async def _drawing(self, request):
+        self._require_page(request)
+        return web.json_response(self._panel.drawing.strokes())
+
+    async def _recordings(self, request):
+        self._require_page(request)
+        try:
+            return web.json_response({"recordings": await self._panel.in_thread(self._folder().shown), "problem": ""})
+        except Refusal as refusal:
+            return web.json_response({"recordings": [], "problem": str(refusal)})
+
+    def _folder(self):
+        machine = self._panel.machine
+        return Recordings(machine.recorder.get("folder", ""), machine.driver.name)
+
+    async def _recording(self, request):
+        self._require_page(request)
+        name = request.match_info["name"]
+        try:
+            file, size = await self._panel.in_thread(self._folder().open, name)
+        except Refusal as refusal:
+            raise web.HTTPNotFound(text=f"{refusal}\n") from None
+        response = web.StreamResponse(headers={**HEADERS, "Content-Disposition": f'attachment; filename="{name}"'})
+        response.content_type = "application/octet-stream"
+        response.content_length = size
+        with file:
+            await response.prepare(request)
+            while size > 0:
+                part = await self._panel.in_thread(file.read, min(size, CHUNK))
+                if not part:
+                    break
+                size -= len(part)
+                await response.write(part)
+        return response
 
     async def _socket(self, request):
         panel = self._panel

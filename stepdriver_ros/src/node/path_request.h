@@ -12,16 +12,26 @@ namespace stepdriver::ros_node {
 ///   point.
 std::vector<machine::PathSegment> pathSegments(const std::vector<PathSegment>& fields);
 
-/// @tparam Fields those of a request of the service follow_path, or of a goal of the action.
+/// A path to which nothing is appended.
+///
+/// @tparam Fields those of a request of the service plan_path, or of pathRequest().
 /// @throw Refused as pathSegments().
 template <typename Fields>
-machine::PathRequest pathRequest(const Fields& fields) {
+machine::PathRequest wholePath(const Fields& fields) {
   machine::PathRequest path;
   path.names = fields.name;
   path.segments = pathSegments(fields.segments);
   path.relative = fields.relative != 0;
   path.velocity = fields.velocity;
   path.tolerance = fields.tolerance;
+  return path;
+}
+
+/// @tparam Fields those of a request of the service follow_path, or of a goal of the action.
+/// @throw Refused as pathSegments().
+template <typename Fields>
+machine::PathRequest pathRequest(const Fields& fields) {
+  machine::PathRequest path = wholePath(fields);
   path.more_follows = fields.more_follows != 0;
   return path;
 }

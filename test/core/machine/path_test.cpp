@@ -94,6 +94,40 @@ class Path : public PathBench {
   }
 };
 
+TEST_F(Path, IsPlannedAsItWillBeFollowed) {
+  const PathRequest request = circle();
+  const double planned = machine().pathDuration(request);
+  machine().hold();
+  EXPECT_EQ(machine().pathDuration(request), planned) << "a hold changes no plan";
+  machine().stop();
+  bench->axis("x").disable();
+  EXPECT_EQ(machine().pathDuration(request), planned) << "nor does a disabled axis";
+  bench->axis("x").enable();
+  EXPECT_EQ(bench->pulses("x"), 0);
+  const CoordinatedResult result = finish(request);
+  ASSERT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_NEAR(result.duration, planned, 1e-6);
+  EXPECT_EQ(machine().pathDuration(request, {0.0, 0.0}), planned) << "from where it began";
+}
+
+TEST_F(Path, IsPlannedFromElsewhere) {
+  const PathRequest there{{"x", "y"}, {lineTo({0.05, 0.0})}, false, 0.0, 0.0};
+  EXPECT_LT(machine().pathDuration(there, {0.04, 0.0}), machine().planPath(there));
+  const auto expect_refused = [&](const PathRequest& request, const std::vector<double>& from,
+                                  const std::string& words) {
+    EXPECT_REFUSED(machine().pathDuration(request, from), words);
+  };
+  expect_refused(there, {0.04}, "there are 2 names, but 1 positions");
+  expect_refused(there, {0.04, std::nan("")}, "y: the position nan from which the path begins");
+  expect_refused(there, {0.04, 1e300}, "y: the position from which the path begins");
+  expect_refused({{"x", "y"}, {lineTo({9e9, 0.0})}, false, 0.0, 0.0}, {}, "segment 0");
+  PathRequest more = there;
+  more.more_follows = true;
+  expect_refused(more, {}, "no more may follow");
+  advance(0.1);
+  EXPECT_EQ(bench->pulses("x"), 0);
+}
+
 TEST_F(Path, FollowsACircleOfLinesWithoutStopping) {
   const CoordinatedMove move = followPath(circle());
   // On the ideal circle: 2 pi r/v + v/a = 1.357 s.

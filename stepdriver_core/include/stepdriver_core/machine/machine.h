@@ -190,6 +190,15 @@ class Machine {
   ///   is 0). Then nothing moves.
   CoordinatedMove followPath(const PathRequest& request);
 
+  /// How long followPath() would take for a path, at the speed override of 1. Nothing moves, and it
+  /// doesn't matter whether the axes are enabled, homed, on hold or at fault.
+  ///
+  /// @param from [unit] where the path begins, one for each name; empty: where the axes stand.
+  /// @return [s]
+  /// @throw Refused as followPath() for the path, if `from` has another number of positions, if one
+  ///   of them is beyond a soft limit, or with PathRequest::more_follows.
+  double pathDuration(const PathRequest& request, const std::vector<double>& from = {}) const;
+
   /// Appends segments to a path that began with PathRequest::more_follows: the axes don't stop at
   /// its former end, and the corner there is rounded, as far as they can still slow down for it. If
   /// the segments come too late, the axes come to rest at the former end, wait there, and continue

@@ -87,11 +87,10 @@ class AxisCard {
   }
 
   show(state) {
-    const { unit } = this.settings;
     setText(this.fields.state, state.state);
     this.fields.state.className = `badge ${state.fault ? "bad" : state.held || !state.valid ? "warn" : "good"}`;
     setText(this.fields.motor, state.motor);
-    setText(this.fields.validity, state.valid ? (state.homed ? "valid, homed" : "valid, not homed") : `not valid${state.note ? `: ${state.note}` : ": not homed, or lost since"}`);
+    setText(this.fields.validity, state.valid ? (state.homed ? "valid, homed" : "valid, not homed") : `not valid: ${state.note || (this.settings.homing ? "home it, or set zero" : "set zero")}`);
     for (const end of ["min", "max"]) {
       const there = this.settings.switches[end];
       setText(this.fields[end], !there ? "none" : state[end] === null ? "not known" : state[end] ? "PRESSED" : "open");

@@ -1,7 +1,9 @@
 // Joins the screens with the connection.
 
 import { Connection } from "./connection.js";
+import { DrawingScreen } from "./drawing.js";
 import { MachineScreen, setText } from "./machine.js";
+import { PlotsScreen } from "./plots.js";
 
 const STALE = 1; // [s]
 const byId = (id) => document.getElementById(id);
@@ -16,7 +18,8 @@ function say(good, text, answer = {}) {
 
 const connection = new Connection(update, say);
 const machine = new MachineScreen(connection);
-const screens = [];
+const plots = new PlotsScreen(connection, say);
+const screens = [new DrawingScreen(connection), plots];
 
 function stop() {
   machine.held.end();
@@ -74,6 +77,7 @@ const SHOW = {
     setText(byId("driver"), value.driver);
     document.title = value.driver;
     machine.configure(value);
+    plots.configure(value);
     if (parts.states) machine.showStates(parts.states);
   },
   states: (value) => machine.showStates(value),

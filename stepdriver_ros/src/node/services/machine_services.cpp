@@ -7,6 +7,7 @@
 #include <stepdriver/AppendPath.h>
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/MoveLine.h>
+#include <stepdriver/PlanPath.h>
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SpeedOverride.h>
 
@@ -155,6 +156,14 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
           tell(machine, move, request.wait != 0, "a path", response);
         });
       };
+  const boost::function<bool(PlanPath::Request&, PlanPath::Response&)> plan =
+      [&machine](PlanPath::Request& request, PlanPath::Response& response) {
+        return respond(response, [&] {
+          response.duration = machine.pathDuration(wholePath(request), request.begin);
+          response.message =
+              fmt::format("the path would take {} s", durationText(response.duration));
+        });
+      };
   const boost::function<bool(AppendPath::Request&, AppendPath::Response&)> append =
       [&machine](AppendPath::Request& request, AppendPath::Response& response) {
         return respond(response, [&] {
@@ -172,6 +181,7 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
   node_.setCallbackQueue(&queues_.lines());
   servers_.push_back(advertiseBounded(node_, "move_line", line));
   servers_.push_back(advertiseBounded(node_, "follow_path", path));
+  servers_.push_back(advertiseBounded(node_, "plan_path", plan));
   servers_.push_back(advertiseBounded(node_, "append_path", append));
 }
 
