@@ -19,9 +19,12 @@ def axis_of(machine, message):
 
 def number(message, key):
     value = message.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise Refusal(f"{key} is {value!r}, but must be a number")
-    return float(value)
+    try:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            return float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        pass
+    raise Refusal(f"{key} is {str(value)[:40]}, but must be a number")
 
 
 def enable(machine, message):

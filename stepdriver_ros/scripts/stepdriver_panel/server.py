@@ -105,6 +105,9 @@ class Panel:
         self.publish("states", self.machine.states())
         self.publish("override", self.machine.override())
         self.publish("events", list(self.machine.driver.events))
+        self._publish_control()
+
+    def _publish_control(self):
         self.publish("control", {"controller": self.controller.number if self.controller else None,
                                  "viewers": len(self.viewers)})
 
@@ -133,15 +136,21 @@ class Panel:
 
     # ---- who may what
 
-    def enter(self, socket, transport):
+    def enter(self, socket, transport, was):
+        """was: the key that the page had before it lost its connection. It gets its control back."""
         self._numbers += 1
         viewer = Viewer(socket, transport, self._numbers, secrets.token_urlsafe(16))
         if len(self.viewers) >= MOST_VIEWERS:
             oldest = next(other for other in self.viewers if other is not self.controller)
             self.begin(oldest.socket.close(message=b"too many pages are open"))
         self.viewers.append(viewer)
-        if self.controller is None:
+        lost = next((other for other in self.viewers if other.key == was), None)
+        if lost is not None:
+            self.jog.end(lost)
+            self.begin(lost.socket.close())
+        if self.controller in (None, lost):
             self.controller = viewer
+        self._publish_control()
         if not self._watching:
             self._watching = True
             self.begin(self._watch())
@@ -401,31 +410,33 @@ class Server:
             raise web.HTTPForbidden(text="Only the panel's own page may connect\n")
         socket = web.WebSocketResponse(heartbeat=ALIVE, max_msg_size=LARGEST_MESSAGE)
         await socket.prepare(request)
-        if not await self._logged_in(socket):
+        login = await self._login(socket)
+        if login is None:
             panel.refuse_login()
             await socket.close(code=FORBIDDEN, message=b"wrong token")
             return socket
-        await self._serve(socket, request.transport)
+        await self._serve(socket, request.transport, login.get("was"))
         return socket
 
-    async def _logged_in(self, socket):
+    async def _login(self, socket):
+        """The first message of a connection; None if it doesn't have the token."""
         strangers = self._panel._strangers
         if len(strangers) >= MOST_STRANGERS:
             self._panel.begin(strangers.pop(0).close())
         strangers.append(socket)
         try:
             message = await socket.receive(timeout=LOGIN)
-            return message.type == WSMsgType.TEXT and self._panel.gate.knows_token(
-                json.loads(message.data).get("token"))
-        except (asyncio.TimeoutError, ValueError, AttributeError, RecursionError):
-            return False
+            login = json.loads(message.data) if message.type == WSMsgType.TEXT else None
+            return login if isinstance(login, dict) and self._panel.gate.knows_token(login.get("token")) else None
+        except (asyncio.TimeoutError, ValueError, RecursionError):
+            return None
         finally:
             if socket in strangers:
                 strangers.remove(socket)
 
-    async def _serve(self, socket, transport):
+    async def _serve(self, socket, transport, was):
         panel = self._panel
-        viewer = panel.enter(socket, transport)
+        viewer = panel.enter(socket, transport, was)
         viewer.answer(welcome={"number": viewer.number, "key": viewer.key})
         sender = asyncio.get_running_loop().create_task(self._send(viewer))
         try:

@@ -20,7 +20,7 @@ BOUND = float(os.environ.get("PANEL_TEST_BOUND", 60.0))  # [s] limit of each wai
 PAUSE = 0.05  # [s] between two looks
 
 CONFIG = """
-jog_timeout: 0.5
+jog_timeout: 1.5
 recorder: {folder: FOLDER/recordings, keep: 5}
 axes:
   x:
@@ -35,6 +35,7 @@ axes:
     max_position_mm: 200.0
     endstops:
       min: {pin: GPIO23, active_level: high}
+    require_homing: false
     homing: {switch: min, seek_speed_mm_s: 50.0, latch_speed_mm_s: 5.0, pull_off_mm: 4.0,
              offset_mm: -2.0, max_travel_mm: 250.0}
   y:

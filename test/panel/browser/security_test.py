@@ -215,6 +215,7 @@ class Requests(unittest.TestCase):
         call = 10
         for message in ('"do": "move"', '"do": "move", "axis": "z", "by": 1', '"do": "move", "axis": "x", "by": "1"',
                         '"do": "move", "axis": "x", "by": NaN', '"do": "move", "axis": "x", "to": 1e999',
+                        f'"do": "move", "axis": "x", "to": 1{"0" * 400}',
                         '"do": "move", "axis": ["x"], "by": 1', '"do": "move", "axis": "x", "by": true',
                         '"do": "jog", "axis": "x", "velocity": 1, "tick": "now", "press": 1',
                         '"do": "jog", "axis": "x", "velocity": NaN, "tick": 1e300, "press": 1',

@@ -78,7 +78,7 @@ export class Connection {
     const socket = new WebSocket(`${scheme}://${location.host}/socket`);
     this.#socket = socket;
     this.#heard = performance.now();
-    socket.addEventListener("open", () => socket.send(JSON.stringify({ token: this.#token })));
+    socket.addEventListener("open", () => socket.send(JSON.stringify({ token: this.#token, was: this.key })));
     socket.addEventListener("message", (event) => {
       if (socket === this.#socket) this.#take(JSON.parse(event.data));
     });
