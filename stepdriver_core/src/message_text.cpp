@@ -54,6 +54,41 @@ std::size_t distance(const std::string& from, const std::string& to) {
   return row.back();
 }
 
+bool isBeginOf(const std::string& word, const std::string& candidate) {
+  return !word.empty() && candidate.compare(0, word.size(), word) == 0;
+}
+
+/// Whether letters were left out of its words, but not the first ones: "accel_mm" and
+/// "acceleration_mm_s2".
+bool isAbbreviationOf(const std::string& word, const std::string& candidate) {
+  bool begins = true;
+  std::size_t at = 0;
+  for (const char letter : word) {
+    if (begins || letter == '_') {
+      if (!begins) at = candidate.find('_', at);
+      if (at >= candidate.size() || candidate[at] != letter) return false;
+    } else {
+      while (at < candidate.size() && candidate[at] != letter && candidate[at] != '_') ++at;
+      if (at >= candidate.size() || candidate[at] != letter) return false;
+    }
+    begins = letter == '_';
+    ++at;
+  }
+  return word.size() > 1;
+}
+
+/// The only word that is meant; nullptr if there is none, or several.
+template <typename IsMeant>
+const std::string* onlyOne(const std::vector<std::string>& words, const IsMeant& is_meant) {
+  const std::string* found = nullptr;
+  for (const std::string& candidate : words) {
+    if (!is_meant(candidate)) continue;
+    if (found != nullptr) return nullptr;
+    found = &candidate;
+  }
+  return found;
+}
+
 }  // namespace
 
 std::string numberText(double number) { return fmt::format("{:.{}g}", number, digitsOf(number)); }
@@ -85,8 +120,16 @@ std::string listText(const std::vector<std::string>& words, const std::string& j
 }
 
 const std::string* nearest(const std::string& word, const std::vector<std::string>& words) {
+  for (const auto& shortens : {isBeginOf, isAbbreviationOf}) {
+    if (const std::string* meant = onlyOne(
+            words, [&](const std::string& candidate) { return shortens(word, candidate); })) {
+      return meant;
+    }
+  }
   const std::string* best = nullptr;
-  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 2) + 1;
+  // A misspelling has a letter in common with the word, at least.
+  std::size_t best_distance = std::min(std::max<std::size_t>(2, word.size() / 2) + 1,
+                                       std::max<std::size_t>(word.size(), 1));
   for (const std::string& candidate : words) {
     const std::size_t candidate_distance = distance(word, candidate);
     if (candidate_distance < best_distance) {

@@ -31,8 +31,8 @@ std::string joinedText(const Elements& elements, const TextOf& text_of) {
   return text;
 }
 
-/// @return the word of which this one may be a misspelling; nullptr if none is close enough. Of two
-///   at the same distance, the first.
+/// @return the word of which this one may be an abbreviation or a misspelling; nullptr if none is
+///   close enough. Of two misspellings at the same distance, the first.
 const std::string* nearest(const std::string& word, const std::vector<std::string>& words);
 
 }  // namespace stepdriver

@@ -2,7 +2,8 @@
 
 #include <array>
 #include <new>
-#include <stdexcept>
+
+#include "stepdriver_core/error.h"
 
 namespace stepdriver {
 
@@ -11,7 +12,7 @@ Pattern::Pattern(const char* expression) {
   if (error == 0) return;
   std::array<char, 128> reason{};
   regerror(error, &compiled_, reason.data(), reason.size());
-  throw std::invalid_argument(std::string(expression) + ": " + reason.data());
+  throw Error(std::string(expression) + ": " + reason.data());
 }
 
 Pattern::~Pattern() { regfree(&compiled_); }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/node_config.h"
 #include "support/node_under_test.h"
 #include "support/says.h"
 #include "support/wait.h"
@@ -311,8 +312,12 @@ TEST(BringUpByHand, HelpExplainsAndUnknownArgumentsAreRefused) {
   EXPECT_EQ(help.waitForExit(kBound).value_or(-1), 0);
   expectSays(help.output(), "usage");
   expectSays(help.output(), "~axis_states");
+  for (const std::string& name : ros_node::parameterNames()) {
+    expectSays(help.output(), ("~" + name + " ").c_str());
+  }
   NodeProcess unknown({"--hlep"});
-  EXPECT_NE(unknown.waitForExit(kBound).value_or(0), 0);
+  EXPECT_EQ(unknown.waitForExit(kBound).value_or(0), 64);
+  expectSays(unknown.output(), "--hlep isn't an option");
   expectSays(unknown.output(), "usage");
 }
 

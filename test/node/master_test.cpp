@@ -118,6 +118,16 @@ class MasterTest : public testing::Test {
     before = registered(node.name());
     ASSERT_GT(before.size(), 30U);
   }
+  /// The node has lost the master, and is stopped while a new one starts: what comes to that one
+  /// now came before the node.
+  void restartBeforeTheNodeSeesIt() {
+    start();
+    master->kill();
+    ASSERT_TRUE(isLost());
+    node.process().signal(SIGSTOP);
+    master->start();
+    ASSERT_TRUE(master->answers());
+  }
   void TearDown() override {
     // Whatever happened, the next test needs a master.
     if (ros::master::check()) return;
@@ -185,12 +195,7 @@ TEST_F(MasterTest, ThatIsRestartedFindsEverythingOfTheNode) {
 }
 
 TEST_F(MasterTest, ThatIsRestartedTellsOfPublishersThatCameBeforeTheNode) {
-  start();
-  master->kill();
-  ASSERT_TRUE(isLost());
-  node.process().signal(SIGSTOP);
-  master->start();
-  ASSERT_TRUE(master->answers());
+  ASSERT_NO_FATAL_FAILURE(restartBeforeTheNodeSeesIt());
   const auto publisher = ros::NodeHandle().advertise<Jog>(node.full("jog"), 1);
   node.process().signal(SIGCONT);
   ASSERT_TRUE(isRegisteredAgain());
@@ -199,12 +204,7 @@ TEST_F(MasterTest, ThatIsRestartedTellsOfPublishersThatCameBeforeTheNode) {
 
 // Its message was published before the node could receive it.
 TEST_F(MasterTest, ThatIsRestartedMakesNoLatchedMessageMoveAnything) {
-  start();
-  master->kill();
-  ASSERT_TRUE(isLost());
-  node.process().signal(SIGSTOP);
-  master->start();
-  ASSERT_TRUE(master->answers());
+  ASSERT_NO_FATAL_FAILURE(restartBeforeTheNodeSeesIt());
   const auto publisher =
       ros::NodeHandle().advertise<std_msgs::Float64>(node.full("x/setpoint"), 1, true);
   std_msgs::Float64 message;

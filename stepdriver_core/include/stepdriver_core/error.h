@@ -26,6 +26,12 @@ class GpioError : public Error {
   using Error::Error;
 };
 
+/// The computer has nothing left for what is needed, such as another thread.
+class ExhaustedError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// The positions of the axes couldn't be written to the state file; names the file and the reason.
 class StateFileError : public Error {
  public:

@@ -15,7 +15,7 @@ namespace stepdriver {
 /// Any thread may use one at any time.
 class Pattern {
  public:
-  /// @throw std::invalid_argument if the expression is wrong.
+  /// @throw Error if the expression is wrong.
   explicit Pattern(const char* expression);
   ~Pattern();
   Pattern(const Pattern&) = delete;

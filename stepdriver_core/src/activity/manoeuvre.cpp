@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "message_text.h"
+#include "motion/errors.h"
 #include "motion/resting_count.h"
 #include "point_motion.h"
 #include "stepdriver_core/error.h"
@@ -209,7 +209,7 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
       planned.limits = order.axis->motor.motions().latest()->limits;
       planned.slows_ns = plans.at;
     }
-  } catch (const std::range_error& error) {
+  } catch (const motion::TooLong& error) {
     orders_.front().axis->refuse(error.what());
   }
   return plans;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 
 #include "axis/move_between.h"
 #include "motion/extent.h"
@@ -102,7 +101,7 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at
   before.max_speed = within.max_speed;
   if (goal.kind == Goal::Kind::kSetpoint && at >= slows_ns) {
     if (axis.moving()) return {{planStop(axis, at)}, before, at};
-    throw std::range_error("no other setpoint came before the timeout");
+    axis.refuse("no other setpoint came before the timeout");
   }
   if (areTheSame(before, within)) {
     return {planFrom(axis, goal, from, at, within), within, slows_ns};

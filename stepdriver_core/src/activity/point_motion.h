@@ -26,7 +26,8 @@ struct GoalPlan {
 /// If the limits have changed since the motion under way was planned, the new ones apply, unless
 /// the axis would pass its target or a soft limit farther with them: then it keeps the old ones.
 ///
-/// @throw std::range_error if the motion takes too long, or if the timeout of a setpoint is over
+/// @throw motion::TooLong if the motion takes too long; Refused if the timeout of a setpoint is
+/// over
 ///   before the axis moves.
 GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at);
 

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <stdexcept>
 
+#include "motion/errors.h"
 #include "point_motion.h"
 #include "stepdriver_core/error.h"
 
@@ -89,7 +89,7 @@ void Schedule::plan(Entry& entry) const {
       plans.push_back(std::make_shared<const motion::Profile>(path->profileOf(i, along)));
     }
     entry.plans = std::move(plans);
-  } catch (const std::range_error& error) {
+  } catch (const motion::TooLong& error) {
     motion.orders.front().axis->refuse(error.what());
   }
   entry.from = std::move(from);

@@ -15,7 +15,7 @@ namespace stepdriver::activity {
 /// axis comes to rest on the last position. In any case it slows down when the timeout is over.
 ///
 /// @param within the limits of the axis, with the highest speed.
-/// @throw std::range_error if the motion takes too long.
+/// @throw motion::TooLong if the motion takes too long.
 motion::Plan planSetpoint(const axis::AxisModel& axis, const Goal& goal,
                           const motion::MotionState& from, std::int64_t at,
                           const motion::MotionLimits& within);

@@ -317,11 +317,6 @@ std::string AxisModel::failureText(const pulse::LineFailure& failure) const {
 // ---- axes that share motors ----
 
 void AxisModel::shareMotors(const std::vector<AxisModel*>& axes) {
-  if (config.motors() > 1 || config.backlash > 0.0 || config.idle_timeout > 0.0 || config.brake) {
-    refuse(
-        "it shares its motors, and can't have motors of its own, a backlash, an idle timeout or a "
-        "brake");
-  }
   sharing_ = axes;
   const std::size_t own = config.kinematics->numberOf(name());
   for (std::size_t i = 0; i < axes.size(); ++i) {

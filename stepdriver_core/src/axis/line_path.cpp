@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "message_text.h"
 #include "motion/compose.h"
+#include "motion/errors.h"
 #include "motion/level_off.h"
 #include "motion/planner.h"
 #include "motion/resting_count.h"
@@ -106,7 +106,7 @@ double LinePath::durationAt(double speed) const {
   limits.max_speed = speed;
   try {
     return motion::planMove(0, {}, length_, limits).profile.duration().value();
-  } catch (const std::range_error& error) {
+  } catch (const motion::TooLong& error) {
     axes_.front().refuse(error.what());
   }
 }

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <functional>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "give_way.h"
 #include "line_path.h"
 #include "message_text.h"
+#include "motion/errors.h"
 #include "motion/interpolate.h"
 #include "motion/planner.h"
 #include "motion/profile_parts.h"
@@ -234,7 +234,7 @@ std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
         const Profile curve = motion::planSpline(0, from, waypoints, curveLimits(member));
         more = std::max(more, slowdownOf(axis, motion::profilePeaks(curve),
                                          motion::splineJerk(from, waypoints)));
-      } catch (const std::invalid_argument& error) {
+      } catch (const motion::Malformed& error) {
         axis.refuse(error.what());
       }
     }
@@ -300,7 +300,7 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
   waypoints.back().may_rest = axis.shares_motors;
   try {
     motion::requireWaypoints(waypoints);
-  } catch (const std::invalid_argument& error) {
+  } catch (const motion::Malformed& error) {
     axis.refuse(error.what());
   }
   return motion::interpolate(
@@ -337,7 +337,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
   part.bounds = {axis.mostAcceleration() * kMore, axis.limits.jerk * kMore};
   try {
     part.spline = std::make_unique<const motion::SplineTail>(waypoints, curveLimits(member));
-  } catch (const std::invalid_argument& error) {
+  } catch (const motion::Malformed& error) {
     axis.refuse(error.what());
   }
   const Profile* joint = part.spline->profile();
@@ -377,7 +377,7 @@ PreparedTrajectory::Head PreparedTrajectory::headOf(std::size_t member,
   const motion::MotionState from = jointOf(start);
   try {
     return {spline.head(from), spline.headJerk(from)};
-  } catch (const std::invalid_argument& error) {
+  } catch (const motion::Malformed& error) {
     axes_[member].refuse(error.what());
   }
 }
@@ -397,7 +397,7 @@ std::vector<motion::Piece> PreparedTrajectory::quickestTo(std::size_t member,
   try {
     const Profile plan = planMove(0, from, axis.restAt(point.position), limits).profile;
     for (const motion::Piece& piece : plan.pieces()) pieces.push_back(piece);
-  } catch (const std::range_error& error) {
+  } catch (const motion::TooLong& error) {
     axis.refuse(error.what());
   }
   // An axis that is there already waits for the others.

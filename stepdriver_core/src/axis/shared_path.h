@@ -12,7 +12,7 @@ namespace stepdriver::axis {
 /// during a stop or a hold.
 ///
 /// It is immutable, and uses no axis, engine or clock: any thread may plan on it. Every function
-/// takes a bounded time, however long the path is. The only exception is std::range_error, if a
+/// takes a bounded time, however long the path is. The only exception is motion::TooLong, if a
 /// motion would take longer than motion::Profile::kLongest.
 class SharedPath {
  public:

@@ -6,6 +6,10 @@
 /// machine, and well within what the motion can count and time in 64 bits.
 namespace stepdriver::config {
 
+/// Tolerance for limits: the rounding of units, or of the bound in a message, doesn't count as
+/// exceeding a limit.
+constexpr double kSlack = 1.0 + 1e-9;
+
 constexpr double kLowestScale = 1e-9;  ///< [steps/unit of configurations]
 constexpr double kHighestScale = 1e9;
 constexpr double kHighestAcceleration = 1e12;        ///< [steps/s^2]

@@ -252,14 +252,19 @@ void ConfigReader::allow(const std::string& key) { known_.insert(key); }
 
 void ConfigReader::rejectUnknown() {
   if (map_ == nullptr) return;
-  const std::vector<std::string> known(known_.begin(), known_.end());
+  const std::vector<std::string> all = known();
+  const std::string list = all.empty() ? "is not known; nothing is allowed here"
+                                       : "is not known; known here: " + listText(all, "and");
+  bool is_listed = false;
   for (const auto& entry : *map_) {
     const std::string& key = entry.first;
     if (known_.count(key) > 0) continue;
-    const std::string* meant = nearest(key, known);
-    contradiction(key, meant != nullptr ? fmt::format("is not known; did you mean {}?", *meant)
-                       : known.empty()  ? "is not known; nothing is allowed here"
-                                        : "is not known; known here: " + listText(known, "and"));
+    if (const std::string* meant = nearest(key, all)) {
+      contradiction(key, fmt::format("is not known; did you mean {}?", *meant));
+      continue;
+    }
+    contradiction(key, is_listed ? "is not known either" : list);
+    is_listed = true;
   }
 }
 

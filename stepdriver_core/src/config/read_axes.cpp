@@ -81,15 +81,15 @@ std::string dirHoldKey(const AxisConfig& config, const std::vector<MotorChip>& c
 
 class AxesReader {
  public:
-  AxesReader(const std::vector<ConfigIssue>& issues, UsedLines& used)
-      : issues_(issues), used_(used) {}
+  AxesReader(const std::vector<ConfigIssue>& issues, UsedLines& used, const OwnChips& own)
+      : issues_(issues), used_(used), own_(own) {}
 
   AxisConfig read(const std::string& name, ConfigReader axis) {
     AxisConfig config;
     config.name = name;
     checkAxisName(name, axis);
     const std::size_t issues_of_chip = issues_.size();
-    const std::vector<MotorChip> chips = readMotorChips(axis);
+    const std::vector<MotorChip> chips = readMotorChips(axis, own_);
     const bool chips_are_right = issues_.size() == issues_of_chip;
     MotionContext context;
     context.microsteps = readMicrosteps(axis, chips);
@@ -140,6 +140,7 @@ class AxesReader {
 
   const std::vector<ConfigIssue>& issues_;
   UsedLines& used_;
+  const OwnChips& own_;
   std::map<std::string, std::string> joints_;  ///< joint -> full name of its axis
 };
 
@@ -159,7 +160,8 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
 }
 
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
-                                 std::vector<ConfigIssue>& issues, UsedLines& used) {
+                                 std::vector<ConfigIssue>& issues, UsedLines& used,
+                                 const OwnChips& own) {
   if (axes.isNothing()) {
     issues.push_back({name, "is missing; it must be a map of at least one axis"});
     return {};
@@ -169,7 +171,7 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
   if (!reader.isMap()) return configs;
   const auto& map = *axes.as<ConfigValue::Map>();
   if (map.empty()) reader.issue("", "is empty, but must be a map of at least one axis");
-  AxesReader each(issues, used);
+  AxesReader each(issues, used, own);
   for (const auto& entry : map) configs.push_back(each.read(entry.first, reader.map(entry.first)));
   return configs;
 }

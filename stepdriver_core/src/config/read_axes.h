@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "config/read_chip.h"
 #include "config/used_lines.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/config_reader.h"
@@ -13,8 +14,10 @@ namespace stepdriver::config {
 /// Like readAxes() without `used`.
 ///
 /// @param used the lines of the axes are added here, for other keys that name lines.
+/// @param own drivers that a program has made itself.
 std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& name,
-                                 std::vector<ConfigIssue>& issues, UsedLines& used);
+                                 std::vector<ConfigIssue>& issues, UsedLines& used,
+                                 const OwnChips& own = {});
 
 /// @return the required name of a line; empty if there is an issue.
 std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedLines& used);

@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -73,10 +72,20 @@ DriverChip describedChip() {
   return chip;
 }
 
-/// "1 LLL, 2 HLL" as modes. @throw std::invalid_argument says what is wrong with it.
-std::vector<driver::Mode> parsedModes(const std::string& text, std::size_t& pins) {
-  std::vector<driver::Mode> modes;
-  std::vector<std::string> codes;
+std::string codeText(const DriverChip& chip, const driver::ModeCode& code) {
+  std::string text;
+  for (std::size_t pin = 0; pin < static_cast<std::size_t>(chip.mode_pins); ++pin) {
+    text += code[pin] ? 'H' : 'L';
+  }
+  return text;
+}
+
+/// Takes modes from a text like "1 LLL, 2 HLL".
+///
+/// @return what is wrong with it, to continue "is ..., but"; empty: nothing.
+std::string takeModes(const std::string& text, DriverChip& chip) {
+  chip.modes.clear();
+  std::string first;
   std::istringstream entries(text + ',');
   for (std::string entry; std::getline(entries, entry, ',');) {
     std::istringstream words(entry);
@@ -87,42 +96,67 @@ std::vector<driver::Mode> parsedModes(const std::string& text, std::size_t& pins
     if (!complete || code.find_first_not_of("LH") != std::string::npos ||
         code.size() > driver::kMostModePins || mode.microsteps < 1 ||
         mode.microsteps > kFinestMicrosteps) {
-      throw std::invalid_argument(
-          "must be modes from 1 to 256 and their codes of one to three levels, L for low and H "
-          "for high, as \"1 LLL, 2 HLL\"");
+      return "must be modes from 1 to 256 and their codes of one to three levels, L for low and H "
+             "for high, as \"1 LLL, 2 HLL\"";
     }
-    if (!codes.empty() && code.size() != codes.front().size()) {
-      throw std::invalid_argument(
-          fmt::format("must have codes of the same length: {} and {} are for different numbers of "
-                      "pins",
-                      codes.front(), code));
-    }
-    const auto twin = std::find(codes.begin(), codes.end(), code);
-    if (twin != codes.end()) {
-      throw std::invalid_argument(fmt::format(
-          "must use each code once: {} selects {} and {} microsteps", code,
-          modes[static_cast<std::size_t>(twin - codes.begin())].microsteps, mode.microsteps));
+    if (first.empty()) first = code;
+    if (code.size() != first.size()) {
+      return fmt::format(
+          "must have codes of the same length: {} and {} are for different numbers "
+          "of pins",
+          first, code);
     }
     for (std::size_t pin = 0; pin < code.size(); ++pin) mode.code[pin] = code[pin] == 'H';
-    modes.push_back(mode);
-    codes.push_back(code);
+    chip.modes.push_back(mode);
   }
-  pins = codes.empty() ? 0 : codes.front().size();
-  return modes;
+  chip.mode_pins = static_cast<int>(first.size());
+  chip.microsteps = driver::selectableMicrosteps(chip);
+  std::sort(chip.microsteps.begin(), chip.microsteps.end());
+  return "";
 }
 
-/// @throw std::invalid_argument if a mode can't be reached from another one.
-void checkPaths(const DriverChip& chip) {
+/// What is wrong with the codes of a chip's modes, to continue "is ..., but"; empty: nothing.
+std::string mistakeInModes(const DriverChip& chip) {
+  for (std::size_t i = 0; i < chip.modes.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (chip.modes[k].code != chip.modes[i].code) continue;
+      return fmt::format("must use each code once: {} selects {} and {} microsteps",
+                         codeText(chip, chip.modes[i].code), chip.modes[k].microsteps,
+                         chip.modes[i].microsteps);
+    }
+  }
   const std::vector<int> modes = driver::selectableMicrosteps(chip);
   for (const int from : modes) {
     for (const int to : modes) {
       if (driver::hasModePath(chip, from, to)) continue;
-      throw std::invalid_argument(
-          fmt::format("must lead from each mode to each other one, one pin at a time and over its "
-                      "codes only: there is no way from {} to {} microsteps",
-                      from, to));
+      return fmt::format(
+          "must lead from each mode to each other one, one pin at a time and over its "
+          "codes only: there is no way from {} to {} microsteps",
+          from, to);
     }
   }
+  return "";
+}
+
+/// What is wrong with a chip that a program has made, apart from what ChipReader checks.
+std::string mistakeInChip(const DriverChip& chip) {
+  const int pins = chip.mode_pins;
+  if (pins < 0 || pins > static_cast<int>(driver::kMostModePins) ||
+      (pins == 0) != chip.modes.empty()) {
+    return fmt::format(
+        "has {} modes and {} microstep pins; it must have 1 to {} pins for modes, or neither",
+        chip.modes.size(), pins, driver::kMostModePins);
+  }
+  const auto possible = [](int microsteps) {
+    return microsteps >= 1 && microsteps <= kFinestMicrosteps;
+  };
+  const std::vector<int> modes = driver::selectableMicrosteps(chip);
+  if (!std::all_of(chip.microsteps.begin(), chip.microsteps.end(), possible) ||
+      !std::all_of(modes.begin(), modes.end(), possible)) {
+    return fmt::format("its modes must be from 1 to {} microsteps", kFinestMicrosteps);
+  }
+  const std::string mistake = mistakeInModes(chip);
+  return mistake.empty() ? "" : "its codes " + mistake;
 }
 
 class ChipReader {
@@ -200,18 +234,14 @@ class ChipReader {
   void readModes() {
     const auto text = reader_.findText("microstep_codes", Presence::kOptional);
     if (!text) return;
-    try {
-      DriverChip chip = chip_;
-      std::size_t pins = 0;
-      chip.modes = parsedModes(*text, pins);
-      chip.mode_pins = static_cast<int>(pins);
-      chip.microsteps = driver::selectableMicrosteps(chip);
-      std::sort(chip.microsteps.begin(), chip.microsteps.end());
-      checkPaths(chip);
+    DriverChip chip = chip_;
+    std::string mistake = takeModes(*text, chip);
+    if (mistake.empty()) mistake = mistakeInModes(chip);
+    if (mistake.empty()) {
       chip_ = chip;
-    } catch (const std::invalid_argument& wrong) {
+    } else {
       reader_.issue("microstep_codes",
-                    fmt::format("is {}, but {}", reader_.shown("microstep_codes"), wrong.what()));
+                    fmt::format("is {}, but {}", reader_.shown("microstep_codes"), mistake));
     }
   }
 
@@ -275,11 +305,32 @@ class ChipReader {
 
 }  // namespace
 
-std::optional<DriverChip> readChip(ConfigReader& reader, const std::set<std::string>& pins) {
+std::string stepInputsText(driver::StepInputs inputs) {
+  return kStepInputs.at(static_cast<std::size_t>(inputs));
+}
+
+std::string faultEndText(FaultEnd end) { return kFaultEnds.at(static_cast<std::size_t>(end)); }
+
+ConfigValue::Map writtenTiming(const driver::Timing& timing) {
+  ConfigValue::Map map;
+  for (const TimingKey& key : kTimingKeys) {
+    map[key.key] = static_cast<double>(timing.*key.time) / key.ns_per_unit;
+  }
+  return map;
+}
+
+std::optional<DriverChip> readChip(ConfigReader& reader, const std::set<std::string>& pins,
+                                   const OwnChips& own) {
   reader.allow("driver");
   const auto* name = reader.value("driver").as<std::string>();
   std::optional<DriverChip> chip;
-  if (name != nullptr && *name == kDescribed) {
+  if (const auto found = own.find(name != nullptr ? *name : ""); found != own.end()) {
+    chip = found->second;
+    if (const std::string mistake = mistakeInChip(*chip); !mistake.empty()) {
+      reader.issue("driver", fmt::format("is the {}, but {}", chip->title, mistake));
+      return {};
+    }
+  } else if (name != nullptr && *name == kDescribed) {
     chip = describedChip();
   } else if (name != nullptr) {
     if (const DriverChip* known = driver::findDriverChip(*name)) chip = *known;

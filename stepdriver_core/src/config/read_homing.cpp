@@ -38,9 +38,7 @@ class HomingReader {
  private:
   double si(double units) const { return static_cast<double>(units / keys_.units_per_si_unit); }
   double units(double si) const { return static_cast<double>(si * keys_.units_per_si_unit); }
-  std::string inUnit(const char* key) const {
-    return std::string(key) + (keys_.kind == Kind::kLinear ? "_mm" : "_deg");
-  }
+  std::string inUnit(const char* key) const { return homingKey(key, keys_.kind); }
   void mustBe(const std::string& key, const std::string& wanted) {
     homing_.issue(key, fmt::format("is {}, but must be {}", homing_.shown(key), wanted));
   }
@@ -95,7 +93,7 @@ class HomingReader {
     const std::string pull_off_key = inUnit("pull_off");
     const auto travel = homing_.findNumber(travel_key, Range::positive(), Presence::kRequired);
     const double steps = config_.steps_per_unit / units(1.0);
-    if (travel && steps > 0.0 && *travel * steps > kFarthestTravel) {
+    if (travel && steps > 0.0 && *travel * steps > kFarthestTravel * kSlack) {
       mustBe(travel_key, fmt::format("at most {}, which is 2^40 steps",
                                      upperBoundText(kFarthestTravel / steps)));
     }
@@ -117,7 +115,7 @@ class HomingReader {
 
   /// The axis must be able to move from its position after the homing.
   void checkRest(const HomingConfig& homing, const std::string& offset_key) {
-    const double rest = homing.offset + (homing.at_max ? -homing.pull_off : homing.pull_off);
+    const double rest = restOf(homing);
     const std::string stands =
         homing_.has(offset_key) ? "is " + homing_.shown(offset_key) : "is missing, and so 0";
     const auto check = [&](const std::optional<double>& limit, bool beyond, const char* word,
@@ -142,6 +140,14 @@ class HomingReader {
 };
 
 }  // namespace
+
+std::string homingKey(const char* what, Kind kind) {
+  return std::string(what) + (kind == Kind::kLinear ? "_mm" : "_deg");
+}
+
+double restOf(const HomingConfig& homing) {
+  return homing.offset + (homing.at_max ? -homing.pull_off : homing.pull_off);
+}
 
 void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {
   axis.allow("homing");

@@ -1,10 +1,17 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
+
+/// A key of `homing` with a length: "pull_off_mm".
+std::string homingKey(const char* what, Kind kind);
+
+/// [unit] Where the axis stands when it has been homed.
+double restOf(const HomingConfig& homing);
 
 /// Reads `homing` and `require_homing`.
 ///

@@ -10,13 +10,13 @@
 #include <string>
 #include <utility>
 
+#include "bounds.h"
 #include "message_text.h"
 #include "restart_speed.h"
 
 namespace stepdriver::config {
 namespace {
 
-constexpr double kSlack = 1.0 + 1e-9;  // for the rounding of decimal numbers
 constexpr double kWorstCondition = 100.0;
 constexpr double kMostRatio = 100.0;  // between the ways of a motor and an axis, either way
 

@@ -179,7 +179,7 @@ class MotionReader {
     const double backlash =
         axis_.findNumber(keys_.backlash, Range::notNegative(), Presence::kOptional).value_or(0.0);
     config.backlash = si(backlash);
-    if (!steps_per_unit_ || backlash * *steps_per_unit_ <= kMostBacklash) return;
+    if (!steps_per_unit_ || backlash * *steps_per_unit_ <= kMostBacklash * kSlack) return;
     mustBe(keys_.backlash, fmt::format("at most {}, which is {} steps",
                                        upperBoundText(kMostBacklash / *steps_per_unit_),
                                        numberText(kMostBacklash)));
@@ -222,7 +222,8 @@ class MotionReader {
 
   std::optional<double> readPosition(const std::string& key) {
     const auto position = axis_.findNumber(key, Range{}, Presence::kOptional);
-    if (position && steps_per_unit_ && std::abs(*position) * *steps_per_unit_ > kFarthestLimit) {
+    if (position && steps_per_unit_ &&
+        std::abs(*position) * *steps_per_unit_ > kFarthestLimit * kSlack) {
       mustBe(key, fmt::format("from -{0} to {0}, which is as far as steps are counted",
                               upperBoundText(kFarthestLimit / *steps_per_unit_)));
     }

@@ -7,10 +7,6 @@
 
 namespace stepdriver::config {
 
-/// Tolerance for limits: the rounding of units, or of the bound in a message, doesn't count as
-/// exceeding a limit.
-constexpr double kSlack = 1.0 + 1e-9;
-
 /// The facts for checking the motion of an axis. A member is empty if it is wrong and therefore
 /// unknown; nothing that depends on it is then reported.
 struct MotionContext {

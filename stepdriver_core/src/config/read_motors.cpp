@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "bounds.h"
 #include "message_text.h"
 #include "motion_keys.h"
 #include "read_chip.h"
@@ -23,8 +24,6 @@ namespace {
 constexpr std::array<const char*, 8> kMotorKeys = {
     "pins",       "invert",           "common_anode",           "fault_bias",
     "fault_stop", "in_position_bias", "in_position_timeout_ms", "endstops"};
-
-const char* offsetKey(Kind kind) { return kind == Kind::kLinear ? "offset_mm" : "offset_deg"; }
 
 /// The keys of a driver: of the axis's, or of a motor's own.
 constexpr std::array<const char*, 3> kChipKeys = {"driver", "chip", "timing"};
@@ -161,11 +160,13 @@ class SquaringReader {
 
 }  // namespace
 
-std::vector<MotorChip> readMotorChips(ConfigReader& axis) {
+const char* offsetKey(Kind kind) { return kind == Kind::kLinear ? "offset_mm" : "offset_deg"; }
+
+std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own) {
   axis.allow("motors");
   const ConfigValue value = axis.value("motors");
   const auto* const map = value.as<ConfigValue::Map>();
-  if (map == nullptr || map->empty()) return {{readChip(axis, pinsGiven(axis)), ""}};
+  if (map == nullptr || map->empty()) return {{readChip(axis, pinsGiven(axis), own), ""}};
   ConfigReader motors = axis.map("motors");
   std::vector<MotorChip> chips;
   std::set<std::string> pins_without_own;
@@ -185,7 +186,7 @@ std::vector<MotorChip> readMotorChips(ConfigReader& axis) {
     }
   }
   std::optional<driver::DriverChip> common;
-  if (!all_have_own) common = readChip(axis, pins_without_own);
+  if (!all_have_own) common = readChip(axis, pins_without_own, own);
   for (const char* key : kChipKeys) {
     axis.allow(key);
     if (all_have_own && axis.has(key)) {
@@ -195,7 +196,7 @@ std::vector<MotorChip> readMotorChips(ConfigReader& axis) {
   for (const std::string& name : motors.keys()) {
     ConfigReader motor = motors.map(name);
     if (motor.has("driver")) {
-      chips.push_back({readChip(motor, pinsGiven(motor)), "motors/" + name + "/"});
+      chips.push_back({readChip(motor, pinsGiven(motor), own), "motors/" + name + "/"});
     } else {
       chips.push_back({common, ""});
     }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "config/used_lines.h"
+#include "read_chip.h"
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
@@ -21,7 +22,10 @@ struct MotorChip {
 /// Reads the drivers of the motors of an axis: of each its own, or that of the axis.
 ///
 /// @return one for each of `motors`, in their order; one if there is no such map.
-std::vector<MotorChip> readMotorChips(ConfigReader& axis);
+std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own);
+
+/// The key of a motor's MotorConfig::offset.
+const char* offsetKey(Kind kind);
 
 /// Reads `motors`, or the pins and endstops of the only motor.
 ///

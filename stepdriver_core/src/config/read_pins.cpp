@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "config/read_axes.h"
 #include "message_text.h"
@@ -34,6 +38,9 @@ bool isPulsePin(const PinName& name) { return name.pin == &Pins::step || name.pi
 const char* cwCcwKey(const PinName& name) { return name.pin == &Pins::step ? "cw" : "ccw"; }
 
 bool isMicrostepPin(const PinName& name) { return name.from_0_key != nullptr; }
+
+// In the order of Bias.
+const std::vector<std::string> kBiases = {"as_is", "pull_up", "pull_down", "disabled"};
 
 constexpr double kLongestSettlingMs = 60'000.0;
 constexpr const char* kWantedLine = "a line: chip:offset, as \"gpiochip0:17\", or a line's name";
@@ -67,11 +74,8 @@ std::optional<std::string> readLine(ConfigReader& reader, const std::string& key
 }
 
 Bias readBias(ConfigReader& reader, const std::string& key) {
-  static const std::map<std::string, Bias> biases = {{"as_is", Bias::kAsIs},
-                                                     {"pull_up", Bias::kPullUp},
-                                                     {"pull_down", Bias::kPullDown},
-                                                     {"disabled", Bias::kDisabled}};
-  return biases.at(reader.oneOf(key, {"as_is", "pull_up", "pull_down", "disabled"}, "as_is"));
+  const std::string bias = reader.oneOf(key, kBiases, "as_is");
+  return static_cast<Bias>(std::find(kBiases.begin(), kBiases.end(), bias) - kBiases.begin());
 }
 
 /// Why the chip has no such pin; empty if it has one.
@@ -325,6 +329,18 @@ class PinsReader {
 };
 
 }  // namespace
+
+std::string biasText(Bias bias) { return kBiases.at(static_cast<std::size_t>(bias)); }
+
+std::vector<std::pair<std::string, Pin>> pinsByKey(const MotorConfig& motor) {
+  const bool is_cw_ccw = motor.driver.step_inputs == driver::StepInputs::kCwCcw;
+  std::vector<std::pair<std::string, Pin>> pins;
+  for (const PinName& name : kPinNames) {
+    const bool other = is_cw_ccw && isPulsePin(name);
+    pins.emplace_back(other ? cwCcwKey(name) : name.key, motor.pins.*name.pin);
+  }
+  return pins;
+}
 
 std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedLines& used) {
   return readLine(reader, key, Presence::kRequired, used).value_or("");

@@ -1,9 +1,19 @@
 #pragma once
 
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "config/used_lines.h"
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
+
+/// The word for a pull resistor.
+std::string biasText(Bias bias);
+
+/// All pins of a motor, with their keys in `pins`.
+std::vector<std::pair<std::string, Pin>> pinsByKey(const MotorConfig& motor);
 
 /// Reads `pins`, `fault_bias`, `fault_stop`, `in_position_...`, `invert` and `common_anode`.
 ///

@@ -40,7 +40,7 @@ class ScaleReader {
 
   /// Whether the motion can count with this scale.
   bool check(long double scale) {
-    if (scale >= kLowestScale && scale <= kHighestScale) return true;
+    if (scale * kSlack >= kLowestScale && scale <= kHighestScale * kSlack) return true;
     std::string key = kFullSteps;
     for (const std::string& other :
          {std::string(kGear), keys_.per_round, keys_.wheel_diameter, keys_.steps_per_unit}) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -115,6 +116,13 @@ class ShaperReader {
 };
 
 }  // namespace
+
+std::string shaperText(ShaperType type) {
+  const auto* const shaper =
+      std::find_if(kShapers.begin(), kShapers.end(),
+                   [type](const ShaperName& known) { return known.type == type; });
+  return shaper != kShapers.end() ? shaper->name : "";
+}
 
 void readShaper(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {
   axis.allow(kKey);

@@ -1,10 +1,14 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
+
+/// Its `type` in `input_shaper`.
+std::string shaperText(ShaperType type);
 
 /// Reads `input_shaper`.
 ///

@@ -1,10 +1,14 @@
 #include "stepdriver_core/driver/driver_chip.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <numeric>
-#include <stdexcept>
 
+#include "message_text.h"
 #include "named_chips.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/printable.h"
 
 namespace stepdriver::driver {
 
@@ -19,8 +23,9 @@ const DriverChip* findDriverChip(const std::string& name) {
 
 const DriverChip& driverChip(const std::string& name) {
   const DriverChip* const chip = findDriverChip(name);
-  if (chip == nullptr) throw std::out_of_range("There is no driver chip named \"" + name + "\".");
-  return *chip;
+  if (chip != nullptr) return *chip;
+  throw Error(fmt::format("there is no driver chip named \"{}\"; there are {}", printable(name),
+                          listText(driverChipNames(), "and")));
 }
 
 std::vector<std::string> driverChipNames() {

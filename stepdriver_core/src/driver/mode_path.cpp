@@ -3,10 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <queue>
-#include <stdexcept>
 #include <string>
 
 #include "stepdriver_core/driver/driver_chip.h"
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::driver {
 namespace {
@@ -32,8 +32,8 @@ ModeCode codeAt(std::size_t index) {
 std::size_t indexOfMode(const DriverChip& chip, int microsteps) {
   const std::optional<ModeCode> code = codeOf(chip, microsteps);
   if (!code) {
-    throw std::invalid_argument(
-        fmt::format("The {} has no microstep pin code for {} microsteps.", chip.title, microsteps));
+    throw Error(
+        fmt::format("the {} has no microstep pin code for {} microsteps", chip.title, microsteps));
   }
   return indexOf(*code);
 }
@@ -70,9 +70,8 @@ std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int 
   const std::size_t to = indexOfMode(chip, to_microsteps);
   const std::array<std::size_t, kCodes> next = waysTo(chip, to);
   if (next[from] == kUnseen) {
-    throw std::invalid_argument(
-        fmt::format("The {} has no way from {} to {} microsteps over defined pin codes.",
-                    chip.title, from_microsteps, to_microsteps));
+    throw Error(fmt::format("the {} has no way from {} to {} microsteps over defined pin codes",
+                            chip.title, from_microsteps, to_microsteps));
   }
   std::vector<ModeCode> path;
   for (std::size_t code = from; code != to; code = next[code]) path.push_back(codeAt(next[code]));

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "activity/driver_activities.h"
@@ -14,6 +13,7 @@
 #include "activity/steps.h"
 #include "axis/setpoint_stream.h"
 #include "message_text.h"
+#include "motion/errors.h"
 #include "motion/resting_count.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
@@ -464,7 +464,7 @@ void Controller::serve(const PlanMove& wanted, const Ack& call) {
       motion::PlannedMotion motion = moved.motor.shaped(std::move(plan.profile));
       shown.move = activity::moveOf(moved, goal, motion.made(), plan.overshoot);
       return motion;
-    } catch (const std::range_error& error) {
+    } catch (const motion::TooLong& error) {
       moved.refuse(error.what());
     }
   }();

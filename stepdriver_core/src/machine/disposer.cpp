@@ -11,6 +11,8 @@
 #include <mutex>
 #include <thread>
 
+#include "start_thread.h"
+
 namespace stepdriver::machine {
 namespace {
 
@@ -45,7 +47,7 @@ class Disposer::Queue {
   /// The first call starts the thread.
   void start() {
     if (!open_.load(std::memory_order_acquire)) return;
-    std::call_once(started_, [this] { thread_ = std::thread([this] { run(); }); });
+    std::call_once(started_, [this] { thread_ = startThread([this] { run(); }); });
   }
 
   void add(Entry* entry) {

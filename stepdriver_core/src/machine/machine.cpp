@@ -21,9 +21,9 @@
 #include "path_plan.h"
 #include "pulse/measure.h"
 #include "pulse/pulse_engine.h"
+#include "read_options.h"
 #include "shell.h"
 #include "state_keeper.h"
-#include "stepdriver_core/config/check_axes.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "wiring.h"
@@ -51,7 +51,7 @@ class Machine::Impl {
   Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options)
       : clock_(clock), disposer_(options.threaded) {
-    config::checkAxes(configs);
+    checkConfiguration(configs, options);
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
     lines_ = backend.request(wiring.outputs, wiring.inputs);

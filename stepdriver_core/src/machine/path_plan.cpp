@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "message_text.h"
+#include "motion/errors.h"
 #include "motion/smooth_contour_motion.h"
 #include "stepdriver_core/error.h"
 
@@ -262,9 +262,9 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       plan.points.insert(plan.points.begin(), std::move(first));
     }
     return plan;
-  } catch (const std::invalid_argument& error) {
+  } catch (const motion::Malformed& error) {
     throw Refused(error.what());
-  } catch (const std::range_error& error) {
+  } catch (const motion::TooLong& error) {
     throw Refused(error.what());
   }
 }

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "motion/backlash.h"
+#include "motion/errors.h"
 #include "motion/profile_parts.h"
 #include "motion/profile_peaks.h"
 #include "motion/resting_count.h"
@@ -438,9 +438,9 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
         if (longer.path) return longer;
       }
     }
-  } catch (const std::invalid_argument& error) {
+  } catch (const motion::Malformed& error) {
     throw Refused(error.what());
-  } catch (const std::range_error& error) {
+  } catch (const motion::TooLong& error) {
     throw Refused(error.what());
   }
   throw Refused(

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <system_error>
 #include <utility>
 
 #include "pulse/realtime.h"
+#include "start_thread.h"
 #include "steady_now.h"
 #include "stepdriver_core/error.h"
 
@@ -71,9 +71,9 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
   if (!threaded_) return;
   try {
     pulse_thread_.emplace(engine_, clock_, this, options.realtime);
-    thread_ = std::thread([this] { run(); });
-    if (has_inputs_) watcher_ = std::thread([this] { watchInputs(); });
-  } catch (const std::system_error&) {
+    thread_ = startThread([this] { run(); });
+    if (has_inputs_) watcher_ = startThread([this] { watchInputs(); });
+  } catch (const Error&) {
     stop();  // ends the threads that were started
     throw;
   }

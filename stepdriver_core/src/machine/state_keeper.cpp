@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "start_thread.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -41,7 +42,7 @@ void StateKeeper::start(std::function<Memories()> read, bool threaded) {
   read_ = std::move(read);
   keep();
   if (const std::string wrong = error(); !wrong.empty()) throw Error(wrong);
-  if (threaded) thread_ = std::thread([this] { run(); });
+  if (threaded) thread_ = startThread([this] { run(); });
 }
 
 void StateKeeper::run() {

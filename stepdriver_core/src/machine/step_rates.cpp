@@ -8,6 +8,7 @@
 
 #include "pulse/hybrid_wait.h"
 #include "pulse/pulse_engine.h"
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
 namespace {
@@ -153,6 +154,11 @@ std::string sustainedText(double rate) {
   return fmt::format("{:.0f} steps/s", std::floor(rate * (1.0 + kRounding)));
 }
 
+void requireAsMany(std::size_t axes, std::size_t others, const char* what) {
+  if (axes == others) return;
+  throw Error(fmt::format("{} {}, but there are {} axes", others, what, axes));
+}
+
 }  // namespace
 
 std::string StepRate::text() const {
@@ -179,9 +185,10 @@ std::vector<std::string> StepRates::complaints() const {
 StepRates stepRates(const std::vector<config::AxisConfig>& configs,
                     const pulse::Capability& capability) {
   const std::vector<config::AxisConfig> axes = atMotorSpeeds(configs);
+  requireAsMany(axes.size(), capability.channels.size(), "channels were measured");
   std::vector<Load> loads;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    loads.push_back(loadOf(axes[i], capability.channels.at(i), capability));
+    loads.push_back(loadOf(axes[i], capability.channels[i], capability));
   }
   StepRates rates;
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -199,15 +206,17 @@ StepRates stepRates(const std::vector<config::AxisConfig>& configs,
 
 StepRates stepRatesInMotion(const std::vector<config::AxisConfig>& axes,
                             const pulse::Capability& capability, const std::vector<double>& rates) {
+  requireAsMany(axes.size(), capability.channels.size(), "channels were measured");
+  requireAsMany(axes.size(), rates.size(), "rates are given");
   std::vector<config::AxisConfig> moving = axes;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    moving[i].max_speed = rates.at(i) / axes[i].steps_per_unit;
+    moving[i].max_speed = rates[i] / axes[i].steps_per_unit;
   }
   moving = atMotorSpeeds(moving);
   pulse::Capability of_moving = capability;
   of_moving.channels.clear();
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (moving[i].max_speed > 0.0) of_moving.channels.push_back(capability.channels.at(i));
+    if (moving[i].max_speed > 0.0) of_moving.channels.push_back(capability.channels[i]);
   }
   moving.erase(std::remove_if(moving.begin(), moving.end(),
                               [](const auto& axis) { return axis.max_speed <= 0.0; }),

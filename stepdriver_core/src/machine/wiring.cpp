@@ -5,6 +5,7 @@
 #include "motor/input_shaping.h"
 #include "nanoseconds.h"
 #include "pulse/measure.h"
+#include "stepdriver_core/config/check_axes.h"
 #include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::machine {
@@ -81,6 +82,7 @@ pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes) {
 
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                           pulse::Clock& clock, const pulse::RealtimeRequest& request) {
+  config::checkAxes(axes);
   const Wiring wiring(axes);
   const auto lines = backend.request(wiring.outputs, wiring.inputs);
   return pulse::measureCapability(*lines, clock, wiring.channels, request);

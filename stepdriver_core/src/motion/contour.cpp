@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
+#include "errors.h"
 #include "gentle_corners.h"
 #include "give_way.h"
 
@@ -170,7 +170,7 @@ Contour::Segment Contour::placed(const std::vector<double>& from,
     }
     const double least = std::min(kLeastRate * handles, kHandle * resolution_);
     if (leastRate(segment.powers, axes()) < least) {
-      throw std::invalid_argument(fmt::format(
+      throw Malformed(fmt::format(
           "segment {} is a Bezier with a cusp: its derivative is 0 there, and must not be",
           given.number));
     }

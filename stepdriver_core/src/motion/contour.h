@@ -111,7 +111,7 @@ class Contour {
   ///
   /// @param start one number for each axis. @param segments each one of a length above 0; at least
   ///   one. @param resolution [unit] what makes no difference: a microstep of the finest axis.
-  /// @throw std::invalid_argument if a Bezier's derivative is (almost) 0 at a point within it,
+  /// @throw motion::Malformed if a Bezier's derivative is (almost) 0 at a point within it,
   /// which
   ///   no axis can pass without a stop; it names the segment (the first is 0).
   /// @param continues more segments will be appended.

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "contour_grid.h"
 #include "contour_speed.h"
+#include "errors.h"
 #include "give_way.h"
 #include "motion/profile.h"
 
@@ -591,7 +591,7 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
                                     const ContourGrid& grid, double factor, double ago) {
   const double last = knots.time(knots.size() - 1) * factor;
   if (!(last < Profile::kLongest)) {
-    throw std::range_error("the motion along the path would take longer than 4e9 s");
+    throw TooLong("the motion along the path would take longer than 4e9 s");
   }
   std::vector<ContourKnot> made;
   made.reserve(knots.size());

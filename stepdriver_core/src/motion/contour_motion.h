@@ -92,7 +92,7 @@ struct ContourPlan {
 /// slowed down by that factor as a whole.
 ///
 /// @param limits one for each axis.
-/// @throw std::range_error if it takes Profile::kLongest or longer.
+/// @throw motion::TooLong if it takes Profile::kLongest or longer.
 ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                         const ContourBegin& begin = {});
 

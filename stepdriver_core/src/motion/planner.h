@@ -24,7 +24,7 @@ namespace stepdriver::motion {
 /// and at any acceleration. With a start speed a motion turns only on a whole microstep, at rest,
 /// so that its steps before and after are about as far apart as at the start speed.
 ///
-/// All planners throw std::range_error if the motion takes longer than Profile::kLongest. A plan
+/// All planners throw motion::TooLong if the motion takes longer than Profile::kLongest. A plan
 /// takes 0.5 to 2.5 us on a processor of 3 GHz.
 /// @pre finite states; positions and targets of less than 2^53 microsteps.
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
+#include "errors.h"
 #include "no_time.h"
 #include "rough_piece.h"
 
@@ -119,7 +119,7 @@ void Profile::add(const Excerpt& excerpt) {
 
 void Profile::finish() {
   if (!(duration_.hi < kLongest)) {
-    throw std::range_error("the motion takes longer than a hundred years");
+    throw TooLong("the motion takes longer than a hundred years");
   }
   end_ns_ = start_ns_ + splitNanoseconds(duration_).whole;
   start_position_ = piece(0).p0;

@@ -74,11 +74,11 @@ class Profile {
   Profile(std::int64_t start_ns, DoubleDouble position);
 
   /// @param pieces each begins where the one before it ends; at least one.
-  /// @throw std::range_error if the motion takes longer than kLongest.
+  /// @throw motion::TooLong if the motion takes longer than kLongest.
   Profile(std::int64_t start_ns, std::vector<Piece> pieces);
 
   /// @param sections not empty; each begins where the one before it ends.
-  /// @throw std::range_error if the motion takes longer than kLongest.
+  /// @throw motion::TooLong if the motion takes longer than kLongest.
   Profile(std::int64_t start_ns, Sections sections);
 
   static constexpr double kLongest = 4.0e9;  ///< [s] more than 126 years; nanoseconds fit in int64

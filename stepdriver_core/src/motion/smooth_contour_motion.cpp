@@ -6,12 +6,12 @@
 #include <iterator>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "contour_grid.h"
 #include "contour_smoothing.h"
 #include "contour_speed.h"
+#include "errors.h"
 #include "give_way.h"
 #include "motion/profile.h"
 #include "smooth_demand.h"
@@ -624,7 +624,7 @@ ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourL
     if (!plan.possible()) return made;
     const double end = static_cast<double>(begin_ns) * 1e-9 + plan.duration();
     if (!(end < Profile::kLongest)) {
-      throw std::range_error("the motion along the path would take longer than 4e9 s");
+      throw TooLong("the motion along the path would take longer than 4e9 s");
     }
     const double factor = plan.slowdown;
     made.settled_ns = begin_ns + std::llround(plan.settled * factor * 1e9);

@@ -41,7 +41,7 @@ namespace stepdriver::motion {
 ///   jerk limit.
 /// @param begin its acceleration isn't 0 only if its speed isn't.
 /// @return not all knots if it begins at a speed from which it needs more than a limit.
-/// @throw std::range_error if it takes Profile::kLongest or longer.
+/// @throw motion::TooLong if it takes Profile::kLongest or longer.
 ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                               const ContourBegin& begin = {});
 

@@ -79,10 +79,10 @@ struct SplineLimits {
 /// @param from finite; its position is within kFarthest of 0.
 /// @param waypoints at least one, at increasing times from 0 on, all numbers finite.
 /// @param limits those of the axis.
-/// @throw std::invalid_argument if these conditions don't hold, naming the waypoint (the first is
+/// @throw motion::Malformed if these conditions don't hold, naming the waypoint (the first is
 ///   0), the value and what is allowed; and if velocities and accelerations lead a curve out of
 ///   2^53 microsteps.
-/// @throw std::range_error if it takes Profile::kLongest or longer.
+/// @throw motion::TooLong if it takes Profile::kLongest or longer.
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
                    const std::vector<Waypoint>& waypoints, const SplineLimits& limits = {});
 
@@ -117,7 +117,7 @@ class SplineTail {
   /// its beginning doesn't.
   const SplineJerk& jerk() const { return jerk_; }
 
-  /// The first segment. @throw std::invalid_argument as planSpline().
+  /// The first segment. @throw motion::Malformed as planSpline().
   std::vector<Piece> head(const MotionState& from) const;
   /// The first segment's demands on such a motor, including its beginning and end.
   SplineJerk headJerk(const MotionState& from) const;

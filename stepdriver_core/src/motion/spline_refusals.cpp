@@ -4,15 +4,15 @@
 
 #include <cmath>
 #include <cstdint>
-#include <stdexcept>
 #include <string>
 
+#include "errors.h"
 #include "give_way.h"
 
 namespace stepdriver::motion {
 namespace {
 
-[[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument(why); }
+[[noreturn]] void refuse(const std::string& why) { throw Malformed(why); }
 
 [[noreturn]] void refuseNumber(const std::string& owner, const char* quantity, double value) {
   refuse(
@@ -49,7 +49,7 @@ void requireTime(const std::vector<Waypoint>& waypoints, std::size_t index) {
   }
   constexpr auto kEnd = static_cast<std::int64_t>(Profile::kLongest * 1e9);
   if (time >= kEnd) {
-    throw std::range_error(
+    throw TooLong(
         fmt::format("The time of waypoint {} is {} ns; it must be less than {} ns, some 126 years.",
                     index, time, kEnd));
   }

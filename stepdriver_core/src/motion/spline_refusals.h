@@ -8,7 +8,7 @@
 namespace stepdriver::motion {
 
 /// Checks everything that planSpline() requires of its arguments.
-/// @throw std::invalid_argument, std::range_error as planSpline().
+/// @throw motion::Malformed, motion::TooLong as planSpline().
 void requirePlannable(const MotionState& from, const std::vector<Waypoint>& waypoints);
 
 /// The same for the waypoints, and for the beginning of the motion.
@@ -16,7 +16,7 @@ void requireWaypoints(const std::vector<Waypoint>& waypoints);
 void requireStart(const MotionState& from);
 
 /// @param reach bound of the curve up to waypoint `index` [microsteps].
-/// @throw std::invalid_argument if a double has no half microsteps there.
+/// @throw motion::Malformed if a double has no half microsteps there.
 void requireReach(double reach, std::size_t index);
 
 }  // namespace stepdriver::motion

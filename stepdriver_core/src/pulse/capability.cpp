@@ -7,13 +7,13 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "pulse/channel.h"
 #include "pulse/cpu_latency.h"
 #include "pulse/measure.h"
 #include "pulse/realtime.h"
+#include "start_thread.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
 
@@ -100,7 +100,7 @@ Capability asPulseThread(Clock& clock, const RealtimeRequest& request,
     awake.emplace(request.latency_device);
     capability.rights.latency_error = awake->error();
   }
-  std::thread([&] {
+  startThread([&] {
     capability.rights.scheduler_error = askForScheduler(kRealtimePriority);
     if (request.cpu) {
       capability.rights.cpu = *request.cpu;

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "pulse/realtime.h"
+#include "start_thread.h"
 
 namespace stepdriver::pulse {
 
@@ -19,7 +20,7 @@ PulseThread::PulseThread(PulseEngine& engine, Clock& clock, NewsListener* listen
     lock_error_ = lockMemory();
     if (!request.latency_device.empty()) latency_.emplace(request.latency_device);
   }
-  thread_ = std::thread([this] { run(); });
+  thread_ = startThread([this] { run(); });
 }
 
 PulseThread::~PulseThread() { stop(); }

@@ -7,13 +7,14 @@
 #include <utility>
 
 #include "dump_files.h"
+#include "start_thread.h"
 
 namespace stepdriver::recorder {
 
 Dumper::Dumper(machine::Machine& machine, DumperOptions options,
                std::function<void(const Dump&)> told)
     : machine_(machine), options_(std::move(options)), told_(std::move(told)) {
-  thread_ = std::thread([this] { run(); });
+  thread_ = startThread([this] { run(); });
   machine_.onFault([this] {
     const std::lock_guard<std::mutex> lock(mutex_);
     fault_ = true;

@@ -1,6 +1,6 @@
 #include "stepdriver_core/setup/hardware.h"
 
-#include "stepdriver_core/config/check_axes.h"
+#include "machine/read_options.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 
@@ -21,7 +21,7 @@ std::unique_ptr<Simulation> makeSimulation(const MachineConfig& config, const st
 }  // namespace
 
 Hardware::Hardware(const MachineConfig& config, const std::string& name) {
-  config::checkAxes(config.axes);
+  machine::checkConfiguration(config.axes, config.options());
   if (config.backend == GpioBackend::kSimulated) {
     simulation_ = makeSimulation(config, name);
   } else {

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "config/read_axes.h"
 #include "config/read_kinematics.h"
+#include "machine/read_options.h"
 #include "pulse/cpu_latency.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 #include "stepdriver_core/setup/simulation.h"
@@ -17,17 +17,7 @@ namespace {
 
 using config::ConfigReader;
 using config::ConfigValue;
-using config::Range;
 
-constexpr double kLongestLatenessMs = 1000.0;
-constexpr double kShortestTimeoutMs = 10.0;
-constexpr double kLongestTimeoutMs = 60'000.0;
-constexpr Range kRecordedSeconds{0.0, 600.0};
-constexpr Range kRecorderMemory{1.0, 1000.0};
-constexpr Range kHeartbeatRates{1.0, 1000.0};  // Hz
-constexpr Range kPowerTimesMs{0.0, 60'000.0};
-constexpr Range kFeedbackTimeoutsMs{1.0, 60'000.0};
-constexpr int kMostProcessors = 1024;  // CPU_SETSIZE of the C library
 constexpr int kMostRecordings = 1000;
 
 const std::vector<std::string> kPolicies = {"warn", "enforce"};
@@ -46,105 +36,23 @@ void readGpio(ConfigReader gpio, MachineConfig& config) {
         "install libgpiod-dev and build again for real lines");
   }
   config.backend = backend == "libgpiod" ? GpioBackend::kLibgpiod : GpioBackend::kSimulated;
-  config.write_timeout =
-      1e-3 * gpio.number("write_timeout_ms", Range{kShortestTimeoutMs, kLongestTimeoutMs},
-                         config.write_timeout * 1e3);
+  config.write_timeout = machine::readWriteTimeout(gpio, config.write_timeout);
   gpio.rejectUnknown();
 }
 
 void readRealtime(ConfigReader realtime, MachineConfig& config) {
   config.enforce_realtime = realtime.oneOf("policy", kPolicies, "warn") == "enforce";
-  const double milliseconds = realtime.number(
-      "max_lateness_ms", Range{0.0, kLongestLatenessMs, true}, config.max_lateness * 1e3);
-  config.max_lateness = milliseconds * 1e-3;
+  config.max_lateness = machine::readMaxLateness(realtime, config.max_lateness);
   config.keep_cpus_awake = realtime.boolean("keep_cpus_awake", config.keep_cpus_awake);
-  config.cpu = realtime.findInteger("cpu", 0, kMostProcessors - 1, config::Presence::kOptional);
+  config.cpu = machine::readProcessor(realtime);
   realtime.rejectUnknown();
 }
 
-void refuseRelativePath(ConfigReader& reader, const std::string& key, const std::string& path,
-                        const char* otherwise) {
-  if (path.empty() || path[0] == '/') return;
-  reader.issue(key, fmt::format("is {}, but must be an absolute path, or empty for {}",
-                                reader.shown(key), otherwise));
-}
-
 void readRecorder(ConfigReader reader, RecorderConfig& recorder) {
-  recorder.seconds = reader.number("seconds", kRecordedSeconds, recorder.seconds);
-  recorder.memory_mb = reader.number("memory_mb", kRecorderMemory, recorder.memory_mb);
-  recorder.folder = reader.text("folder", recorder.folder);
-  refuseRelativePath(reader, "folder", recorder.folder, "the default");
+  machine::readRecorderSize(reader, recorder.seconds, recorder.memory_mb);
+  recorder.folder = machine::readAbsolutePath(reader, "folder", recorder.folder, "the default");
   recorder.keep = reader.integer("keep", 1, kMostRecordings, recorder.keep);
   reader.rejectUnknown();
-}
-
-std::optional<machine::HeartbeatConfig> readHeartbeat(ConfigReader& machine,
-                                                      config::UsedLines& used) {
-  ConfigReader reader = machine.map("heartbeat");
-  if (!machine.has("heartbeat")) return {};
-  machine::HeartbeatConfig heartbeat;
-  heartbeat.line = config::readRequiredLine(reader, "pin", used);
-  heartbeat.rate = reader.number("rate_hz", kHeartbeatRates, heartbeat.rate);
-  reader.rejectUnknown();
-  return heartbeat;
-}
-
-std::optional<config::MotorPowerConfig> readMotorPower(ConfigReader& machine,
-                                                       config::UsedLines& used) {
-  ConfigReader reader = machine.map("motor_power");
-  if (!machine.has("motor_power")) return {};
-  const auto nanoseconds = [&reader](const char* key, Range range,
-                                     std::optional<double> otherwise) {
-    const double milliseconds =
-        otherwise ? reader.number(key, range, *otherwise) : reader.number(key, range);
-    return std::llround(milliseconds * 1e6);
-  };
-  config::MotorPowerConfig power;
-  power.line = config::readRequiredLine(reader, "pin", used);
-  power.active_level = reader.oneOf("active_level", {"low", "high"}, "high") == "high";
-  power.on_ns = nanoseconds("on_ms", kPowerTimesMs, std::nullopt);
-  power.off_delay_ns = nanoseconds("off_delay_ms", kPowerTimesMs, 0.0);
-  ConfigReader contact = reader.map("feedback");
-  if (reader.has("feedback")) {
-    power.feedback = config::readInputSwitch(contact, used);
-    contact.rejectUnknown();
-    power.feedback_timeout_ns = nanoseconds("feedback_timeout_ms", kFeedbackTimeoutsMs,
-                                            static_cast<double>(power.feedback_timeout_ns) / 1e6);
-  }
-  reader.rejectUnknown();
-  return power;
-}
-
-machine::EmergencyDisable readDisable(ConfigReader& reader) {
-  // YAML 1.1 takes off for a boolean.
-  const bool* flag = reader.value("disable").as<bool>();
-  const bool is_off = flag != nullptr && !*flag;
-  if (is_off) reader.allow("disable");
-  const std::string how = is_off ? "off" : reader.oneOf("disable", {"hold", "ramp", "off"}, "hold");
-  if (how == "off") return machine::EmergencyDisable::kOff;
-  return how == "ramp" ? machine::EmergencyDisable::kRamp : machine::EmergencyDisable::kHold;
-}
-
-void readEmergencyStop(ConfigReader& machine, bool axes_are_right, MachineConfig& config,
-                       config::UsedLines& used) {
-  ConfigReader reader = machine.map("emergency_stop");
-  if (!machine.has("emergency_stop")) return;
-  config.emergency_disable = readDisable(reader);
-  const bool has_button = !reader.has("disable") || reader.has("pin") ||
-                          reader.has("active_level") || reader.has("bias");
-  if (has_button) config.emergency_stop = config::readInputSwitch(reader, used);
-  reader.rejectUnknown();
-  if (!axes_are_right || config.emergency_disable == machine::EmergencyDisable::kHold) return;
-  if (config.motor_power) return;
-  for (const config::AxisConfig& axis : config.axes) {
-    if (axis.pins.enable.wired()) continue;
-    reader.contradiction(
-        "disable",
-        fmt::format("is {}, but axes/{}/pins/enable is missing, and there is no motor_power: "
-                    "nothing could switch the current of this motor off",
-                    config.emergency_disable == machine::EmergencyDisable::kOff ? "off" : "ramp",
-                    axis.name));
-  }
 }
 
 }  // namespace
@@ -170,8 +78,7 @@ machine::MachineOptions MachineConfig::options() const {
 MachineConfig readMachineConfig(ConfigReader& reader) {
   MachineConfig config;
   readGpio(reader.map("gpio"), config);
-  config.state_file = reader.text("state_file", config.state_file);
-  refuseRelativePath(reader, "state_file", config.state_file, "none");
+  config.state_file = machine::readAbsolutePath(reader, "state_file", config.state_file, "none");
   readRecorder(reader.map("recorder"), config.recorder);
   if (reader.value("realtime").as<std::string>() != nullptr) {
     config.enforce_realtime = reader.oneOf("realtime", kPolicies) == "enforce";
@@ -189,9 +96,11 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   if (reader.has("kinematics")) {
     config::readKinematics(std::move(kinematics), axes_are_right, config.axes);
   }
-  config.motor_power = readMotorPower(reader, used);
-  readEmergencyStop(reader, axes_are_right, config, used);
-  config.heartbeat = readHeartbeat(reader, used);
+  config.motor_power = machine::readMotorPower(reader, used);
+  machine::readEmergencyStop(reader, axes_are_right ? &config.axes : nullptr,
+                             config.motor_power.has_value(), config.emergency_disable,
+                             config.emergency_stop, used);
+  config.heartbeat = machine::readHeartbeat(reader, used);
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !config.emergency_stop) {
     simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",

@@ -180,10 +180,17 @@ sim::MotorLimits limitsOf(const AxisConfig& axis, double steps_per_unit) {
 }  // namespace
 
 sim::MotorLimits motorLimits(const std::vector<AxisConfig>& axes, std::size_t axis) {
-  const AxisConfig& own = axes.at(axis);
+  if (axis >= axes.size()) {
+    throw Error(fmt::format("there is no axis number {}; there are {}", axis, axes.size()));
+  }
+  const AxisConfig& own = axes[axis];
   if (own.kinematics == nullptr) return limitsOf(own, own.steps_per_unit);
   const config::Kinematics& shared = *own.kinematics;
-  const std::vector<double>& row = shared.matrix.at(shared.numberOf(own.name));
+  const std::size_t motor = shared.numberOf(own.name);
+  if (motor >= shared.matrix.size()) {
+    throw Error(fmt::format("{} isn't one of the axes with which it shares its motors", own.name));
+  }
+  const std::vector<double>& row = shared.matrix[motor];
   sim::MotorLimits sum;
   for (const AxisConfig& sharer : axes) {
     const std::size_t number = shared.numberOf(sharer.name);
@@ -270,6 +277,7 @@ void Simulation::pressEndstop(const std::string& axis, End end, bool pressed) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto pressed_axis = std::find_if(
       axes_.begin(), axes_.end(), [&](const AxisConfig& known) { return known.name == axis; });
+  if (pressed_axis == axes_.end()) throw Error("the rig has no axis named " + axis);
   for (std::size_t i = 0; i < pressed_axis->motors(); ++i) {
     const std::string rig_axis = pressed_axis->traceName(i);
     const sim::RigFaults& always = faults_.at(rig_axis);

@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <cstddef>
-#include <stdexcept>
+
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::sim {
 
@@ -21,7 +22,7 @@ int MemoryTrace::pin(const std::string& scope, const std::string& variable) cons
   for (std::size_t i = 0; i < pins_.size(); ++i) {
     if (pins_[i].scope == scope && pins_[i].variable == variable) return static_cast<int>(i);
   }
-  throw std::out_of_range(fmt::format("The trace has no pin {}.{}.", scope, variable));
+  throw Error(fmt::format("the trace has no pin {}.{}", scope, variable));
 }
 
 std::vector<std::int64_t> MemoryTrace::times(const std::string& scope, const std::string& variable,

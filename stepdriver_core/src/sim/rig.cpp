@@ -7,12 +7,12 @@
 #include <cstddef>
 #include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <unordered_map>
 #include <utility>
 
 #include "power_relay.h"
 #include "rig_axis.h"
+#include "stepdriver_core/error.h"
 #include "trace_feed.h"
 
 namespace stepdriver::sim {
@@ -65,7 +65,7 @@ class Rig::Impl {
       const bool twin = std::any_of(axes.begin(), axes.end(), [&](const auto& axis) {
         return axis->spec().name == spec.name;
       });
-      if (twin) throw std::invalid_argument("The rig has two axes named " + spec.name + ".");
+      if (twin) throw Error("the rig has two axes named " + spec.name);
       axes.push_back(std::make_unique<RigAxis>(spec, slides));
       wire(*axes.back());
     }
@@ -79,7 +79,7 @@ class Rig::Impl {
     for (const auto& axis : axes) {
       if (axis->spec().name == name) return *axis;
     }
-    throw std::out_of_range("The rig has no axis named " + name + ".");
+    throw Error("the rig has no axis named " + name);
   }
 
   /// @return the time, but not before any earlier one; bounces up to it are in the trace.
@@ -160,10 +160,21 @@ class Rig::Impl {
   void couple(const RigCoupling& coupling) const {
     std::vector<RigAxis*> coupled;
     for (const std::string& name : coupling.axes) coupled.push_back(&axisOf(name));
+    const auto fits = [size = coupled.size()](const std::vector<std::vector<double>>& matrix) {
+      return matrix.size() == size &&
+             std::all_of(matrix.begin(), matrix.end(),
+                         [&](const auto& row) { return row.size() == size; });
+    };
+    if (!fits(coupling.matrix) || !fits(coupling.inverse)) {
+      throw Error(
+          fmt::format("a coupling of the rig has {} axes, but must have as many rows and "
+                      "columns in each of its matrices",
+                      coupled.size()));
+    }
     for (std::size_t i = 0; i < coupled.size(); ++i) {
       std::vector<RigAxis::Drive> drives;
       for (std::size_t k = 0; k < coupled.size(); ++k) {
-        drives.push_back({coupled[k], coupling.inverse.at(i).at(k), coupling.matrix.at(k).at(i)});
+        drives.push_back({coupled[k], coupling.inverse[i][k], coupling.matrix[k][i]});
       }
       coupled[i]->couple(std::move(drives));
     }
@@ -238,7 +249,7 @@ void Rig::setFaults(const std::string& axis, const RigFaults& faults) {
 
 void Rig::stickMotorPower(std::optional<bool> on, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
-  if (!impl_->relay) throw std::logic_error("The rig has no relay of the motor power.");
+  if (!impl_->relay) throw Error("the rig has no relay of the motor power");
   const std::int64_t now_ns = impl_->advance(time_ns);
   impl_->relay->stick(on, now_ns);
   impl_->switchPower(now_ns);

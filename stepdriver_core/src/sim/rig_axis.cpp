@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::sim {
 namespace {
@@ -17,13 +18,12 @@ const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const bool is_known =
       known.empty() || std::find(known.begin(), known.end(), spec.microsteps) != known.end();
   if (!is_known || spec.microsteps < 1) {
-    throw std::invalid_argument(fmt::format("Axis {} of the rig: the {} doesn't do {} microsteps.",
-                                            spec.name, spec.chip.title, spec.microsteps));
+    throw Error(fmt::format("axis {} of the rig: the {} doesn't do {} microsteps", spec.name,
+                            spec.chip.title, spec.microsteps));
   }
   if (!(spec.full_step_travel > 0.0)) {
-    throw std::invalid_argument(
-        fmt::format("Axis {} of the rig: full_step_travel is {:f}, it has to be above 0.",
-                    spec.name, spec.full_step_travel));
+    throw Error(fmt::format("axis {} of the rig: full_step_travel is {}, but must be above 0",
+                            spec.name, spec.full_step_travel));
   }
   return spec;
 }

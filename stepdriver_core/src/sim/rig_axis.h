@@ -20,7 +20,7 @@ namespace stepdriver::sim {
 class RigAxis {
  public:
   /// @param slides of the rig, outlives the axis.
-  /// @throw std::invalid_argument if the chip can't do what the specification says.
+  /// @throw Error if the chip can't do what the specification says.
   RigAxis(const RigAxisSpec& spec, Slides& slides);
 
   /// A motor that moves the carriage of a coupled axis.

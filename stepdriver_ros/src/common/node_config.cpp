@@ -9,11 +9,7 @@ constexpr config::Range kJointStateRates{1.0, 1000.0};
 constexpr config::Range kJogTimeouts{0.02, 60.0};
 constexpr config::Range kSetpointTimeouts{0.02, 60.0};
 
-}  // namespace
-
-NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& name,
-                          std::vector<ConfigIssue>& issues) {
-  config::ConfigReader reader(tree, name, issues);
+NodeConfig readKeys(config::ConfigReader& reader) {
   NodeConfig config;
   static_cast<setup::MachineConfig&>(config) = setup::readMachineConfig(reader);
   config.joint_state_rate =
@@ -44,8 +40,25 @@ NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& na
   config.setpoint_timeout = setpoint.number("timeout", kSetpointTimeouts, config.setpoint_timeout);
   setpoint.rejectUnknown();
   config.hardware_id = reader.text("hardware_id", config.hardware_id);
+  return config;
+}
+
+}  // namespace
+
+NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& name,
+                          std::vector<ConfigIssue>& issues) {
+  config::ConfigReader reader(tree, name, issues);
+  NodeConfig config = readKeys(reader);
   reader.rejectUnknown();
   return config;
+}
+
+std::vector<std::string> parameterNames() {
+  const config::ConfigValue nothing = config::ConfigValue::Map{};
+  std::vector<ConfigIssue> issues;
+  config::ConfigReader reader(nothing, "", issues);
+  readKeys(reader);
+  return reader.known();
 }
 
 }  // namespace stepdriver::ros_node

@@ -46,4 +46,7 @@ struct NodeConfig : setup::MachineConfig {
 NodeConfig readNodeConfig(const config::ConfigValue& tree, const std::string& name,
                           std::vector<ConfigIssue>& issues);
 
+/// The keys that readNodeConfig() knows.
+std::vector<std::string> parameterNames();
+
 }  // namespace stepdriver::ros_node

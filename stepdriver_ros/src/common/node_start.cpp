@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "stepdriver_core/printable.h"
 #include "xmlrpc_value.h"
 
 namespace stepdriver::ros_node {
@@ -18,14 +19,18 @@ constexpr std::chrono::milliseconds kMasterPoll{200};
 
 }  // namespace
 
-std::optional<int> handleArguments(int argc, char** argv, const char* usage) {
+std::optional<int> handleArguments(int argc, char** argv, const std::string& usage) {
   // A program that reads the output through a pipe, such as roslaunch, must see each line at once.
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   std::vector<std::string> arguments;
   ros::removeROSArgs(argc, argv, arguments);
   if (arguments.size() < 2) return {};
   const bool help = arguments[1] == "--help" || arguments[1] == "-h";
-  std::fputs(usage, help ? stdout : stderr);
+  if (!help) {
+    std::fprintf(stderr, "%s isn't an option; parameters are given as _name:=value\n",
+                 printable(arguments[1]).c_str());
+  }
+  std::fputs(usage.c_str(), help ? stdout : stderr);
   return help ? kExitOk : kExitUsage;
 }
 

@@ -15,10 +15,10 @@ constexpr int kExitConfig = 1;
 constexpr int kExitUsage = 64;
 
 /// The start of a node's main(), before ros::init(). Makes the output line-buffered, and answers
-/// arguments that aren't for ROS with the usage.
+/// arguments that aren't for ROS with the usage, and names the one that isn't known.
 ///
 /// @return the exit code if the program must end now.
-std::optional<int> handleArguments(int argc, char** argv, const char* usage);
+std::optional<int> handleArguments(int argc, char** argv, const std::string& usage);
 
 /// @return false: the node was asked to end before there was a master.
 bool waitForMaster(EndRequests& end_requests);

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <pthread.h>
 #include <ros/console.h>
 #include <ros/init.h>
@@ -20,6 +21,7 @@
 #include "common/latched_messages.h"
 #include "common/loopback_only.h"
 #include "common/master_directory.h"
+#include "common/node_config.h"
 #include "common/node_start.h"
 #include "common/xml_depth.h"
 #include "node/actions/action_topics.h"
@@ -86,16 +88,29 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~jog  ~setpoint  ~AXIS/setpoint  ~command  (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_path
               ~follow_joint_trajectory
-  parameters  ~axes  ~gpio  ~joint_state_rate  ~jog_timeout  ~realtime  ~emergency_stop
-              ~state_file  ~recorder  ~hardware_id  ~urdf_limits  ~publish_clock
-              ~on_master_lost  ~trajectory  ~setpoint  ~simulation
-              robot_description
+  parameters  {}robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
 written, 3 the computer is too slow for its axes and ~realtime is enforce, 4 ended as asked, but
 ~state_file couldn't be written, 5 the computer had no memory or no thread left, 64 wrong usage.
 Start it with: roslaunch stepdriver axis.launch
 )";
+
+/// With all parameters that the node reads.
+std::string usage() {
+  constexpr std::size_t kWidth = 88;
+  const std::string indent(14, ' ');
+  std::string names;
+  std::string line;
+  for (const std::string& name : parameterNames()) {
+    if (indent.size() + line.size() + name.size() + 1 > kWidth) {
+      names += line + "\n" + indent;
+      line.clear();
+    }
+    line += "~" + name + "  ";
+  }
+  return fmt::format(kUsage, names + line + "\n" + indent);
+}
 
 /// Refuses new commands, decelerates, disables the axes, and lets every client get its answer.
 ///
@@ -304,6 +319,9 @@ int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
   } catch (const Refused& error) {
     ROS_FATAL_NAMED("node", "Not started: %s", error.what());
     return kExitTooSlow;
+  } catch (const ExhaustedError& error) {
+    ROS_FATAL_NAMED("node", "Not started: %s", error.what());
+    return kExitExhausted;
   } catch (const boost::thread_resource_error& error) {
     ROS_FATAL_NAMED("node", "Not started: no thread can be started: %s", error.what());
     return kExitExhausted;
@@ -338,7 +356,7 @@ int main(int argc, char** argv) {
   node::limitXmlDepth();
   node::limitFrameMemory();
   node::EndRequests end_requests(node::EndRequests::Usr1::kAsksForARecording);
-  if (const auto code = node::handleArguments(argc, argv, node::kUsage)) return *code;
+  if (const auto code = node::handleArguments(argc, argv, node::usage())) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);
   if (!node::waitForMaster(end_requests)) return node::kExitOk;
   const int exit_code = node::start(end_requests);

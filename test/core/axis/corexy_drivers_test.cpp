@@ -88,7 +88,7 @@ TEST(CoreXyDrivers, KeepTheTimesOfEach) {
   axes[1].driver.timing.step_high_ns = 20'000;
   axes[1].driver.timing.step_low_ns = 20'000;
   axes[1].driver.timing.dir_setup_ns = 400'000;
-  axes[1].driver.timing.dir_hold_ns = 300'000;
+  axes[1].driver.timing.dir_hold_ns = 120'000;
   const auto bench = benchOf(axes);
   expectExactMoves(*bench);
 }

@@ -168,9 +168,14 @@ TEST_F(CoreXy, RefusesWhatMakesNoSense) {
 TEST(CoreXyMachine, RefusesAnIdleTimeoutDuringWhichTheOtherAxisMayMove) {
   std::vector<config::AxisConfig> axes = coreXyAxes();
   axes[1].idle_timeout = 1.0;
-  EXPECT_EQ(refusal([&] { const Bench bench(axes); }),
-            "y: it shares its motors, and can't have motors of its own, a backlash, an idle "
-            "timeout or a brake");
+  try {
+    const Bench bench(axes);
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_STREQ(error.what(),
+                 "kinematics/axes: has y with idle_timeout_s, which it must not have: while it "
+                 "rests, its motors may move another axis");
+  }
 }
 
 // A thread reports the edge of a fault output, so this is on the rig in real time.

@@ -261,7 +261,7 @@ TEST_F(Gantry, KeepsTheTimesOfTwoDifferentDrivers) {
 
 TEST_F(Gantry, IsNoFasterThanItsSlowestDriver) {
   config::AxisConfig config = withTwoDrivers();
-  config.max_speed = 4.0;  // 320,000 steps/s
+  config.max_speed = 2.5;  // 200,000 steps/s
   config.acceleration = config.deceleration = 200.0;
   build(config);
   y().setPosition(0.0);

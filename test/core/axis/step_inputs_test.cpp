@@ -59,7 +59,7 @@ TEST(CwCcw, MakesStepsForwardOnOneLineAndStepsBackwardOnTheOther) {
 TEST(CwCcw, TurnsInMotionWithTheTimeBetweenThePulsesOfTheTwoLines) {
   config::AxisConfig config = cwCcwAxis();
   config.driver.timing.dir_setup_ns = 3'000'000;
-  config.driver.timing.dir_hold_ns = 2'000'000;
+  config.driver.timing.dir_hold_ns = 120'000;
   Bench bench({config});
   bench.axis().moveTo(0.02);
   for (int i = 0; i < 20; ++i) {

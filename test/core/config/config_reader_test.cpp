@@ -238,6 +238,10 @@ TEST(ConfigReader, NamesTheNearestKnownKey) {
       {"Max_Speed_MM_S", "is not known; did you mean max_speed_mm_s?"},
       {"joitn", "is not known; did you mean joint?"},
       {"jonts", "is not known; did you mean joint?"},
+      {"j", "is not known; did you mean joint?"},
+      {"max", "is not known; did you mean max_speed_mm_s?"},
+      {"mx_spd", "is not known; did you mean max_speed_mm_s?"},
+      {"cw", "is not known; known here: joint, max_speed_mm_s and pins"},
       {"colour", "is not known; known here: joint, max_speed_mm_s and pins"}};
   for (const Case& each : cases) {
     const ConfigValue value = mapOf({{each.unknown, 1}, {"pins", 1}});
@@ -249,6 +253,18 @@ TEST(ConfigReader, NamesTheNearestKnownKey) {
     reader.rejectUnknown();
     EXPECT_EQ(linesOf(issues), Lines{"/n/" + each.unknown + ": " + each.message});
   }
+}
+
+TEST(ConfigReader, ListsTheKnownKeysOnce) {
+  const ConfigValue value = mapOf({{"colour", 1}, {"price", 2}, {"weight", 3}});
+  std::vector<ConfigIssue> issues;
+  ConfigReader reader(value, "/n", issues);
+  reader.allow("joint");
+  reader.allow("pins");
+  reader.rejectUnknown();
+  EXPECT_EQ(linesOf(issues),
+            (Lines{"/n/colour: is not known; known here: joint and pins",
+                   "/n/price: is not known either", "/n/weight: is not known either"}));
 }
 
 TEST(ConfigReader, RejectsEveryKeyWhereNothingIsKnown) {

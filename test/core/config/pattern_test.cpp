@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "stepdriver_core/error.h"
 
 namespace stepdriver {
 namespace {
@@ -52,7 +53,7 @@ TEST(Pattern, SaysWhatIsWrongWithAnExpression) {
   try {
     const Pattern pattern("a(b");
     FAIL() << "it was taken";
-  } catch (const std::invalid_argument& error) {
+  } catch (const stepdriver::Error& error) {
     EXPECT_EQ(std::string(error.what()).find("a(b: "), 0U) << error.what();
   }
 }

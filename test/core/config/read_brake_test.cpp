@@ -33,8 +33,7 @@ TEST(ReadBrake, RefusesWrongValues) {
   expectIssues(brakedAxis(),
                {{"brake/release_ms", -1.0, "is -1.0, but must be from 0 to 10000"},
                 {"brake/engage_ms", 10'001.0, "is 10001.0, but must be from 0 to 10000"},
-                {"brake/release_level", std::string("on"),
-                 "is \"on\", but must be low or high; did you mean low?"},
+                {"brake/release_level", std::string("on"), "is \"on\", but must be low or high"},
                 {"brake/pin", std::string("E"),
                  "is \"E\", which is used twice: it is /axes/x/pins/enable already, and each pin "
                  "needs a line of its own"}});

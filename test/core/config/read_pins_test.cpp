@@ -29,7 +29,10 @@ TEST(ReadPins, RefusesWhatIsNoLine) {
                               {"pins/step", "gpiochip0:0", ""},
                               {"pins/step", "1e20.gpio:0:4", ""},
                               {"pins/step", "X_STEP", ""},
-                              {"pins/stp", "gpiochip0:4", "is not known; did you mean step?"}});
+                              {"pins/stp", "gpiochip0:4", "is not known; did you mean step?"},
+                              {"pins/en", "gpiochip0:4", "is not known; did you mean enable?"},
+                              {"pins/ena", "gpiochip0:4", "is not known; did you mean enable?"},
+                              {"pins/slp", "gpiochip0:4", "is not known; did you mean sleep?"}});
 }
 
 TEST(ReadPins, WantsAllMicrostepPinsOrNone) {

@@ -6,9 +6,10 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::driver {
 namespace {
@@ -141,7 +142,7 @@ TEST(Chip, IsFoundByTheNameInConfigurations) {
   EXPECT_EQ(findDriverChip("a498"), nullptr);
   EXPECT_EQ(findDriverChip("a49888"), nullptr);
   EXPECT_EQ(findDriverChip(""), nullptr);
-  EXPECT_THROW(driverChip("a498"), std::out_of_range);
+  EXPECT_THROW(driverChip("a498"), Error);
 }
 
 /// [ns] The DRV8825's gap is the part of the 4 us between two steps that remains after the pulse.
@@ -269,10 +270,10 @@ TEST(ModePath, IsAsShortAsTheDefinedCodesAllow) {
 }
 
 TEST(ModePath, RefusesModesWithoutACode) {
-  EXPECT_THROW(modePath(driverChip("a4988"), 1, 32), std::invalid_argument);
-  EXPECT_THROW(modePath(driverChip("a4988"), 32, 1), std::invalid_argument);
-  EXPECT_THROW(modePath(driverChip("drv8825"), 3, 3), std::invalid_argument);
-  EXPECT_THROW(modePath(driverChip("tb6600"), 1, 2), std::invalid_argument);
+  EXPECT_THROW(modePath(driverChip("a4988"), 1, 32), Error);
+  EXPECT_THROW(modePath(driverChip("a4988"), 32, 1), Error);
+  EXPECT_THROW(modePath(driverChip("drv8825"), 3, 3), Error);
+  EXPECT_THROW(modePath(driverChip("tb6600"), 1, 2), Error);
 }
 
 TEST(KeepsPosition, WhereBothModesHaveAPlace) {

@@ -21,11 +21,11 @@ using test::linearAxis;
 using test::violationsOf;
 
 TEST(Machine, TakesAllLinesOrNone) {
-  std::vector<config::AxisConfig> configs = {linearAxis("x"), linearAxis("y")};
-  configs[1].pins.step.line = "x.step";
+  const std::vector<config::AxisConfig> configs = {linearAxis("x"), linearAxis("y")};
   sim::Rig rig(Bench::rigAxes({configs[0]}));
   pulse::VirtualClock clock;
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
+  const auto held = backend.request({{"y.step", false, false}}, {});
   EXPECT_THROW(machine::Machine(configs, backend, clock, {false}), GpioError);
   // All lines are released: they can be requested again.
   machine::Machine machine({configs[0]}, backend, clock, {false});

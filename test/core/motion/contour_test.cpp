@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "motion/errors.h"
 #include "support/constants.h"
 #include "support/contour_line.h"
 #include "support/random_contour.h"
@@ -291,7 +292,7 @@ TEST(Contour, RefusesACusp) {
   bezier.end = {10.0, 0.0};
   bezier.control1 = {10.0, 10.0};
   bezier.control2 = {0.0, 10.0};
-  EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), std::invalid_argument);
+  EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), motion::Malformed);
   bezier.control1 = {9.0, 10.0};
   EXPECT_NO_THROW(Contour({0.0, 0.0}, {bezier}, 1.0));
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
+#include "motion/errors.h"
 #include "motion/planner.h"
 #include "support/profile_check.h"
 #include "support/random_motion.h"
@@ -104,7 +104,7 @@ TEST(PlannerProperties, HoldForLimitsThatHaveNothingToDoWithEachOther) {
       check.expectWithinLimits();
       check.expectRestOn(target);
       if (check.way() < 100.0) check.expectSteps(target);
-    } catch (const std::range_error&) {
+    } catch (const TooLong&) {
       const double jerks = 2.0 * (limits.acceleration + limits.deceleration) / limits.jerk;
       const double level = std::abs(v) + a * a / (2.0 * limits.jerk);
       const double speed = level + limits.max_speed;

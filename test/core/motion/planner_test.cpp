@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <stdexcept>
 
+#include "motion/errors.h"
 #include "motion/step_finder.h"
 #include "support/profile_check.h"
 
@@ -156,7 +157,7 @@ TEST(PlanMove, RestStaysRest) {
 
 TEST(PlanMove, RefusesWhatTakesCenturies) {
   const MotionLimits limits{0, 0.001, 1, 1, 1};
-  EXPECT_THROW(planMove(0, at(0), std::int64_t{1} << 40, limits), std::range_error);
+  EXPECT_THROW(planMove(0, at(0), std::int64_t{1} << 40, limits), TooLong);
 }
 
 TEST(PlanMove, GoesOnFromTheStateItWasPlannedFrom) {

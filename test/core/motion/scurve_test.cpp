@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "motion/errors.h"
 #include "motion/planner.h"
 #include "motion/step_finder.h"
 #include "support/profile_check.h"
@@ -139,7 +140,7 @@ TEST(SCurve, TakesTheTimeOfTheTextbookForAllOrdersOfMagnitude) {
     SCOPED_TRACE(testing::Message() << length << " microsteps, " << limits);
     const auto textbook = static_cast<double>(DoubleS(length, limits).total());
     if (textbook > Profile::kLongest) {
-      EXPECT_THROW(fromRest(length, limits), std::range_error);
+      EXPECT_THROW(fromRest(length, limits), TooLong);
       continue;
     }
     const Profile profile = fromRest(length, limits);

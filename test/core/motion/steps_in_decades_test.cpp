@@ -7,10 +7,10 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "motion/errors.h"
 #include "motion/level_off.h"
 #include "motion/planner.h"
 #include "motion/profile_sum.h"
@@ -360,7 +360,7 @@ bool command(Random& random, Axis& axis, std::int64_t now, const MotionLimits& l
     axis.motions.push_back(axis.motions.empty() ? PlannedMotion(plan, axis.shaper)
                                                 : axis.motions.back().takenOverBy(plan));
     return true;
-  } catch (const std::range_error&) {
+  } catch (const TooLong&) {
     return false;  // it takes more than a hundred years
   }
 }

@@ -82,7 +82,7 @@ class DumperTest : public testing::Test {
     bench_.reset();
     machine::MachineOptions options;
     options.record_seconds = 10.0;
-    options.record_bytes = std::size_t{8} * 20'000;
+    options.record_bytes = 1'000'000;
     const std::vector<config::AxisConfig> axes{linearAxis("x"), linearAxis("y", "tb6600")};
     bench_ = std::make_unique<Bench>(axes, Bench::rigAxes(axes), threaded, 0.0, options);
   }

@@ -181,8 +181,9 @@ std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisCo
   return slowing;
 }
 
-bool endsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+/// A sentence that ends where its reason should stand says no more than an empty one.
+bool givesNoReason(const std::string& text) {
+  return text.empty() || text.back() == ' ' || text.back() == ':';
 }
 
 }  // namespace
@@ -270,7 +271,7 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   answered_[call] = asked.name;
   note("answer of " + asked.name +
        (reply.failure ? ": " + reply.failure->text : std::string(": done")));
-  if (reply.failure && (reply.failure->text.empty() || endsWith(reply.failure->text, ": "))) {
+  if (reply.failure && givesNoReason(reply.failure->text)) {
     oracle_.complain(asked.name + " fails without a reason: " + reply.failure->text);
   }
   std::array<bool, kAxes> at_fault{};
@@ -1417,7 +1418,7 @@ void Participants::checkOutcomes() {
     const auto result = move.outcome->get();
     if (!result) {
       oracle_.complain("the outcome of " + name + " is not set");
-    } else if (endsWith(result->message, ": ")) {
+    } else if (givesNoReason(result->message)) {
       oracle_.complain(name + " ends without a reason: " + result->message);
     } else if (result->end == axis::MoveEnd::kReached && name.rfind("jog", 0) != 0 &&
                std::abs(result->position - move.rest) > reached) {
@@ -1428,7 +1429,12 @@ void Participants::checkOutcomes() {
   }
   for (const activity::AcceptedHoming& homing : homings_) {
     for (const auto& outcome : homing.outcomes) {
-      if (!outcome->get()) oracle_.complain("the outcome of a homing is not set");
+      const auto result = outcome->get();
+      if (!result) {
+        oracle_.complain("the outcome of a homing is not set");
+      } else if (givesNoReason(result->message)) {
+        oracle_.complain("a homing ends without a reason: " + result->message);
+      }
     }
   }
 }

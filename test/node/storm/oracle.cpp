@@ -100,6 +100,7 @@ class Judge {
 
   std::vector<std::string> verdict() {
     for (const Request& request : seen_.requests) {
+      judgeReason(request);
       if (!request.answered || !request.success) continue;
       judgeArrivals(request);
       if (!ends(request.kind)) continue;
@@ -303,6 +304,11 @@ class Judge {
   std::string requestsAround(std::int64_t begin, std::int64_t end) const {
     constexpr std::int64_t kBefore = 1500 * kMillisecond;
     return requestsText(seen_.requests, begin - kBefore, end, begin);
+  }
+
+  void judgeReason(const Request& request) {
+    if (!request.has_answer || !request.answered || request.success) return;
+    if (request.message.empty()) broken_.push_back(request.text + " failed without a reason");
   }
 
   void judgeArrivals(const Request& request) {

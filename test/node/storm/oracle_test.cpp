@@ -198,6 +198,17 @@ TEST(Oracle, HoldsASuccessAgainstTheTarget) {
   }
 }
 
+TEST(Oracle, WantsAReasonFromEachFailure) {
+  for (const char* const message : {"x: the axis is asleep", ""}) {
+    OneAxis axis;
+    Request refused = requestOf(Kind::kMotion, 2000, 2010);
+    refused.success = false;
+    refused.message = message;
+    axis.ask(refused);
+    EXPECT_EQ(axis.broken(), *message != '\0' ? 0U : 1U);
+  }
+}
+
 TEST(Oracle, HoldsPositionsAgainstTheCountOfThePulses) {
   for (const double position : {0.015, 0.01505}) {
     OneAxis axis;

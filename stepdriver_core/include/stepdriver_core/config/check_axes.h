@@ -6,15 +6,15 @@
 
 namespace stepdriver::config {
 
-/// Checks axes that a program has made itself. readAxes() has checked those of a file already, and
-/// in more detail: this makes sure that every number is one that motions can be planned with, and
-/// that everything that an axis names is there. A machine::Machine and a setup::Hardware call it.
+/// Checks axes that a program has made itself, by the rules of a configuration file: readAxes() has
+/// checked those of a file already. A machine::Machine and a setup::Hardware call it. Messages name
+/// the keys and the units of a file.
 ///
 ///     std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
 ///     config::checkAxes(axes);
 ///
-/// @throw ConfigError with all issues, for example "x/deceleration: is 0, but must be from 1e-08 to
-///   12500000 m/s^2".
+/// @throw ConfigError with all issues, for example "axes/x/deceleration_mm_s2: is 0.0, but must be
+///   above 0".
 void checkAxes(const std::vector<AxisConfig>& axes);
 
 }  // namespace stepdriver::config

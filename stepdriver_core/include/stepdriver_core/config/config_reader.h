@@ -100,7 +100,11 @@ class ConfigReader {
   /// Accepts a key as known although nothing reads its value.
   void allow(const std::string& key);
 
-  /// Reports every key of the map that nothing has read, with the nearest known one.
+  /// The keys that may be there, because something has read or allowed them.
+  std::vector<std::string> known() const { return {known_.begin(), known_.end()}; }
+
+  /// Reports every key of the map that nothing has read, with the one that may be meant. The first
+  /// of those that resemble none comes with all known ones.
   void rejectUnknown();
 
  private:

@@ -93,7 +93,7 @@ struct DriverChip {
 const DriverChip* findDriverChip(const std::string& name);
 
 /// @param name in upper or lower case.
-/// @throw std::out_of_range if there is no driver of that name.
+/// @throw Error if there is no driver of that name.
 const DriverChip& driverChip(const std::string& name);
 
 /// Names of all named chips, for messages and checks.
@@ -115,10 +115,10 @@ std::vector<int> selectableMicrosteps(const DriverChip& chip);
 /// undefined code appears in passing. The first code is left out; the path is empty if both modes
 /// are the same.
 ///
-/// @throw std::invalid_argument if a mode has no code on this chip, or no such path leads to it.
+/// @throw Error if a mode has no code on this chip, or no such path leads to it.
 std::vector<ModeCode> modePath(const DriverChip& chip, int from_microsteps, int to_microsteps);
 
-/// Whether there is such a path. @throw std::invalid_argument if a mode has no code on this chip.
+/// Whether there is such a path. @throw Error if a mode has no code on this chip.
 bool hasModePath(const DriverChip& chip, int from_microsteps, int to_microsteps);
 
 /// The times that suit two chips that get the same edges: of each time the longer one.

@@ -100,9 +100,14 @@ class Machine {
   /// enables the axes that are configured so. Nothing moves.
   ///
   /// @param backend, clock outlive the machine.
+  /// @throw ConfigError with all that the axes and the options contradict of the rules of a
+  ///   configuration file, see config::checkAxes(); then no line is requested.
   /// @throw GpioError if a line can't be requested; then no line is held.
   /// @throw Refused with MachineOptions::enforce, naming what this computer can't do; then no line
   ///   is held.
+  /// @throw ExhaustedError if a thread can't be started; then no line is held.
+  /// @throw Error if the state file is used by another program or can't be written, or if an axis
+  ///   can't be brought up; then no line is held.
   Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
           const MachineOptions& options = {});
 

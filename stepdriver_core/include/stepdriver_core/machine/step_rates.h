@@ -54,6 +54,8 @@ struct StepRates {
 /// Steps of several axes that fall due at once are one call for each chip; that counts as one for
 /// each axis here. Changes of DIR, and what the engine calculates, about a microsecond a step, are
 /// left out.
+///
+/// @throw Error if the capability is that of another number of axes.
 StepRates stepRates(const std::vector<config::AxisConfig>& axes,
                     const pulse::Capability& capability);
 
@@ -61,6 +63,7 @@ StepRates stepRates(const std::vector<config::AxisConfig>& axes,
 ///
 /// @param rates [steps/s] of each axis; 0: it is at rest, and takes no time.
 /// @return the axes that move.
+/// @throw Error if there is another number of rates, or as stepRates().
 StepRates stepRatesInMotion(const std::vector<config::AxisConfig>& axes,
                             const pulse::Capability& capability, const std::vector<double>& rates);
 
@@ -72,6 +75,7 @@ std::string whyNotInRealtime(const std::vector<config::AxisConfig>& axes,
 /// ENABLE isn't asserted.
 ///
 /// @param request see MachineOptions.
+/// @throw ConfigError as config::checkAxes().
 /// @throw GpioError if a line can't be requested, written or read; no line is held then.
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                           pulse::Clock& clock, const pulse::RealtimeRequest& request = {});

@@ -16,7 +16,7 @@ namespace stepdriver::setup {
 class Hardware {
  public:
   /// @param name of the map that the configuration was read from, for messages; it may be empty.
-  /// @throw ConfigError if the rig's trace can't be written, or as config::checkAxes().
+  /// @throw ConfigError if the rig's trace can't be written, or as machine::Machine.
   /// @throw GpioError if the backend is libgpiod and stepdriver was built without it.
   explicit Hardware(const MachineConfig& config, const std::string& name = "");
 

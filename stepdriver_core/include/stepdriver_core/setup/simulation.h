@@ -23,6 +23,7 @@ namespace stepdriver::setup {
 /// axes that share it can demand of it together.
 ///
 /// @param axis its place in `axes`.
+/// @throw Error if there is no such axis, or its kinematics doesn't name it.
 sim::MotorLimits motorLimits(const std::vector<config::AxisConfig>& axes, std::size_t axis);
 
 /// The motor that has the pins of an axis, on the rig. Without a configured holding torque it has
@@ -39,7 +40,7 @@ class Simulation {
  public:
   /// @param emergency_stop the machine's input, to which the rig connects a button.
   /// @param motor_power the machine's, for which the rig has a relay.
-  /// @throw Error if the trace can't be written.
+  /// @throw Error if the trace can't be written, or as sim::Rig.
   Simulation(const std::vector<config::AxisConfig>& axes,
              std::optional<config::InputSwitch> emergency_stop,
              const std::optional<config::MotorPowerConfig>& motor_power,
@@ -65,6 +66,7 @@ class Simulation {
   /// @param axis of the configuration.
   /// @param end of the axis; the wiring determines which lines change: all motors of an axis press
   ///   theirs.
+  /// @throw Error if there is no such axis.
   void pressEndstop(const std::string& axis, End end, bool pressed);
 
  private:

@@ -55,7 +55,7 @@ class MemoryTrace : public PinTrace {
   const std::vector<bool>& levels() const { return levels_; }  ///< at begin()
   const std::vector<Edge>& edges() const { return edges_; }
 
-  /// @return index of the pin. @throw std::out_of_range
+  /// @return index of the pin. @throw Error if there is no such pin.
   int pin(const std::string& scope, const std::string& variable) const;
 
   /// Times at which the pin changed to this level; its level at begin() isn't included.

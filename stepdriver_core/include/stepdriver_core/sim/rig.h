@@ -233,15 +233,16 @@ class Rig : public gpio::Board {
   /// @param trace receives every edge in the order of time, including those of bouncing switches;
   ///   levels are those of the lines. May be null.
   /// @param couplings the motors of all other axes move only their own carriages.
-  /// @throw std::invalid_argument if an axis is named twice, doesn't travel, or has microsteps that
-  ///   its chip doesn't have.
   /// @param motor_power empty: the power is always there.
+  /// @throw Error if an axis is named twice, doesn't travel, or has microsteps that its chip
+  /// doesn't
+  ///   have, or if a coupling names an axis that there isn't, or has matrices of another size.
   explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr,
                const std::vector<RigCoupling>& couplings = {},
                const std::optional<MotorPowerSpec>& motor_power = {});
   ~Rig() override;
 
-  /// @throw std::out_of_range if there is no such axis; so do all functions that take an axis.
+  /// @throw Error if there is no such axis; so do all functions that take an axis.
   RigAxisReport report(const std::string& axis) const;
   /// Their names, in the order in which they were given.
   std::vector<std::string> axes() const;
@@ -252,7 +253,7 @@ class Rig : public gpio::Board {
   /// The relay of the motor power doesn't follow its line from now on: the power is there (true:
   /// its contacts are welded), or it isn't (false: a fuse, or a safety relay). Empty: it follows.
   ///
-  /// @throw std::logic_error if there is no such relay.
+  /// @throw Error if there is no such relay.
   void stickMotorPower(std::optional<bool> on, std::int64_t time_ns);
 
   /// The write that comes after `writes` more successful ones on this line fails with `error` (an

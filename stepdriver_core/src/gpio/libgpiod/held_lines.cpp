@@ -1,5 +1,6 @@
 #include "held_lines.h"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -8,10 +9,11 @@
 #include <cerrno>
 #include <ctime>
 #include <mutex>
-#include <system_error>
 #include <utility>
 
 #include "steady_now.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::gpio::gpiod {
 namespace {
@@ -37,7 +39,8 @@ int setLevels(OutputGroup& group, LineBits lines, LineBits levels) noexcept {
 
 HeldLines::HeldLines(Parts&& parts)
     : parts_(std::move(parts)), interrupt_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-  if (interrupt_fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  if (interrupt_fd_ < 0)
+    throw GpioError(fmt::format("inputs can't be watched: eventfd: {}", errorText(errno)));
   polled_.push_back({interrupt_fd_, POLLIN, 0});
   for (const auto& group : parts_.input_groups) {
     const std::vector<int>& fds = group->request->edgeFds();

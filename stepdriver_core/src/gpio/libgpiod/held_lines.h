@@ -54,7 +54,7 @@ class HeldLines : public Lines {
     std::vector<std::string> input_names;
   };
 
-  /// @throw std::system_error if the kernel has no eventfd left.
+  /// @throw GpioError if the kernel has no eventfd left.
   explicit HeldLines(Parts&& parts);
   ~HeldLines() override;
 

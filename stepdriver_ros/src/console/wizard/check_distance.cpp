@@ -36,11 +36,13 @@ struct Measured {
 
 /// Asks which way has room, and doesn't offer one that the driver would refuse.
 ///
-/// @param distance [mm|deg] of all moves together, above 0.
+/// @param measured, play [mm|deg] lengths of the move that is measured and of the one before it
 /// @param wrong_way the driver's plus is the user's minus.
 /// @return 1 for plus, -1 for minus; empty: there is no room.
 std::optional<double> askWay(Dialogue& dialogue, HandMove& hand_move,
-                             const config::AxisConfig& config, double distance, bool wrong_way) {
+                             const config::AxisConfig& config, double measured, double play,
+                             bool wrong_way) {
+  const double distance = measured + play;
   const auto possible = [&](double way) {
     const std::string why = hand_move.refusalOf(way * distance);
     if (!why.empty()) {
@@ -57,9 +59,10 @@ std::optional<double> askWay(Dialogue& dialogue, HandMove& hand_move,
     return fmt::format("your {} end", is_plus != wrong_way ? "plus" : "minus");
   };
   const std::string question = fmt::format(
-      "Is there room for {} {} towards {}?{}", roundedText(distance), configUnitOf(config.kind),
-      end(plus),
-      plus && minus ? fmt::format(" If you answer n, it moves towards {}.", end(false)) : "");
+      "Is there room for {} {unit} towards {}: {} {unit} to take up the play, then {} {unit}?{}",
+      roundedText(distance), end(plus), roundedText(play), roundedText(measured),
+      plus && minus ? fmt::format(" If you answer n, it moves towards {}.", end(false)) : "",
+      fmt::arg("unit", configUnitOf(config.kind)));
   if (askYesNo(dialogue, question, true)) return way;
   return plus && minus ? std::optional(-1.0) : std::nullopt;
 }
@@ -73,7 +76,7 @@ std::optional<Measured> measure(Dialogue& dialogue, HandMove& hand_move,
   move.distance =
       *askLength(dialogue, fmt::format("How far should {} move to be measured?", config.name), unit,
                  move.distance);
-  const auto way = askWay(dialogue, hand_move, config, move.distance + play.distance, wrong_way);
+  const auto way = askWay(dialogue, hand_move, config, move.distance, play.distance, wrong_way);
   if (!way) return {};
   move.distance *= *way;
   play.distance *= *way;
