@@ -17,6 +17,7 @@ leaves the packages in the folder packages of the build folder:
   python3-stepdriver     the messages for Python
   libstepdriver-dev      the messages for C++, and what catkin needs
   libstepdriver-core-dev the library without ROS
+  python3-stepdriver-core the Python package without ROS
 
   --twice  builds them twice, in different folders: they must be equal
   --try FOLDER  makes nothing, but installs the packages of that folder, with nothing but what they and
@@ -84,7 +85,8 @@ try_packages() {
 
   say "Installing them"
   apt --no-install-recommends install "$packages"/*.deb >"$build/log/package-install.log" 2>&1
-  (cd "$root" && bash scripts/demo.sh --packaged | tail -n 4 && bash debian/tests/library | tail -n 1)
+  (cd "$root" && bash scripts/demo.sh --packaged | tail -n 4 && bash debian/tests/library | tail -n 1 &&
+    bash debian/tests/python)
   for name in gpio realtime; do
     getent group "$name" | grep -qw stepdriver || die "stepdriver isn't in the group $name"
   done
@@ -120,7 +122,7 @@ fi
 
 # ---- making them ----
 
-install_packages core ros package ${arch:+"cross-$arch"}
+install_packages core python ros package ${arch:+"cross-$arch"}
 packages=$build/packages${arch:+-$arch}
 builder=(dpkg-buildpackage --no-sign --build=binary --jobs="$jobs")
 

@@ -14,8 +14,8 @@ Installs missing packages, builds, and runs the named parts; by default all but 
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
           headers; the keys of package.xml; the links of the pages, and the files that they name; the table of
           their commands; the tests that docs/reliability.md names; the English of pages and comments
-  --core  stepdriver_core and its tests, built alone, as on a machine without ROS, and programs that use
-          the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
+  --core  stepdriver_core and its tests, built alone, as on a machine without ROS, its Python package, and
+          programs that use the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
           with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
           (test/kernel), with each libgpiod of this Debian; includes --core
@@ -169,7 +169,7 @@ check_format() {
 
 check_shell() {
   (cd "$root" && shellcheck -x scripts/*.sh bench/*.sh test/kernel/*.sh test/library/*.sh \
-    test/operations/*.sh .ci/run)
+    test/operations/*.sh test/python/*.sh .ci/run)
 }
 
 check_packages() { /usr/bin/python3 -B "$root/test/docs/packages_test.py"; }
@@ -202,7 +202,7 @@ tidy_all() {
 configure_tidy() {
   local options=("$strict" -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12
     -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
-  configure "$src/stepdriver_core" "$build/tidy/core" "${options[@]}" -DSTEPDRIVER_BENCH=ON &&
+  configure "$src/stepdriver_core" "$build/tidy/core" "${options[@]}" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
     configure "$src" "$build/tidy/catkin" "${options[@]}" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
     cmake --build "$build/tidy/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp &&
     cp "$src/.clang-tidy" "$build/tidy/" &&
@@ -235,11 +235,21 @@ tidy() {
 
 check_tidy() { await tidy_all; }
 
+# Ubuntu 20.04 has an older pybind11.
+python_option() {
+  local version
+  version=$(dpkg-query -W -f='${Version}' pybind11-dev 2>/dev/null) || true
+  if dpkg --compare-versions "$version" ge 2.10; then
+    say -DSTEPDRIVER_PYTHON=ON
+  else
+    say -DSTEPDRIVER_PYTHON=OFF
+  fi
+}
 build_core() {
   quietly core-build build_core_quietly
 }
 build_core_quietly() {
-  configure_core "$strict" -DSTEPDRIVER_BENCH=ON &&
+  configure_core "$strict" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
     cmake --build "$build/core" -j "$jobs"
 }
 test_core() {
@@ -506,8 +516,8 @@ choose_build_folder
 rm -rf "$build/ros"
 rm -f "$build"/log/*.times
 install_packages core ccache "${parts[@]}" "$(wants node && echo ros plots panel ros-tests browser)" \
-  "$(wants ros && echo trace)" "$(wants core && echo pictures bench)" \
-  "$(wants lint && echo ros plots ros-tests bench)" \
+  "$(wants ros && echo trace)" "$(wants core && echo python python-tests pictures bench)" \
+  "$(wants lint && echo python ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
   "$(wants fuzz && echo ros)"
 # If they can't be installed, its stages say so.

@@ -124,12 +124,12 @@ def _of_sentences(text):
 
 
 def commands(text):
-    """All commands of a page, in order: the lines of blocks, except those of text, YAML, CMake, C++ and
+    """All commands of a page, in order: the lines of blocks, except those of text, YAML, CMake, C++, Python and
     nftables, and whole commands in sentences."""
     for language, lines in _blocks(text):
         if language is None:
             yield from _of_sentences("\n".join(lines))
-        elif language not in ("text", "yaml", "cmake", "cpp", "nft"):
+        elif language not in ("text", "yaml", "cmake", "cpp", "python", "nft"):
             yield from _of_block(lines)
 
 

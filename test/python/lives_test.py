@@ -2,6 +2,8 @@
 
 import gc
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -298,6 +300,25 @@ assert os.waitpid(child, 0)[1] == 0
 
 
 class Examples(unittest.TestCase):
+    def test_the_blocks_of_the_page_run(self):
+        root = Path(__file__).resolve().parents[2]
+        page = (root / "docs" / "python.md").read_text(encoding="utf-8")
+        blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+        self.assertEqual(len(blocks), 4)
+        program, moves, picture, own_test = blocks
+        opened = 'machine = Machine.from_file("axis.yaml", simulated=True)\nx = machine["x"]\nx.enable()\n'
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copy(root / "examples" / "move_axis" / "axis.yaml", folder)
+            self.assertEqual(in_python(program, folder), "0.05 True\n")
+            self.assertRegex(in_python(opened + moves, folder), "^x (stands at|reached) ")
+            in_python("from stepdriver_core import Machine\n" + own_test, folder)
+            try:
+                import matplotlib  # noqa: F401
+            except ImportError:
+                self.skipTest("needs matplotlib")
+            in_python(opened + picture, folder)
+            self.assertIn("<svg", (Path(folder) / "plan.svg").read_text(encoding="utf-8"))
+
     def test_the_example_moves_its_axis(self):
         example = Path(__file__).resolve().parents[2] / "examples" / "python" / "move_axis.py"
         said = subprocess.run([sys.executable, "-B", str(example)], capture_output=True, text=True, check=True).stdout

@@ -39,7 +39,9 @@ config::ConfigValue mapOf(const py::dict& items, const std::string& name) {
       throw py::type_error(message.cast<std::string>());
     }
     const auto text = key.cast<std::string>();
-    map[text] = configOf(value, name.empty() ? text : name + "/" + text);
+    std::string full_name = name.empty() ? text : name;
+    if (!name.empty()) full_name.append("/").append(text);
+    map[text] = configOf(value, full_name);
   }
   return {std::move(map)};
 }

@@ -45,8 +45,8 @@ def arc_around(
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
 ) -> PathSegment:
-    """A circular arc around ``centre``: a full turn if both of its ends are the same. Other axes move in proportion to its
-    angle.
+    """A circular arc around ``centre``: a full turn if both of its ends are the same. Other axes move in proportion
+    to its angle.
 
     end, velocity, tolerance: as for line().
     centre: [unit] of the two axes of the plane. It must be as far from the begin as from the end, up to rounding.
