@@ -154,6 +154,8 @@ bool MotorPower::endWrite(Context& context) {
   since_ = context.now;
   const std::vector<Ack> calls = switched_off ? std::exchange(off_calls_, {}) : std::vector<Ack>();
   if (error == 0) return true;
+  // Its feedback says nothing about a line that wasn't written.
+  if (switched_off) state_ = State::kOff;
   const std::string why = fmt::format(
       "the motor power line {} can't be written: {}; check the cable and the supply of "
       "its chip",

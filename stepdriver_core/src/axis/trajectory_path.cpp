@@ -19,6 +19,7 @@ using motion::DoubleDouble;
 constexpr double kSteepestJerk = motion::kSteepestSlope * motion::kSteepestSlope;  // 1/s^2
 constexpr double kGentler = 0.8;
 constexpr int kTries = 60;             // down to a millionth of the steepest
+constexpr double kLastResort = 1e-6;   // of the steepest
 constexpr double kFirstDelay = 0.010;  // s
 // Braking as steeply as each place allows: at most this many slopes, none shorter than this.
 constexpr double kMostSlopes = 100.0;
@@ -116,15 +117,41 @@ motion::MotionState TrajectoryPath::onCurves(const motion::MotionState& on_path)
   return state;
 }
 
-// As fast as the limits of all axes allow: now, or, if one of them is at its limit already, as soon
-// as it leaves some room. If that never happens, the trajectory continues almost unchanged: it also
-// ends at rest.
+// As fast as the limits of all axes allow. If they never leave room for it, the trajectory
+// continues almost unchanged: it also ends at rest.
 motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::MotionState& from,
                                            double rate, Bounds bounds) const {
   const DoubleDouble end = members_.front().curve->duration();
   if (from.velocity == rate && from.acceleration == 0.0) {
     return motion::planRate(at_ns, from, rate, {1.0, 1.0}, 0.0, end);
   }
+  if (std::optional<motion::Profile> fastest = fastestChange(at_ns, from, rate, bounds)) {
+    return *std::move(fastest);
+  }
+  std::vector<motion::Piece> pieces = levelOff(at_ns, from);
+  motion::MotionState level{from.position, from.velocity, 0.0};
+  if (!pieces.empty()) {
+    const motion::Piece& last = pieces.back();
+    level.position = last.positionAt(last.duration);
+    level.velocity = last.velocityAt(last.duration).value();
+  }
+  std::optional<motion::Profile> change = fastestChange(at_ns, level, rate, bounds);
+  if (!change) {
+    motion::RateLimits limits = steepest(level, 0.0, bounds);
+    limits.slope *= kLastResort;
+    limits.jerk *= kLastResort;
+    change = motion::planRate(at_ns, level, rate, limits, 0.0, end);
+  }
+  for (const motion::Piece& piece : change->pieces()) pieces.push_back(piece);
+  if (pieces.empty()) return {at_ns, level.position};
+  return {at_ns, std::move(pieces)};
+}
+
+// Now, or, if one of the axes is at its limit already, as soon as it leaves some room.
+std::optional<motion::Profile> TrajectoryPath::fastestChange(std::int64_t at_ns,
+                                                             const motion::MotionState& from,
+                                                             double rate, Bounds bounds) const {
+  const DoubleDouble end = members_.front().curve->duration();
   const double left = (end - from.position).value();
   std::optional<motion::Profile> best;
   double soonest = std::numeric_limits<double>::infinity();
@@ -135,15 +162,32 @@ motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::Mot
       motion::Profile path = motion::planRate(at_ns, from, rate, limits, delay, end);
       const double time = timeToRate(path, rate);
       if (time >= soonest) break;
-      const bool last_resort = delay == 0.0 && i + 1 == kTries;
-      if (!last_resort && !keeps(motion::part(path, 0.0, time), bounds)) continue;
+      if (!keeps(motion::part(path, 0.0, time), bounds)) continue;
       best = std::move(path);
-      soonest = last_resort ? soonest : time;
+      soonest = time;
       break;
     }
     delay = std::max(kFirstDelay, 2.0 * delay);
   } while (delay < soonest && delay * from.velocity < left && from.velocity > 0.0);
-  return *std::move(best);
+  return best;
+}
+
+// Ends the slope of a stop within the limits of stops: the trajectory may have a lower jerk limit,
+// which can't take it back in time.
+std::vector<motion::Piece> TrajectoryPath::levelOff(std::int64_t at_ns,
+                                                    const motion::MotionState& from) const {
+  motion::RateLimits limits = steepest(from, 0.0, &Member::stop_bounds);
+  if (from.acceleration == 0.0 || limits.jerk == 0.0) return {};
+  const DoubleDouble end = members_.front().curve->duration();
+  for (int i = 0; i < kTries; ++i, limits.jerk *= kGentler) {
+    const double change = from.acceleration * std::abs(from.acceleration) / (2.0 * limits.jerk);
+    const double rate = std::clamp(from.velocity + change, 0.0, 1.0);
+    const motion::Profile path = motion::planRate(at_ns, from, rate, limits, 0.0, end);
+    const motion::Profile level_off = motion::part(path, 0.0, timeToRate(path, rate));
+    if (!keeps(level_off, &Member::stop_bounds)) continue;
+    return {level_off.pieces().begin(), level_off.pieces().end()};
+  }
+  return {};
 }
 
 motion::RateLimits TrajectoryPath::steepest(const motion::MotionState& from, double delay,

@@ -46,7 +46,11 @@ class TrajectoryPath : public SharedPath {
   /// Of the position on the curves.
   motion::Profile changeRate(std::int64_t at, const motion::MotionState& from, double rate,
                              Bounds bounds) const;
-  /// The same, or a steeper fall of the rate.
+  /// @return no value if the limits leave no room for it.
+  std::optional<motion::Profile> fastestChange(std::int64_t at, const motion::MotionState& from,
+                                               double rate, Bounds bounds) const;
+  std::vector<motion::Piece> levelOff(std::int64_t at, const motion::MotionState& from) const;
+  /// As changeRate(), or a steeper fall of the rate.
   motion::Profile slowDown(std::int64_t at, const motion::MotionState& from, double rate,
                            Bounds bounds) const;
   /// The steepest fall to a rate, if it takes less than a time [s].

@@ -334,6 +334,26 @@ TEST_F(PathQueue, IsToldItsEndAfterAHoldAtRest) {
   }
 }
 
+// The hold slows down without a jerk limit, and the rate had to be kept from falling to 0 within
+// one.
+TEST_F(PathQueue, ContinuesSoonIfItIsResumedWhileItSlowsDownAndHasALowerJerkLimit) {
+  for (int i = 1; i < 10; ++i) {
+    build({plotterAxis("x"), plotterAxis("y")});
+    axis::AxisLimits smooth;
+    smooth.jerk = 5.0;
+    bench->axis("y").setLimits(smooth);
+    begin(test::circle(), 100);
+    advance(0.1 * i);
+    machine().hold();
+    advance(0.001);
+    machine().resume();
+    append({}, false);
+    const CoordinatedResult result = machine().wait(move_);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    EXPECT_LT(result.duration, 10.0) << "held after " << 0.1 * i << " s";
+  }
+}
+
 TEST_F(PathQueue, RunsMoreSlowlyAtASpeedOverride) {
   const PathRequest path = test::circle();
   machine().setSpeedOverride(0.5);

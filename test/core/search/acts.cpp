@@ -33,39 +33,91 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
   return {name, [=](Participants& all, int client) { all.post(client, name, wanted, meaning); }};
 }
 
+constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
+
 /// While z still decelerates at the configured jerk it gets a target within a lower one, and is
 /// stopped again. The pauses differ with the steps before.
 std::deque<Turn> turns(std::size_t steps) {
-  constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
   const auto pause = static_cast<pulse::Nanoseconds>(20 + steps % 7 * 5) * kMillisecond;
   const auto short_pause = static_cast<pulse::Nanoseconds>(1 + steps % 5 * 4) * kMillisecond;
   axis::AxisLimits smooth;
   smooth.jerk = 5.0;
   const Meaning slows_down = quiet(Meaning::Quiet::kSlowsDown, {kZ});
   const machine::MoveTo move{kZ, 0.012, false, 0.0};
-  return {{0, "smooth limits of z", machine::SetLimits{kZ, smooth}, {}},
-          {0, "jog z", machine::Jog{kZ, 0.05, {}}, moving({kZ})},
-          {230 * kMillisecond, "stop z", machine::StopAxis{kZ}, slows_down},
-          {pause, "move z to 12 mm", move, moving({kZ})},
-          {short_pause, "stop z", machine::StopAxis{kZ}, slows_down}};
+  return {{0, request("smooth limits of z", machine::SetLimits{kZ, smooth}, {})},
+          {0, request("jog z", machine::Jog{kZ, 0.05, {}}, moving({kZ}))},
+          {230 * kMillisecond, request("stop z", machine::StopAxis{kZ}, slows_down)},
+          {pause, request("move z to 12 mm", move, moving({kZ}))},
+          {short_pause, request("stop z", machine::StopAxis{kZ}, slows_down)}};
 }
 
 /// The limits of z are lowered while it speeds up, moves or slows down to a target, and it is
 /// stopped. The pauses differ with the steps before.
 std::deque<Turn> lowers(std::size_t steps) {
-  constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
   const auto pause = static_cast<pulse::Nanoseconds>(3 + steps % 11 * 15) * kMillisecond;
   const auto short_pause = static_cast<pulse::Nanoseconds>(1 + steps % 5 * 9) * kMillisecond;
   axis::AxisLimits slow;
   slow.acceleration = slow.deceleration = 0.3;
   axis::AxisLimits smooth;
   smooth.jerk = 0.5;
-  return {{0, "move z by 4 mm", machine::MoveTo{kZ, 0.004, true, 0.0}, moving({kZ})},
-          {pause, "low jerk of z", machine::SetLimits{kZ, smooth}, {}},
-          {short_pause, "override 0.7", machine::SetSpeedOverride{0.7}, {}},
-          {short_pause, "low accelerations of z", machine::SetLimits{kZ, slow}, {}},
-          {short_pause, "stop z", machine::StopAxis{kZ}, quiet(Meaning::Quiet::kSlowsDown, {kZ})},
-          {short_pause, "all limits of z", machine::SetLimits{kZ, {}}, {}}};
+  const machine::MoveTo move{kZ, 0.004, true, 0.0};
+  const Meaning slows_down = quiet(Meaning::Quiet::kSlowsDown, {kZ});
+  return {{0, request("move z by 4 mm", move, moving({kZ}))},
+          {pause, request("low jerk of z", machine::SetLimits{kZ, smooth}, {})},
+          {short_pause, request("override 0.7", machine::SetSpeedOverride{0.7}, {})},
+          {short_pause, request("low accelerations of z", machine::SetLimits{kZ, slow}, {})},
+          {short_pause, request("stop z", machine::StopAxis{kZ}, slows_down)},
+          {short_pause, request("all limits of z", machine::SetLimits{kZ, {}}, {})}};
+}
+
+Act append(const std::string& name, double size, bool is_last) {
+  return {name,
+          [=](Participants& all, int client) { all.appendToPath(client, kX, size, is_last); }};
+}
+
+Act beginPath() {
+  return {"begin a path of x and y", [](Participants& all, int client) {
+            all.postPath(client, {kX, kY}, 0.006);
+          }};
+}
+
+/// The path is ended in motion, or when it waits at its end; with a segment, or with nothing but
+/// the end.
+std::deque<Turn> feeds(std::size_t steps) {
+  const auto pause = static_cast<pulse::Nanoseconds>(1 + steps % 13 * 30) * kMillisecond;
+  return {{0, beginPath()}, {pause, append("end the path", steps % 2 == 0 ? 0.0 : 0.002, true)}};
+}
+
+/// The path is held in motion, or when it waits at its end. The pauses differ with the steps
+/// before.
+std::deque<Turn> holdsAndFeeds(std::size_t steps) {
+  const auto pause = [steps](std::size_t divisor) {
+    return static_cast<pulse::Nanoseconds>(1 + steps / divisor % 3 * 200) * kMillisecond;
+  };
+  const std::vector<std::size_t> every = {kX, kY, kZ};
+  Meaning resumes = about(every);
+  resumes.resumes = true;
+  return {{0, beginPath()},
+          {pause(1), append("append to the path", 0.004, false)},
+          {pause(3), request("hold", machine::Hold{}, quiet(Meaning::Quiet::kHeld, every))},
+          {pause(9), request("resume", machine::Resume{}, resumes)},
+          {pause(27), append("tell the end of the path", 0.0, true)}};
+}
+
+/// The client watches it.
+std::deque<Turn> followsSlowly() {
+  return {{0,
+           {"begin a slow path of x and y",
+            [](Participants& all, int client) {
+              all.postSlowPath(client, {kX, kY});
+            }}},
+          {20'000 * kMillisecond, {"watch", [](Participants& /*all*/, int /*client*/) {}}}};
+}
+
+/// An act of several acts, which differ with the steps before.
+Act inTurn(const std::string& name, std::deque<Turn> (*turns_after)(std::size_t steps)) {
+  return {name,
+          [=](Participants& all, int client) { all.postInTurn(client, turns_after(all.steps())); }};
 }
 
 machine::FollowSetpoints positions(const std::vector<machine::Setpoint>& setpoints) {
@@ -100,10 +152,8 @@ std::vector<Act> makeActs() {
               moving({kX, kY})),
       request("line of y and z by", machine::MoveLine{{kY, kZ}, {-0.005, 0.005}, true, 0.0, 0.0},
               moving({kY, kZ})),
-      {"stop z, move it at a lower jerk, and stop it",
-       [=](Participants& all, int client) { all.postInTurn(client, turns(all.steps())); }},
-      {"lower the limits of z while it moves, and stop it",
-       [=](Participants& all, int client) { all.postInTurn(client, lowers(all.steps())); }},
+      inTurn("stop z, move it at a lower jerk, and stop it", turns),
+      inTurn("lower the limits of z while it moves, and stop it", lowers),
       {"trajectory of x and y",
        [](Participants& all, int client) {
          all.postTrajectory(client, {kX, kY}, 0.008);
@@ -120,16 +170,10 @@ std::vector<Act> makeActs() {
        }},
       {"trajectory of z that begins later",
        [](Participants& all, int client) { all.postLaterTrajectory(client, {kZ}, 0.006); }},
-      {"path of x and y that is fed",
-       [](Participants& all, int client) {
-         all.postPath(client, {kX, kY}, 0.006);
-       }},
-      {"append to the path",
-       [](Participants& all, int client) { all.appendToPath(client, kX, 0.004, false); }},
-      {"append to the path, and end it",
-       [](Participants& all, int client) { all.appendToPath(client, kX, 0.002, true); }},
-      {"tell the end of the path",
-       [](Participants& all, int client) { all.appendToPath(client, kX, 0.0, true); }},
+      inTurn("path of x and y that is fed", feeds),
+      append("append to the path", 0.004, false),
+      append("append to the path, and end it", 0.002, true),
+      append("tell the end of the path", 0.0, true),
       request("jog x", machine::Jog{kX, 0.05, {}}, moving({kX})),
       request("jog z back", machine::Jog{kZ, -0.05, {}}, moving({kZ})),
       request("end the jog of x", machine::Jog{kX, 0.0, {}}, {}),
@@ -203,6 +247,8 @@ std::vector<Act> makeActs() {
       {"a pin hangs", [](Participants& all, int) { all.hangNextPin(600'000'000); }},
       {"a pin is slow", [](Participants& all, int) { all.hangNextPin(20'000'000); }},
       {"shut down", [](Participants& all, int client) { all.shutDown(client); }},
+      inTurn("path of x and y that is held, resumed and ended", holdsAndFeeds),
+      inTurn("slow path of x and y", [](std::size_t /*steps*/) { return followsSlowly(); }),
   };
 }
 

@@ -178,12 +178,8 @@ TEST(FoundSchedules, AnAxisThatIsShapedTwiceMakesNoBursts) {
 // Its ramps are so short that their ends were dropped, and the second line began with the speed of
 // the first.
 TEST(FoundSchedules, ASlowPathStaysWhereItIsSentTo) {
-  const auto slow_path =
-      std::make_shared<const Act>(Act{"slow path of x and y", [](Participants& all, int client) {
-                                        all.postSlowPath(client, {0, 1});
-                                      }});
   for (int variant = 0; variant < 5; ++variant) {
-    expectGood({variant, {{0, 0, 0, slow_path}}, {}});
+    expectGood({variant, {does(0, 0, "slow path of x and y")}, {}});
   }
 }
 
@@ -202,6 +198,12 @@ TEST(FoundSchedules, AnEnableDoesNotSucceedIfAStopComesWhileTheBrakeIsReleased) 
 TEST(FoundSchedules, AHoldBeforeAMotionHasBegunIsNamedAsTheReason) {
   expectGood(
       {0, {does(0, 0, "trajectory of x and y"), does(1, 0, "hold")}, {{3, Who::kEngine, 4}}});
+}
+
+// The feedback of a line that could not be written was waited for, and its relay was called welded.
+TEST(FoundSchedules, AfterAFailureToSwitchTheMotorPowerOffItIsSwitchedOffAgainAndOn) {
+  expectGood(
+      {1, {does(0, 0, "emergency stop"), does(1, 16, "a pin fails")}, {{9, Who::kWriter, 40}}});
 }
 
 }  // namespace

@@ -142,7 +142,7 @@ Schedule crowdOf(std::mt19937_64& random) {
   return schedule;
 }
 
-/// About 175,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is the number of
+/// About 335,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is the number of
 /// schedules of each sampled kind, STEPDRIVER_FIRST_SEED the first seed, and STEPDRIVER_FAILURES
 /// the number of failures after which a test ends. A seed means the same schedule, whatever these
 /// values are.

@@ -312,6 +312,7 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
   if (client.waits_for != call) return;
   client.waits_for = 0;
   if (client.on_answer) std::exchange(client.on_answer, nullptr)(reply);
+  pauseBeforeTurn(client);
 }
 
 // A message for several axes, of which some may be refused.
@@ -337,7 +338,8 @@ std::vector<int> Participants::readInputs() {
 
 bool Participants::canGo(Who who) {
   const auto has_next = [this](std::size_t client) {
-    if (clients_[client].next) return clock_.now() >= clients_[client].from;
+    const Client& own = clients_[client];
+    if (own.next || hasTurn(own)) return clock_.now() >= own.from;
     return script_ && itemReady() && schedule_.items[next_item_].client == static_cast<int>(client);
   };
   switch (who) {
@@ -414,6 +416,7 @@ void Participants::go(Who who) {
         if (!client.waits_for_stops) continue;
         if (controller_->snapshot()->stops_handled < *client.waits_for_stops) continue;
         client.waits_for_stops.reset();
+        pauseBeforeTurn(client);
         if (engine_->stopsAsked() == engine_->stopsServed()) {
           oracle_.emergencyStopAnswered(clock_.now());
         }
@@ -450,9 +453,10 @@ void Participants::go(Who who) {
       return watch();
     case Who::kClientA:
     case Who::kClientB: {
-      Client& client = clients_[who == Who::kClientA ? 0 : 1];
+      const int number = who == Who::kClientA ? 0 : 1;
+      Client& client = clients_[static_cast<std::size_t>(number)];
       if (client.next) return std::exchange(client.next, nullptr)();
-      return beginItem();
+      return hasTurn(client) ? beginTurn(number) : beginItem();
     }
     case Who::kClock:
       return advanceTo(nextDue());
@@ -524,7 +528,7 @@ pulse::Nanoseconds Participants::nextDue() {
   look(core_->due());
   look(watch_due_);
   for (const Client& client : clients_) {
-    if (client.next) look(client.from);
+    if (client.next || hasTurn(client)) look(client.from);
   }
   if (!jobs_.empty()) look(jobs_.front().returns);
   for (const Job& job : jobs_) {
@@ -874,19 +878,27 @@ void Participants::checkEnabled(const Ask& asked) {
 }
 
 void Participants::postInTurn(int client, std::deque<Turn> turns) {
-  if (turns.empty()) return;
   Client& who = clients_[static_cast<std::size_t>(client)];
-  who.from = clock_.now() + turns.front().after;
-  who.next = [this, client, turns = std::move(turns)]() mutable {
-    const Turn turn = std::move(turns.front());
-    turns.pop_front();
-    post(client, turn.name, turn.request, turn.meaning);
-    clients_[static_cast<std::size_t>(client)].on_answer =
-        [this, client, turns = std::move(turns)](const activity::Reply& /*reply*/) {
-          // A request that was held is answered by the stop that ends the script.
-          if (script_) postInTurn(client, turns);
-        };
-  };
+  who.turns = std::move(turns);
+  pauseBeforeTurn(who);
+}
+
+// A request that was held is answered by the stop that ends the script.
+bool Participants::hasTurn(const Client& client) const {
+  return script_ && !client.waits() && !client.next && !client.turns.empty();
+}
+
+void Participants::pauseBeforeTurn(Client& client) {
+  if (hasTurn(client)) client.from = clock_.now() + client.turns.front().after;
+}
+
+void Participants::beginTurn(int client) {
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  const Turn turn = std::move(who.turns.front());
+  who.turns.pop_front();
+  note("begin " + turn.act.name);
+  turn.act.begin(*this, client);
+  pauseBeforeTurn(who);
 }
 
 void Participants::streamJog(int client, std::size_t axis) {
@@ -1044,29 +1056,19 @@ Meaning::Reach reachOfPath(double size, double tolerance) {
 void Participants::postPath(int client, const std::vector<std::size_t>& axes, double size) {
   const machine::PathRequest request{
       {}, {lineTo({size, 0.0}), lineTo({size, size})}, true, 0.0, size / 10.0, true};
-  followPath(client, axes, size, request, [this, client, axes] {
-    Client& feeds = clients_[static_cast<std::size_t>(client)];
-    // In motion, or when it waits at its end; with a segment, or with nothing but the end.
-    feeds.from = clock_.now() + static_cast<pulse::Nanoseconds>(1 + steps_ % 13 * 30) * 1'000'000;
-    const double more = steps_ % 2 == 0 ? 0.0 : 0.002;
-    feeds.next = [this, client, axes, more] { appendToPath(client, axes.front(), more, true); };
-  });
+  followPath(client, axes, size, request);
 }
 
 void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes) {
   constexpr double kSize = 0.0001;  // m
   machine::PathRequest request{{}, {lineTo({kSize, 0.0}), lineTo({2.0 * kSize, 0.0})}, true};
-  request.segments[0].velocity = 20e-6;
-  request.segments[1].velocity = 1e-6;
-  followPath(client, axes, 2.0 * kSize, request, [this, client] {
-    Client& waits = clients_[static_cast<std::size_t>(client)];
-    waits.from = clock_.now() + 60 * kSecond;
-    waits.next = [] {};
-  });
+  request.segments[0].velocity = 40e-6;
+  request.segments[1].velocity = 3e-6;
+  followPath(client, axes, 2.0 * kSize, request);
 }
 
 void Participants::followPath(int client, const std::vector<std::size_t>& axes, double size,
-                              machine::PathRequest request, std::function<void()> begun) {
+                              machine::PathRequest request) {
   const auto snapshot = controller_->snapshot();
   machine::FollowTrajectory wanted{axes, nullptr, {}, machine::FollowTrajectory::Path{}};
   std::vector<axis::PathAxis> facts;
@@ -1097,12 +1099,15 @@ void Participants::followPath(int client, const std::vector<std::size_t>& axes, 
   }
   // Posting the request is a separate step.
   Client& who = clients_[static_cast<std::size_t>(client)];
-  who.next = [=] {
+  who.next = [=, more_follows = request.more_follows] {
     post(client, "follow path", wanted, meaning);
     clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
       if (reply.failure) return;
       for (const std::size_t axis : axes) path_axes_[axis] = axes;
-      begun();
+      if (!more_follows) return;
+      for (const axis::Move& move : std::get<std::vector<axis::Move>>(reply.value)) {
+        open_paths_.insert(move.id);
+      }
     };
   };
 }
@@ -1145,7 +1150,11 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
   clients_[static_cast<std::size_t>(client)].next = [=] {
     post(client, "append to the path", wanted, meaning);
     clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
-      if (!reply.failure) moveEnds(*snapshot, path_axes_[axis], wanted.extension.targets);
+      if (reply.failure) return;
+      moveEnds(*snapshot, path_axes_[axis], wanted.extension.targets);
+      for (const std::size_t own : path_axes_[axis]) {
+        if (is_last) open_paths_.erase(snapshot->axes.at(own).path->move);
+      }
     };
   };
 }
@@ -1166,7 +1175,6 @@ void Participants::moveEnds(const machine::MachineSnapshot& before,
 void Participants::emergencyStop(int client) {
   Client& who = clients_[static_cast<std::size_t>(client)];
   who.waits_for_stops = engine_->emergencyStop();
-  who.since = clock_.now();
   oracle_.emergencyStopped(clock_.now(), rampBegins());
 }
 
@@ -1411,6 +1419,22 @@ void Participants::checkPower() {
   oracle_.complain("a motor has current long after an emergency stop");
 }
 
+// What was accepted and leads to a place ends by itself, unless it is held.
+void Participants::checkEnds() {
+  const auto is_over = [this](const auto& named) {
+    const auto& [name, move] = named;
+    return name.rfind("jog", 0) == 0 || open_paths_.count(move.id) != 0 ||
+           move.outcome->get().has_value();
+  };
+  const auto all_are_over = [&] {
+    return controller_->snapshot()->axes.front().state.held ||
+           std::all_of(moves_.begin(), moves_.end(), is_over);
+  };
+  if (playUntil(all_are_over, kLongestCall)) return;
+  const auto never = std::find_if_not(moves_.begin(), moves_.end(), is_over);
+  if (never != moves_.end()) oracle_.complain(never->first + " never ends");
+}
+
 void Participants::checkOutcomes() {
   // Another axis may have made only one of the two steps that together leave this one in place.
   const double reached = schedule_.variant == kSharing ? 0.51 / 20'000.0 : 1e-9;
@@ -1530,6 +1554,7 @@ std::vector<std::string> Participants::run() {
     playUntil([&] { return clock_.now() >= later; }, kLongestCall);
   }
   script_ = false;
+  if (oracle_.complaints.empty()) checkEnds();
   if (oracle_.complaints.empty()) {
     checkInPosition();
     checkPower();

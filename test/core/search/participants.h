@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,18 +71,16 @@ struct Schedule {
 
 class Participants;
 
-/// One of several requests of a client.
-struct Turn {
-  pulse::Nanoseconds after = 0;  ///< time since the answer to the request before it
-  std::string name;
-  machine::Request request;
-  Meaning meaning;
-};
-
 /// An action of a client, or an event.
 struct Act {
   std::string name;
   std::function<void(Participants&, int client)> begin;
+};
+
+/// One of several acts of a client.
+struct Turn {
+  pulse::Nanoseconds after = 0;  ///< time since the answer to the one before it
+  Act act;
 };
 const std::vector<Act>& acts();
 const Act& actOf(const Item& item);
@@ -116,7 +115,7 @@ class Participants : private machine::ShellCore::Host {
   /// @name Actions of the acts
   /// @{
   void post(int client, const std::string& name, machine::Request request, const Meaning& meaning);
-  /// Posts each request when the one before it has been answered.
+  /// Begins each act when the one before it has been answered.
   void postInTurn(int client, std::deque<Turn> turns);
   /// Jogs as a joystick does, without waiting for a result.
   void streamJog(int client, std::size_t axis);
@@ -125,7 +124,7 @@ class Participants : private machine::ShellCore::Host {
   void postTrajectory(int client, std::vector<std::size_t> axes, double size);
   /// One that begins a little later, whatever the axes do until then.
   void postLaterTrajectory(int client, std::vector<std::size_t> axes, double size);
-  /// A path of several axes at rest that is fed while they follow it.
+  /// A path of several axes at rest that can be fed until appendToPath() ends it.
   void postPath(int client, const std::vector<std::size_t>& axes, double size);
   /// Two short lines, the second one at a twentieth of the first one's speed.
   void postSlowPath(int client, const std::vector<std::size_t>& axes);
@@ -184,9 +183,10 @@ class Participants : private machine::ShellCore::Host {
     std::optional<std::uint64_t> waits_for_stops;
     std::function<void()> next;   // its next step
     pulse::Nanoseconds from = 0;  // clock time before which it doesn't take its next step
+    std::deque<Turn> turns;       // begin one after the other
     std::function<void(const activity::Reply&)> on_answer;
-    pulse::Nanoseconds since = 0;
-    bool idle() const { return waits_for == 0 && !waits_for_stops && !next; }
+    bool waits() const { return waits_for != 0 || waits_for_stops; }
+    bool idle() const { return !waits() && !next && turns.empty(); }
   };
   /// A motion that the engine was ordered to make.
   struct Ordered {
@@ -216,6 +216,9 @@ class Participants : private machine::ShellCore::Host {
   void writeLines();
   void beginItem();
   bool itemReady() const;
+  bool hasTurn(const Client& client) const;
+  void beginTurn(int client);
+  void pauseBeforeTurn(Client& client);
   pulse::Nanoseconds nextDue();
   void advanceTo(pulse::Nanoseconds time);
   std::vector<int> readInputs();
@@ -230,9 +233,8 @@ class Participants : private machine::ShellCore::Host {
   };
   void wish(int client, std::vector<std::size_t> axes, double size, pulse::Nanoseconds begin_in);
   void prepareAndPost(int client, const Wish& wish, int tries);
-  /// @param begun called when it has been accepted
   void followPath(int client, const std::vector<std::size_t>& axes, double size,
-                  machine::PathRequest request, std::function<void()> begun);
+                  machine::PathRequest request);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
                        int left);
   void postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,
@@ -269,6 +271,7 @@ class Participants : private machine::ShellCore::Host {
   void checkPower();
   bool ramps() const;
   std::optional<pulse::Nanoseconds> rampBegins() const;
+  void checkEnds();
   void checkOutcomes();
   void checkInPosition();
   void probe();
@@ -313,6 +316,7 @@ class Participants : private machine::ShellCore::Host {
   bool closed_ = false;
   bool close_was_served_ = false;
   std::vector<std::pair<std::string, axis::Move>> moves_;
+  std::set<std::uint64_t> open_paths_;            // moves along paths of which more is to come
   std::optional<std::size_t> never_in_position_;  // how many moves there were by then
   std::array<std::uint64_t, kAxes> last_move_{};
   std::array<std::vector<Ordered>, kAxes> ordered_;
