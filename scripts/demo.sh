@@ -88,7 +88,7 @@ build_demo() {
 }
 
 choose_build_folder
-[[ $installed == packaged ]] || install_packages core ros trace
+[[ $installed == packaged ]] || install_packages core ros panel trace
 if [[ -z $installed ]]; then
   rm -rf "$ROS_HOME/log"
   say "Building: the first time this takes two to three minutes of processor time" \
