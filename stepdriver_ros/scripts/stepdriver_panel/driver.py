@@ -8,7 +8,7 @@ import math
 import threading
 import time
 from collections import deque
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 
 import rosgraph
 import rospy
@@ -23,7 +23,7 @@ from .units import UNITS, in_page_units
 
 EVENTS = 50  # kept
 JOINT_STATES = 64  # at most between two updates
-PATIENCE = 1.0  # [s] an urgent call without an answer for this long is repeated on another connection
+PATIENCE = 1.0  # [s] for the answer of an urgent call, before the next one is sent on another connection
 MOST_HANGING = 4  # urgent calls without an answer
 ENGINE = "pulse engine"
 LATENESS = "lateness in the last second max [us]"
@@ -51,25 +51,33 @@ class Newest:
 
 
 class Urgent:
-    """A service that only stops, on a connection that stays open: new ones need the ROS master. Callers that
-    come while a call is on its way share its answer."""
+    """A service that only stops, on a connection that stays open: new ones need the ROS master. A call that is
+    on its way may have reached the driver before what its caller wants to stop: so another one follows it. All
+    callers that come meanwhile share the answer of that one."""
 
     def __init__(self, service):
         self._service = service
         self._lock = threading.Lock()
         self._idle = []  # proxies
-        self._last, self._since, self._hanging = None, 0.0, 0
+        self._last, self._next = None, None  # the newest call that was sent, and the one that follows it
+        self._open = 0
 
     def call(self):
         """A Future of the service's answer."""
         with self._lock:
-            now = time.monotonic()
-            waits = self._last is not None and not self._last.done()
-            if waits and (now - self._since < PATIENCE or self._hanging >= MOST_HANGING):
-                return self._last
-            self._last, self._since, self._hanging = Future(), now, self._hanging + 1
-            threading.Thread(target=self._run, args=(self._last,), daemon=True).start()
-            return self._last
+            if self._next is not None:
+                return self._next
+            before = self._last if self._last is not None and not self._last.done() else None
+            if self._open >= MOST_HANGING:
+                return before
+            future = Future()
+            if before is None:
+                self._last = future
+            else:
+                self._next = future
+            self._open += 1
+            threading.Thread(target=self._run, args=(future, before), daemon=True).start()
+            return future
 
     def connect(self):
         """Opens the connection ahead of the first call. It may wait: call it in a thread."""
@@ -78,14 +86,18 @@ class Urgent:
         with self._lock:
             self._idle.append(proxy)
 
-    def _run(self, future):
+    def _run(self, future, before):
+        if before is not None:
+            wait([before], PATIENCE)
+            with self._lock:
+                self._last, self._next = future, None
         try:
             future.set_result(self._answer())
         except Exception as error:  # noqa: BLE001: whatever it is, the caller must be told
             future.set_exception(error)
         finally:
             with self._lock:
-                self._hanging -= 1
+                self._open -= 1
 
     def _answer(self):
         with self._lock:

@@ -6,10 +6,10 @@ import json
 import math
 import pathlib
 import secrets
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 
-from aiohttp import WSMsgType, web
+from aiohttp import WSCloseCode, WSMsgType, web
 
 from .commands import COMMANDS, MOTIONS, axis_of, carry_out, number
 from .drawing import Drawing
@@ -59,12 +59,12 @@ class Panel:
         self.controller = None
         self._strangers = []
         self._parts = {}
+        self._stops = 0  # so far
         self._pending = {}  # what the driver was asked, and has not answered
         self._way = []
         self._numbers = 0
         self._jog_timer = None
         self._refused, self._refused_told = 0, -math.inf
-        self._calls = ThreadPoolExecutor(MOST_CALLS, "call")
         self._tasks = set()
         self._was_live = False
         self._watching = False
@@ -125,14 +125,38 @@ class Panel:
         self.jog.timeout = self.machine.jog_timeout
         self.publish("settings", self.machine.settings())
 
-    def in_thread(self, function, *arguments):
-        return asyncio.get_running_loop().run_in_executor(self._calls, function, *arguments)
+    @staticmethod
+    async def in_thread(function, *arguments):
+        """Calls a function that may wait for long, and returns its result. The threads don't keep the process
+        from ending."""
+        loop = asyncio.get_running_loop()
+        future = loop.create_future()
+
+        def conclude(conclusion, value):
+            if not future.done():
+                conclusion(value)
+
+        def run():
+            try:
+                conclusion = (conclude, future.set_result, function(*arguments))
+            except Exception as error:  # noqa: BLE001: the caller gets it
+                conclusion = (conclude, future.set_exception, error)
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(*conclusion)
+        threading.Thread(target=run, daemon=True).start()
+        return await future
 
     def begin(self, coroutine):
         """Runs it without waiting for it."""
         task = asyncio.get_running_loop().create_task(coroutine)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+
+    async def end(self):
+        """Ends the jog, and says goodbye to all pages."""
+        self.jog.end()
+        for viewer in list(self.viewers):
+            await viewer.socket.close(code=WSCloseCode.GOING_AWAY)
 
     # ---- who may what
 
@@ -206,8 +230,9 @@ class Panel:
             return
         if what in ("stop", "emergency_stop"):
             self.jog.end()
+            self._stops += 1
             self.begin(self._stop(viewer, call, getattr(self.machine.driver, what)))
-            self.begin(self._stop_what_is_on_its_way())
+            self.begin(self._stop_what_is_on_its_way(dict(self._pending)))
             return
         if not viewer.rate.take():
             viewer.answer(id=call, ok=False, text="not sent: too many messages")
@@ -271,9 +296,10 @@ class Panel:
         if len(self._pending) >= MOST_CALLS:
             raise Refusal(f"{shown}: not sent, because {MOST_CALLS} calls wait for the driver")
         self._pending[name] = message
-        self.begin(self._carry_out(viewer, call, message, name, shown))
+        self.begin(self._carry_out(viewer, call, message, name, shown, self._stops))
 
-    async def _carry_out(self, viewer, call, message, name, shown):
+    async def _carry_out(self, viewer, call, message, name, shown, stops):
+        """stops: how many there were when the message came."""
         try:
             if message["do"] == "draw":
                 self.drawing.begin(message.get("version"))
@@ -287,14 +313,16 @@ class Panel:
             viewer.answer(id=call, ok=True, text=text)
         finally:
             del self._pending[name]
+            if self._stops != stops and name[0] in MOTIONS:
+                self.machine.driver.stop.call()  # the driver may have got the stop before the motion
 
-    async def _stop_what_is_on_its_way(self):
-        """A motion that the driver was asked for before a stop may reach it after the stop: then it is stopped,
-        too."""
-        asked = {name: task for name, task in self._pending.items() if name[0] in MOTIONS}
+    async def _stop_what_is_on_its_way(self, asked):
+        """A motion that the driver was asked for before a stop may reach it after the stop. It is stopped too,
+        even if the driver answers only at its end."""
         for _ in range(STOPS_AGAIN):
             await asyncio.sleep(STOP_AGAIN)
-            if all(self._pending.get(name) is not task for name, task in asked.items()):
+            if not any(name[0] in MOTIONS and self._pending.get(name) is message
+                       for name, message in asked.items()):
                 return
             await asyncio.wait([asyncio.wrap_future(self.machine.driver.stop.call())])
 

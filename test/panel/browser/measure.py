@@ -49,15 +49,16 @@ def heap(chrome):
     return next(metric["value"] for metric in metrics if metric["name"] == "JSHeapUsedSize") / 1e6
 
 
-def move_for(minutes, page):
-    """Both axes move all the time, in steps and by a refusal now and then, while the page is open. Returns the
+def move_for(minutes, page, warm=WARM):
+    """Both axes move all the time, in steps and by a refusal now and then, while the page is open. warm: [s] before
+    the measurement. Returns the
     processor time of the panel [%], and how it and the page have grown [MB]."""
     from stepdriver.srv import MoveTo
     machine, process = page.machine, page.machine.panel_process()
     begun = time.monotonic()
     first, before = None, 0.0
     number = 0
-    while time.monotonic() - begun < WARM + 60.0 * minutes:
+    while time.monotonic() - begun < warm + 60.0 * minutes:
         number += 1
         for axis in ("x", "y"):
             machine.call(f"{axis}/move_to", MoveTo, position=0.02 + 0.1 * (number % 2), wait=False)
@@ -68,9 +69,9 @@ def move_for(minutes, page):
             page.open_live(machine.link)
             page.take_control()
         time.sleep(1.0)
-        if first is None and time.monotonic() - begun > WARM:
+        if first is None and time.monotonic() - begun > warm:
             first, before = (memory(process), heap(page.driver)), processor_seconds(process)
-    used = 100.0 * (processor_seconds(process) - before) / (time.monotonic() - begun - WARM)
+    used = 100.0 * (processor_seconds(process) - before) / (time.monotonic() - begun - warm)
     return used, memory(process) - first[0], heap(page.driver) - first[1]
 
 

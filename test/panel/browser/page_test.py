@@ -154,6 +154,23 @@ class Stops(OnTheMachine):
         self.stops_by(act)
 
 
+    def test_what_is_on_its_way_is_stopped_too(self):
+        for number in range(6):
+            with self.subTest(number):
+                far = 190 if position() < 100 else 1
+                self.page.driver.execute_script("""
+                    const form = document.querySelector('.axis[data-axis="x"] form');
+                    form.querySelector("input").value = arguments[0];
+                    form.requestSubmit();
+                    document.getElementById("stop").click();""", far)
+                self.page.wait_said("")
+                begin = machine.rig().time
+                # The move takes 1 s or more.
+                wait_until(lambda: machine.rig().time > begin + 1.5, "time passes")
+                self.rests()
+                self.assertGreater(abs(position() - far), 1.0)
+
+
 class JogByPressAndHold(OnTheMachine):
     def setUp(self):
         super().setUp()

@@ -6,6 +6,7 @@ import tempfile
 import threading
 import unittest
 
+import measure
 from machine import Machine, Page, browser, wait_until
 from selenium.webdriver.common.keys import Keys
 
@@ -250,6 +251,16 @@ class Drawings(OnOnePage):
     def test_a_file_that_is_too_large_is_refused(self):
         self.choose('<svg xmlns="http://www.w3.org/2000/svg"><!--' + "x" * (5 << 20) + "--></svg>")
         self.wait_text("at most 4194304 are allowed")
+
+
+class Growth(OnOnePage):
+    def test_neither_the_page_nor_the_panel_grows(self):
+        self.page.machine = machine
+        self.chrome.execute_cdp_cmd("Performance.enable", {})
+        used, panel, script = measure.move_for(0.2, self.page, 8.0)
+        print(f"{used:.1f} % of a core; the panel grew by {panel:.1f} MB, the page by {script:.1f} MB")
+        self.assertLess(panel, measure.GROWTH)
+        self.assertLess(script, measure.GROWTH)
 
 
 class Plots(OnOnePage):
