@@ -52,7 +52,7 @@ class Newest:
 
 class Urgent:
     """A service that only stops, on a connection that stays open: new ones need the ROS master. A call that is
-    on its way may have reached the driver before what its caller wants to stop: so another one follows it. All
+    on its way may have reached the driver before what its caller wants to stop, and another one follows it. All
     callers that come meanwhile share the answer of that one."""
 
     def __init__(self, service):
