@@ -248,6 +248,31 @@ TEST(ContourMotion, IsNearlyTimeOptimalWithFewKnots) {
   EXPECT_LE(durationOf(knots), 1.004 * FineGrid(contour, limits).shortestTime());
 }
 
+// A curve that is given as many chords. The speed rises and falls at each of their corners, for
+// which a corner has about 18 knots: if the axes pass a chord in less than half a millisecond, as
+// the last ones here, knots 20 us apart are too few for that.
+TEST(ContourMotion, IsNearlyTimeOptimalOnDenseChords) {
+  struct Case {
+    double length;  // [microsteps] of a chord
+    double most;    // of the time that the fine grid takes
+  };
+  constexpr int kChords = 200;
+  for (const Case& each : {Case{30.0, 1.02}, Case{10.0, 1.03}, Case{3.0, 1.03}, Case{0.3, 1.09}}) {
+    const double radius = each.length * kChords / (2.0 * kPi);
+    std::vector<ContourSegment> segments;
+    for (int i = 1; i <= kChords; ++i) {
+      const double angle = 2.0 * kPi * i / kChords;
+      segments.push_back(
+          lineTo({radius * (std::cos(angle) - 1.0), 0.5 * radius * std::sin(angle)}, 1.6));
+    }
+    const Contour contour({0.0, 0.0}, segments, 1.0);
+    const std::vector<ContourLimits> limits(2, {100'000.0, 400'000.0, 400'000.0});
+    EXPECT_LE(durationOf(motion::planContour(contour, limits).knots),
+              each.most * FineGrid(contour, limits).shortestTime())
+        << "chords of " << each.length << " microsteps";
+  }
+}
+
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
 // the fine grid's. That isn't fine enough for the last paths, whose Beziers lack handles.
 TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
