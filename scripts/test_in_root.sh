@@ -9,7 +9,7 @@ source "$root/scripts/roots.sh"
 usage() {
   cat <<'END'
 usage: scripts/test_in_root.sh bookworm|trixie|focal [--blank] [--keep]
-                              [--demo | --packages | --arch arm64|armhf]
+                              [--demo | --python | --packages | --arch arm64|armhf]
 
 Makes a clean root of that Debian, or of Ubuntu 20.04, with debootstrap (minbase, nothing else),
 copies the checkout into it, and runs scripts/demo.sh, scripts/test.sh and the demo again there as root,
@@ -24,6 +24,7 @@ the next time; the working copy is removed at the end.
   --blank  uses a folder whose path contains a blank: catkin can't build there, so the build goes
            elsewhere. Not with --packages
   --demo   only runs scripts/demo.sh, once: a newcomer's first command
+  --python  only runs scripts/python.sh, once: the same without ROS
   --packages  only runs scripts/package.sh --twice, and then tries the Debian packages that it made in
            another clean root, by scripts/package.sh --try
   --arch arm64|armhf  only runs scripts/cross.sh for that processor: builds the core with a cross compiler,
@@ -38,6 +39,7 @@ while (($# > 0)); do
     bookworm | trixie | focal) suite=$1 ;;
     --blank) checkout="/home/new user/step driver" ;;
     --demo) only=demo.sh ;;
+    --python) only=python.sh ;;
     --packages) only='package.sh --twice' packages=1 ;;
     --arch)
       [[ ${2:-} == arm64 || ${2:-} == armhf ]] || { usage >&2 && exit 2; }
