@@ -181,6 +181,7 @@ TEST(Oracle, LetsALineThatFailsTakeUpBacklashBeforeItsAnswerAndNoMore) {
     OneAxis axis = endedBy(Kind::kStop, 2200);
     Request failed = requestOf(Kind::kMotion, 4000, 4005);
     failed.success = false;
+    failed.message = "the line doesn't begin: a stop has come";
     axis.ask(failed);
     axis.move(3002, last);
     EXPECT_EQ(axis.broken(), last == 3220 ? 0U : 1U);
