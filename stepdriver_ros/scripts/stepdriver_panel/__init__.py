@@ -1,2 +1,2 @@
-"""The panel: a page in the browser for a running stepdriver_node. Only driver.py needs ROS, and only
-server.py needs aiohttp."""
+"""The panel: a page in the browser for a running stepdriver_node. panel.py and server.py need aiohttp; driver.py,
+commands.py and drawing.py need ROS."""

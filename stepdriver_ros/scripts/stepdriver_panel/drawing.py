@@ -11,6 +11,7 @@ from stepdriver.srv import FollowPath, PlanPath
 from stepdriver_plots.drawing import segments
 
 from .errors import Refusal
+from .threads import in_thread
 from .units import in_page_units
 
 READER = pathlib.Path(__file__).resolve().parent / "read_drawing.py"
@@ -63,7 +64,7 @@ class Drawing:
         self.shown = {"version": self._version, "state": state, "problem": problem, "facts": facts,
                       "axes": [axis.name for axis in self._axes]}
 
-    async def read(self, document, query, in_thread, publish):
+    async def read(self, document, query, publish):
         """Takes the place of the drawing before. publish: called after each change of `shown`."""
         if self._busy:
             raise Refusal("another drawing is being read or drawn")

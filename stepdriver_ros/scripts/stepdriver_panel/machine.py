@@ -4,6 +4,7 @@ import math
 import time
 
 from .driver import LATENESS, Axis
+from .units import in_page_units
 
 STALE_AFTER = 1.0  # [s] the driver publishes its states ten times a second
 
@@ -56,8 +57,9 @@ class Machine:
         return {
             "name": name, "enabled": message.enabled[i], "moving": message.moving[i], "held": message.held[i],
             "homed": message.homed[i], "valid": message.position_valid[i], "motor": message.motor[i],
-            "state": message.state[i], "fault": message.fault[i], "remedy": message.remedy[i],
-            "note": message.position_note[i], "target": message.target[i] * axis.factor,
+            "state": message.state[i], "fault": in_page_units(message.fault[i]),
+            "remedy": in_page_units(message.remedy[i]), "note": in_page_units(message.position_note[i]),
+            "target": message.target[i] * axis.factor,
             "min": switches["min"], "max": switches["max"]}
 
     def override(self):

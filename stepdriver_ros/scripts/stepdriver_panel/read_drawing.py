@@ -1,5 +1,5 @@
 """A program of its own, which reads an SVG file from its standard input and writes its strokes as JSON. A file
-that takes all of the time or the memory ends only this program, which server.py starts."""
+that takes all of the time or the memory ends only this program, which drawing.py starts."""
 
 import json
 import math

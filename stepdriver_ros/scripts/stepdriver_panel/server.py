@@ -1,22 +1,15 @@
-"""Serves the page, and passes messages between its viewers and the driver. Everything here runs in one
-thread; calls of the driver run in others."""
+"""Serves the page: its files, its connections, drawings and recordings. Everything here runs in one thread; calls
+that wait run in others."""
 
 import asyncio
 import json
-import math
 import pathlib
-import secrets
-import threading
-import time
 
-from aiohttp import WSCloseCode, WSMsgType, web
+from aiohttp import WSMsgType, web
 
-from .commands import COMMANDS, MOTIONS, axis_of, carry_out, number
-from .drawing import Drawing
 from .errors import Refusal
-from .jog import HeldJog
 from .recordings import Recordings
-from .viewer import Viewer
+from .threads import in_thread
 
 PAGE = pathlib.Path(__file__).resolve().parent / "page"
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
@@ -30,311 +23,14 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-UPDATES = 20.0  # [1/s]
-MOST_VIEWERS = 16
 MOST_STRANGERS = 16  # connections that have not shown the token yet
 MOST_CONNECTIONS = 128
-MOST_CALLS = 16  # calls of the driver at once
 LOGIN = 5.0  # [s] for the token, on a new connection
-LINGER = 2.0  # [s] without a viewer before nothing is received any more
 ALIVE = 4.0  # [s] between two pings; a page that misses one is gone
 LARGEST_MESSAGE = 4096  # [bytes]
 LARGEST_REQUEST = 4 << 20  # [bytes] a drawing
 FORBIDDEN = 4403  # the code with which a socket ends after a wrong token
-STOP_AGAIN = 0.2  # [s]
-STOPS_AGAIN = 50
 CHUNK = 1 << 18  # [bytes] of a recording
-REFUSED_LOG_EVERY = 60.0  # [s]
-
-
-class Panel:
-    """The state of the server: its viewers, the one that has control, and what was last sent."""
-
-    def __init__(self, machine, gate, log):
-        """log: called with each text for the log."""
-        self.machine, self.gate, self.log = machine, gate, log
-        self.jog = HeldJog(self._publish_jog, machine.jog_timeout)
-        self.drawing = Drawing(machine)
-        self.viewers = []
-        self.controller = None
-        self._strangers = []
-        self._parts = {}
-        self._stops = 0  # so far
-        self._pending = {}  # what the driver was asked, and has not answered
-        self._way = []
-        self._numbers = 0
-        self._jog_timer = None
-        self._refused, self._refused_told = 0, -math.inf
-        self._tasks = set()
-        self._was_live = False
-        self._watching = False
-
-    # ---- what the viewers see
-
-    def publish(self, name, value):
-        """Sends a value to each viewer that doesn't have it yet."""
-        version, old = self._parts.get(name, (0, None))
-        if version == 0 or old is not value and old != value:
-            self._parts[name] = (version + 1, value)
-
-    def newest(self):
-        age = self.machine.age()
-        update = {"tick": round(time.monotonic(), 4), "age": round(age, 2) if age < 1e6 else None,
-                  "positions": self.machine.positions(), "late": self.machine.lateness()}
-        if self.drawing.shown["state"] == "drawing":
-            update["way"] = self._way
-        return update, self._parts
-
-    async def _beat(self):
-        """Updates the viewers, while there are any."""
-        while self.viewers:
-            self._look()
-            for viewer in self.viewers:
-                viewer.wake()
-            await asyncio.sleep(1.0 / UPDATES)
-
-    def _look(self):
-        live = self.machine.live
-        if live and not self._was_live:
-            self.begin(self._configure())  # it may be another driver, or have other parameters
-        if not live:
-            self.jog.end()
-        self._was_live = live
-        self._way = self.machine.way(self.drawing.shown["axes"])
-        self.publish_drawing()
-        self.publish("states", self.machine.states())
-        self.publish("override", self.machine.override())
-        self.publish("events", list(self.machine.driver.events))
-        self._publish_control()
-
-    def _publish_control(self):
-        self.publish("control", {"controller": self.controller.number if self.controller else None,
-                                 "viewers": len(self.viewers)})
-
-    def publish_drawing(self):
-        self.publish("drawing", self.drawing.shown)
-
-    async def _configure(self):
-        try:
-            parameters = await self.in_thread(self.machine.driver.parameters)
-        except Exception as error:  # noqa: BLE001: the master may be gone in many ways
-            self.machine.driver.tell("error", f"the driver's parameters can't be read: {error}")
-            self._was_live = False
-            return
-        self.machine.configure(parameters)
-        self.jog.timeout = self.machine.jog_timeout
-        self.publish("settings", self.machine.settings())
-
-    @staticmethod
-    async def in_thread(function, *arguments):
-        """Calls a function that may wait for long, and returns its result. The threads don't keep the process
-        from ending."""
-        loop = asyncio.get_running_loop()
-        future = loop.create_future()
-
-        def conclude(conclusion, value):
-            if not future.done():
-                conclusion(value)
-
-        def run():
-            try:
-                conclusion = (conclude, future.set_result, function(*arguments))
-            except Exception as error:  # noqa: BLE001: the caller gets it
-                conclusion = (conclude, future.set_exception, error)
-            if not loop.is_closed():
-                loop.call_soon_threadsafe(*conclusion)
-        threading.Thread(target=run, daemon=True).start()
-        return await future
-
-    def begin(self, coroutine):
-        """Runs it without waiting for it."""
-        task = asyncio.get_running_loop().create_task(coroutine)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    async def end(self):
-        """Ends the jog, and says goodbye to all pages."""
-        self.jog.end()
-        for viewer in list(self.viewers):
-            await viewer.socket.close(code=WSCloseCode.GOING_AWAY)
-
-    # ---- who may what
-
-    def enter(self, socket, transport, was):
-        """was: the key that the page had before it lost its connection. It gets its control back."""
-        self._numbers += 1
-        viewer = Viewer(socket, transport, self._numbers, secrets.token_urlsafe(16))
-        if len(self.viewers) >= MOST_VIEWERS:
-            oldest = next(other for other in self.viewers if other is not self.controller)
-            self.begin(oldest.socket.close(message=b"too many pages are open"))
-        self.viewers.append(viewer)
-        lost = next((other for other in self.viewers if other.key == was), None)
-        if lost is not None:
-            self.jog.end(lost)
-            self.begin(lost.socket.close())
-        if self.controller in (None, lost):
-            self.controller = viewer
-        self._publish_control()
-        if not self._watching:
-            self._watching = True
-            self.begin(self._watch())
-        return viewer
-
-    async def _watch(self):
-        """Receives what the driver publishes while there are viewers, and a little longer: a page that is
-        loaded again is a new viewer."""
-        driver = self.machine.driver
-        # These ask the master, which may take long to answer.
-        await self.in_thread_quietly(driver.watch)
-        for urgent in (driver.stop, driver.emergency_stop):
-            self.begin(self.in_thread_quietly(urgent.connect))
-        while self.viewers:
-            await self._beat()
-            await asyncio.sleep(LINGER)
-        await self.in_thread_quietly(driver.unwatch)
-        self._watching = False
-        if self.viewers:  # one came during that
-            self._watching = True
-            self.begin(self._watch())
-
-    async def in_thread_quietly(self, function):
-        try:
-            await self.in_thread(function)
-        except Exception:  # noqa: BLE001: the call itself will say what is wrong
-            pass
-
-    def leave(self, viewer):
-        self.jog.forget(viewer)
-        self.viewers.remove(viewer)
-        if self.controller is viewer:
-            self.controller = None
-
-    def refuse_login(self):
-        """Says that logins were refused, at most once a minute."""
-        self._refused += 1
-        now = time.monotonic()
-        if now - self._refused_told >= REFUSED_LOG_EVERY:
-            self.log(f"refused {self._refused} connection(s) without the token or from a foreign page")
-            self._refused, self._refused_told = 0, now
-
-    # ---- commands
-
-    def take(self, viewer, text):
-        """A message of a viewer."""
-        try:
-            message = json.loads(text)
-            what, call = message["do"], message["id"]
-        except (ValueError, TypeError, KeyError, RecursionError):
-            return
-        if not isinstance(call, int):
-            return
-        if what in ("stop", "emergency_stop"):
-            self.jog.end()
-            self._stops += 1
-            self.begin(self._stop(viewer, call, getattr(self.machine.driver, what)))
-            self.begin(self._stop_what_is_on_its_way(dict(self._pending)))
-            return
-        if not viewer.rate.take():
-            viewer.answer(id=call, ok=False, text="not sent: too many messages")
-            return
-        try:
-            if what == "take_control":
-                self._take_control(viewer)
-                viewer.answer(id=call, ok=True, text="this page has control")
-                return
-            if what == "jog_end":
-                self.jog.end(viewer)
-                return
-            self.require_control(viewer)
-            if what == "jog":
-                self._press(viewer, message)
-            elif isinstance(what, str) and (what == "draw" or what in COMMANDS):
-                self._start(viewer, call, message)
-            else:
-                raise Refusal(f"there is no command {what!r}")
-        except Refusal as refusal:
-            viewer.answer(id=call, ok=False, text=str(refusal), jog=what == "jog")
-
-    def require_control(self, viewer):
-        if viewer is not self.controller:
-            raise Refusal("nothing was sent: " + (
-                "another page has control; take it over first" if self.controller else
-                "no page has control; take it first"))
-        if not self.machine.live:
-            raise Refusal("nothing was sent: no state of the driver arrives")
-
-    def _take_control(self, viewer):
-        self.jog.end()
-        if self.controller not in (None, viewer):
-            self.machine.driver.tell("event", f"page {viewer.number} took control from page "
-                                              f"{self.controller.number}")
-        self.controller = viewer
-
-    def _press(self, viewer, message):
-        axis = axis_of(self.machine, message)
-        velocity, press = number(message, "velocity") / axis.factor, number(message, "press")
-        now = time.monotonic()
-        if not self.jog.press(viewer, press, axis.name, velocity, number(message, "tick"), now):
-            raise Refusal(f"{axis.name}: the jog ended: something stopped it, or no message came in time for "
-                          f"jog_timeout, {self.machine.jog_timeout:g} s. Press again")
-        self._end_jog_in_time(now)
-
-    def _end_jog_in_time(self, now):
-        if self._jog_timer is not None:
-            self._jog_timer.cancel()
-        self._jog_timer = asyncio.get_running_loop().call_later(
-            max(0.0, self.jog.until - now), self.jog.end)
-
-    def _publish_jog(self, axis, velocity):
-        self.machine.driver.jog(axis, velocity)
-
-    def _start(self, viewer, call, message):
-        name = (message["do"], message.get("axis") if isinstance(message.get("axis"), str) else None)
-        shown = (f"{name[1]}: " if name[1] else "") + name[0].replace("_", " ")
-        if name in self._pending:
-            raise Refusal(f"{shown}: not sent again, because the driver has not answered the last one yet")
-        if len(self._pending) >= MOST_CALLS:
-            raise Refusal(f"{shown}: not sent, because {MOST_CALLS} calls wait for the driver")
-        self._pending[name] = message
-        self.begin(self._carry_out(viewer, call, message, name, shown, self._stops))
-
-    async def _carry_out(self, viewer, call, message, name, shown, stops):
-        """stops: how many there were when the message came."""
-        try:
-            if message["do"] == "draw":
-                self.drawing.begin(message.get("version"))
-                text = await self.in_thread(self.drawing.draw)
-            else:
-                text = await self.in_thread(carry_out, self.machine, message)
-        except Refusal as refusal:
-            self.machine.driver.tell("refused", f"{shown}: {refusal}")
-            viewer.answer(id=call, ok=False, text=str(refusal))
-        else:
-            viewer.answer(id=call, ok=True, text=text)
-        finally:
-            del self._pending[name]
-            if self._stops != stops and name[0] in MOTIONS:
-                self.machine.driver.stop.call()  # the driver may have got the stop before the motion
-
-    async def _stop_what_is_on_its_way(self, asked):
-        """A motion that the driver was asked for before a stop may reach it after the stop. It is stopped too,
-        even if the driver answers only at its end."""
-        for _ in range(STOPS_AGAIN):
-            await asyncio.sleep(STOP_AGAIN)
-            if not any(name[0] in MOTIONS and self._pending.get(name) is message
-                       for name, message in asked.items()):
-                return
-            await asyncio.wait([asyncio.wrap_future(self.machine.driver.stop.call())])
-
-    async def _stop(self, viewer, call, urgent):
-        try:
-            answer = await asyncio.wrap_future(urgent.call())
-        except Exception as error:  # noqa: BLE001: whatever it is, the person must be told
-            text = f"THE DRIVER DID NOT ANSWER: {error}. Cut the power of the motors"
-            self.machine.driver.tell("error", text)
-            viewer.answer(id=call, ok=False, text=text)
-            return
-        viewer.answer(id=call, ok=bool(answer.success), text=answer.message)
 
 
 class Server:
@@ -342,6 +38,7 @@ class Server:
 
     def __init__(self, panel):
         self._panel = panel
+        self._strangers = []  # connections that have not shown the token yet
         self._files = {file.name: file.read_bytes() for file in PAGE.iterdir()}
         self.application = web.Application(client_max_size=LARGEST_REQUEST, middlewares=[self._guard])
         self.application.router.add_get("/", self._file)
@@ -390,8 +87,7 @@ class Server:
             raise web.HTTPForbidden(text="Only the panel's own page may ask for this\n")
         try:
             self._panel.require_control(viewer)
-            await self._panel.drawing.read(await request.read(), request.query, self._panel.in_thread,
-                                           self._panel.publish_drawing)
+            await self._panel.drawing.read(await request.read(), request.query, self._panel.publish_drawing)
         except Refusal as refusal:
             return web.json_response({"problem": str(refusal)})
         return web.json_response({"problem": ""})
@@ -403,7 +99,7 @@ class Server:
     async def _recordings(self, request):
         self._require_page(request)
         try:
-            return web.json_response({"recordings": await self._panel.in_thread(self._folder().shown), "problem": ""})
+            return web.json_response({"recordings": await in_thread(self._folder().shown), "problem": ""})
         except Refusal as refusal:
             return web.json_response({"recordings": [], "problem": str(refusal)})
 
@@ -415,7 +111,7 @@ class Server:
         self._require_page(request)
         name = request.match_info["name"]
         try:
-            file, size = await self._panel.in_thread(self._folder().open, name)
+            file, size = await in_thread(self._folder().open, name)
         except Refusal as refusal:
             raise web.HTTPNotFound(text=f"{refusal}\n") from None
         response = web.StreamResponse(headers={**HEADERS, "Content-Disposition": f'attachment; filename="{name}"'})
@@ -424,7 +120,7 @@ class Server:
         with file:
             await response.prepare(request)
             while size > 0:
-                part = await self._panel.in_thread(file.read, min(size, CHUNK))
+                part = await in_thread(file.read, min(size, CHUNK))
                 if not part:
                     break
                 size -= len(part)
@@ -448,7 +144,7 @@ class Server:
 
     async def _login(self, socket):
         """The first message of a connection; None if it doesn't have the token."""
-        strangers = self._panel._strangers
+        strangers = self._strangers
         if len(strangers) >= MOST_STRANGERS:
             self._panel.begin(strangers.pop(0).close())
         strangers.append(socket)

@@ -138,7 +138,9 @@ class Drawings(OnOnePage):
         """An SVG file, which the page reads at once."""
         file = self.folder / "chosen.svg"
         file.write_text(text, encoding="utf-8")
-        self.page.driver.execute_script("document.getElementById('svg').value = ''")
+        # The drawing before is ready too.
+        self.page.driver.execute_script(
+            "document.getElementById('svg').value = ''; document.getElementById('drawing-text').textContent = ''")
         self.page.find("#svg").send_keys(str(file))
 
     def wait_text(self, words):
@@ -241,7 +243,6 @@ class Drawings(OnOnePage):
         }
         for name, text in attacks.items():
             with self.subTest(name):
-                self.page.driver.execute_script("document.getElementById('drawing-text').textContent = ''")
                 self.choose(text)
                 wait_until(lambda: self.page.text("drawing-text").startswith(("Ready", "Refused")), f"{name} is judged")
         self.assertEqual(asked, [])
