@@ -1,5 +1,5 @@
-"""The state of the panel: who views it, who has control, and what the driver was asked. Everything here runs in
-the server's thread."""
+"""The state of the panel: its viewers, the one with control, and the calls that wait for the driver. Everything
+here runs in the server's thread."""
 
 import asyncio
 import json
