@@ -323,8 +323,10 @@ TEST(WizardDistance, OffersOnlyTheWayThatHasRoom) {
   checkDistance(person, machine, config, findings);
   EXPECT_EQ(machine.moves, (std::vector<double>{-2.0, -20.0})) << person.heard;
   EXPECT_TRUE(person.heardOf("x can't move 22 mm towards plus: it stands at 190.0000 mm"));
-  EXPECT_TRUE(person.heardOf("Is there room for 22 mm towards your minus end: 2 mm to take up "
-                            "the play, then 20 mm?")) << person.heard;
+  EXPECT_TRUE(
+      person.heardOf("Is there room for 22 mm towards your minus end: 2 mm to take up "
+                     "the play, then 20 mm?"))
+      << person.heard;
 
   Person far({"300", "n"});
   checkDistance(far, machine, config, findings);
@@ -383,8 +385,10 @@ TEST(WizardDistance, IsTriedAgainWhereAMoveIsRefused) {
   EXPECT_EQ(machine.moves, (std::vector<double>{2.0, -2.0, -20.0})) << person.heard;
   EXPECT_TRUE(findings.scale) << person.heard;
   EXPECT_TRUE(person.heardOf("its plus is your minus")) << person.heard;
-  EXPECT_TRUE(person.heardOf("Is there room for 22 mm towards your minus end: 2 mm to take up "
-                            "the play, then 20 mm?")) << person.heard;
+  EXPECT_TRUE(
+      person.heardOf("Is there room for 22 mm towards your minus end: 2 mm to take up "
+                     "the play, then 20 mm?"))
+      << person.heard;
   EXPECT_TRUE(person.heardOf("If you answer n, it moves towards your plus end.")) << person.heard;
 }
 

@@ -170,8 +170,10 @@ TEST_F(WizardTest, KeepsTheCommentsOfTheDriversFile) {
   ASSERT_NO_FATAL_FAILURE(answer("2 mm towards plus", "y"));
   ASSERT_NO_FATAL_FAILURE(answer("Which way did x move?", "+"));
   ASSERT_NO_FATAL_FAILURE(answer("How far should x move", ""));
-  ASSERT_NO_FATAL_FAILURE(answer("Is there room for 22 mm towards your plus end: 2 mm to take up the play, "
-                                 "then 20 mm?", ""));
+  ASSERT_NO_FATAL_FAILURE(
+      answer("Is there room for 22 mm towards your plus end: 2 mm to take up the play, "
+             "then 20 mm?",
+             ""));
   ASSERT_NO_FATAL_FAILURE(answer("take up the play", "y"));
   ASSERT_NO_FATAL_FAILURE(answer("Mark where x stands", ""));
   ASSERT_NO_FATAL_FAILURE(answer("will move 20 mm", "y"));

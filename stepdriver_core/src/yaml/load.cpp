@@ -124,6 +124,20 @@ std::optional<YAML::Mark> secondDocument(const std::string& text) {
   return second.mark;
 }
 
+/// The place of a tab that indents the line of a mistake; no value if none does. yaml-cpp takes
+/// what follows for a part of the line before it, and complains of that.
+std::optional<YAML::Mark> tabBefore(const std::string& text, const YAML::Mark& mistake) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int i = 0; i <= mistake.line && std::getline(lines, line); ++i) {
+  }
+  const std::size_t tab = line.find('\t');
+  if (tab == std::string::npos || line.find_first_not_of(" \t") < tab) return {};
+  YAML::Mark mark = mistake;
+  mark.column = static_cast<int>(tab);
+  return mark;
+}
+
 class Converter {
  public:
   explicit Converter(std::string name) : name_(std::move(name)) {}
@@ -238,6 +252,9 @@ ConfigValue parse(const std::string& text, const std::string& name) {
     const ConfigValue value = converter.convert(YAML::Load(text));
     return value.isNothing() ? ConfigValue::Map{} : value;
   } catch (const YAML::Exception& error) {
+    if (const auto tab = tabBefore(text, error.mark)) {
+      converter.fail(*tab, "the line is indented by a tab; YAML takes only spaces for that");
+    }
     converter.fail(error.mark, error.msg);
   }
 }

@@ -192,6 +192,23 @@ TEST(Yaml, SaysWhereItIsWrong) {
   EXPECT_NE(errorOf("a: &a [*a]\n").find("alias for a node that contains it"), std::string::npos);
 }
 
+TEST(Yaml, NamesATabThatIndents) {
+  for (const std::string text :
+       {"axes:\n\tx:\n\t\tdriver: a4988\n", "axes:\n  x:\n\tdriver: a4988\n",
+        "axes:\n  x:\n    pins:\n    \tstep: a\n", "\ta: 1\n",
+        "axes:\n  x:\n    driver: a4988\n\tpins: {step: a}\n"}) {
+    try {
+      yaml::parse(text, "f.yaml");
+      ADD_FAILURE() << text;
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      EXPECT_NE(what.find(": the line is indented by a tab; YAML takes only spaces"),
+                std::string::npos)
+          << text << what;
+    }
+  }
+}
+
 // YAML::LoadAll() would return empty documents for ever.
 TEST(Yaml, RefusesATextThatContinuesWhereItMustEnd) {
   const std::string why = "a second document begins here; only one is allowed";
