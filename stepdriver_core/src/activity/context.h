@@ -94,7 +94,7 @@ class Context : public AnswerSink {
     std::shared_ptr<std::vector<pulse::Follow>> follows;
   };
 
-  std::vector<FollowCommand> follow_commands_;  // of this turn
+  std::vector<FollowCommand> follow_commands_;  // those of this turn
   std::uint64_t groups_ = 0;
   std::uint64_t moves_ = 0;
   std::uint64_t jobs_ = 0;

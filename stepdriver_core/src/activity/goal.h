@@ -47,7 +47,7 @@ struct Goal {
   double remainder = 0.0;  ///< [microsteps] of a move: the commanded position minus the target
   /// [unit/s] As requested, without the override; of a jog or a setpoint of velocity with its sign.
   double velocity = 0.0;
-  Setpoint setpoint;      ///< of a kSetpoint
+  Setpoint setpoint;      ///< used by a kSetpoint only
   bool of_motor = false;  ///< true: the target is the motor's; false: the joint's
   MotorsTogether motors;
   motion::MotionLimits path_limits;  ///< [microsteps] of a kTogether: its path keeps them
@@ -113,8 +113,8 @@ struct Predecessor {
   axis::AxisModel* axis = nullptr;
   Goal goal;
   std::string left_by;       ///< why it isn't reached if its axis comes to rest before it, in words
-  Ack call;                  ///< of its beginning, if the engine had not yet accepted it
-  std::uint64_t serial = 0;  ///< of the order that would have begun it
+  Ack call;                  ///< waits for its beginning, if the engine had not yet accepted it
+  std::uint64_t serial = 0;  ///< the order that would have begun it
   /// The last order for it that the engine has accepted, and those that it has not yet handled.
   std::vector<Followed> orders;
 };

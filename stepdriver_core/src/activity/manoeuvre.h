@@ -110,7 +110,7 @@ class Manoeuvre {
     Plans plans;
     Course course;
     Ack extension;                                        // that it begins
-    std::shared_ptr<std::vector<pulse::Follow>> follows;  // of its command
+    std::shared_ptr<std::vector<pulse::Follow>> follows;  // the motions in its command
   };
 
   /// The next order is its first, and begins at the same time as others.
@@ -153,15 +153,15 @@ class Manoeuvre {
   const std::shared_ptr<const CommonStart> start_;
   const std::int64_t begins_ns_;
   Course course_;                                       // that was joined last
-  Course accepted_course_;                              // of the motion that the engine follows
+  Course accepted_course_;                              // the one that the engine follows
   std::optional<std::pair<Extension, Ack>> extension_;  // waits until the engine has handled all
   std::uint64_t group_ = 0;
   std::vector<Predecessor> predecessors_;
   std::optional<Plans> prepared_;
 
   Mode mode_ = Mode::kRun;
-  Why why_;                          // of a stop
-  Mode accepted_mode_ = Mode::kRun;  // of the motion that the engine follows
+  Why why_;                          // why it stops
+  Mode accepted_mode_ = Mode::kRun;  // how the engine follows it
   std::vector<OpenOrder> open_;
   // the last order begins at rest: it is the first one, or that of a resume
   bool from_rest_ = true;
@@ -172,13 +172,13 @@ class Manoeuvre {
   axis::MoveResult result_;
   std::optional<Failure> failure_;
   pulse::Nanoseconds lead_;
-  std::shared_ptr<const motion::Profile> path_;           // of the last order
-  std::shared_ptr<const motion::Profile> accepted_path_;  // of the motion that the engine follows
-  Ack call_;                                              // of the beginning
-  std::vector<Ack> calls_;                                // of the open orders
+  std::shared_ptr<const motion::Profile> path_;           // as last ordered
+  std::shared_ptr<const motion::Profile> accepted_path_;  // as the engine follows it
+  Ack call_;                                              // waits for the beginning
+  std::vector<Ack> calls_;                                // wait for the open orders
 };
 
-/// Of a goal that isStreamed().
+/// For a goal that isStreamed().
 inline const Why kEndedByHold{axis::MoveEnd::kStopped,
                               "it was held, which ends jogs and setpoints"};
 

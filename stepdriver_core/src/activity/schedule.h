@@ -82,7 +82,7 @@ class Schedule {
     std::vector<std::uint64_t> stops;
     std::vector<std::uint64_t> ended;  // motions of its axis
     std::vector<Source> from;
-    std::vector<std::shared_ptr<const motion::Profile>> plans;  // of the motors
+    std::vector<std::shared_ptr<const motion::Profile>> plans;  // one for each motor
   };
   struct Drop {
     const axis::AxisModel* axis;

@@ -94,7 +94,7 @@ class BrakeStep : public Step {
  protected:
   Context& context_;
   axis::AxisModel& axis_;
-  std::unique_ptr<Step> writing_;  // of the brake's line; nullptr: it isn't being written
+  std::unique_ptr<Step> writing_;  // writes the brake's line; nullptr: it isn't being written
 };
 
 /// Engages the brake of an axis, and waits until it holds the load.
