@@ -43,11 +43,13 @@ std::vector<AxisConfig> readAxes(FuzzedDataProvider& input) {
   return configs;
 }
 
-/// Mostly a number that a trajectory could have.
+/// Mostly a number that a trajectory could have, ordinary or in one of twelve decades.
 double readNumber(FuzzedDataProvider& input, double size) {
   const auto kind = input.ConsumeIntegral<std::uint8_t>();
-  if (kind < 250) return size * input.ConsumeIntegral<std::int16_t>() / 32768.0;
-  return input.ConsumeFloatingPoint<double>();
+  if (kind >= 250) return input.ConsumeFloatingPoint<double>();
+  const double number = size * input.ConsumeIntegral<std::int16_t>() / 32768.0;
+  if (kind < 160) return number;
+  return number * std::pow(10.0, -12.0 * input.ConsumeIntegral<std::uint8_t>() / 255.0);
 }
 
 std::vector<double> readNumbers(FuzzedDataProvider& input, std::size_t axes, double size) {
