@@ -199,6 +199,9 @@ TEST(Screen, ShowsTheStepSizeTheOverrideAndWhatIsTyped) {
   session.press({'g', '-', '7'}, 0.0);
   EXPECT_TRUE(shows(screenText(session, 24, 80), "Move x to [mm]: -7_"));
   EXPECT_TRUE(shows(screenText(session, 6, 40), "Move x to [mm]: -7_")) << "also in a small window";
+  session.press({'s'}, 0.0);
+  EXPECT_TRUE(shows(screenText(session, 24, 80),
+                    "x isn't moved: keys do nothing until Enter or Esc (s, SPACE stop)"));
   session.press({kKeyEscape, 'z'}, 0.0);
   EXPECT_TRUE(shows(screenText(session, 24, 80), "Set the position of x to 0?"));
 }

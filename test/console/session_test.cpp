@@ -284,6 +284,71 @@ TEST(Session, LettersThatAreTypedIntoAPositionDoNothingElse) {
   EXPECT_EQ(session.prompt()->text(), "2");
 }
 
+/// The axes that keys enable or disable, as their calls say it.
+std::vector<std::string> callsOf(Session& session, const std::vector<Key>& keys) {
+  std::vector<std::string> names;
+  for (const Call& call : session.press(keys, 0.0).calls) names.push_back(call.name());
+  return names;
+}
+
+TEST(Session, DigitsAfterARefusedGoToDoNothing) {
+  AxisView disabled = axisView("x");
+  disabled.enabled = false;
+  Session session = sessionWith({disabled, axisView("y")});
+  EXPECT_EQ(callsOf(session, keysOf("g2d")), std::vector<std::string>{});
+  EXPECT_EQ(session.chosen(), "x");
+  EXPECT_EQ(callsOf(session, keysOf("-1.5deg+,eh")), std::vector<std::string>{});
+  EXPECT_TRUE(session.tick(0.0).jogs.empty());
+  EXPECT_EQ(session.chosen(), "x");
+  ASSERT_NE(session.closedPrompt(), nullptr);
+  EXPECT_EQ(callsOf(session, {kKeyEnter}), std::vector<std::string>{});
+  EXPECT_EQ(session.closedPrompt(), nullptr);
+  EXPECT_EQ(callsOf(session, keysOf("2e")), std::vector<std::string>{"y: enable"});
+}
+
+TEST(Session, WhatIsTypedIntoAClosedPromptDoesNothing) {
+  // How the prompt was closed, before the user has finished.
+  for (const std::string closed : {"g1s", "g1 ", "g9999\n", "g1.2.3\n", "g\n"}) {
+    Session session =
+        sessionWith({axisView("x"), axisView("y")}, {limitedConfig(), limitedConfig()});
+    for (const char key : closed) session.press({Key(key)}, 0.0);
+    for (const char key : std::string("2deg")) {
+      EXPECT_EQ(callsOf(session, {Key(key)}), std::vector<std::string>{}) << closed;
+    }
+    EXPECT_EQ(session.chosen(), "x") << closed;
+    EXPECT_EQ(callsOf(session, {kKeyEscape}), std::vector<std::string>{}) << closed;
+    EXPECT_EQ(callsOf(session, {'e'}), std::vector<std::string>{"x: enable"}) << closed;
+  }
+}
+
+TEST(Session, StopsWorkWhileTypingIsLeftOver) {
+  AxisView disabled = axisView("x");
+  disabled.enabled = false;
+  Session session = sessionWith({disabled});
+  session.press(keysOf("g12"), 0.0);
+  EXPECT_EQ(callsOf(session, {'s'}), std::vector<std::string>{"all axes: stop"});
+  EXPECT_TRUE(session.press({' '}, 0.1).emergency_stop);
+  session.press({kKeyCtrlC}, 0.2);
+  EXPECT_TRUE(session.ended());
+}
+
+TEST(Session, ObeysAKeyAfterARefusedGoToIfNothingWasTyped) {
+  AxisView disabled = axisView("x");
+  disabled.enabled = false;
+  Session session = sessionWith({disabled, axisView("y")});
+  EXPECT_EQ(callsOf(session, keysOf("ge")), std::vector<std::string>{"x: enable"})
+      << "as the refusal says";
+  session.press({'g'}, 0.0);
+  session.press({kKeyDown}, 0.0);
+  EXPECT_EQ(session.chosen(), "y");
+}
+
+TEST(Session, SwitchesAllMotorsOnAndOff) {
+  Session session = sessionWith({axisView("x"), axisView("y")});
+  EXPECT_EQ(callsOf(session, keysOf("mo")),
+            (std::vector<std::string>{"all axes: enable", "all axes: disable"}));
+}
+
 TEST(Session, SetsZeroOnlyAtRest) {
   AxisView axis = axisView("x");
   axis.enabled = false;

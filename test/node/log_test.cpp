@@ -97,6 +97,22 @@ TEST_F(LogTest, HasWhatIsRefusedOnceASecondByTheNameOfTheAxis) {
   EXPECT_EQ(lines().size(), before + static_cast<std::size_t>(said) + 1);
 }
 
+TEST_F(LogTest, HasARefusedServiceOnceASecondByItsReason) {
+  start();
+  const std::size_t before = lines().size();
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < 50; ++i) EXPECT_FALSE(node.moveTo(5.0 + 0.01 * i, true).success);
+  EXPECT_FALSE(node.moveTo(0.01, true, 5.0).success);
+  end();
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  const int said = count("Refused: x: the position 5");
+  EXPECT_GE(said, 1) << node.process().output();
+  EXPECT_LE(said, static_cast<int>(took.count()) + 1);
+  EXPECT_EQ(count("Refused: x: the velocity 5 m/s is above the maximum"), 1)
+      << node.process().output();
+  EXPECT_EQ(lines().size(), before + static_cast<std::size_t>(said) + 2);
+}
+
 TEST_F(LogTest, IsSilentWhereALoggerIsSetSoByName) {
   start();
   roscpp::SetLoggerLevel silence;

@@ -62,19 +62,15 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
 
 axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis, const Goal& goal,
                             axis::MoveEnd end, const std::string& why) {
-  const pulse::ChannelState& state = axis.motor.state();
   axis::MoveResult result;
   result.end = end;
   result.position = axis.positionNow();
-  result.duration = durationOf(context, goal, state.end_time);
+  result.duration = durationOf(context, goal, axis.motor.state().end_time);
   if (end == axis::MoveEnd::kReached) {
     result.message = fmt::format("{} reached {}", axis.name(), axis.showPlace(result.position));
     return result;
   }
-  result.message = standsAt(axis, goal, why);
-  if (!axis.position.isValid() && state.end_abrupt) {
-    result.message += "; it stopped too fast for the position to be trusted";
-  }
+  result.message = standsAt(axis, goal, why) + axis.abruptText();
   return result;
 }
 

@@ -383,6 +383,30 @@ void AxisModel::distrust() {
   for (AxisModel* sharer : sharers_) sharer->position.distrust();
 }
 
+// ---- how a motion ended ----
+
+void AxisModel::noteEndstop(bool at_max) {
+  ++endstops_met;
+  stopped_by = fmt::format("the {} endstop was met at {}{}", at_max ? "max" : "min",
+                           showPlace(positionNow()), abruptText());
+}
+
+std::string AxisModel::abruptText() const {
+  const pulse::ChannelState& state = motor.state();
+  if (position.isValid() || !state.end_abrupt) return "";
+  std::string text = "; it stopped too fast for the position to be trusted";
+  const bool at_max = state.end == pulse::EndReason::kEndstopMax;
+  if (config.kind != config::Kind::kRotary ||
+      (!at_max && state.end != pulse::EndReason::kEndstopMin)) {
+    return text;
+  }
+  return text + fmt::format(
+                    "; no axis passes an endstop: if this switch closes once a turn, keep the "
+                    "axis within a turn by min_position_deg and max_position_deg, or, if it "
+                    "must pass the switch, remove endstops/{} and homing",
+                    at_max ? "max" : "min");
+}
+
 // ---- the driver chip ----
 
 bool AxisModel::motorHolds() const {

@@ -199,6 +199,12 @@ class AxisModel {
   std::string whyUnverified(const AxisMemory& kept, bool clean, const std::string& source) const;
   /// @}
 
+  /// Its motion has ended at an endstop that it wasn't looking for.
+  void noteEndstop(bool at_max);
+  /// Whether its last motion ended too fast for the position to be trusted, as the end of a
+  /// sentence; empty if it didn't.
+  std::string abruptText() const;
+
   /// Something stopped it, moving or not: its command has ended.
   void noteStop() {
     ++stops;
@@ -211,6 +217,9 @@ class AxisModel {
   pulse::Nanoseconds rest_since = 0;
   /// How often something stopped it, other than the end of its motion.
   std::uint64_t stops = 0;
+  /// AxisState::stopped_by and endstops_met.
+  std::string stopped_by;
+  std::uint64_t endstops_met = 0;
 
  private:
   /// [unit/s] At finer microsteps than the configured ones it may be below the configured speed.

@@ -183,6 +183,7 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
   const pulse::ChannelState before = axis.motor.state();
   axis.motor.take(state);
   const bool was_faulty = static_cast<bool>(axis.fault);
+  if (state.accepted != before.accepted) axis.stopped_by.clear();
   if (state.line_errors != before.line_errors) {
     axis.fault.latch(axis.failureText(state.failure), "then call recover");
     axis.distrust();
@@ -217,6 +218,10 @@ void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
       axis.distrust();
     }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.distrust();
+    const bool at_max = state.end == pulse::EndReason::kEndstopMax;
+    const Activity* const owner = activities_.owner(axis);
+    const bool homes = owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone;
+    if ((at_max || state.end == pulse::EndReason::kEndstopMin) && !homes) axis.noteEndstop(at_max);
   }
   if (!was_faulty && axis.fault) axis.noteStop();
 }
@@ -877,7 +882,12 @@ void Controller::serve(const CancelHoming& wanted, const Ack& /*call*/) {
 // ---- the driver chip ----
 
 void Controller::serve(const Enable& wanted, const Ack& call) {
-  const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
+  std::vector<axis::AxisModel*> all;
+  for (const AxisId id : wanted.axes) {
+    for (axis::AxisModel* axis : withSharers(id)) {
+      if (std::find(all.begin(), all.end(), axis) == all.end()) all.push_back(axis);
+    }
+  }
   for (const axis::AxisModel* changed : all) {
     changed->refuseUnlessOpen();
     if (!changed->motor.pins().hasEnable()) {
@@ -1056,6 +1066,8 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   state.speed_override = context_.mode.speed_override;
   state.fault = axis.faultText();
   state.remedy = axis.remedyText();
+  state.stopped_by = axis.stopped_by;
+  state.endstops_met = axis.endstops_met;
   state.stops = axis.stops;
   state.position_note = axis.position.note();
   shown.steps_per_unit = axis.stepsPerUnit();

@@ -78,7 +78,7 @@ class RequestText {
     return fmt::format("cancel {} homings", wanted.ids.size());
   }
   std::string operator()(const Enable& wanted) const {
-    return (wanted.on ? "enable " : "disable ") + name(wanted.axis);
+    return (wanted.on ? "enable " : "disable ") + names(wanted.axes);
   }
   std::string operator()(const Sleep& wanted) const {
     return fmt::format("{}: {}", name(wanted.axis), wanted.asleep ? "sleep" : "wake");

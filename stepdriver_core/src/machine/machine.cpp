@@ -664,6 +664,22 @@ bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped
 
 void Machine::recover() { ask(*impl_->shell_, Recover{}); }
 
+void Machine::enable(bool on) {
+  Enable wanted{{}, on};
+  for (AxisId id = 0; id < axes().size(); ++id) {
+    const config::AxisConfig& config = axes()[id]->config();
+    bool wired = true;
+    for (std::size_t i = 0; i < config.motors(); ++i) {
+      wired = wired && config.motorAt(i).pins.enable.wired();
+    }
+    if (wired) wanted.axes.push_back(id);
+  }
+  if (wanted.axes.empty()) {
+    throw Refused("no axis has pins/enable: the motors are energized as long as their drivers are");
+  }
+  ask(*impl_->shell_, std::move(wanted));
+}
+
 void Machine::shutdown() { impl_->shutdown(); }
 
 bool Machine::responds(std::chrono::nanoseconds longest) const {

@@ -184,7 +184,7 @@ std::vector<axis::HomingResult> homeInOrder(Shell& shell, const std::vector<Mach
 
 // ---- the driver chip ----
 
-void MachineAxis::enable(bool on) { ask(shell_, Enable{id_, on}); }
+void MachineAxis::enable(bool on) { ask(shell_, Enable{{id_}, on}); }
 
 void MachineAxis::sleep(bool asleep) { ask(shell_, Sleep{id_, asleep}); }
 

@@ -116,8 +116,9 @@ struct Home {
 struct CancelHoming {
   std::vector<std::uint64_t> ids;
 };
+/// Of all or of none, if one of them can't be.
 struct Enable {
-  AxisId axis = 0;
+  std::vector<AxisId> axes;
   bool on = false;
 };
 struct Sleep {

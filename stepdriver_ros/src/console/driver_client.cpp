@@ -41,7 +41,7 @@ client::Answer moveTo(const std::string& service, const MoveTo::Request& request
 
 /// @param units of the call's axis.
 client::Answer carryOutCall(const std::string& driver, const Call& call, const TableUnits& units) {
-  const std::string axis = driver + "/" + call.axis + "/";
+  const std::string axis = driver + "/" + (call.axis.empty() ? "" : call.axis + "/");
   switch (call.what) {
     case Call::What::kEnable:
     case Call::What::kDisable: {

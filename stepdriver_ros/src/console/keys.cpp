@@ -40,6 +40,8 @@ const std::map<Key, Command>& commands() {
       {']', {Action::kFaster}},
       {'e', {Action::kEnable}},
       {'d', {Action::kDisable}},
+      {'m', {Action::kEnableAll}},
+      {'o', {Action::kDisableAll}},
       {'h', {Action::kHome}},
       {'a', {Action::kHomeAll}},
       {'?', {Action::kHelp}},

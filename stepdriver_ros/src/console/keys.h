@@ -35,6 +35,8 @@ enum class Action {
   kFaster,
   kEnable,
   kDisable,
+  kEnableAll,
+  kDisableAll,
   kHome,
   kHomeAll,
   kHelp,

@@ -37,6 +37,7 @@ restores the terminal when it ends. Nothing moves when it starts, and a disabled
   g                 go to a position: type it, then press Enter
   z y               set zero at this position: y confirms it
   e, d              enable, disable
+  m, o              motors of all axes on, off
   h, a              home the axis, home all
   p, c              hold all axes, resume
   [ ]               slow down, speed up all motions by 10 %

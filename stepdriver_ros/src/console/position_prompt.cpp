@@ -9,17 +9,21 @@ namespace {
 
 constexpr std::size_t kLongest = 16;  // characters; more than any position has
 
-bool isTyped(Key key) {
-  return (key >= '0' && key <= '9') || key == '+' || key == '-' || key == '.' || key == ',';
-}
-
 }  // namespace
+
+bool PositionPrompt::takes(Key key) {
+  return (key >= '0' && key <= '9') || key == '+' || key == '-' || key == '.' || key == ',' ||
+         key == kKeyBackspace;
+}
 
 PositionPrompt::Outcome PositionPrompt::press(Key key) {
   if (key == kKeyEscape) return Outcome::kCancelled;
   if (key == kKeyEnter) return Outcome::kEntered;
-  if (key == kKeyBackspace && !text_.empty()) text_.pop_back();
-  if (isTyped(key) && text_.size() < kLongest) text_ += static_cast<char>(key);
+  if (key == kKeyBackspace) {
+    if (!text_.empty()) text_.pop_back();
+  } else if (takes(key) && text_.size() < kLongest) {
+    text_ += static_cast<char>(key);
+  }
   return Outcome::kOpen;
 }
 

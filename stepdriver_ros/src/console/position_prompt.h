@@ -17,6 +17,8 @@ class PositionPrompt {
   /// Digits, signs, points and commas are typed; a backspace removes the last of them. All other
   /// keys except Enter and Escape are ignored.
   Outcome press(Key key);
+  /// Whether a key can be part of a number.
+  static bool takes(Key key);
 
   const std::string& axis() const { return axis_; }
   const std::string& text() const { return text_; }

@@ -147,6 +147,12 @@ std::vector<Row> promptRows(const Session& session, int columns) {
                               shortName(*axis, kShortName)),
                   columns, true);
   }
+  if (const ClosedPrompt* const closed = session.closedPrompt()) {
+    return rowsOf(fmt::format("{} isn't moved: {} nothing until Enter or Esc (s, SPACE stop)",
+                              shortName(closed->axis, kShortName),
+                              closed->typed ? "keys do" : "the keys of a number do"),
+                  columns, true);
+  }
   const PositionPrompt* const prompt = session.prompt();
   if (prompt == nullptr) return {};
   const config::AxisConfig* config = session.driver().config(prompt->axis());
@@ -175,12 +181,12 @@ std::vector<Row> packed(const std::vector<std::string>& texts, int columns) {
 std::vector<Row> helpRows(const Session& session, int columns) {
   const std::string axis =
       session.chosen().empty() ? "the axis" : shortName(session.chosen(), kShortName);
-  std::vector<Row> rows =
-      packed({"up down 1-9 choose an axis", "e enable " + axis, "d disable " + axis,
-              "left right jog slowly while held", "shift+left shift+right < > jog fast",
-              "- + one step", "i step size", "g go to a position", "z set zero", "h home " + axis,
-              "a home all", "p hold all", "c resume", "[ ] speed", "r recover"},
-             columns);
+  std::vector<Row> rows = packed(
+      {"up down 1-9 choose an axis", "e enable " + axis, "d disable " + axis,
+       "left right jog slowly while held", "shift+left shift+right < > jog fast", "- + one step",
+       "i step size", "g go to a position", "z set zero", "h home " + axis, "a home all",
+       "m o all motors on, off", "p hold all", "c resume", "[ ] speed", "r recover"},
+      columns);
   if (!session.showsHelp()) return rows;
   append(rows,
          packed({", . jog slowly too", "k j tab choose an axis too", "= one step too"}, columns));

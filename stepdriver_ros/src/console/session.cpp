@@ -104,6 +104,8 @@ Orders Session::press(const std::vector<Key>& keys, double now) {
       typeInto(key, now, orders);
     } else if (zero_asked_) {
       answerZero(key, now, orders);
+    } else if (isLeftOver(key)) {
+      continue;
     } else if (const auto command = commandOf(key)) {
       obey(*command, now, orders);
     }
@@ -136,8 +138,7 @@ void Session::obey(const Command& command, double now, Orders& orders) {
       emergency_ = Emergency::kSent;
       emergency_since_ = now;
       emergency_seen_ = false;
-      prompt_.reset();
-      zero_asked_.reset();
+      closeDialogues();
       break;
     case Action::kStop:
       call({Call::What::kStop, {}}, now, orders);
@@ -186,6 +187,12 @@ void Session::obey(const Command& command, double now, Orders& orders) {
       break;
     case Action::kDisable:
       if (!chosen_.empty()) call({Call::What::kDisable, chosen_}, now, orders);
+      break;
+    case Action::kEnableAll:
+      call({Call::What::kEnable, {}}, now, orders);
+      break;
+    case Action::kDisableAll:
+      call({Call::What::kDisable, {}}, now, orders);
       break;
     case Action::kHome:
     case Action::kHomeAll:
@@ -242,13 +249,31 @@ void Session::openPrompt(double now) {
     prompt_.emplace(chosen_);
   } else {
     messages_.say(why);
+    closed_prompt_ = ClosedPrompt{chosen_};
   }
+}
+
+void Session::closeDialogues() {
+  if (prompt_) closed_prompt_ = ClosedPrompt{prompt_->axis(), !prompt_->text().empty()};
+  prompt_.reset();
+  zero_asked_.reset();
+}
+
+bool Session::isLeftOver(Key key) {
+  if (!closed_prompt_ || key == 's' || key == kKeyCtrlC) return false;
+  if (key == kKeyEnter || key == kKeyEscape) {
+    closed_prompt_.reset();
+    return true;
+  }
+  closed_prompt_->typed = closed_prompt_->typed || PositionPrompt::takes(key);
+  if (closed_prompt_->typed) return true;
+  closed_prompt_.reset();
+  return false;
 }
 
 bool Session::leavesDialogue(Key key, double now, Orders& orders) {
   if (key != 's' && key != kKeyCtrlC) return false;
-  prompt_.reset();
-  zero_asked_.reset();
+  closeDialogues();
   obey(*commandOf(key), now, orders);
   return true;
 }
@@ -270,6 +295,8 @@ void Session::typeInto(Key key, double now, Orders& orders) {
 void Session::goToTyped(double now, Orders& orders) {
   const PositionPrompt typed = *prompt_;
   prompt_.reset();
+  // Whoever has not seen the refusal types again, as into an open prompt.
+  closed_prompt_ = ClosedPrompt{typed.axis()};
   const std::string why = hindrance(typed.axis(), now);
   if (!why.empty()) {
     messages_.say(why);
@@ -290,6 +317,7 @@ void Session::goToTyped(double now, Orders& orders) {
                               positionText(*number, unit), range));
     return;
   }
+  closed_prompt_.reset();
   Call go{Call::What::kGoTo, typed.axis()};
   go.position = position;
   call(std::move(go), now, orders);

@@ -66,6 +66,13 @@ class StepSize {
   int index_ = 0;
 };
 
+/// A position prompt that is closed, or wasn't opened, although the user may still be typing into
+/// it. What is typed must not be taken for commands.
+struct ClosedPrompt {
+  std::string axis;
+  bool typed = false;  ///< a part of a number was typed: what follows may be its unit
+};
+
 /// What the user wants, and the results: the part of the console that is neither ROS nor a
 /// terminal. It has no clock: times are seconds on any clock that never goes back.
 ///
@@ -85,7 +92,9 @@ class Session {
 
   /// All keys since the last call. An emergency stop among them comes first, and the other keys are
   /// dropped. While a position is being typed, or the question about zero is open, the keys belong
-  /// to that, except for those that stop or quit; Escape cancels it.
+  /// to that, except for those that stop or quit; Escape cancels it. After a prompt that was
+  /// refused or that a stop has closed, see closedPrompt(), the keys of a number do nothing until
+  /// Enter or Escape, and once one was typed, nor do all others but those that stop or quit.
   Orders press(const std::vector<Key>& keys, double now);
   /// Handles the passing of time. Call it often.
   Orders tick(double now);
@@ -112,6 +121,8 @@ class Session {
   const StepSize& stepSize() const { return step_size_; }
   /// The position that is being typed; nullptr: none.
   const PositionPrompt* prompt() const { return prompt_ ? &*prompt_ : nullptr; }
+  /// nullptr: no typing is left over.
+  const ClosedPrompt* closedPrompt() const { return closed_prompt_ ? &*closed_prompt_ : nullptr; }
   /// The axis whose present position becomes 0 if the user says yes; empty: no such question.
   const std::optional<std::string>& zeroAsked() const { return zero_asked_; }
   /// The driver's, whoever set it; empty: unknown, because the driver's state isn't live.
@@ -134,6 +145,10 @@ class Session {
   /// Obeys a key that stops or quits, and closes what is being typed or asked.
   bool leavesDialogue(Key key, double now, Orders& orders);
   void goToTyped(double now, Orders& orders);
+  /// Closes the prompt, and the question about zero, before the user has answered them.
+  void closeDialogues();
+  /// Whether a key was meant for a prompt that is closed.
+  bool isLeftOver(Key key);
   void askForZero(double now);
   void answerZero(Key key, double now, Orders& orders);
   /// Says why not.
@@ -152,6 +167,7 @@ class Session {
   HeldJog jog_;
   StepSize step_size_;
   std::optional<PositionPrompt> prompt_;
+  std::optional<ClosedPrompt> closed_prompt_;
   std::optional<std::string> zero_asked_;
   std::optional<double> override_;
   std::string chosen_;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <ros/console.h>
+
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -21,6 +23,15 @@ inline std::string messageOf(const std::vector<axis::HomingResult>& results) {
     text += (text.empty() ? "" : "; ") + result.message;
   }
   return text;
+}
+
+/// For homings that nobody waits for.
+inline void logHoming(const std::vector<axis::HomingResult>& results) {
+  if (areAllHomed(results)) {
+    ROS_INFO_NAMED("homing", "%s", messageOf(results).c_str());
+  } else {
+    ROS_WARN_NAMED("homing", "%s", messageOf(results).c_str());
+  }
 }
 
 }  // namespace stepdriver::ros_node

@@ -147,6 +147,61 @@ TEST(Axis, DistrustsThePositionAfterAnEndstopAtSpeed) {
   }
 }
 
+/// Moves of an axis x that nobody waits for, towards a min switch at -20 mm.
+axis::AxisState stateAtTheSwitch(const config::AxisConfig& config, double target) {
+  std::vector<sim::RigAxisSpec> specs = {rigAxis(config)};
+  specs[0].min_switch->position = -20.0;
+  Bench bench({config}, specs);
+  axis::Axis& x = bench.axis();
+  x.setPosition(0.0);
+  x.moveTo(target);
+  bench.machine->advance(10.0);
+  return x.state();
+}
+
+TEST(Axis, SaysInItsStateThatAMoveMetAnEndstop) {
+  std::vector<sim::RigAxisSpec> specs = {rigAxis(linearAxis("x"))};
+  specs[0].max_switch->position = 5.0;
+  Bench bench({linearAxis("x")}, specs);
+  axis::Axis& x = bench.axis();
+  x.setPosition(0.0);
+  EXPECT_EQ(x.state().stopped_by, "");
+  x.moveTo(0.05, false, 0.01);
+  bench.machine->advance(2.0);
+  EXPECT_EQ(x.state().stopped_by, "the max endstop was met at 0.005 m");
+  EXPECT_EQ(x.state().endstops_met, 1U);
+  EXPECT_REFUSED(x.moveTo(0.001, true), "max endstop is active");
+  EXPECT_NE(x.state().stopped_by, "") << "a refused motion hasn't begun";
+  x.moveTo(-0.001, true);
+  bench.machine->advance(0.01);
+  EXPECT_EQ(x.state().stopped_by, "") << "the next motion has begun";
+  EXPECT_EQ(x.state().endstops_met, 1U);
+}
+
+TEST(Axis, SaysThatAJogMetAnEndstop) {
+  std::vector<sim::RigAxisSpec> specs = {rigAxis(linearAxis("x"))};
+  specs[0].min_switch->position = -5.0;
+  Bench bench({linearAxis("x")}, specs);
+  bench.axis().jog(-0.01);
+  bench.machine->advance(2.0);
+  const std::string met = bench.axis().state().stopped_by;
+  EXPECT_NE(met.find("the min endstop was met at -0.005 m"), std::string::npos) << met;
+}
+
+TEST(Axis, SaysHowToConfigureASwitchThatARotaryAxisPasses) {
+  config::AxisConfig rotary = linearAxis("x");
+  const std::string advice = "keep the axis within a turn by min_position_deg and max_position_deg";
+  EXPECT_EQ(stateAtTheSwitch(rotary, -0.05).stopped_by.find(advice), std::string::npos);
+  rotary.kind = config::Kind::kRotary;
+  const std::string met = stateAtTheSwitch(rotary, -0.05).stopped_by;
+  EXPECT_NE(met.find(advice), std::string::npos) << met;
+  EXPECT_NE(met.find("remove endstops/min and homing"), std::string::npos) << met;
+  EXPECT_EQ(stateAtTheSwitch(rotary, -0.01).stopped_by, "") << "it doesn't get to the switch";
+  rotary.start_speed = rotary.max_speed;
+  EXPECT_EQ(stateAtTheSwitch(rotary, -0.05).stopped_by, "the min endstop was met at -0.02 rad")
+      << "it could stop there at once";
+}
+
 TEST(Axis, KnowsASwitchThatIsActiveAtTheStart) {
   std::vector<config::AxisConfig> configs = {linearAxis("x")};
   std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(configs);

@@ -12,6 +12,7 @@
 
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/refusal.h"
 
 namespace stepdriver {
 namespace {
@@ -62,6 +63,54 @@ TEST(Machine, MovesAxesAtOnce) {
   EXPECT_EQ(bench.pulses("x"), 4000);
   EXPECT_EQ(bench.pulses("y"), -2400);
   EXPECT_EQ(violationsOf(bench.report("x")) + violationsOf(bench.report("y")), "");
+}
+
+/// Whether an axis is enabled, for each axis.
+std::vector<bool> enabledAxes(const Bench& bench) {
+  std::vector<bool> enabled;
+  for (const auto& axis : bench.machine->axes()) enabled.push_back(axis->state().enabled);
+  return enabled;
+}
+
+TEST(Machine, EnablesAndDisablesAllAxesAtOnce) {
+  std::vector<config::AxisConfig> configs = {linearAxis("x"), linearAxis("y", "drv8825"),
+                                             linearAxis("always_on")};
+  for (config::AxisConfig& config : configs) config.enable_on_start = false;
+  configs[2].pins.enable = {};
+  Bench bench(configs);
+  EXPECT_EQ(enabledAxes(bench), (std::vector<bool>{false, false, true}));
+  bench.machine->enable(true);
+  EXPECT_EQ(enabledAxes(bench), (std::vector<bool>{true, true, true}));
+
+  const axis::Move x = bench.axis("x").moveTo(0.08);
+  const axis::Move y = bench.axis("y").moveTo(-0.08);
+  bench.machine->advance(0.3);
+  const double before = bench.axis("x").state().velocity;
+  bench.machine->enable(false);
+  EXPECT_EQ(enabledAxes(bench), (std::vector<bool>{false, false, true}));
+  EXPECT_EQ(bench.axis("x").wait(x).end, axis::MoveEnd::kStopped);
+  EXPECT_EQ(bench.axis("y").wait(y).end, axis::MoveEnd::kStopped);
+  // Both decelerate at the same time.
+  const double ramp = before / bench.axis("x").config().deceleration;
+  EXPECT_NEAR(bench.axis("x").wait(x).duration, 0.3 + ramp, 0.01);
+  EXPECT_NEAR(bench.axis("y").wait(y).duration, 0.3 + ramp, 0.01);
+  EXPECT_EQ(violationsOf(bench.report("x")) + violationsOf(bench.report("y")), "");
+}
+
+TEST(Machine, EnablesNoAxisIfOneCannotBe) {
+  std::vector<config::AxisConfig> configs = {linearAxis("x"), linearAxis("y")};
+  for (config::AxisConfig& config : configs) config.enable_on_start = false;
+  Bench bench(configs);
+  bench.machine->emergencyStop();
+  EXPECT_REFUSED(bench.machine->enable(true), "x: at fault: emergency stop");
+  EXPECT_EQ(enabledAxes(bench), (std::vector<bool>{false, false}));
+  bench.machine->recover();
+  bench.machine->enable(true);
+  EXPECT_EQ(enabledAxes(bench), (std::vector<bool>{true, true}));
+
+  for (config::AxisConfig& config : configs) config.pins.enable = {};
+  Bench unwired(configs);
+  EXPECT_REFUSED(unwired.machine->enable(false), "no axis has pins/enable");
 }
 
 TEST(Machine, StopsAllAxes) {

@@ -1511,7 +1511,7 @@ void Participants::probeAxis(std::size_t axis) {
     if (reply.failure) oracle_.complain(name + ": " + what + ": " + reply.failure->text);
   };
   must("wake", machine::Sleep{axis, false});
-  must("enable", machine::Enable{axis, true});
+  must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
   const double way = before > 3.0 ? -0.002 : 0.002;
   const std::size_t moves = moves_.size();

@@ -101,6 +101,11 @@ struct AxisState {
   double time_left = 0.0;
   std::string fault;   ///< in words; empty: no fault
   std::string remedy;  ///< what ends the fault, in words; empty if there is none
+  /// At which endstop its last motion ended, and where; empty: at none, it was a homing, or the
+  /// next motion has begun.
+  std::string stopped_by;
+  /// How many motions have ended at an endstop, except those of a homing.
+  std::uint64_t endstops_met = 0;
   /// How many times something has stopped the axis, moving or not (a stop, a hold, a disable, a
   /// sleep, a fault, an emergency stop), or ended that (a resume, an enable, a wake, a recover).
   std::uint64_t stops = 0;

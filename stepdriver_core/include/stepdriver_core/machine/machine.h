@@ -283,6 +283,14 @@ class Machine {
   ///   be written; it names the axis, which stays at fault. The other axes have recovered.
   void recover();
 
+  /// Energizes the motors of all axes that have an enable line, or switches their current off:
+  /// those that move decelerate first, all at once. Returns when it is done for all, see
+  /// Axis::enable().
+  ///
+  /// @throw Refused if one of them can't be enabled now, for example because it is at fault: then
+  ///   none is. Also if no axis has such a line.
+  void enable(bool on);
+
   /// Refuses every command from now on, decelerates, and disables the axes that are configured so.
   /// Returns when that is done.
   ///

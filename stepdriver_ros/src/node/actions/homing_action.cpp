@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "node/homing_results.h"
+#include "node/refusal_log.h"
 
 namespace stepdriver::ros_node {
 namespace {
@@ -48,6 +49,7 @@ void HomingAction::home(Goals::GoalHandle& goal, const std::function<bool()>& ca
     answer.message = result.message;
   } catch (const std::exception& error) {
     answer.message = error.what();
+    logRefusal(answer.message);
   }
   answer.position = axis_.state().position;
   if (end == axis::HomingEnd::kHomed) {
@@ -81,6 +83,7 @@ void MachineHomingAction::home(Goals::GoalHandle& goal, const std::function<bool
     answer.message = messageOf(results);
   } catch (const std::exception& error) {
     answer.message = error.what();
+    logRefusal(answer.message);
   }
   for (const axis::HomingResult& result : results) {
     answer.name.push_back(result.axis);

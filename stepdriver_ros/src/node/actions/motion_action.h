@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "action_server.h"
+#include "node/refusal_log.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::ros_node {
@@ -122,6 +123,7 @@ class MotionAction {
         handle.setCanceled({}, kCancelledBefore);
       } else {
         reject(handle, error);
+        logRefusal(error.what());
       }
       concludeEnded();
     }

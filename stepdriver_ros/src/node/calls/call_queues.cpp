@@ -26,6 +26,7 @@ CallQueues::CallQueues(std::size_t axes)
     axes_.emplace_back(waiting_pool_, kThreadsPerAxis);
     power_.emplace_back(waiting_pool_, kPowerThreadsPerAxis);
   }
+  power_.emplace_back(waiting_pool_, kPowerThreadsPerAxis);
 }
 
 void CallQueues::start() {

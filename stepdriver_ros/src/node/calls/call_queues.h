@@ -25,7 +25,7 @@ namespace stepdriver::ros_node {
 /// Nothing that stops a motion waits behind another call. Stops and holds have a socket and a
 /// thread of their own, which serves them one after another, and so does the emergency stop: they
 /// don't even wait while roscpp reads a long message. Enabling and disabling has its own share for
-/// each axis, because a disable waits for standstill.
+/// each axis, and one for all axes at once, because a disable waits for standstill.
 ///
 /// Created and used by one thread; any thread may use the queues themselves.
 class CallQueues {
@@ -52,6 +52,8 @@ class CallQueues {
   ros::CallbackQueue& recordings() { return recordings_; }
   /// Calls that enable or disable this axis.
   ros::CallbackQueue& power(std::size_t axis) { return power_.at(axis); }
+  /// Calls that enable or disable all axes.
+  ros::CallbackQueue& powerOfAll() { return power_.back(); }
   /// Recover, resume, and everything that answers at once.
   ros::CallbackQueue& control() { return control_; }
   /// Stops and holds, which answer at once.
@@ -72,7 +74,7 @@ class CallQueues {
   CallPool waiting_pool_;
   CallPool control_pool_;
   std::deque<PooledQueue> axes_;
-  std::deque<PooledQueue> power_;
+  std::deque<PooledQueue> power_;  // of each axis, and of all
   PooledQueue lines_;
   PooledQueue trajectories_;
   PooledQueue streams_;

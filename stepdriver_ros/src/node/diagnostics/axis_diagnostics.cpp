@@ -80,6 +80,9 @@ void reportAxis(const config::AxisConfig& config, const AxisReading& reading,
   if (!reading.endstop_error.empty()) {
     status.mergeSummary(DiagnosticStatus::ERROR, reading.endstop_error);
   }
+  if (!state.stopped_by.empty()) {
+    status.mergeSummary(DiagnosticStatus::WARN, "its last motion ended early: " + state.stopped_by);
+  }
   if (!state.position_valid) {
     status.mergeSummary(DiagnosticStatus::WARN,
                         "the position is unverified" +

@@ -5,6 +5,7 @@
 #include <exception>
 #include <string>
 
+#include "node/homing_results.h"
 #include "respond.h"
 
 namespace stepdriver::ros_node {
@@ -27,7 +28,7 @@ bool AxisHomeService::home(Home::Request& request, Home::Response& response) {
     task_.start([this] { axis_.checkHoming(); },
                 [this] {
                   try {
-                    ROS_INFO_NAMED("homing", "%s", axis_.home().message.c_str());
+                    logHoming({axis_.home()});
                   } catch (const std::exception& error) {
                     ROS_ERROR_NAMED("homing", "%s", error.what());
                   }

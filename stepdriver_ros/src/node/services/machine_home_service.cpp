@@ -15,7 +15,7 @@ namespace {
 
 void homeAndLog(machine::Machine& machine, const std::vector<std::string>& names) {
   try {
-    ROS_INFO_NAMED("homing", "%s", messageOf(machine.home(names)).c_str());
+    logHoming(machine.home(names));
   } catch (const std::exception& error) {
     ROS_ERROR_NAMED("homing", "%s", error.what());
   }

@@ -129,6 +129,14 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
   node_.setCallbackQueue(&queues.control());
   servers_.push_back(node_.advertiseService(
       "recover", triggerHandler("all faults cleared", [&machine] { machine.recover(); })));
+  const boost::function<bool(std_srvs::SetBool::Request&, std_srvs::SetBool::Response&)> enable =
+      [&machine](std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+        return respond(response, [&] {
+          machine.enable(request.data != 0);
+          response.message = request.data != 0 ? "all axes are enabled" : "all axes are disabled";
+        });
+      };
+  servers_.push_back(onQueue(queues.powerOfAll(), node_).advertiseService("enable", enable));
   servers_.push_back(node_.advertiseService(
       "resume",
       triggerHandler("the hold is over: held motions continue", [&machine] { machine.resume(); })));

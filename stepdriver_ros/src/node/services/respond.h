@@ -2,11 +2,12 @@
 
 #include <exception>
 
-#include "stepdriver_core/error.h"
+#include "node/refusal_log.h"
 
 namespace stepdriver::ros_node {
 
-/// Answers a service call: exceptions of the core become `success: false` and a message.
+/// Answers a service call: exceptions of the core become `success: false` and a message,
+/// which is logged.
 ///
 /// @param action sets the other fields of the response, and success if it isn't simply true.
 /// @return true: the call is answered; with false, roscpp would tell the client nothing else.
@@ -18,6 +19,7 @@ bool respond(Response& response, const Action& action) {
   } catch (const std::exception& error) {
     response.success = false;
     response.message = error.what();
+    logRefusal(response.message);
   }
   return true;
 }

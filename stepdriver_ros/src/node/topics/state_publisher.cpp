@@ -35,7 +35,8 @@ bool differ(const axis::AxisState& one, const axis::AxisState& other) {
          one.moving != other.moving || one.held != other.held || one.homed != other.homed ||
          one.position_valid != other.position_valid || one.microsteps != other.microsteps ||
          one.target != other.target || one.speed_override != other.speed_override ||
-         one.fault != other.fault || one.position_note != other.position_note;
+         one.fault != other.fault || one.endstops_met != other.endstops_met ||
+         one.stopped_by != other.stopped_by || one.position_note != other.position_note;
 }
 
 }  // namespace
@@ -120,7 +121,19 @@ bool StatePublisher::sleepUntil(Clock::time_point time) {
 
 void StatePublisher::readStates() {
   states_read_ = ros::Time::now();
-  for (std::size_t i = 0; i < states_.size(); ++i) states_[i] = machine_.axes()[i]->state();
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    const std::uint64_t met_before = states_[i].endstops_met;
+    states_[i] = machine_.axes()[i]->state();
+    if (states_[i].endstops_met != met_before) logEndstop(i);
+  }
+}
+
+// If the next motion has begun already, its end is no longer known.
+void StatePublisher::logEndstop(std::size_t axis) const {
+  const std::string& what = states_[axis].stopped_by;
+  ROS_WARN_NAMED("endstops", "%s: its motion has ended: %s",
+                 machine_.axes()[axis]->config().name.c_str(),
+                 what.empty() ? "an endstop was met" : what.c_str());
 }
 
 void StatePublisher::publishJointStates() {
@@ -202,6 +215,7 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
     message.remedy.push_back(state.remedy);
     message.motor.push_back(motorWords(state));
     message.state.push_back(stateWords(state));
+    message.stopped_by.push_back(state.stopped_by);
     message.position_note.push_back(state.position_note);
   }
   axis_state_publisher_.publish(message);
@@ -234,6 +248,7 @@ void StatePublisher::publishStateOfEachAxis(bool due) {
     message.time_left = state.time_left;
     message.fault = state.fault;
     message.remedy = state.remedy;
+    message.stopped_by = state.stopped_by;
     message.position_note = state.position_note;
     own_state_publishers_[i].publish(message);
   }

@@ -41,6 +41,7 @@ class StatePublisher {
   void run();
   bool sleepUntil(Clock::time_point time);
   void readStates();
+  void logEndstop(std::size_t axis) const;
   void publishJointStates();
   void publishControllerState();
   void publishEndstopsOnChange();

@@ -1,5 +1,6 @@
 #include "trajectory_command.h"
 
+#include <ros/console.h>
 #include <ros/transport_hints.h>
 
 #include "stepdriver_core/error.h"
@@ -30,7 +31,8 @@ void TrajectoryCommand::take(const boost::shared_ptr<const Message>& message) {
       followMessage(machine_, *message, axes_, allow_slower_);
     }
   } catch (const Error& error) {
-    log_.warn(error.what());
+    const std::string why = error.what();
+    if (log_.isDue(why)) ROS_WARN_NAMED("trajectory", "command: %s", why.c_str());
   }
 }
 

@@ -7,7 +7,7 @@
 #include "common/latched_messages.h"
 #include "node/calls/bounded.h"
 #include "node/calls/call_queues.h"
-#include "refusal_log.h"
+#include "node/refusal_log.h"
 #include "stepdriver_core/machine/machine.h"
 #include "trajectory_message.h"
 
@@ -34,7 +34,7 @@ class TrajectoryCommand {
   machine::Machine& machine_;
   const AxisOfJoint axes_;
   const bool allow_slower_;
-  RefusalLog log_{"command"};
+  RefusalLog log_;
   ros::Subscriber subscriber_;
 };
 

@@ -18,16 +18,18 @@ std::string withoutNumbers(std::string text) {
 
 }  // namespace
 
-void RefusalLog::warn(const std::string& reason) {
+bool RefusalLog::isDue(const std::string& reason) {
   const ros::SteadyTime now = ros::SteadyTime::now();
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    for (auto entry = said_.begin(); entry != said_.end();) {
-      entry = now - entry->second >= kSayPeriod ? said_.erase(entry) : std::next(entry);
-    }
-    if (!said_.emplace(withoutNumbers(reason), now).second) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (auto entry = said_.begin(); entry != said_.end();) {
+    entry = now - entry->second >= kSayPeriod ? said_.erase(entry) : std::next(entry);
   }
-  ROS_WARN_NAMED("trajectory", "%s: %s", source_.c_str(), reason.c_str());
+  return said_.emplace(withoutNumbers(reason), now).second;
+}
+
+void logRefusal(const std::string& reason) {
+  static RefusalLog log;
+  if (log.isDue(reason)) ROS_WARN_NAMED("refused", "Refused: %s", reason.c_str());
 }
 
 }  // namespace stepdriver::ros_node
