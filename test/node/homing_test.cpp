@@ -54,7 +54,6 @@ class Homing : public testing::Test {
 };
 
 TEST_F(Homing, FindsTheZeroAndThenMovesToAbsolutePositions) {
-  node.set("axes/x/require_homing", true);
   node.start();
   const Recorder<AxisStates> states(node.full("axis_states"));
   const auto refused = node.moveTo(0.1, true);

@@ -36,6 +36,7 @@ class KilledNode : public testing::Test {
       node.set(std::string("axes/") + axis + "/holds_position_unpowered", true);
     }
     node.set("axes/x/homing/switch", "min");
+    node.set("axes/x/require_homing", false);
     node.set("axes/x/homing/seek_speed_mm_s", 0.01);  // takes minutes
     node.set("axes/x/homing/latch_speed_mm_s", 0.01);
     node.set("axes/x/homing/pull_off_mm", 1.0);

@@ -100,7 +100,8 @@ TEST(Launch, KeepsNodesInNamespacesApart) {
   const Recorder<JointState> both(std::string("/both/joint_states"));
   ASSERT_TRUE(waitUntil([&] { return left.count() > 0 && both.count() > 0; }));
   EXPECT_EQ(left.messages().back().name, std::vector<std::string>{"x_joint"});
-  EXPECT_EQ(both.messages().back().name, (std::vector<std::string>{"r_joint", "x_joint"}));
+  EXPECT_EQ(both.messages().back().name, (std::vector<std::string>{"x_joint", "r_joint"}))
+      << "in the order of the file";
 
   const auto before = callWhenThere<RigReport>("/both/stepdriver/rig/report");
   MoveTo::Request request;
@@ -119,29 +120,41 @@ TEST(Launch, BringsUpTwoAxesThatMoveAtTheSameTime) {
   const std::string node = "/both/stepdriver";
   std_srvs::SetBool::Request on;
   on.data = true;
-  for (const char* axis : {"x", "r"}) {
-    EXPECT_TRUE(callWhenThere<std_srvs::SetBool>(node + "/" + axis + "/enable", on).success);
-  }
+  EXPECT_TRUE(callWhenThere<std_srvs::SetBool>(node + "/enable", on).success);
   MoveTo::Request request;
   request.position = 0.05;
+  const auto refused = callWhenThere<MoveTo>(node + "/x/move_to", request);
+  EXPECT_FALSE(refused.success) << "it has a homing, and isn't homed";
+  HomeAxes::Request waiting;
+  waiting.wait = true;
+  const auto homed = callWhenThere<HomeAxes>(node + "/home", waiting);
+  EXPECT_TRUE(homed.success) << homed.message;
   EXPECT_TRUE(callWhenThere<MoveTo>(node + "/x/move_to", request).success);
   request.position = 1.0;
   EXPECT_TRUE(callWhenThere<MoveTo>(node + "/r/move_to", request).success);
   const Recorder<JointState> states(std::string("/both/joint_states"));
   EXPECT_TRUE(states.waitForLatest([](const JointState& s) {
-    return std::abs(s.position.at(0) - 1.0) < 1e-3 && std::abs(s.position.at(1) - 0.05) < 1e-4;
+    return std::abs(s.position.at(0) - 0.05) < 1e-4 && std::abs(s.position.at(1) - 1.0) < 1e-3;
   }));
 }
 
 TEST(Launch, BringsUpAPlotterThatDrawsALine) {
+  HomeAxes::Request waiting;
+  waiting.wait = true;
+  const auto homed = callWhenThere<HomeAxes>("/plotter/stepdriver/home", waiting);
+  EXPECT_TRUE(homed.success) << homed.message;
   MoveLine::Request request;
   request.name = {"x", "y"};
-  request.position = {0.08, 0.06};
+  request.position = {0.0, 0.0};
   request.wait = true;
+  EXPECT_TRUE(callWhenThere<MoveLine>("/plotter/stepdriver/move_line", request).success);
+  const auto before = callWhenThere<RigReport>("/plotter/stepdriver/rig/report");
+  request.position = {0.08, 0.06};
   const auto answer = callWhenThere<MoveLine>("/plotter/stepdriver/move_line", request);
   EXPECT_TRUE(answer.success) << answer.message;
   const auto report = callWhenThere<RigReport>("/plotter/stepdriver/rig/report");
-  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{6400, 4800}));
+  EXPECT_EQ(report.pulses_forward[0] - before.pulses_forward[0], 6400);
+  EXPECT_EQ(report.pulses_forward[1] - before.pulses_forward[1], 4800);
   EXPECT_EQ(report.violations, (std::vector<std::int64_t>{0, 0}));
   const Recorder<JointState> states(std::string("/plotter/joint_states"));
   ASSERT_TRUE(states.waitForLatest([](const JointState&) { return true; }));
@@ -160,8 +173,8 @@ TEST(Launch, JogsTwoAxesByAJoystick) {
   EXPECT_TRUE(waitUntil([&] {
     joy.publish(sticks);
     const auto now = callWhenThere<RigReport>(node + "/rig/report");
-    return now.pulses_backward.at(0) > before.pulses_backward.at(0) &&
-           now.pulses_forward.at(1) > before.pulses_forward.at(1);
+    return now.pulses_backward.at(1) > before.pulses_backward.at(1) &&
+           now.pulses_forward.at(0) > before.pulses_forward.at(0);
   })) << "r is inverted, and enabled by the joystick's node";
 }
 

@@ -26,6 +26,7 @@
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/tmux.h"
 #include "support/wait.h"
 
 namespace stepdriver::node_test {
@@ -290,6 +291,31 @@ TEST_F(MasterTest, ThatHangsIsReportedAndHoldsUpNothing) {
   node.process().signal(SIGTERM);
   EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
   master->signal(SIGCONT);
+}
+
+// roslaunch ends the master that it has started, and the next launch starts another one.
+TEST(Console, FindsADriverThatIsRestartedWithTheMaster) {
+  if (!Tmux::possible()) GTEST_SKIP() << "this machine has no terminals: /dev/pts isn't mounted";
+  const Tmux terminal(80, 24);
+  {
+    NodeUnderTest node;
+    node.start();
+    terminal.type(std::string(STEPDRIVER_PROGRAMS) + "/console --driver " + node.name());
+    ASSERT_TRUE(terminal.waitFor(" live"));
+  }
+  ASSERT_TRUE(terminal.waitFor("NO STATE FOR"));
+  master->kill();
+  ASSERT_TRUE(terminal.waitFor("the ROS master doesn't answer"));
+  master->start();
+  ASSERT_TRUE(master->answers());
+  NodeUnderTest node;
+  node.start();
+  ASSERT_TRUE(terminal.waitFor(" live"));
+  terminal.press("+");
+  EXPECT_TRUE(waitUntil([&] { return node.pulses() == 1; })) << terminal.screen();
+  terminal.press(" ");
+  EXPECT_TRUE(terminal.waitFor("EMERGENCY STOP: the driver has stopped every axis"));
+  terminal.press("q");
 }
 
 }  // namespace

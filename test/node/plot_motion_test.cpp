@@ -5,6 +5,7 @@
 
 #include "support/node_under_test.h"
 #include "support/program.h"
+#include "support/rotary_axis.h"
 #include "support/says.h"
 #include "support/temporary_file.h"
 
@@ -25,6 +26,19 @@ TEST(PlotMotion, DrawsWhatARunningNodeWouldDoAndMovesNothing) {
     expectSays(picture.text(), words);
   }
   EXPECT_EQ(node.pulses(), 0);
+}
+
+TEST(PlotMotion, TakesDegreesForARotaryAxis) {
+  NodeUnderTest node;
+  makeRotary(node);
+  node.start();
+  const TemporaryFile picture(".svg");
+  for (const char* how : {"--by", "--to"}) {
+    const auto end = runProgram("plot_motion", {"plan", "--node", node.name(), "--axis", "x", how,
+                                                "90", "--velocity", "45", "-o", picture.path()});
+    EXPECT_EQ(end.code, 0) << end.output;
+    expectSays(end.output, "x: from 0 to 90 deg in 2.");
+  }
 }
 
 TEST(PlotMotion, SaysWhyItDrawsNothing) {

@@ -76,5 +76,80 @@ TEST(ReadingARobotDescription, RefusesWhatIsNestedTooDeep) {
   expectSays(mistakeIn(robot({}, nested(100'000))), "Excessive depth");
 }
 
+/// An axis x that was fitted to a joint with this limit.
+config::AxisConfig fitted(const std::string& limit, std::vector<std::string>* warnings = nullptr,
+                          std::vector<ConfigIssue>* issues = nullptr) {
+  config::AxisConfig x;
+  x.name = "x";
+  x.joint = "x_joint";
+  x.max_speed = 0.1;
+  x.steps_per_unit = 80000.0;
+  std::vector<config::AxisConfig> axes{x};
+  std::vector<ConfigIssue> found;
+  const std::string urdf =
+      "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>"
+      "<joint name=\"y_joint\" type=\"prismatic\"><parent link=\"a\"/><child link=\"c\"/>"
+      "<limit lower=\"0\" upper=\"1\" velocity=\"1\" effort=\"1\"/></joint>"
+      "<joint name=\"x_joint\" type=\"prismatic\"><parent link=\"a\"/><child link=\"b\"/>" +
+      limit + "</joint></robot>";
+  const auto said = ros_node::applyRobotDescription(urdf, "/robot_description", axes, found);
+  if (warnings != nullptr) *warnings = said;
+  if (issues == nullptr) {
+    for (const ConfigIssue& issue : found) ADD_FAILURE() << issue.message;
+  } else {
+    *issues = found;
+  }
+  return axes.front();
+}
+
+TEST(ReadingARobotDescription, TakesLimitsBeyondAllStepsForNone) {
+  for (const std::string far : {"1e16", "1e300"}) {
+    const config::AxisConfig free = fitted("<limit lower=\"-" + far + "\" upper=\"" + far +
+                                           "\" velocity=\"1e16\" effort=\"1e16\"/>");
+    EXPECT_FALSE(free.min_position) << far;
+    EXPECT_FALSE(free.max_position) << far;
+    EXPECT_EQ(free.max_speed, 0.1);
+  }
+  const config::AxisConfig half =
+      fitted("<limit lower=\"-0.2\" upper=\"1e16\" velocity=\"1\" effort=\"1\"/>");
+  EXPECT_EQ(half.min_position, -0.2);
+  EXPECT_FALSE(half.max_position);
+  std::vector<ConfigIssue> issues;
+  fitted("<limit lower=\"1e16\" upper=\"2e16\" velocity=\"1\" effort=\"1\"/>", nullptr, &issues);
+  ASSERT_EQ(issues.size(), 1U) << "no position is in it";
+  expectSays(issues[0].message, "as far as steps are counted");
+}
+
+TEST(ReadingARobotDescription, TightensLimitsByASafetyController) {
+  const std::string limit = "<limit lower=\"0\" upper=\"0.2\" velocity=\"1\" effort=\"1\"/>";
+  const auto safety = [&limit](const std::string& soft) {
+    return limit + "<safety_controller " + soft + " k_velocity=\"10\"/>";
+  };
+  const config::AxisConfig tight =
+      fitted(safety("soft_lower_limit=\"0.01\" soft_upper_limit=\"0.15\""));
+  EXPECT_EQ(tight.min_position, 0.01);
+  EXPECT_EQ(tight.max_position, 0.15);
+  EXPECT_EQ(tight.min_position_source, config::LimitSource::kRobotDescription);
+  const config::AxisConfig wide =
+      fitted(safety("soft_lower_limit=\"-1\" soft_upper_limit=\"0.15\""));
+  EXPECT_EQ(wide.min_position, 0.0);
+  EXPECT_EQ(wide.max_position, 0.15);
+  const config::AxisConfig without = fitted(safety(""));
+  EXPECT_EQ(without.min_position, 0.0);
+  EXPECT_EQ(without.max_position, 0.2);
+  std::vector<ConfigIssue> issues;
+  fitted(safety("soft_lower_limit=\"0.3\" soft_upper_limit=\"0.4\""), nullptr, &issues);
+  ASSERT_EQ(issues.size(), 1U);
+  expectSays(issues[0].message, "soft_lower_limit=0.3 and soft_upper_limit=0.4");
+}
+
+TEST(ReadingARobotDescription, WarnsOfAnAxisWhoseJointMimicsAnother) {
+  std::vector<std::string> warnings;
+  fitted("<limit lower=\"0\" upper=\"0.2\" velocity=\"1\" effort=\"1\"/><mimic joint=\"y_joint\"/>",
+         &warnings);
+  ASSERT_EQ(warnings.size(), 1U);
+  expectSays(warnings[0], "axis x has the joint x_joint, which mimics y_joint");
+}
+
 }  // namespace
 }  // namespace stepdriver::node_test

@@ -113,14 +113,28 @@ TEST(ReadingTrajectories, ComesSoonerByWhatOfItHasGoneBy) {
   expectTimes(read, {0.0, 0.3, 0.8});
 }
 
-TEST(ReadingTrajectories, RefusesAPointInThePast) {
-  auto given = message({"elbow"}, {0.0, 0.5, 1.0});
+TEST(ReadingTrajectories, DropsPointsInThePast) {
+  auto given = message({"elbow"}, {0.0, 0.5, 1.0, 1.5});
+  for (std::size_t i = 0; i < 4; ++i) given.points[i].positions = {0.1 * static_cast<double>(i)};
   given.header.stamp = kNow - ros::Duration(0.75);
-  expectBadMessage(BadTrajectory::Kind::kOldStamp,
-                   "point 1, 0.5 s after header.stamp, is in the past by 0.25 s", given);
+  machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  expectTimes(read, {0.25, 0.75});
+  EXPECT_EQ(read.points[0].positions, std::vector<double>{0.1 * 2.0});
+  given.header.stamp = kNow - ros::Duration(1.0);
+  read = trajectoryRequest(given, kAxes, kNow);
+  expectTimes(read, {0.5});
+  EXPECT_EQ(read.begin_in, 0.0);
+}
+
+TEST(ReadingTrajectories, RefusesOneThatIsWhollyInThePast) {
+  auto given = message({"elbow"}, {0.0, 0.5, 1.0});
+  given.header.stamp = kNow - ros::Duration(1.25);
+  expectBadMessage(
+      BadTrajectory::Kind::kOldStamp,
+      "all of its points are in the past: the last one, 1 s after header.stamp, by 0.25 s", given);
   auto only = message({"elbow"}, {0.0});
   only.header.stamp = kNow - ros::Duration(0.001);
-  expectBadMessage(BadTrajectory::Kind::kOldStamp, "point 0", only);
+  expectBadMessage(BadTrajectory::Kind::kOldStamp, "all of its points are in the past", only);
 }
 
 // ros::Time counts to 2106, but a difference of more than 68 years is no ros::Duration.
@@ -129,7 +143,7 @@ TEST(ReadingTrajectories, TakesAStampOfAnyYear) {
   given.header.stamp = ros::Time(4'294'967'295, 0);
   EXPECT_NEAR(trajectoryRequest(given, kAxes, kNow).begin_in, 4'294'967'295.0 - kNow.toSec(), 1e-5);
   given.header.stamp = ros::Time(1, 0);
-  expectBad(BadTrajectory::Kind::kOldStamp, "is in the past by 4294967293 s",
+  expectBad(BadTrajectory::Kind::kOldStamp, "after header.stamp, by 4294967293 s",
             [&] { trajectoryRequest(given, kAxes, ros::Time(4'294'967'295, 0)); });
 }
 

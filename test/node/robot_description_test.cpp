@@ -155,7 +155,7 @@ const std::vector<BadDescription> kBadDescriptions = {
      robot("prismatic", R"(<limit lower="0" upper="0.1" velocity="1e-300" effort="1"/>)"),
      "which is 0.001 steps/s"},
     {"FartherThanStepsAreCounted", true,
-     robot("revolute", R"(<limit lower="-1e300" upper="0.1" velocity="1" effort="1"/>)"),
+     robot("revolute", R"(<limit lower="1e16" upper="1e300" velocity="1" effort="1"/>)"),
      "which is as far as steps are counted"},
     {"ElsewhereThanTheAxis", false,
      robot("prismatic", R"(<limit lower="1" upper="2" velocity="1" effort="1"/>)"),

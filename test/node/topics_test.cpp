@@ -214,6 +214,17 @@ TEST(RigClock, IsPublishedIfItIsAskedFor) {
   }
 }
 
+TEST(RigClock, IsMissedIfNothingPublishesIt) {
+  ros::param::set("/use_sim_time", true);
+  NodeUnderTest node;
+  node.start();
+  ros::param::del("/use_sim_time");
+  EXPECT_TRUE(waitUntil([&] {
+    return node.process().output().find("use_sim_time is true, but nothing publishes /clock") !=
+           std::string::npos;
+  })) << node.process().output();
+}
+
 // Nodes with use_sim_time take their time from it, this one too.
 TEST(RigClock, StampsTheStatesWithSimulatedTime) {
   ros::param::set("/use_sim_time", true);

@@ -182,7 +182,7 @@ TEST_F(TrajectoryActionTest, RejectsWhatIsNoTrajectoryForItsAxes) {
   expectRejected(changed([](Goal& g) { g.trajectory.points[1].time_from_start.fromSec(0.05); }),
                  Result::INVALID_GOAL, "the trajectory's velocity is");
   expectRejected(changed([](Goal& g) { g.trajectory.header.stamp = ros::Time(1.0); }),
-                 Result::OLD_HEADER_TIMESTAMP, "point 1, 1 s after header.stamp, is in the past");
+                 Result::OLD_HEADER_TIMESTAMP, "all of its points are in the past");
   expectRejected(changed([](Goal& g) { tolerate(g.path_tolerance, "wrist", 1.0); }),
                  Result::INVALID_GOAL, "path_tolerance names the joint wrist");
   EXPECT_EQ(node.pulses(), 0);

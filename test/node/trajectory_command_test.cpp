@@ -97,7 +97,7 @@ TEST_F(TrajectoryCommandTest, MovesNothingByWhatItRefusesAndSaysWhy) {
       {changed([nan](auto& m) { m.points[0].positions[1] = nan; }), "among its positions"},
       {changed([](auto& m) { m.points[0].positions[0] = 0.3; }), "0.2 m"},
       {changed([](auto& m) { m.points[0].time_from_start.fromSec(0.1); }), "velocity is"},
-      {changed([](auto& m) { m.header.stamp = ros::Time(1.0); }), "is in the past"},
+      {changed([](auto& m) { m.header.stamp = ros::Time(1.0); }), "in the past"},
   };
   for (const auto& [message, words] : bad) {
     publisher.publish(message);

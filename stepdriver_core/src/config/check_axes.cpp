@@ -135,4 +135,22 @@ void checkAxes(const std::vector<AxisConfig>& axes) {
   if (!issues.empty()) throw ConfigError(std::move(issues));
 }
 
+std::vector<std::string> homingWarnings(const std::vector<AxisConfig>& axes) {
+  std::vector<std::string> warnings;
+  for (const AxisConfig& axis : axes) {
+    if (!axis.homing || !axis.brake) continue;
+    std::vector<std::string> others;
+    for (const AxisConfig& other : axes) {
+      const bool together = other.homing && other.homing->order == axis.homing->order;
+      if (together && other.name != axis.name) others.push_back(other.name);
+    }
+    if (others.empty()) continue;
+    warnings.push_back(fmt::format(
+        "axis {0} has a brake, so it may be vertical, but it is homed together with {1}: each has "
+        "the homing/order {2}. If {0} must be out of the way first, give it a lower homing/order",
+        axis.name, listText(others, "and"), axis.homing->order));
+  }
+  return warnings;
+}
+
 }  // namespace stepdriver::config

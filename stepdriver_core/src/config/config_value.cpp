@@ -1,5 +1,7 @@
 #include "stepdriver_core/config/config_value.h"
 
+#include <set>
+
 #include "message_text.h"
 #include "stepdriver_core/printable.h"
 
@@ -13,6 +15,20 @@ std::string doubleText(double number) {
 }
 
 }  // namespace
+
+std::vector<std::string> ConfigValue::orderedKeys() const {
+  std::vector<std::string> keys;
+  const auto* map = as<Map>();
+  if (map == nullptr) return keys;
+  std::set<std::string> ordered;
+  for (const std::string& key : key_order_) {
+    if (map->count(key) > 0 && ordered.insert(key).second) keys.push_back(key);
+  }
+  for (const auto& entry : *map) {
+    if (ordered.count(entry.first) == 0) keys.push_back(entry.first);
+  }
+  return keys;
+}
 
 std::string ConfigValue::shown() const {
   if (const auto* flag = as<bool>()) return *flag ? "true" : "false";

@@ -172,7 +172,9 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
   const auto& map = *axes.as<ConfigValue::Map>();
   if (map.empty()) reader.issue("", "is empty, but must be a map of at least one axis");
   AxesReader each(issues, used, own);
-  for (const auto& entry : map) configs.push_back(each.read(entry.first, reader.map(entry.first)));
+  for (const std::string& key : axes.orderedKeys()) {
+    configs.push_back(each.read(key, reader.map(key)));
+  }
   return configs;
 }
 

@@ -17,6 +17,17 @@ namespace {
 constexpr double kLongestDebounceMs = 1000.0;
 constexpr int kHighestOrder = 1000;
 
+/// Whether the trigger of the homing lies so far inside the soft limit at its end that the axis,
+/// pulled off, hasn't left the part between the two: no motion gets there, because the switch is an
+/// endstop.
+bool triggersInside(const AxisConfig& axis, const HomingConfig& homing) {
+  const auto& limit = homing.at_max ? axis.max_position : axis.min_position;
+  if (!limit) return false;
+  const double inside = homing.at_max ? *limit - homing.offset : homing.offset - *limit;
+  const double step = axis.steps_per_unit > 0.0 ? 1.0 / axis.steps_per_unit : 0.0;
+  return inside > homing.pull_off + step;
+}
+
 class HomingReader {
  public:
   HomingReader(ConfigReader& axis, const MotionKeys& keys, const AxisConfig& config)
@@ -118,6 +129,22 @@ class HomingReader {
     const double rest = restOf(homing);
     const std::string stands =
         homing_.has(offset_key) ? "is " + homing_.shown(offset_key) : "is missing, and so 0";
+    if (triggersInside(config_, homing)) {
+      const std::string limit = homing.at_max ? keys_.max_position : keys_.min_position;
+      const double clear =
+          homing.at_max ? homing.offset + homing.pull_off : homing.offset - homing.pull_off;
+      return homing_.issue(
+          offset_key,
+          fmt::format(
+              "{}, so that nothing of the way between the {} switch and {}, which is {}, "
+              "can be reached, because no motion passes an endstop; it must be {} {}, or {} "
+              "must be {} {}",
+              stands, homing.at_max ? "max" : "min", limit, axis_.shown(limit),
+              homing.at_max ? "at least" : "at most",
+              roughText(units(homing.at_max ? *config_.max_position - homing.pull_off
+                                            : *config_.min_position + homing.pull_off)),
+              limit, homing.at_max ? "at most" : "at least", roughText(units(clear))));
+    }
     const auto check = [&](const std::optional<double>& limit, bool beyond, const char* word,
                            const std::string& key) {
       if (!limit || !beyond) return;
@@ -151,7 +178,7 @@ double restOf(const HomingConfig& homing) {
 
 void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {
   axis.allow("homing");
-  config.require_homing = axis.boolean("require_homing", config.require_homing);
+  config.require_homing = axis.boolean("require_homing", axis.has("homing"));
   if (axis.has("homing")) {
     if (kind) config.homing = HomingReader(axis, motionKeys(*kind), config).read();
   } else if (config.require_homing) {

@@ -154,7 +154,7 @@ class Converter {
         return {std::move(list)};
       }
       case YAML::NodeType::Map:
-        return {map(node, depth)};
+        return orderedMap(node, depth);
       default:
         return {};
     }
@@ -205,6 +205,14 @@ class Converter {
     if (const auto* word = key.as<std::string>()) return *word;
     fail(node.Mark(), fmt::format("the key {} is read as {}, but must be a word: put it in quotes",
                                   node.Scalar(), key.shown()));
+  }
+
+  ConfigValue orderedMap(const YAML::Node& node, int depth) {
+    ConfigValue value(map(node, depth));
+    std::vector<std::string> keys;
+    for (const auto& entry : node) keys.push_back(entry.first.Scalar());
+    value.setKeyOrder(std::move(keys));
+    return value;
   }
 
   ConfigValue::Map map(const YAML::Node& node, int depth) {

@@ -70,12 +70,12 @@ constexpr std::size_t kLongestPlainKey = 250;  // bytes
 void emit(YAML::Emitter& emitter, const ConfigValue& value) {
   if (const auto* map = value.as<ConfigValue::Map>()) {
     emitter << YAML::BeginMap;
-    for (const auto& [key, below] : *map) {
+    for (const std::string& key : value.orderedKeys()) {
       if (key.size() > kLongestPlainKey) emitter << YAML::LongKey;
       emitter << YAML::Key;
       emitText(emitter, key);
       emitter << YAML::Value;
-      emit(emitter, below);
+      emit(emitter, map->at(key));
     }
     emitter << YAML::EndMap;
   } else if (const auto* list = value.as<ConfigValue::List>()) {

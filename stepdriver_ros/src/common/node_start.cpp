@@ -17,6 +17,20 @@ namespace {
 
 constexpr std::chrono::milliseconds kMasterPoll{200};
 
+/// The parameter server keeps the order in which parameters were set, and tells it in the list of
+/// their names; in the values it is lost, because roscpp sorts them.
+std::vector<std::string> keysInOrder(const std::string& space) {
+  std::vector<std::string> names;
+  std::vector<std::string> keys;
+  if (!ros::param::getParamNames(names)) return keys;
+  for (const std::string& name : names) {
+    if (name.rfind(space + "/", 0) != 0) continue;
+    const std::string key = name.substr(space.size() + 1);
+    keys.push_back(key.substr(0, key.find('/')));
+  }
+  return keys;
+}
+
 }  // namespace
 
 std::optional<int> handleArguments(int argc, char** argv, const std::string& usage) {
@@ -45,7 +59,12 @@ bool waitForMaster(EndRequests& end_requests) {
 config::ConfigValue privateParameters(const std::string& node_name) {
   XmlRpc::XmlRpcValue tree;
   if (!ros::param::get(node_name, tree)) return config::ConfigValue::Map{};
-  return configValue(tree);
+  config::ConfigValue parameters = configValue(tree);
+  auto* const map = parameters.as<config::ConfigValue::Map>();
+  if (map == nullptr) return parameters;
+  const auto axes = map->find("axes");
+  if (axes != map->end()) axes->second.setKeyOrder(keysInOrder(node_name + "/axes"));
+  return parameters;
 }
 
 void explain(const ConfigError& error, const std::string& node_name,

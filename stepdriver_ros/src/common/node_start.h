@@ -24,7 +24,8 @@ std::optional<int> handleArguments(int argc, char** argv, const std::string& usa
 bool waitForMaster(EndRequests& end_requests);
 
 /// @param node_name full name of a node.
-/// @return its private parameters as one map, empty if there are none.
+/// @return its private parameters as one map, empty if there are none. The keys of `axes` have the
+///   order in which they were set, which is that of the file.
 config::ConfigValue privateParameters(const std::string& node_name);
 
 /// Logs all mistakes in the parameters. If some of them may be left over from an earlier launch, it

@@ -4,7 +4,7 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 #include <optional>
 
 #include "common/text.h"
@@ -17,6 +17,7 @@ namespace {
 
 // The relative error of a number with six digits.
 constexpr double kRounding = 1e-5;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using config::AxisConfig;
 using config::Kind;
@@ -113,25 +114,51 @@ class JointFitter {
           roundedText(limits.lower), roundedText(limits.upper)));
       right = false;
     } else if (limited && isTooFar(limits)) {
-      const double farthest = config::kFarthestLimit / axis_.steps_per_unit;
+      const double counted = config::kFarthestLimit / axis_.steps_per_unit;
       issueOfJoint(fmt::format(
-          "has lower={} and upper={}, but they must be from -{} to {} {}, which is as far as steps "
-          "are counted",
-          roundedText(limits.lower), roundedText(limits.upper), roundedText(farthest),
-          roundedText(farthest), config::unitOf(axis_.kind)));
+          "has lower={} and upper={}, but a part of that must be from -{} to {} {}, which is as "
+          "far as steps are counted",
+          roundedText(limits.lower), roundedText(limits.upper), roundedText(counted),
+          roundedText(counted), config::unitOf(axis_.kind)));
+      right = false;
+    } else if (const Range range = rangeOf(joint); limited && !(range.lower < range.upper)) {
+      issueOfJoint(fmt::format(
+          "has a safety_controller with soft_lower_limit={} and soft_upper_limit={} (a missing one "
+          "is 0), which leaves nothing of its limits, {} to {}",
+          roundedText(joint.safety->soft_lower_limit), roundedText(joint.safety->soft_upper_limit),
+          roundedText(limits.lower), roundedText(limits.upper)));
       right = false;
     }
     return right;
   }
 
-  /// Whether a limit that the axis would get is beyond the steps that are counted.
+  /// [unit] As far as steps are counted. A limit beyond, such as 1e16, limits nothing.
+  double farthest() const {
+    return config::kFarthestLimit * (1.0 + kRounding) / axis_.steps_per_unit;
+  }
+
+  /// Whether the joint is only where no steps are counted.
   bool isTooFar(const urdf::JointLimits& limits) const {
-    const double farthest = config::kFarthestLimit * (1.0 + kRounding);
-    const auto is_too_far = [&](const std::optional<double>& own, double limit) {
-      return !own && std::abs(limit) * axis_.steps_per_unit > farthest;
-    };
-    return is_too_far(axis_.min_position, limits.lower) ||
-           is_too_far(axis_.max_position, limits.upper);
+    return limits.lower > farthest() || limits.upper < -farthest();
+  }
+
+  /// The limits of the position with those of the joint's safety_controller, which gives none if
+  /// both are 0, as missing ones are.
+  struct Range {
+    double lower;
+    double upper;
+  };
+  static Range rangeOf(const urdf::Joint& joint) {
+    Range range{joint.limits->lower, joint.limits->upper};
+    if (hasSoftLimits(joint)) {
+      range.lower = std::max(range.lower, joint.safety->soft_lower_limit);
+      range.upper = std::min(range.upper, joint.safety->soft_upper_limit);
+    }
+    return range;
+  }
+  static bool hasSoftLimits(const urdf::Joint& joint) {
+    return joint.safety &&
+           (joint.safety->soft_lower_limit != 0.0 || joint.safety->soft_upper_limit != 0.0);
   }
 
   /// [unit/s] 0 if the scale of the axis is not known.
@@ -151,17 +178,18 @@ class JointFitter {
       axis_.max_speed_source = LimitSource::kRobotDescription;
     }
     if (joint.type == urdf::Joint::CONTINUOUS) return;
-    if (!axis_.min_position || limits.lower > *axis_.min_position) {
-      axis_.min_position = limits.lower;
+    const Range range = rangeOf(joint);
+    if (range.lower >= -farthest() && range.lower > axis_.min_position.value_or(-kInfinity)) {
+      axis_.min_position = range.lower;
       axis_.min_position_source = LimitSource::kRobotDescription;
     }
-    if (!axis_.max_position || limits.upper < *axis_.max_position) {
-      axis_.max_position = limits.upper;
+    if (range.upper <= farthest() && range.upper < axis_.max_position.value_or(kInfinity)) {
+      axis_.max_position = range.upper;
       axis_.max_position_source = LimitSource::kRobotDescription;
     }
-    if (*axis_.min_position < *axis_.max_position) return;
+    if (axis_.min_position.value_or(-kInfinity) < axis_.max_position.value_or(kInfinity)) return;
     issueOfJoint(fmt::format("goes from {} to {} {}, which doesn't overlap the axis's own range",
-                             roundedText(limits.lower), roundedText(limits.upper),
+                             roundedText(range.lower), roundedText(range.upper),
                              config::unitOf(axis_.kind)));
   }
 
@@ -209,6 +237,13 @@ std::vector<std::string> applyRobotDescription(const std::string& urdf, const st
     if (joint && joint->type == urdf::Joint::CONTINUOUS &&
         (axis.min_position || axis.max_position)) {
       warnings.push_back(continuousJointText(axis));
+    }
+    if (joint && joint->mimic) {
+      warnings.push_back(fmt::format(
+          "axis {} has the joint {}, which mimics {} in the robot description: programs that use "
+          "the description compute its position from that joint and never command it. Remove the "
+          "<mimic>, or make its motor one of the motors of the other axis",
+          axis.name, axis.joint, joint->mimic->joint_name));
     }
   }
   return warnings;

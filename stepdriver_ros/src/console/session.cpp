@@ -295,7 +295,7 @@ void Session::typeInto(Key key, double now, Orders& orders) {
 void Session::goToTyped(double now, Orders& orders) {
   const PositionPrompt typed = *prompt_;
   prompt_.reset();
-  // Whoever has not seen the refusal types again, as into an open prompt.
+  // If it is refused, the user may type again, as into an open prompt.
   closed_prompt_ = ClosedPrompt{typed.axis()};
   const std::string why = hindrance(typed.axis(), now);
   if (!why.empty()) {

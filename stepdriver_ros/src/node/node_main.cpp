@@ -2,14 +2,17 @@
 #include <pthread.h>
 #include <ros/console.h>
 #include <ros/init.h>
+#include <ros/master.h>
 #include <ros/node_handle.h>
 #include <ros/this_node.h>
+#include <ros/time.h>
 
 #include <boost/thread/exceptions.hpp>
 #include <cstddef>
 #include <cstdlib>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <new>
 #include <optional>
 #include <string>
@@ -21,6 +24,7 @@
 #include "common/latched_messages.h"
 #include "common/loopback_only.h"
 #include "common/master_directory.h"
+#include "common/master_watch.h"
 #include "common/node_config.h"
 #include "common/node_start.h"
 #include "common/xml_depth.h"
@@ -37,7 +41,6 @@
 #include "node/diagnostics/diagnostics.h"
 #include "node/flight_recorder_service.h"
 #include "node/master/end_despite_master.h"
-#include "node/master/master_watch.h"
 #include "node/memory_reserve.h"
 #include "node/parameters/read_parameters.h"
 #include "node/services/axis_home_service.h"
@@ -64,6 +67,8 @@ constexpr int kExitStateFile = 4;
 constexpr int kExitExhausted = 5;
 
 constexpr std::chrono::milliseconds kPoll{1000};
+// A simulator that is launched together with the node may take so long to publish its clock.
+constexpr int kPollsUntilClock = 5;
 // Time for the calls that arrived while the axes came to rest.
 constexpr std::chrono::milliseconds kLastAnswers{500};
 
@@ -168,6 +173,14 @@ void warnOfSlowness(const std::vector<config::AxisConfig>& axes,
   }
 }
 
+void warnWithoutClock() {
+  if (ros::Time::isSystemTime() || !ros::Time::now().isZero()) return;
+  ROS_WARN_NAMED("node",
+                 "use_sim_time is true, but nothing publishes /clock: the stamps of all messages "
+                 "are 0, and stamped trajectories aren't followed. Start the simulator, set "
+                 "publish_clock to true, or delete the parameter /use_sim_time");
+}
+
 void warnOfPositions(const machine::Machine& machine) {
   for (const auto& axis : machine.axes()) {
     const std::string note = axis->state().position_note;
@@ -175,6 +188,27 @@ void warnOfPositions(const machine::Machine& machine) {
     ROS_WARN_NAMED("position", "%s: its position is unverified: %s", axis->config().name.c_str(),
                    note.c_str());
   }
+}
+
+MasterWatch::Events loggedEvents(const std::function<void()>& lost,
+                                 const std::function<bool()>& forgotten) {
+  MasterWatch::Events events;
+  events.lost = [lost] {
+    ROS_ERROR_NAMED("master",
+                    "The ROS master at %s doesn't answer. Clients that are connected are served; "
+                    "new ones can't find this node until the master is back",
+                    ros::master::getURI().c_str());
+    lost();
+  };
+  events.found = [] { ROS_INFO_NAMED("master", "The ROS master answers again"); };
+  events.forgotten = forgotten;
+  events.registered = [](const Registrations& all) {
+    ROS_WARN_NAMED("master",
+                   "The ROS master was restarted: %zu topics and %zu services are registered "
+                   "again. It has forgotten all parameters, also this node's",
+                   all.topics(), all.services());
+  };
+  return events;
 }
 
 void stopForLostMaster(machine::Machine& machine) {
@@ -249,11 +283,12 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
                                              config.allow_slower);
   TrajectoryAction trajectory_action(private_node, machine, queues, topics, config.allow_slower);
   const std::string description = hardware.description();
-  MasterWatch master_watch(
-      [&] {
-        if (config.stop_on_master_lost) stopForLostMaster(machine);
-      },
-      [&] { return latched.lookAgain(); });
+  MasterWatch master_watch(private_node.resolveName("emergency_stop"),
+                           loggedEvents(
+                               [&] {
+                                 if (config.stop_on_master_lost) stopForLostMaster(machine);
+                               },
+                               [&] { return latched.lookAgain(); }));
   DescriptorWatch descriptors;
   const Diagnostics diagnostics(
       node, private_node, machine, queues, master_watch, descriptors,
@@ -272,8 +307,9 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
 
   MemoryWatch memory;
   std::string who;
-  while (who.empty()) {
+  for (int polls = 1; who.empty(); ++polls) {
     who = end_requests.waitFor(kPoll);
+    if (polls == kPollsUntilClock) warnWithoutClock();
     descriptors.look();
     memory.look();
     if (end_requests.takeRecordingRequest()) recorder.request("SIGUSR1");

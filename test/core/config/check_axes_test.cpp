@@ -42,6 +42,32 @@ std::string mistakesOf(const std::function<void(Axes&)>& change) {
   return "";
 }
 
+/// An axis with a homing of this order.
+AxisConfig homedAxis(const std::string& name, int order, bool brake) {
+  AxisConfig axis;
+  axis.name = name;
+  axis.homing.emplace();
+  axis.homing->order = order;
+  if (brake) axis.brake.emplace();
+  return axis;
+}
+
+TEST(HomingWarnings, NameAnAxisWithABrakeThatIsHomedTogetherWithOthers) {
+  EXPECT_EQ(homingWarnings({homedAxis("x", 0, false), homedAxis("y", 0, false)}),
+            std::vector<std::string>{});
+  EXPECT_EQ(homingWarnings({homedAxis("x", 1, false), homedAxis("z", 0, true)}),
+            std::vector<std::string>{});
+  EXPECT_EQ(
+      homingWarnings({homedAxis("x", 0, false), homedAxis("y", 0, false), homedAxis("z", 0, true)}),
+      std::vector<std::string>{
+          "axis z has a brake, so it may be vertical, but it is homed together with x and y: "
+          "each has the homing/order 0. If z must be out of the way first, give it a lower "
+          "homing/order"});
+  AxisConfig unhomed = homedAxis("x", 0, false);
+  unhomed.homing.reset();
+  EXPECT_EQ(homingWarnings({unhomed, homedAxis("z", 0, true)}), std::vector<std::string>{});
+}
+
 /// Both axes share their motors.
 void share(Axes& axes, const std::vector<std::string>& names, const Matrix& matrix) {
   auto shared = std::make_shared<Kinematics>();

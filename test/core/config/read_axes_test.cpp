@@ -146,6 +146,19 @@ TEST(ReadAxes, GivesTheAxesInTheOrderOfTheirNames) {
   EXPECT_EQ(configs[2].name, "y");
 }
 
+TEST(ReadAxes, GivesTheAxesInTheOrderOfTheFileIfItIsKnown) {
+  std::vector<ConfigIssue> issues;
+  ConfigValue axes =
+      mapOf({{"y", rotaryAxis("b")}, {"b", linearAxis("a")}, {"a", linearAxis("c")}});
+  axes.setKeyOrder({"y", "gone", "a", "y"});
+  const auto configs = readAxes(axes, "/axes", issues);
+  EXPECT_EQ(linesOf(issues), Lines{});
+  ASSERT_EQ(configs.size(), 3U);
+  EXPECT_EQ(configs[0].name, "y");
+  EXPECT_EQ(configs[1].name, "a");
+  EXPECT_EQ(configs[2].name, "b") << "not in the order that is known";
+}
+
 TEST(ReadAxes, NeedsAMapOfAtLeastOneAxis) {
   EXPECT_EQ(issuesOf({}), Lines{"/axes: is missing; it must be a map of at least one axis"});
   EXPECT_EQ(issuesOf(ConfigValue::Map{}),

@@ -132,13 +132,40 @@ TEST(ReadHoming, ChecksItAgainstTheAxis) {
         "is 100000000000.0, but must be at most 13743800000, which is 2^40 steps"},
        {"homing/pull_off_mm", 251.0, "is 251.0, but must be at most max_travel_mm, which is 250.0"},
        {"homing/offset_mm", -4.0, ""},
-       {"homing/offset_mm", 196.0, ""},
+       {"homing/offset_mm", 4.0, ""},
+       {"homing/offset_mm", 4.1,
+        "is 4.1, so that nothing of the way between the min switch and min_position_mm, which is "
+        "0.0, can be reached, because no motion passes an endstop; it must be at most 4, or "
+        "min_position_mm must be at least 0.1"},
        {"homing/offset_mm", -4.1,
         "is -4.1, so that the axis stands at -0.1 when it is homed, but that must be at least "
         "min_position_mm, which is 0.0"},
-       {"homing/offset_mm", 197.0,
-        "is 197.0, so that the axis stands at 201 when it is homed, but that must be at most "
-        "max_position_mm, which is 200.0"}});
+       {"homing/offset_mm", 100.0,
+        "is 100.0, so that nothing of the way between the min switch and min_position_mm, which is "
+        "0.0, can be reached, because no motion passes an endstop; it must be at most 4, or "
+        "min_position_mm must be at least 96"}});
+}
+
+TEST(ReadHoming, RefusesATriggerThatIsAtTheOtherEnd) {
+  ConfigValue axis = withSwitch(homingAxis(), "max");
+  drop(axis, "endstops/min");
+  put(axis, "homing/switch", "max");
+  put(axis, "homing/pull_off_mm", 0.0);
+  drop(axis, "homing/offset_mm");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/offset_mm",
+                    "is missing, and so 0, so that nothing of the way between the max switch and "
+                    "max_position_mm, which is 200.0, can be reached, because no motion passes an "
+                    "endstop; it must be at least 200, or max_position_mm must be at most 0"));
+  put(axis, "homing/offset_mm", 200.0);
+  EXPECT_EQ(issuesOfX(axis), Lines{});
+}
+
+TEST(ReadHoming, IsRequiredIfItIsConfiguredUnlessTheFileSaysOtherwise) {
+  ConfigValue axis = homingAxis();
+  EXPECT_TRUE(readX(axis).require_homing);
+  put(axis, "require_homing", false);
+  EXPECT_FALSE(readX(axis).require_homing);
 }
 
 TEST(ReadHoming, LatchesNoFasterThanItSeeks) {

@@ -172,6 +172,14 @@ TEST(Yaml, ResolvesAliasesAndMergeKeys) {
   EXPECT_EQ(pin("z", "step") + pin("z", "dir"), "AD");
 }
 
+TEST(Yaml, KeepsTheOrderOfKeys) {
+  const ConfigValue tree = parse("z: 1\nb: {y: 1, a: 2}\na: 3\n", "text");
+  EXPECT_EQ(tree.orderedKeys(), (std::vector<std::string>{"z", "b", "a"}));
+  EXPECT_EQ(tree.as<ConfigValue::Map>()->at("b").orderedKeys(),
+            (std::vector<std::string>{"y", "a"}));
+  EXPECT_EQ(parse(textOf(tree), "text").orderedKeys(), tree.orderedKeys());
+}
+
 TEST(Yaml, SaysWhereItIsWrong) {
   EXPECT_EQ(errorOf("a: 1\nb: [1, 2\n").rfind("axis.yaml:3:1: ", 0), 0U) << errorOf("b: [1, 2\n");
   EXPECT_EQ(errorOf("a: 1\na: 2\n"), "axis.yaml:2:1: the key a occurs twice");

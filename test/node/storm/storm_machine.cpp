@@ -60,6 +60,7 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node) {
     node.set(std::string("axes/x/endstops/") + end + "/active_level", "high");
   }
   node.set("axes/x/homing/switch", "min");
+  node.set("axes/x/require_homing", false);
   node.set("axes/x/homing/seek_speed_mm_s", 60.0);
   node.set("axes/x/homing/latch_speed_mm_s", 5.0);
   node.set("axes/x/homing/pull_off_mm", 2.0);

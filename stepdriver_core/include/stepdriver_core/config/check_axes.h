@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "stepdriver_core/config/axis_config.h"
@@ -16,5 +17,11 @@ namespace stepdriver::config {
 /// @throw ConfigError with all issues, for example "axes/x/deceleration_mm_s2: is 0.0, but must be
 ///   above 0".
 void checkAxes(const std::vector<AxisConfig>& axes);
+
+/// What is allowed, but may not be meant, of the order in which axes are homed: an axis with a
+/// brake, which may carry a load, is homed together with others, whose way it may be in.
+///
+/// @return a sentence for each such axis.
+std::vector<std::string> homingWarnings(const std::vector<AxisConfig>& axes);
 
 }  // namespace stepdriver::config

@@ -34,6 +34,11 @@ class ConfigValue {
     return std::get_if<T>(&value_);
   }
 
+  /// @param keys of a map, in the order in which they were written.
+  void setKeyOrder(std::vector<std::string> keys) { key_order_ = std::move(keys); }
+  /// The keys of a map: those whose order is known in that order, and then the others, sorted.
+  std::vector<std::string> orderedKeys() const;
+
   /// Whether this is a key without a value, such as `key:` in YAML.
   bool isNothing() const { return std::holds_alternative<std::monostate>(value_); }
 
@@ -42,6 +47,7 @@ class ConfigValue {
 
  private:
   std::variant<std::monostate, bool, int, double, std::string, List, Map> value_;
+  std::vector<std::string> key_order_;  // may have keys that the map doesn't have
 };
 
 }  // namespace stepdriver::config

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "common/master_watch.h"
 #include "common/node_config.h"
 #include "node/calls/call_queues.h"
 #include "node/calls/descriptor_watch.h"
 #include "node/flight_recorder_service.h"
-#include "node/master/master_watch.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/machine.h"
 

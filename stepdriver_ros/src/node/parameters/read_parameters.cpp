@@ -5,12 +5,14 @@
 #include <ros/this_node.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/description_parameter.h"
 #include "common/node_start.h"
 #include "common/robot_description.h"
 #include "common/xmlrpc_value.h"
+#include "stepdriver_core/config/check_axes.h"
 #include "stepdriver_core/config/config_reader.h"
 #include "stepdriver_core/error.h"
 
@@ -69,6 +71,9 @@ Parameters readParameters() {
     setup::checkSimulation(config.axes, config.simulation, name + "/simulation", issues);
   }
   if (!issues.empty()) throw ConfigError(issues);
+  for (std::string& warning : config::homingWarnings(config.axes)) {
+    parameters.warnings.push_back(std::move(warning));
+  }
   for (const config::AxisConfig& axis : config.axes) parameters.notes.push_back(limitsText(axis));
   return parameters;
 }

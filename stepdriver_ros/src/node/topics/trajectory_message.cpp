@@ -1,6 +1,7 @@
 #include "trajectory_message.h"
 
 #include <fmt/format.h>
+#include <ros/console.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -27,18 +28,23 @@ double secondsFrom(ros::Time begin, ros::Time end) {
                                     static_cast<std::int64_t>(begin.toNSec()));
 }
 
-/// [s] A point's time after the start of a trajectory that began `late` ago.
-double timeOf(const trajectory_msgs::JointTrajectory& message, std::size_t index, double late) {
-  const double planned = message.points[index].time_from_start.toSec();
-  if (late == 0.0) return planned;
-  const bool tells_where_it_begins = index == 0 && planned == 0.0 && message.points.size() > 1;
-  if (tells_where_it_begins) return 0.0;
-  if (planned <= late) {
-    throw BadTrajectory(Wrong::kOldStamp,
-                        fmt::format("point {}, {} s after header.stamp, is in the past by {} s",
-                                    index, roundedText(planned), roundedText(late - planned)));
+/// The first point of a trajectory, which began `late` ago, that isn't in the past.
+std::size_t firstPoint(const trajectory_msgs::JointTrajectory& message, double late) {
+  const auto time = [&message](std::size_t index) {
+    return message.points[index].time_from_start.toSec();
+  };
+  if (late == 0.0) return 0;
+  std::size_t first = 0;
+  while (first < message.points.size() && time(first) <= late) ++first;
+  if (first == message.points.size()) {
+    throw BadTrajectory(
+        Wrong::kOldStamp,
+        fmt::format(
+            "all of its points are in the past: the last one, {} s after header.stamp, by {} s",
+            roundedText(time(first - 1)), roundedText(late - time(first - 1))));
   }
-  return planned - late;
+  // A first one at time 0 tells where it begins.
+  return first == 1 && time(0) == 0.0 ? 0 : first;
 }
 
 axis::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point, double time) {
@@ -85,8 +91,10 @@ machine::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTraject
   const double ahead = message.header.stamp.isZero() ? 0.0 : secondsFrom(now, message.header.stamp);
   if (ahead > kShortestDelay) request.begin_in = ahead;
   const double late = std::max(0.0, -ahead);
-  for (std::size_t i = 0; i < message.points.size(); ++i) {
-    request.points.push_back(pointOf(message.points[i], timeOf(message, i, late)));
+  for (std::size_t i = firstPoint(message, late); i < message.points.size(); ++i) {
+    const double time = message.points[i].time_from_start.toSec();
+    request.points.push_back(
+        pointOf(message.points[i], late > 0.0 ? std::max(0.0, time - late) : time));
   }
   return request;
 }
@@ -96,6 +104,10 @@ machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const AxisOfJoint& axes, bool allow_slower) {
   machine::TrajectoryRequest request = trajectoryRequest(message, axes, ros::Time::now());
   request.allow_slower = allow_slower;
+  if (const std::size_t dropped = message.points.size() - request.points.size(); dropped > 0) {
+    ROS_WARN_NAMED("trajectory", "The first %zu of %zu points are dropped: they are in the past",
+                   dropped, message.points.size());
+  }
   return machine.followTrajectory(request);
 }
 

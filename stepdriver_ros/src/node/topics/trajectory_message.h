@@ -18,7 +18,7 @@ class BadTrajectory : public Refused {
   enum class Kind {
     kInvalid,
     kJoints,    ///< an unknown joint, no joint, or a joint twice
-    kOldStamp,  ///< a point is in the past
+    kOldStamp,  ///< all points are in the past
   };
 
   BadTrajectory(Kind kind, const std::string& message) : Refused(message), kind_(kind) {}
@@ -39,8 +39,9 @@ AxisOfJoint axisOfJoint(const machine::Machine& machine);
 std::vector<std::string> axesOf(const std::vector<std::string>& joints, const AxisOfJoint& axes);
 
 /// Translates a message for the axes. The header's stamp gives the start of the trajectory; 0 means
-/// at once. A stamp in the past shortens the time to the points. A first point at time 0 only gives
-/// the start position, and is never too late if others follow. The machine checks the numbers and
+/// at once. A stamp in the past shortens the time to the points, and those that are in the past are
+/// dropped. A first point at time 0 only gives the start position, and is kept if all others are
+/// ahead. The machine checks the numbers and
 /// their count.
 ///
 /// @throw BadTrajectory

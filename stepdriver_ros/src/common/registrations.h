@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/xmlrpc_caller.h"
+#include "xmlrpc_caller.h"
 
 namespace stepdriver::ros_node {
 

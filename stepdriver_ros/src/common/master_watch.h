@@ -8,21 +8,29 @@
 #include <string>
 #include <thread>
 
-#include "common/xmlrpc_caller.h"
 #include "registrations.h"
+#include "xmlrpc_caller.h"
 
 namespace stepdriver::ros_node {
 
-/// Asks the ROS master each second for this node's emergency stop, and registers all topics and
+/// Asks the ROS master each second for a service of this node, and registers all topics and
 /// services again with a master that has forgotten them, because it was restarted or was told so:
 /// roscpp registers only once, and without that no new client would find anything of the node. If a
 /// newer node has taken this one's name, nothing is registered again: the name is that one's.
 class MasterWatch {
  public:
-  /// @param on_lost called in the watch's thread each time the master no longer answers.
-  /// @param on_restarted called in the watch's thread before this node registers with a master that
-  ///   has forgotten it; false: it must be called again a second later.
-  MasterWatch(std::function<void()> on_lost, std::function<bool()> on_restarted);
+  /// What is called in the watch's thread.
+  struct Events {
+    std::function<void()> lost;   ///< the master no longer answers
+    std::function<void()> found;  ///< it answers again
+    /// Before this node registers with a master that has forgotten it. False: it must be called
+    /// again a second later.
+    std::function<bool()> forgotten;
+    std::function<void(const Registrations&)> registered;  ///< with that master
+  };
+
+  /// @param service of this node, by its full name.
+  MasterWatch(std::string service, Events events);
   ~MasterWatch();
   MasterWatch(const MasterWatch&) = delete;
   MasterWatch& operator=(const MasterWatch&) = delete;
@@ -51,8 +59,8 @@ class MasterWatch {
   std::optional<bool> hasAnotherNode();
   void registerAgain();
 
-  const std::function<void()> on_lost_;
-  const std::function<bool()> on_restarted_;
+  const std::string service_;
+  const Events events_;
   XmlRpcCaller master_;
   // Of the watch's thread.
   std::optional<Registrations> registrations_;

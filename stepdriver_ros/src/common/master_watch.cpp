@@ -15,9 +15,9 @@ constexpr std::chrono::milliseconds kAskPeriod{1000};
 
 }  // namespace
 
-MasterWatch::MasterWatch(std::function<void()> on_lost, std::function<bool()> on_restarted)
-    : on_lost_(std::move(on_lost)),
-      on_restarted_(std::move(on_restarted)),
+MasterWatch::MasterWatch(std::string service, Events events)
+    : service_(std::move(service)),
+      events_(std::move(events)),
       master_(ros::master::getHost(), ros::master::getPort(), kMasterPatience) {}
 
 MasterWatch::~MasterWatch() { stop(); }
@@ -58,7 +58,7 @@ void MasterWatch::watch() {
 void MasterWatch::look() {
   const std::string& name = ros::this_node::getName();
   // A master may know a node without knowing all that it has registered. This must not be missing.
-  const auto found = master_.call("lookupService", name, name + "/emergency_stop");
+  const auto found = master_.call("lookupService", name, service_);
   if (!found) {
     lose();
     return;
@@ -88,11 +88,7 @@ void MasterWatch::lose() {
     if (lost_) return;
     lost_ = Clock::now();
   }
-  ROS_ERROR_NAMED("master",
-                  "The ROS master at %s doesn't answer. Clients that are connected are served; "
-                  "new ones can't find this node until the master is back",
-                  ros::master::getURI().c_str());
-  on_lost_();
+  events_.lost();
 }
 
 void MasterWatch::find() {
@@ -101,7 +97,7 @@ void MasterWatch::find() {
     if (!lost_) return;
     lost_.reset();
   }
-  ROS_INFO_NAMED("master", "The ROS master answers again");
+  events_.found();
 }
 
 void MasterWatch::registerAgain() {
@@ -111,17 +107,14 @@ void MasterWatch::registerAgain() {
                              "is registered: start the node again");
     return;
   }
-  registered_ = on_restarted_() && registrations_->registerAgain(
-                                       master_, ros::XMLRPCManager::instance()->getServerURI());
+  registered_ = events_.forgotten() && registrations_->registerAgain(
+                                           master_, ros::XMLRPCManager::instance()->getServerURI());
   if (!registered_) return;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++restarts_;
   }
-  ROS_WARN_NAMED("master",
-                 "The ROS master was restarted: %zu topics and %zu services are registered "
-                 "again. It has forgotten all parameters, also this node's",
-                 registrations_->topics(), registrations_->services());
+  events_.registered(*registrations_);
 }
 
 }  // namespace stepdriver::ros_node
