@@ -130,9 +130,9 @@ class AxisWriter {
     if (axis_.input_shaper.empty()) return;
     ConfigValue::List shapers;
     for (const ShaperConfig& shaper : axis_.input_shaper) {
-      shapers.push_back(ConfigValue::Map{{"type", shaperText(shaper.type)},
-                                         {"frequency", shaper.frequency},
-                                         {"damping", shaper.damping}});
+      shapers.emplace_back(ConfigValue::Map{{"type", shaperText(shaper.type)},
+                                            {"frequency", shaper.frequency},
+                                            {"damping", shaper.damping}});
     }
     map_["input_shaper"] = std::move(shapers);
   }
@@ -201,7 +201,7 @@ ConfigValue::Map writeSwitch(const InputSwitch& input) {
 ConfigValue::List writeMatrix(const Matrix& matrix) {
   ConfigValue::List rows;
   for (const std::vector<double>& row : matrix) {
-    rows.push_back(ConfigValue::List(row.begin(), row.end()));
+    rows.emplace_back(ConfigValue::List(row.begin(), row.end()));
   }
   return rows;
 }
