@@ -72,7 +72,7 @@ bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clo
   for (config::AxisConfig& axis : axes) {
     axis.enable_on_start = false;
     axis.disable_on_shutdown = true;
-    axis.require_homing = false;  // it goes back to where it was
+    axis.require_homing = false;  // its stroke ends at its beginning
   }
   machine::MachineOptions options = order.machine;
   options.measure = false;

@@ -137,7 +137,7 @@ class JointFitter {
     return config::kFarthestLimit * (1.0 + kRounding) / axis_.steps_per_unit;
   }
 
-  /// Whether the joint is only where no steps are counted.
+  /// Whether no position of the joint has a step that is counted.
   bool isTooFar(const urdf::JointLimits& limits) const {
     return limits.lower > farthest() || limits.upper < -farthest();
   }

@@ -43,7 +43,7 @@ std::size_t firstPoint(const trajectory_msgs::JointTrajectory& message, double l
             "all of its points are in the past: the last one, {} s after header.stamp, by {} s",
             roundedText(time(first - 1)), roundedText(late - time(first - 1))));
   }
-  // A first one at time 0 tells where it begins.
+  // The point at time 0 only gives the position of the start.
   return first == 1 && time(0) == 0.0 ? 0 : first;
 }
 
