@@ -583,7 +583,7 @@ void Participants::post(int client, const std::string& name, machine::Request re
     x = y = x || y;
   }
   const auto* enable = std::get_if<machine::Enable>(&request);
-  if (enable != nullptr && enable->on) asked.enables = enable->axis;
+  if (enable != nullptr && enable->on) asked.enables = enable->axes.front();
   asked.request = std::move(request);
   noteGoals(asked);
   asked.posted = clock_.now();
