@@ -29,10 +29,8 @@ def number(message, key):
 
 def enable(machine, message):
     on = message.get("on") is True
-    if message.get("axis") is None and machine.driver.has("enable"):
-        return machine.driver.call("enable", SetBool, data=on).message
-    axes = list(machine.axes) if message.get("axis") is None else [axis_of(machine, message).name]
-    return "; ".join(machine.driver.call(f"{axis}/enable", SetBool, data=on).message for axis in axes)
+    of = "" if message.get("axis") is None else f"{axis_of(machine, message).name}/"
+    return machine.driver.call(f"{of}enable", SetBool, data=on).message
 
 
 def home(machine, message):

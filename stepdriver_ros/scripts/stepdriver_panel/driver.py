@@ -10,7 +10,6 @@ import time
 from collections import deque
 from concurrent.futures import Future, wait
 
-import rosgraph
 import rospy
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
@@ -168,14 +167,6 @@ class Driver:
         if not answer.success:
             raise Refusal(in_page_units(answer.message))
         return answer
-
-    def has(self, service):
-        """Whether a service exists below the driver's name."""
-        try:
-            rosgraph.Master(rospy.get_name()).lookupService(f"{self.name}/{service}")
-        except (rosgraph.MasterException, OSError):
-            return False
-        return True
 
     def parameters(self):
         """The driver's parameters. It waits for the master: call it in a thread."""

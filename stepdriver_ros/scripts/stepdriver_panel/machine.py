@@ -59,7 +59,7 @@ class Machine:
             "homed": message.homed[i], "valid": message.position_valid[i], "motor": message.motor[i],
             "state": message.state[i], "fault": in_page_units(message.fault[i]),
             "remedy": in_page_units(message.remedy[i]), "note": in_page_units(message.position_note[i]),
-            "target": message.target[i] * axis.factor,
+            "target": message.target[i] * axis.factor, "stoppedBy": in_page_units(message.stopped_by[i]),
             "min": switches["min"], "max": switches["max"]}
 
     def override(self):

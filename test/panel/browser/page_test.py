@@ -6,6 +6,7 @@ import unittest
 
 from machine import Machine, Network, Page, browser, wait_until
 from selenium.webdriver.common.keys import Keys
+from stepdriver.srv import MoveTo
 
 JOG_TIMEOUT = 1.5  # [s] of the machine: longer than a busy browser takes between two messages
 PRESSES = 5  # a jog may end by itself on a busy computer
@@ -96,6 +97,18 @@ class Controls(OnTheMachine):
         self.assertIn("valid", self.page.find(self.page.axis("x", '[data-field="validity"]')).text)
         self.assertFalse(self.page.find(self.page.axis("y", '[data-do="home"]')).is_displayed())
 
+    def test_an_endstop_that_ended_a_motion_is_shown(self):
+        from std_srvs.srv import SetBool
+        machine.call("x/move_to", MoveTo, position=0.05, wait=True)
+        self.page.find(self.page.axis("x", ".goto input")).send_keys("1", Keys.ENTER)
+        self.moves()
+        machine.call("rig/x/press_min", SetBool, data=True)
+        self.addCleanup(machine.call, "rig/x/press_min", SetBool, data=False)
+        self.rests()
+        wait_until(lambda: "endstop" in self.page.find(self.page.axis("x", '[data-field="stopped"]')).text,
+                   "the page says which")
+        wait_until(lambda: self.page.find(self.page.axis("x", '[data-field="min"]')).text == "PRESSED", "and that it is")
+
     def test_setting_zero_asks_first(self):
         self.page.click(self.page.axis("y", '[data-by="1"]'))
         machine.at_rest()
@@ -174,7 +187,6 @@ class Stops(OnTheMachine):
 class JogByPressAndHold(OnTheMachine):
     def setUp(self):
         super().setUp()
-        from stepdriver.srv import MoveTo
         machine.call("x/move_to", MoveTo, position=0.02, wait=True)
         wait_until(lambda: abs(position() - 20.0) < 0.02 and not machine.state("x")["moving"], "x is at 20 mm")
         self.page.click('[data-share="0.05"]')

@@ -91,6 +91,8 @@ class AxisCard {
     this.fields.state.className = `badge ${state.fault ? "bad" : state.held || !state.valid ? "warn" : "good"}`;
     setText(this.fields.motor, state.motor);
     setText(this.fields.validity, state.valid ? (state.homed ? "valid, homed" : "valid, not homed") : `not valid: ${state.note || (this.settings.homing ? "home it, or set zero" : "set zero")}`);
+    this.fields.stopped.hidden = !state.stoppedBy;
+    setText(this.fields.stopped, state.stoppedBy);
     for (const end of ["min", "max"]) {
       const there = this.settings.switches[end];
       setText(this.fields[end], !there ? "none" : state[end] === null ? "not known" : state[end] ? "PRESSED" : "open");
