@@ -39,14 +39,14 @@ struct Row {
   bool loaded = false;
   PacedFigures figures;
 
-  bool sound() const { return figures.too_short == 0 && figures.too_close == 0; }
+  bool sound() const { return figures.too_short == 0 && figures.early == 0; }
 };
 
 double us(pulse::Nanoseconds time) { return static_cast<double>(time) * 1e-3; }
 
 void printHead() {
   std::printf("%-15s %4s %7s %-6s %8s %9s %9s %9s %9s %6s %9s %6s %6s %5s\n", "", "axes", "steps/s",
-              "cores", "edges", "p50", "p99", "p99.9", "max", "slips", "slid ms", "short", "close",
+              "cores", "edges", "p50", "p99", "p99.9", "max", "slips", "slid ms", "short", "early",
               "cpu");
 }
 
@@ -57,7 +57,7 @@ void print(const Row& row) {
               us(figures.percentile(0.5)), us(figures.percentile(0.99)),
               us(figures.percentile(0.999)), us(figures.percentile(1.0)),
               static_cast<unsigned long long>(figures.slips),
-              static_cast<double>(figures.slipped) * 1e-6, figures.too_short, figures.too_close,
+              static_cast<double>(figures.slipped) * 1e-6, figures.too_short, figures.early,
               100.0 * figures.cpu);
   std::fflush(stdout);
 }
@@ -72,12 +72,12 @@ void write(const std::vector<Row>& rows, const std::string& file) {
         json,
         "  {\"what\": \"%s\", \"axes\": %d, \"steps_per_s\": %.0f, \"busy\": %s, \"edges\": %zu, "
         "\"late_us\": {\"p50\": %.3f, \"p99\": %.3f, \"p99.9\": %.3f, \"max\": %.3f}, "
-        "\"slips\": %llu, \"slipped_ms\": %.6f, \"too_short\": %zu, \"too_close\": %zu, "
+        "\"slips\": %llu, \"slipped_ms\": %.6f, \"too_short\": %zu, \"early\": %zu, "
         "\"cpu\": %.4f}%s\n",
         row.what.c_str(), row.axes, row.rate, row.loaded ? "true" : "false", figures.edges,
         us(figures.percentile(0.5)), us(figures.percentile(0.99)), us(figures.percentile(0.999)),
         us(figures.percentile(1.0)), static_cast<unsigned long long>(figures.slips),
-        static_cast<double>(figures.slipped) * 1e-6, figures.too_short, figures.too_close,
+        static_cast<double>(figures.slipped) * 1e-6, figures.too_short, figures.early,
         figures.cpu, &row == &rows.back() ? "" : ",");
   }
   std::fprintf(json, "]\n");

@@ -27,6 +27,7 @@ namespace {
 
 using pulse::Nanoseconds;
 
+constexpr int kMicrosteps = 16;                        // in a full step
 constexpr Nanoseconds kStepTime = 1000;               // an A4988's, high and low
 constexpr Nanoseconds kBegin = 20'000'000;            // from now
 constexpr Nanoseconds kMaxLateness = 60'000'000'000;  // a late edge is a result here, not a fault
@@ -113,6 +114,7 @@ Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rat
       follows[i].channel = static_cast<int>(i);
       follows[i].serial = serial;
       follows[i].profile = plan.profiles[i].get();
+      follows[i].full_step = kMicrosteps;
     }
     pulse::Command command;
     command.follows = follows.data();
@@ -126,13 +128,12 @@ Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rat
   }
 }
 
-// For one axis: compares each edge with the plan, and with the edge before it.
+// For one axis: compares each edge with the plan, and with the other edge of its pulse.
 void take(PacedFigures& figures, const std::vector<Edge>& edges, const motion::Profile& profile) {
   motion::StepFinder finder(profile, 0);
   motion::Step step;
   const Edge* rose = nullptr;
   const Edge* fell = nullptr;
-  std::int64_t planned_before = 0;
   for (const Edge& edge : edges) {
     const Edge* const before = edge.level ? fell : rose;
     if (before != nullptr && edge.time - before->time < kStepTime) ++figures.too_short;
@@ -143,11 +144,8 @@ void take(PacedFigures& figures, const std::vector<Edge>& edges, const motion::P
     if (!finder.next(step)) throw std::logic_error("more steps went out than were planned");
     ++figures.edges;
     figures.lateness.push_back(edge.time - (step.time_ns + edge.slipped));
-    const auto closest = static_cast<Nanoseconds>(
-        pulse::PulseEngine::kClosest * static_cast<double>(step.time_ns - planned_before));
-    if (rose != nullptr && edge.time - rose->time < closest) ++figures.too_close;
+    if (figures.lateness.back() < 0) ++figures.early;
     rose = &edge;
-    planned_before = step.time_ns;
   }
   if (finder.next(step)) throw std::logic_error("fewer steps went out than were planned");
 }

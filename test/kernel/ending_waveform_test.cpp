@@ -47,12 +47,16 @@ TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
   const auto ramp =
       static_cast<std::size_t>(limits.max_speed * limits.max_speed / (2.0 * limits.deceleration));
   ASSERT_GE(seen.pulses.size(), cruised + ramp);
+  const auto time_left = [&](double steps) {
+    return static_cast<std::int64_t>(1e9 * std::sqrt(2.0 * steps / limits.deceleration));
+  };
+  const std::int64_t last = time_left(0.5);
   for (std::size_t left = 1; left < ramp; ++left) {
-    const auto time = [&](double steps) { return std::sqrt(2.0 * steps / limits.deceleration); };
-    const double planned = 1e9 * (time(left + 0.5) - time(left - 0.5));
-    const std::size_t k = seen.pulses.size() - left;
-    ASSERT_GE(seen.pulses[k].time_ns - seen.pulses[k - 1].time_ns,
-              closest(static_cast<std::int64_t>(planned)))
+    const auto steps = static_cast<double>(left);
+    const std::int64_t interval = time_left(steps + 0.5) - time_left(steps - 0.5);
+    const std::size_t k = seen.pulses.size() - 1 - left;
+    ASSERT_GE(seen.pulses.back().time_ns - seen.pulses[k].time_ns,
+              time_left(steps + 0.5) - last - madeUp(interval))
         << left << " steps before the end";
   }
 }

@@ -45,8 +45,9 @@ std::string nameOfTest() {
 
 }  // namespace
 
-std::int64_t closest(std::int64_t planned_interval) {
-  return static_cast<std::int64_t>(0.75 * static_cast<double>(planned_interval));
+std::int64_t madeUp(std::int64_t planned_interval) {
+  return std::max<std::int64_t>(planned_interval / 4,
+                                std::min<std::int64_t>(planned_interval * 32 / 4, 2'000'000));
 }
 
 Place placeAt(const std::string& chip, unsigned first, bool inverted) {
@@ -71,10 +72,7 @@ std::map<std::string, Waveform> MachineWaveform::read(KernelBench& bench,
   std::map<std::string, Waveform> waveforms;
   std::size_t pulses = 0;
   for (const config::AxisConfig& config : axes) {
-    WiredAxis wired = wiredAxis(config, *trace);
-    wired.shortest_interval_ns =
-        closest(static_cast<std::int64_t>(1e9 / (config.max_speed * config.steps_per_unit)));
-    const Waveform& seen = waveforms[config.name] = waveformOf(*trace, wired);
+    const Waveform& seen = waveforms[config.name] = waveformOf(*trace, wiredAxis(config, *trace));
     EXPECT_TRUE(seen.violations.empty()) << config.name << ":\n" << reportOf(seen);
     EXPECT_EQ(seen.position(), counts[config.name]) << config.name;
     pulses += seen.pulses.size();
@@ -97,9 +95,10 @@ void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
     ASSERT_EQ(pulse.forward, steps[k].direction > 0) << "step " << k;
     ASSERT_GE(pulse.time_ns, timeline + steps[k].time_ns) << "step " << k << " came too early";
     if (k + 1 == count) break;
-    const std::int64_t interval = steps[k + 1].time_ns - steps[k].time_ns;
-    const std::int64_t made_up = interval - closest(interval);
-    timeline = std::max(timeline, pulse.time_ns - steps[k].time_ns - made_up);
+    // Of the longer one of the intervals beside it.
+    std::int64_t interval = steps[k + 1].time_ns - steps[k].time_ns;
+    if (k > 0) interval = std::max(interval, steps[k].time_ns - steps[k - 1].time_ns);
+    timeline = std::max(timeline, pulse.time_ns - steps[k].time_ns - madeUp(interval));
   }
 }
 

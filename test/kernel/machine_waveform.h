@@ -16,12 +16,13 @@
 
 /// What the kernel's lines did while whole machines moved, compared with the plan and the chips.
 ///
-/// On a machine that stalls, pulses come late. Then later pulses come late, too, but they are never
-/// closer than three quarters of their planned interval, and none is left out.
+/// On a machine that stalls, pulses come late. Then later pulses come late, too, except for what may
+/// be made up for, and none is left out.
 namespace stepdriver::kernel {
 
-/// The shortest allowed interval, from the planned one.
-std::int64_t closest(std::int64_t planned_interval);
+/// [ns] By how much a late pulse may be made up for: a quarter of a full step, at most 2 ms, or a
+/// quarter of the planned interval. 1/32 is the finest mode here.
+std::int64_t madeUp(std::int64_t planned_interval);
 
 /// The lines of STEP, DIR and ENABLE, in this order.
 Place placeAt(const std::string& chip, unsigned first, bool inverted = false);
@@ -41,8 +42,7 @@ class MachineWaveform : public testing::Test {
 
 /// Compares pulses with the planned steps, beginning with the pulse `first`.
 ///
-/// The timeline may only slide to later times. A late pulse is made up for by at most the part of
-/// the next interval that closest() leaves.
+/// The timeline may only slide to later times. A late pulse is made up for by at most madeUp().
 /// @param count number of steps to compare; there may be more steps and pulses.
 void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
                      const std::vector<motion::Step>& steps, std::size_t count);

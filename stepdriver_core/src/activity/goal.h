@@ -50,6 +50,8 @@ struct Goal {
   Setpoint setpoint;      ///< used by a kSetpoint only
   bool of_motor = false;  ///< true: the target is the motor's; false: the joint's
   MotorsTogether motors;
+  /// Its steps are never late by more than a quarter of an interval: its end measures a place.
+  bool measures = false;
   motion::MotionLimits path_limits;  ///< [microsteps] of a kTogether: its path keeps them
   /// At the target the axis waits for a path that continues its own: it isn't the end.
   bool waits_at_target = false;

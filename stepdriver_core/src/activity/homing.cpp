@@ -274,6 +274,7 @@ void Homing::goOn() {
 }
 
 void Homing::stroke(Goal goal) {
+  goal.measures = true;
   axis_.refuseUnlessReady();
   stroke_ = std::make_unique<Manoeuvre>(context(), std::vector<Order>{{&axis_, goal}});
   stroke_->prepare();

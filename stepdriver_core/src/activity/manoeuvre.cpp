@@ -248,6 +248,7 @@ void Manoeuvre::order(Plans plans, const Ack& extension) {
     follow.profile = plans.planned[i].motion->made();
     follow.continues = before != nullptr ? before->serial : 0;
     follow.restart_interval = axis.restartInterval();
+    follow.full_step = orders_[i].goal.measures ? 0 : axis.motor.microsteps();
     follow.group = plans.path != nullptr ? group_ : 0;
     follow.stops = context_.stops_handled;
     follow.faults = axis.motor.state().faults();

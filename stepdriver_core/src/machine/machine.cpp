@@ -57,6 +57,7 @@ class Machine::Impl {
     lines_ = backend.request(wiring.outputs, wiring.inputs);
     if (options.measure && clock.realtime()) {
       capability_ = pulse::measureCapability(*lines_, clock, wiring.channels, options.realtime);
+      capability_->late_steps = options.late_steps;
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
       if (!why.empty()) throw Refused(why);
     }

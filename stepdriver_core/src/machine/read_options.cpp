@@ -19,6 +19,7 @@ using config::Range;
 
 constexpr Range kWriteTimeoutsMs{10.0, 60'000.0};
 constexpr Range kLatenessesMs{0.0, 60'000.0, true};
+constexpr Range kLateSteps{0.0, 0.5};
 constexpr Range kRecordedSeconds{0.0, 600.0};
 constexpr Range kRecorderMemoryMb{1.0, 1000.0};
 constexpr Range kHeartbeatRates{1.0, 1000.0};  // Hz
@@ -55,7 +56,8 @@ ConfigValue writeOptions(const MachineOptions& options) {
   ConfigValue::Map stop;
   if (options.emergency_stop) stop = config::writeSwitch(*options.emergency_stop);
   stop["disable"] = kDisables.at(static_cast<std::size_t>(options.emergency_disable));
-  ConfigValue::Map realtime{{"max_lateness_ms", options.max_lateness * 1e3}};
+  ConfigValue::Map realtime{{"max_lateness_ms", options.max_lateness * 1e3},
+                            {"late_steps", options.late_steps}};
   if (options.realtime.cpu) realtime["cpu"] = *options.realtime.cpu;
   ConfigValue::Map map{
       {"gpio", ConfigValue::Map{{"write_timeout_ms", options.write_timeout * 1e3}}},
@@ -85,6 +87,7 @@ void checkOptions(const std::vector<config::AxisConfig>* axes, const MachineOpti
   MachineOptions read;
   readWriteTimeout(gpio, 0.0);
   readMaxLateness(realtime, 0.0);
+  readLateSteps(realtime, 0.0);
   readProcessor(realtime);
   double memory_mb = kRecorderMemoryMb.max;
   readRecorderSize(recorder, read.record_seconds, memory_mb);
@@ -103,6 +106,10 @@ double readWriteTimeout(ConfigReader& gpio, double otherwise) {
 
 double readMaxLateness(ConfigReader& realtime, double otherwise) {
   return 1e-3 * realtime.number("max_lateness_ms", kLatenessesMs, otherwise * 1e3);
+}
+
+double readLateSteps(ConfigReader& realtime, double otherwise) {
+  return realtime.number("late_steps", kLateSteps, otherwise);
 }
 
 std::optional<int> readProcessor(ConfigReader& realtime) {

@@ -17,6 +17,9 @@ double readWriteTimeout(config::ConfigReader& gpio, double otherwise);
 /// Reads `max_lateness_ms` of `realtime` [s].
 double readMaxLateness(config::ConfigReader& realtime, double otherwise);
 
+/// Reads `late_steps` of `realtime` [full steps].
+double readLateSteps(config::ConfigReader& realtime, double otherwise);
+
 /// Reads `cpu` of `realtime`.
 std::optional<int> readProcessor(config::ConfigReader& realtime);
 

@@ -17,15 +17,26 @@ namespace {
 enum class RateLimit { kLateness, kPulse, kSpinning };
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
+// [steps] What the engine absorbs in any case.
+constexpr double kLeastAbsorbed = 1.0 - pulse::PulseEngine::kClosest;
+// The part of the time that pulses may take: the rest is for catching up.
+constexpr double kMostPulses = 0.9;
 
 /// The time of the pulse thread that a step of an axis takes, in nanoseconds.
 struct Load {
+  double absorbed;  // [steps] by which it may be late
   double rise;      // the calls for the rising edge: the read of an endstop and a write
   double calls;     // those for both edges
   double chip;      // high and low time
+  double wake_ups;  // in a step: its end is one if the thread may sleep until then
   double spinning;  // spinning before both edges, if nothing shortens it
   double alone;     // the shortest interval that doesn't spin too much, with no other axis moving
   double interval;  // of the steps at top speed
+
+  /// [steps] How much lateness of so many nanoseconds is absorbed.
+  double absorbedIn(double ns) const {
+    return ns > pulse::kLongestCatchUp ? kLeastAbsorbed : absorbed;
+  }
 };
 
 Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
@@ -37,9 +48,11 @@ Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
   const auto high = both ? 0.0 : static_cast<double>(axis.timing().step_high_ns);
   const auto guard = static_cast<double>(capability.guard);
   Load load{};
+  load.absorbed = std::max(kLeastAbsorbed, axis.microsteps * capability.late_steps);
   load.rise = read + write;
   load.calls = read + (both ? 1.0 : 2.0) * write;
   load.chip = static_cast<double>(axis.shortestStepNs());
+  load.wake_ups = high > static_cast<double>(pulse::HybridWait::kShortWait) ? 2.0 : 1.0;
   load.spinning = guard + std::min(guard, high);
   // A sleep ends late, and shortens the spinning; but there must be room for one.
   const double after_sleep =
@@ -55,12 +68,12 @@ Load loadOf(const config::AxisConfig& axis, const pulse::CallCosts& cost,
 /// The time that the other axes take meanwhile, at their top speeds.
 struct Others {
   double rise = 0.0;
-  double calls = 0.0;
+  double pulses = 0.0;        // calls, high and low times
   double not_spinning = 1.0;  // share of the time
 
   void add(const Load& load) {
     rise += load.rise;
-    calls += load.calls;
+    pulses += load.calls + load.chip;
     not_spinning *= 1.0 - std::min(1.0, load.spinning / load.interval);
   }
 };
@@ -84,10 +97,9 @@ double shortestSpinning(const Load& load, const Others& others) {
 Interval shortest(const Load& load, const Others& others, pulse::Nanoseconds late,
                   double spinning) {
   const auto lateness = static_cast<double>(late);
-  const double absorbed = 1.0 - pulse::PulseEngine::kClosest;
-  const double pulse = 2.0 * lateness + load.calls + load.chip + others.calls;
-  Interval interval{(lateness + load.rise + others.rise) / absorbed, RateLimit::kLateness,
-                    lateness};
+  const double behind = load.wake_ups * lateness + load.rise + others.rise;
+  const double pulse = (load.calls + load.chip + others.pulses) / kMostPulses;
+  Interval interval{behind / load.absorbedIn(behind), RateLimit::kLateness, lateness};
   if (pulse > interval.ns) interval = {pulse, RateLimit::kPulse, lateness};
   if (spinning > interval.ns) interval = {spinning, RateLimit::kSpinning, lateness};
   return interval;
@@ -106,18 +118,21 @@ std::string percentText(double share) { return fmt::format("{} %", std::lround(s
 
 std::string reasonOf(const Interval& interval, const Load& load, const Others& others,
                      pulse::Nanoseconds guard) {
+  const double steps = load.absorbedIn(load.wake_ups * interval.lateness + load.rise + others.rise);
   switch (interval.limit) {
     case RateLimit::kLateness:
       return fmt::format(
-          "wake-ups late by {} and calls of {} before the pulse is out must fit in a quarter of a "
-          "step's interval",
-          inMicroseconds(interval.lateness), inMicroseconds(load.rise + others.rise));
+          "wake-ups late by {} and calls of {} before the pulse is out must fit in the time of "
+          "{:g} "
+          "{}",
+          inMicroseconds(interval.lateness), inMicroseconds(load.rise + others.rise), steps,
+          steps == 1.0 ? "step" : "steps");
     case RateLimit::kPulse:
       return fmt::format(
-          "the chip's high and low time of {}, calls of {} and two wake-ups late by {} must fit in "
-          "a step's interval",
-          inMicroseconds(load.chip), inMicroseconds(load.calls + others.calls),
-          inMicroseconds(interval.lateness));
+          "the chips' high and low times and calls of {} for a step of each axis must fit in {} of "
+          "a "
+          "step's interval",
+          inMicroseconds(load.chip + load.calls + others.pulses), percentText(kMostPulses));
     case RateLimit::kSpinning:
       break;
   }
@@ -145,13 +160,21 @@ std::vector<config::AxisConfig> atMotorSpeeds(const std::vector<config::AxisConf
 
 constexpr double kRounding = 1e-9;  // of a rate, in its calculation
 
+std::string rateText(double rate, double steps_per_round, double (*rounded)(double)) {
+  std::string text = fmt::format("{:.0f} steps/s", rate);
+  if (steps_per_round > 0.0) {
+    text += fmt::format(" ({:.0f} rpm)", rounded(60.0 * rate / steps_per_round));
+  }
+  return text;
+}
+
 // Rounded away from each other: a rate that is too high doesn't look like one that can be
 // sustained.
-std::string neededText(double rate) {
-  return fmt::format("{:.0f} steps/s", std::ceil(rate * (1.0 - kRounding)));
+std::string neededText(double rate, double steps_per_round) {
+  return rateText(std::ceil(rate * (1.0 - kRounding)), steps_per_round, std::ceil);
 }
-std::string sustainedText(double rate) {
-  return fmt::format("{:.0f} steps/s", std::floor(rate * (1.0 + kRounding)));
+std::string sustainedText(double rate, double steps_per_round) {
+  return rateText(std::floor(rate * (1.0 + kRounding)), steps_per_round, std::floor);
 }
 
 void requireAsMany(std::size_t axes, std::size_t others, const char* what) {
@@ -162,12 +185,13 @@ void requireAsMany(std::size_t axes, std::size_t others, const char* what) {
 }  // namespace
 
 std::string StepRate::text() const {
-  const std::string of_alone =
-      alone > held
-          ? fmt::format(" while all axes move ({} if only this one does)", sustainedText(alone))
-          : "";
-  return fmt::format("{} needs {}{} this computer can sustain {}{}: {}", axis, neededText(asked),
-                     holds() ? ", and" : ", but", sustainedText(held), of_alone, limited);
+  const std::string of_alone = alone > held
+                                   ? fmt::format(" while all axes move ({} if only this one does)",
+                                                 sustainedText(alone, 0.0))
+                                   : "";
+  return fmt::format("{} needs {}{} this computer can sustain {}{}: {}", axis,
+                     neededText(asked, steps_per_round), holds() ? ", and" : ", but",
+                     sustainedText(held, steps_per_round), of_alone, limited);
 }
 
 bool StepRates::holds() const {
@@ -199,6 +223,7 @@ StepRates stepRates(const std::vector<config::AxisConfig>& configs,
     const Interval interval = shortest(loads[i], others, capability);
     rates.axes.push_back({axes[i].name, 1e9 / loads[i].interval,
                           1e9 / shortest(loads[i], Others{}, capability).ns, 1e9 / interval.ns,
+                          axes[i].steps_per_round,
                           reasonOf(interval, loads[i], others, capability.guard)});
   }
   return rates;

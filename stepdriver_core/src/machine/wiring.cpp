@@ -47,6 +47,7 @@ Wiring::Wiring(const std::vector<config::AxisConfig>& axes) {
 
 Wiring::Wiring(const std::vector<config::AxisConfig>& axes, const MachineOptions& options)
     : Wiring(axes) {
+  for (pulse::ChannelConfig& channel : channels) channel.late_steps = options.late_steps;
   if (const auto& button = options.emergency_stop) {
     emergency_stop = pulse::Signal{static_cast<int>(inputs.size()), button->active_level};
     inputs.push_back({button->line, button->bias, true});

@@ -52,6 +52,11 @@ inline std::int64_t skewOf(const MotorCounts& now, const MotorCounts& square, st
   return most - least;
 }
 
+/// The longest lateness that is caught up by the angle of a motor. After a longer one a rotor has
+/// come to rest where the field stands: catching up is no gentler then than starting again, and
+/// the axes of a line would be apart for that long.
+constexpr Nanoseconds kLongestCatchUp = 2'000'000;
+
 /// What the engine needs to know about an axis: its first motor, and all else.
 struct ChannelConfig : MotorSignals {
   /// Further motors, at most kMostMotors - 1: they step in the same write as the first one, with
@@ -71,6 +76,10 @@ struct ChannelConfig : MotorSignals {
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;
   Nanoseconds dir_hold = 0;
+  /// [full steps] How late a step may be without putting off all that follow: the motor feels the
+  /// angle by which its field is behind the plan, and then returns to it, as at the steps of a
+  /// coarser mode. See PulseEngine.
+  double late_steps = 0.25;
   /// [microsteps] Of the motor at a reversal before the joint moves. It need not be a whole number.
   double backlash = 0.0;
 };

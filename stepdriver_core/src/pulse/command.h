@@ -35,6 +35,9 @@ struct Follow {
   bool slows = false;
   /// At its end it waits for the in-position outputs, if the channel has any.
   bool settles = false;
+  /// [microsteps] Of a full step: its steps may be late by ChannelConfig::late_steps of it. 0: only
+  /// by a quarter of an interval each.
+  int full_step = 0;
   /// @name Of an order from rest, for an axis with several motors; profiles that continue it keep
   ///   these
   /// @{

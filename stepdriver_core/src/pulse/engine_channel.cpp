@@ -1,6 +1,7 @@
 #include "engine_channel.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "motion/resting_count.h"
@@ -65,8 +66,22 @@ Nanoseconds EngineChannel::restartInterval() const {
   return shared != nullptr ? shared->restartInterval() : restart_interval;
 }
 
+// A step's interval alone would be too long where the motion speeds up, and the present speed
+// alone, where it slows down.
+Nanoseconds EngineChannel::angleAsTime(Nanoseconds motion_now) const {
+  const double speed = std::abs(shared != nullptr ? shared->velocityOf(*this, motion_now)
+                                                  : profile.stateAt(motion_now).velocity);
+  const auto interval_ns = static_cast<double>(interval());
+  const double step_ns = speed * interval_ns > 1e9 ? 1e9 / speed : interval_ns;
+  const double angle_ns = config.late_steps * fullStep() * step_ns;
+  return angle_ns < kLongestCatchUp ? static_cast<Nanoseconds>(angle_ns) : kLongestCatchUp;
+}
+
+int EngineChannel::fullStep() const { return shared != nullptr ? shared->fullStep() : full_step; }
+
 void EngineChannel::follow(const Follow& order) {
   restart_interval = order.restart_interval;
+  full_step = order.full_step;
   group = order.group;
   slows = order.slows;
   if (!follows()) {
@@ -117,6 +132,7 @@ void EngineChannel::countStep() {
   ++state.pulses;
   state.rose = rose;
   running = true;
+  stepped = direction;
   last_planned = next->time_ns;
   late = 0;
   pullNext();

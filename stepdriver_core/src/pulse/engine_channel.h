@@ -42,8 +42,20 @@ struct EngineChannel {
   /// It moves at a speed at which the motor can't start or stop at once.
   bool isFast() const { return running && next && interval() < restart_interval; }
 
+  /// Its late steps follow as closely as the chip allows, until the plan is reached: not the first
+  /// step of a motion, and none across a reversal.
+  bool catchesUp() const {
+    return running && next && next->direction == stepped && config.late_steps > 0.0 &&
+           fullStep() > 0;
+  }
+  /// By how much the next step may be late by the angle of the motor: no more of its plan is open
+  /// then than late_steps, whether it speeds up or slows down. @pre catchesUp()
+  Nanoseconds angleAsTime(Nanoseconds motion_now) const;
+
   /// Steps with this interval or a longer one can begin and end at once.
   Nanoseconds restartInterval() const;
+  /// [microsteps] See Follow::full_step.
+  int fullStep() const;
 
   /// The next step is obsolete: it would come after the first successor has begun.
   bool isSucceeded() const {
@@ -113,6 +125,7 @@ struct EngineChannel {
   MotorSet faulty = 0;   // by the last readings of the fault lines
   bool unchecked = false;  // its fault line must be read before the next step
   bool reserved = false;   // the chip's other pins are being written
+  int stepped = 0;         // the direction of the last step
   int direction = -1;      // the direction on the DIR line, or of pulse_line
   Signal pulse_line;       // the first motor's line of steps in that direction
   std::optional<motion::Step> next;
@@ -135,6 +148,7 @@ struct EngineChannel {
   motion::ShapedProfile profile;  // the one that is followed
   std::uint64_t group = 0;        // of the last order; 0: no group
   Nanoseconds restart_interval = 0;
+  int full_step = 0;          // of the last order
   MotorCounts square_lags{};  // ChannelState::lags when it was square
   ChannelState state;
   Snapshot<ChannelState> published;

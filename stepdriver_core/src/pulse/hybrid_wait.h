@@ -17,6 +17,9 @@ class HybridWait {
   /// If a real-time thread keeps spinning, the kernel stops it for the rest of the second
   /// (sched_rt_runtime_us), which costs far more than one late wake-up.
   static constexpr double kMostSpinning = 0.8;
+  /// A wait that isn't longer always spins: those for the times of chips are of 1 to 5 us, and the
+  /// shortest sleep takes many times that. They count as spinning.
+  static constexpr Nanoseconds kShortWait = 5'000;
 
   /// @param guard how long before the deadline the sleep ends; empty: GuardLearner learns it.
   explicit HybridWait(std::optional<Nanoseconds> guard) : fixed_guard_(guard) {}
@@ -53,8 +56,9 @@ class HybridWait {
       spun_ = 0;
     }
     const auto most = static_cast<Nanoseconds>(kMostSpinning * kWindow);
-    const bool spins = may_spin && spun_ < most && time != kNever;
-    const Nanoseconds wake = spins ? time - guard() : time;
+    const bool is_short = time - now <= kShortWait;
+    const bool spins = may_spin && time != kNever && (is_short || spun_ < most);
+    const Nanoseconds wake = spins ? time - std::max(guard(), is_short ? kShortWait : 0) : time;
     const Nanoseconds rest = share_.rest();
     return rest == 0 ? wake : std::max(wake, now + rest);
   }

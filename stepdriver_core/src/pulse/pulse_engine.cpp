@@ -405,21 +405,20 @@ bool PulseEngine::meetLateness(Nanoseconds now) {
     Channel& channel = channels_[index];
     if (channel.action() != Action::kRise) continue;
     const Nanoseconds late = now - dues_[index];
+    const Nanoseconds motion_now = now - state_.slipped;
+    const Nanoseconds lag = motion_now - channel.next->time_ns;
     const Nanoseconds worst = std::max({late, channel.overdue(now), channel.behind});
-    if (late == 0 && worst <= max_lateness_) continue;
-    channel.late = std::max(channel.late, late);
+    if (lag <= 0 && worst <= max_lateness_) continue;
+    channel.late = std::max({channel.late, late, lag});
     const bool too_late =
         worst > max_lateness_ &&
-        (channel.shared != nullptr ? channel.shared->isFast(now - state_.slipped - late)
-                                   : channel.isFast());
+        (channel.shared != nullptr ? channel.shared->isFast(motion_now - late) : channel.isFast());
     if (too_late) {
       channel.state.end_lateness = worst;
       end(channel, EndReason::kTooLate, now);
       continue;
     }
-    const auto absorbed =
-        static_cast<Nanoseconds>((1.0 - kClosest) * static_cast<double>(channel.interval()));
-    excess = std::max(excess, late - absorbed);
+    excess = std::max(excess, lag - absorbed(channel, motion_now));
   }
   if (excess == 0) return false;
   slide(excess);
@@ -746,7 +745,7 @@ bool PulseEngine::schedule(Channel& channel) {
       // lateness.
       slid = channel.next && !channel.isSucceeded() &&
              !(channel.shared != nullptr && channel.shared->isObsolete(channel)) &&
-             slideUpTo(closestRise(channel), channel.next->time_ns + state_.slipped);
+             slideFor(channel, closestRise(channel));
       break;
     case Action::kTurn:
       due = channel.state.pulses != 0 ? channel.rose + channel.config.dir_hold : 0;
@@ -759,10 +758,21 @@ bool PulseEngine::schedule(Channel& channel) {
   return slid;
 }
 
+// How late the next step may be without a slide.
+Nanoseconds PulseEngine::absorbed(const Channel& channel, Nanoseconds motion_now) {
+  const auto part =
+      static_cast<Nanoseconds>((1.0 - kClosest) * static_cast<double>(channel.interval()));
+  return channel.catchesUp() ? std::max(part, channel.angleAsTime(motion_now)) : part;
+}
+
 // The earliest time at which the next step may follow the last one.
 Nanoseconds PulseEngine::closestRise(const Channel& channel) {
-  return channel.rose +
-         static_cast<Nanoseconds>(kClosest * static_cast<double>(channel.interval()));
+  const ChannelConfig& config = channel.config;
+  if (!channel.catchesUp()) {
+    return channel.rose +
+           static_cast<Nanoseconds>(kClosest * static_cast<double>(channel.interval()));
+  }
+  return config.both_edges ? channel.rose : channel.rose + config.step_high + config.step_low;
 }
 
 bool PulseEngine::scheduleRise(Channel& channel) {
@@ -774,14 +784,18 @@ bool PulseEngine::scheduleRise(Channel& channel) {
     if (!channel.isAlone() && channel.toggled != 0) gap = std::max(gap, config.step_low);
     earliest = std::max({earliest, channel.fell + gap, closestRise(channel)});
   }
-  const Nanoseconds planned = channel.next->time_ns + state_.slipped;
-  dues_.set(channel.index, std::max(planned, earliest));
-  return slideUpTo(earliest, planned);
+  dues_.set(channel.index, std::max(channel.next->time_ns + state_.slipped, earliest));
+  return slideFor(channel, earliest);
 }
 
-bool PulseEngine::slideUpTo(Nanoseconds earliest, Nanoseconds planned) {
-  if (earliest <= planned) return false;
-  slide(earliest - planned);
+// The next step can't go out before `earliest`.
+bool PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) {
+  const Nanoseconds motion_then = earliest - state_.slipped;
+  Nanoseconds lag = motion_then - channel.next->time_ns;
+  if (lag <= 0) return false;
+  if (channel.catchesUp()) lag -= channel.angleAsTime(motion_then);
+  if (lag <= 0) return false;
+  slide(lag);
   return true;
 }
 

@@ -53,8 +53,12 @@ class NewsListener {
 ///   matters.
 /// - High, low, setup and hold times are kept from the end of the write that made the earlier edge
 ///   (the edge is not later than that) to the beginning of the write that makes the next.
-/// - After a late step, the next one follows no sooner than kClosest of their planned interval; any
-///   further lateness slides the timeline of all channels (a slip).
+/// - A step may be late by a part of a full step of its motor (ChannelConfig::late_steps,
+///   Follow::full_step). The steps that are overdue then follow as closely as the chip's times
+///   allow, until the plan is reached. Only what is beyond that slides the timeline of all channels
+///   (a slip). This is so in the middle of a motion in one direction. For the first step of a
+///   motion, for one after a turn, and without a full step, a quarter of an interval is absorbed,
+///   and the next step follows no sooner than kClosest of their planned interval.
 /// - If a write for several channels fails, those whose own lines can be written continue.
 /// - The switch is read before each step towards an endstop; no step goes out while it reads
 ///   active.
@@ -72,7 +76,7 @@ class PulseEngine {
   PulseEngine(const PulseEngine&) = delete;
   PulseEngine& operator=(const PulseEngine&) = delete;
 
-  /// The shortest interval after a late step, as a part of the planned one.
+  /// The shortest interval after a late step that isn't caught up, as a part of the planned one.
   static constexpr double kClosest = 0.75;
   /// From an emergency stop with a ramp until each channel must have an order to decelerate.
   static constexpr Nanoseconds kRampBegins = 100'000'000;
@@ -198,8 +202,9 @@ class PulseEngine {
   bool schedule(Channel& channel);
   void scheduleShared(const Channel& axis);
   bool scheduleRise(Channel& channel);
+  static Nanoseconds absorbed(const Channel& channel, Nanoseconds motion_now);
   static Nanoseconds closestRise(const Channel& channel);
-  bool slideUpTo(Nanoseconds earliest, Nanoseconds planned);
+  bool slideFor(const Channel& channel, Nanoseconds earliest);
   void slide(Nanoseconds by);
 
   gpio::Lines& lines_;

@@ -1,7 +1,6 @@
 #include "shared_motors.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -31,6 +30,7 @@ SharedMotors::SharedMotors(const SharedAxes& shared, std::vector<EngineChannel*>
     motor.step_low = chip.step_low;
     motor.dir_setup = chip.dir_setup;
     motor.dir_hold = chip.dir_hold;
+    motor.late_steps = chip.late_steps;
     motors_[i]->pulse_line = motors_[i]->stepOf(0, motors_[i]->direction);
   }
   // Every axis needs all chips to be in order.
@@ -74,18 +74,31 @@ Nanoseconds SharedMotors::restartInterval() const {
 }
 
 bool SharedMotors::isFast(Nanoseconds motion_now) const {
-  std::array<double, motion::kMostTerms> velocities{};
   const Nanoseconds restart = restartInterval();
+  return std::any_of(motors_.begin(), motors_.end(), [&](const EngineChannel* motor) {
+    constexpr double kRounding = 1.0 + 1e-6;
+    return std::abs(velocityOf(*motor, motion_now)) * static_cast<double>(restart) >
+           1e9 * kRounding;
+  });
+}
+
+double SharedMotors::velocityOf(const EngineChannel& motor, Nanoseconds motion_now) const {
+  const auto number =
+      static_cast<std::size_t>(std::find(motors_.begin(), motors_.end(), &motor) - motors_.begin());
+  double velocity = 0.0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (!axes_[i]->follows()) continue;
-    velocities.at(i) = axes_[i]->profile.stateAt(motion_now).velocity;
+    velocity += matrix_[number][i] * axes_[i]->profile.stateAt(motion_now).velocity;
   }
-  return std::any_of(matrix_.begin(), matrix_.end(), [&](const std::vector<double>& row) {
-    double speed = 0.0;
-    for (std::size_t i = 0; i < row.size(); ++i) speed += row[i] * velocities.at(i);
-    constexpr double kRounding = 1.0 + 1e-6;
-    return std::abs(speed) * static_cast<double>(restart) > 1e9 * kRounding;
-  });
+  return velocity;
+}
+
+int SharedMotors::fullStep() const {
+  int least = std::numeric_limits<int>::max();
+  for (const EngineChannel* axis : axes_) {
+    if (axis->follows()) least = std::min(least, axis->full_step);
+  }
+  return least;
 }
 
 Nanoseconds SharedMotors::madeUntil() const {

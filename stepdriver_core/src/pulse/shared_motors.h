@@ -34,6 +34,8 @@ class SharedMotors {
   bool isFast(Nanoseconds motion_now) const;
   /// The longest of the axes, see EngineChannel::restartInterval().
   Nanoseconds restartInterval() const;
+  /// The least of the axes that move, see EngineChannel::fullStep(). @pre moves()
+  int fullStep() const;
   /// See EngineChannel::madeUntil().
   Nanoseconds madeUntil() const;
 
@@ -53,6 +55,8 @@ class SharedMotors {
 
   /// A motor's next step belongs to a profile that is about to be replaced.
   bool isObsolete(const EngineChannel& motor) const;
+  /// [microsteps/s] Of a motor, by the motions of the axes.
+  double velocityOf(const EngineChannel& motor, Nanoseconds motion_now) const;
   /// A motor has made a step.
   void stepped(const EngineChannel& motor);
   /// A chip is ready at a clock time: no motor steps before.

@@ -43,6 +43,7 @@ void readGpio(ConfigReader gpio, MachineConfig& config) {
 void readRealtime(ConfigReader realtime, MachineConfig& config) {
   config.enforce_realtime = realtime.oneOf("policy", kPolicies, "warn") == "enforce";
   config.max_lateness = machine::readMaxLateness(realtime, config.max_lateness);
+  config.late_steps = machine::readLateSteps(realtime, config.late_steps);
   config.keep_cpus_awake = realtime.boolean("keep_cpus_awake", config.keep_cpus_awake);
   config.cpu = machine::readProcessor(realtime);
   realtime.rejectUnknown();
@@ -60,6 +61,7 @@ void readRecorder(ConfigReader reader, RecorderConfig& recorder) {
 machine::MachineOptions MachineConfig::options() const {
   machine::MachineOptions options;
   options.max_lateness = max_lateness;
+  options.late_steps = late_steps;
   options.write_timeout = write_timeout;
   options.measure = true;
   options.enforce = enforce_realtime;

@@ -10,18 +10,16 @@ namespace {
 
 // [ns] Between two times, each rounded to a nanosecond.
 constexpr std::int64_t kTimeError = 1;
-// After a late step, the next one may follow after this part of its interval.
-constexpr double kClosestAfterLate = 0.75;
 
 double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
 }  // namespace
 
 MotionJudge::MotionJudge(const MotorLimits& limits)
-    : rate_(limits.rate * kMore / (limits.exact_times ? 1.0 : kClosestAfterLate)),
+    : rate_(limits.rate * kMore),
       acceleration_(limits.acceleration * kMore),
       start_rate_(limits.start_rate * kMore),
-      exact_(limits.exact_times) {}
+      late_(limits.late) {}
 
 void MotionJudge::forget() { forgets_ = true; }
 
@@ -49,7 +47,7 @@ std::optional<Violation> MotionJudge::step(double way, std::int64_t time_ns,
     std::optional<Violation> found;
     if (scale.known > 1 && isTooFast(scale.ends[1], edge, step)) {
       found = Violation::kAboveTopRate;
-    } else if (scale.known > 2 && exact_ && isTooSudden(scale, step)) {
+    } else if (scale.known > 2 && late_ == 0.0 && isTooSudden(scale, step)) {
       found = Violation::kAboveAcceleration;
     }
     if (!found || violation) continue;
@@ -73,10 +71,10 @@ void MotionJudge::rest(const Edge& last, Edge& next, double step) const {
 
 // If steps end at once, the next motion begins at a whole step, up to half a step ahead of the one
 // before it. (Never twice in a window: each of these ends would have to come right after a step,
-// and a new request after it.)
+// and a new request after it.) If the first of them was late, what was open then may come too.
 bool MotionJudge::isTooFast(const Edge& from, const Edge& to, double step) const {
   const double ahead = from.rests != to.rests ? 0.5 : 0.0;
-  const double way = std::abs(to.place - from.place) - (ahead + 2.0 * kPlaceError) * step;
+  const double way = std::abs(to.place - from.place) - (ahead + 2.0 * kPlaceError) * step - late_;
   return way > rate_ * seconds(to.time_ns - from.time_ns + kTimeError);
 }
 

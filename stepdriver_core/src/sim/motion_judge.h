@@ -95,7 +95,7 @@ class MotionJudge {
   const double rate_;
   const double acceleration_;
   const double start_rate_;
-  const bool exact_;
+  const double late_;
   std::uint64_t steps_ = 0;
   double position_ = 0.0;
   bool forgets_ = false;

@@ -108,6 +108,7 @@ class Check {
 
   void reportRates() {
     if (capability_.channels.empty()) return;
+    capability_.late_steps = config_.late_steps;
     const machine::StepRates rates = machine::stepRates(config_.axes, capability_);
     section("Step rates at which about one step in a hundred is late, or fewer", ratesText(rates));
     if (!rates.holds()) {

@@ -93,10 +93,7 @@ class KernelSoak {
              const std::map<std::string, std::int64_t>& counts, std::uint64_t sent) {
     std::uint64_t pulses = 0;
     for (const config::AxisConfig& config : axes) {
-      kernel::WiredAxis wired = kernel::wiredAxis(config, trace);
-      wired.shortest_interval_ns =
-          static_cast<std::int64_t>(0.75e9 / (config.max_speed * config.steps_per_unit));
-      const kernel::Waveform seen = kernel::waveformOf(trace, wired);
+      const kernel::Waveform seen = kernel::waveformOf(trace, kernel::wiredAxis(config, trace));
       pulses += seen.pulses.size();
       findings_.violations += static_cast<std::int64_t>(seen.violations.size());
       if (!seen.violations.empty()) {

@@ -292,6 +292,8 @@ TEST(CheckConfiguration, KnowsTheRulesOfAConfigurationFileForOptionsToo) {
   const std::vector<WrongOption> wrongs_of_options = {
       {[](MachineOptions& options) { options.max_lateness = test::kNan; },
        "realtime/max_lateness_ms: is nan, but must be"},
+      {[](MachineOptions& options) { options.late_steps = 0.6; },
+       "realtime/late_steps: is 0.6, but must be from 0 to 0.5"},
       {[](MachineOptions& options) { options.max_lateness = 0.0; },
        "realtime/max_lateness_ms: is 0.0, but must be above 0 and at most 60000"},
       {[](MachineOptions& options) { options.write_timeout = 0.001; },

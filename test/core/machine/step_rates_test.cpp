@@ -59,17 +59,33 @@ StepRate rateOf(const Times& times, double asked = 8000.0) {
   return machine::stepRates({axisOf(asked)}, capabilityOf(times)).axes.front();
 }
 
-TEST(StepRates, AreLimitedByLatenessAndCallsInAQuarterOfAnInterval) {
-  const StepRate rate = rateOf({10'000, 1'000'000, 2000, 500});
-  EXPECT_DOUBLE_EQ(rate.held, 1e9 / (4.0 * 12'500.0));
+// At 1/16, a quarter of a full step is four microsteps.
+TEST(StepRates, AreLimitedByLatenessAndCallsInAQuarterOfAFullStep) {
+  const StepRate rate = rateOf({77'500, 1'000'000, 2000, 500});
+  EXPECT_DOUBLE_EQ(rate.held, 4.0e9 / 80'000.0);
   EXPECT_DOUBLE_EQ(rate.alone, rate.held);
   EXPECT_EQ(rate.limited,
-            "wake-ups late by 10.0 us and calls of 2.5 us before the pulse is out must fit in a "
-            "quarter of a step's interval");
+            "wake-ups late by 77.5 us and calls of 2.5 us before the pulse is out must fit in the "
+            "time of 4 steps");
+}
+
+TEST(StepRates, AreLimitedByAQuarterOfAnIntervalIfNoMoreIsAbsorbed) {
+  config::AxisConfig full = axisOf(8000.0);
+  full.microsteps = 1;
+  Capability capability = capabilityOf({77'500, 1'000'000, 2000, 500});
+  const StepRate in_full_steps = machine::stepRates({full}, capability).axes.front();
+  EXPECT_DOUBLE_EQ(in_full_steps.held, 0.25e9 / 80'000.0);
+  EXPECT_NE(in_full_steps.limited.find("in the time of 0.25 steps"), std::string::npos);
+  capability.late_steps = 0.0;
+  EXPECT_DOUBLE_EQ(machine::stepRates({axisOf(8000.0)}, capability).axes.front().held,
+                   0.25e9 / 80'000.0);
+  // Longer than what is caught up by the angle.
+  const double behind = 2'100'000.0 + 2'500.0;
+  EXPECT_DOUBLE_EQ(rateOf({2'100'000, 3'000'000, 2000, 500}).held, 0.25e9 / behind);
 }
 
 TEST(StepRatesInMotion, AreThoseOfTheAxesThatMoveBesideTheOthersThatMove) {
-  const Times times{10'000, 1'000'000, 2000, 500};
+  const Times times{197'500, 1'000'000, 2000, 500};
   Capability capability = capabilityOf(times, 3);
   capability.channels[2].write.p99 = 7000;
   const std::vector<config::AxisConfig> axes{axisOf(8000.0), axisOf(8000.0, "y"),
@@ -79,10 +95,10 @@ TEST(StepRatesInMotion, AreThoseOfTheAxesThatMoveBesideTheOthersThatMove) {
   ASSERT_EQ(one.size(), 1U);
   EXPECT_EQ(one[0].axis, "x");
   EXPECT_DOUBLE_EQ(one[0].asked, 3000.0);
-  EXPECT_DOUBLE_EQ(one[0].held, 1e9 / (4.0 * 12'500.0));
+  EXPECT_DOUBLE_EQ(one[0].held, 4.0e9 / 200'000.0);
   const auto two = machine::stepRatesInMotion(axes, capability, {3000.0, 0.0, 500.0}).axes;
   ASSERT_EQ(two.size(), 2U);
-  EXPECT_DOUBLE_EQ(two[0].held, 1e9 / (4.0 * (12'500.0 + 7'500.0)));
+  EXPECT_DOUBLE_EQ(two[0].held, 4.0e9 / (200'000.0 + 7'500.0));
   EXPECT_EQ(two[1].axis, "z");
   EXPECT_DOUBLE_EQ(two[1].asked, 500.0);
 }
@@ -93,7 +109,7 @@ TEST(StepRates, AreLimitedByThePulseItself) {
   config.driver.timing.step_low_ns = 20'000;
   const StepRate rate =
       machine::stepRates({config}, capabilityOf({1000, 1'000'000, 2000, 500})).axes.front();
-  EXPECT_DOUBLE_EQ(rate.held, 1e9 / (2'000.0 + 4'500.0 + 50'000.0));
+  EXPECT_DOUBLE_EQ(rate.held, 0.9e9 / (4'500.0 + 50'000.0));
 }
 
 TEST(StepRates, AreLimitedByWhatMayBeSpun) {
@@ -113,17 +129,18 @@ TEST(StepRates, CountThatALateSleepIsSpunForShorter) {
 }
 
 TEST(StepRates, GoOnWithoutSpinningWhereSleepingIsPunctualEnough) {
-  const StepRate rate = rateOf({1000, 9000, 1000, 0, 60'000});
-  EXPECT_DOUBLE_EQ(rate.held, 1e9 / (4.0 * 10'000.0));
+  const StepRate rate = rateOf({1000, 99'000, 1000, 0, 60'000});
+  EXPECT_DOUBLE_EQ(rate.held, 4.0e9 / 100'000.0);
 }
 
 TEST(StepRates, LeaveRoomForTheOtherAxes) {
   const std::vector<config::AxisConfig> axes = {axisOf(1000.0), axisOf(2000.0, "y"),
                                                 axisOf(3000.0, "z")};
-  const auto rates = machine::stepRates(axes, capabilityOf({10'000, 1'000'000, 2000, 500}, 3)).axes;
+  const auto rates =
+      machine::stepRates(axes, capabilityOf({197'500, 1'000'000, 2000, 500}, 3)).axes;
   for (const StepRate& rate : rates) {
-    EXPECT_DOUBLE_EQ(rate.alone, 1e9 / (4.0 * 12'500.0));
-    EXPECT_DOUBLE_EQ(rate.held, 1e9 / (4.0 * 17'500.0));
+    EXPECT_DOUBLE_EQ(rate.alone, 4.0e9 / 200'000.0);
+    EXPECT_DOUBLE_EQ(rate.held, 4.0e9 / 205'000.0);
   }
   EXPECT_EQ(rates[1].axis, "y");
   EXPECT_DOUBLE_EQ(rates[1].asked, 2000.0);
@@ -138,40 +155,41 @@ TEST(StepRates, LeaveRoomForTheOtherAxes) {
 TEST(StepRates, AreNeverBelowWhatSleepingAloneHolds) {
   const std::vector<config::AxisConfig> axes = {axisOf(1000.0), axisOf(100'000.0, "y")};
   const auto rates =
-      machine::stepRates(axes, capabilityOf({1000, 20'000, 1000, 0, 60'000}, 2)).axes;
-  EXPECT_DOUBLE_EQ(rates[0].held, 1e9 / (4.0 * 22'000.0)) << "y takes all that may be spun";
+      machine::stepRates(axes, capabilityOf({1000, 198'000, 1000, 0, 60'000}, 2)).axes;
+  EXPECT_DOUBLE_EQ(rates[0].held, 4.0e9 / 200'000.0) << "y takes all that may be spun";
 }
 
 TEST(StepRates, ThatDoNotHoldNameAxisAskedRateHeldRateAndReason) {
-  const Capability capability = capabilityOf({10'000, 1'000'000, 2000, 500});
-  EXPECT_TRUE(machine::stepRates({axisOf(20'000.0)}, capability).holds());
-  EXPECT_TRUE(machine::stepRates({axisOf(20'000.0)}, capability).complaints().empty());
-  const auto rates = machine::stepRates({axisOf(20'001.0)}, capability);
+  const Capability capability = capabilityOf({77'500, 1'000'000, 2000, 500});
+  EXPECT_TRUE(machine::stepRates({axisOf(50'000.0)}, capability).holds());
+  EXPECT_TRUE(machine::stepRates({axisOf(50'000.0)}, capability).complaints().empty());
+  const auto rates = machine::stepRates({axisOf(50'001.0)}, capability);
   EXPECT_FALSE(rates.holds());
   ASSERT_EQ(rates.complaints().size(), 1U);
-  EXPECT_EQ(rates.complaints()[0],
-            "x needs 20001 steps/s, but this computer can sustain 20000 steps/s: wake-ups late by "
-            "10.0 us and calls of 2.5 us before the pulse is out must fit in a quarter of a step's "
-            "interval");
-  const std::vector<config::AxisConfig> two = {axisOf(19'000.0), axisOf(1000.0, "y")};
+  EXPECT_EQ(
+      rates.complaints()[0],
+      "x needs 50001 steps/s (938 rpm), but this computer can sustain 50000 steps/s (937 "
+      "rpm): wake-ups late by 77.5 us and calls of 2.5 us before the pulse is out must fit in "
+      "the time of 4 steps");
+  const std::vector<config::AxisConfig> two = {axisOf(49'000.0), axisOf(1000.0, "y")};
   const auto both =
-      machine::stepRates(two, capabilityOf({10'000, 1'000'000, 2000, 500}, 2)).complaints();
+      machine::stepRates(two, capabilityOf({77'500, 1'000'000, 2000, 500}, 2)).complaints();
   ASSERT_EQ(both.size(), 1U);
-  EXPECT_NE(both[0].find("but this computer can sustain 16666 steps/s while all axes move (20000 "
-                         "steps/s if only this one does): "),
+  EXPECT_NE(both[0].find("but this computer can sustain 48484 steps/s (909 rpm) while all axes "
+                         "move (50000 steps/s if only this one does): "),
             std::string::npos)
       << both[0];
 }
 
 TEST(WhyNotInRealtime, NamesRightsAndAxes) {
-  Capability capability = capabilityOf({10'000, 1'000'000, 2000, 500});
-  EXPECT_EQ(machine::whyNotInRealtime({axisOf(20'000.0)}, capability), "");
-  const std::string too_fast = machine::whyNotInRealtime({axisOf(20'001.0)}, capability);
-  EXPECT_NE(too_fast.find("x needs 20001 steps/s"), std::string::npos) << too_fast;
+  Capability capability = capabilityOf({77'500, 1'000'000, 2000, 500});
+  EXPECT_EQ(machine::whyNotInRealtime({axisOf(50'000.0)}, capability), "");
+  const std::string too_fast = machine::whyNotInRealtime({axisOf(50'001.0)}, capability);
+  EXPECT_NE(too_fast.find("x needs 50001 steps/s"), std::string::npos) << too_fast;
   EXPECT_NE(too_fast.find("PREEMPT_RT"), std::string::npos) << too_fast;
   for (const pulse::RealtimeRights rights : {pulse::RealtimeRights{EPERM, 0}, {0, EPERM}}) {
     capability.rights = rights;
-    const std::string why = machine::whyNotInRealtime({axisOf(20'000.0)}, capability);
+    const std::string why = machine::whyNotInRealtime({axisOf(50'000.0)}, capability);
     EXPECT_NE(why.find(rights.text()), std::string::npos) << why;
   }
 }
@@ -180,10 +198,13 @@ TEST(WhyNotInRealtime, NamesRightsAndAxes) {
 class MachineOnSlowHardware : public testing::Test {
  protected:
   MachineOnSlowHardware() {
-    clock.spun = [] { return 1'000; };
-    clock.slept = [] { return 50'000; };
+    setLateness(196'000);
     backend.write_cost = [] { return 2'000; };
     backend.read_cost = [](const std::string&) { return 2'000; };
+  }
+
+  void setLateness(Nanoseconds lateness) {
+    clock.spun = clock.slept = [lateness] { return lateness; };
   }
 
   enum class Measure { kNo, kWarn, kEnforce };
@@ -203,7 +224,7 @@ class MachineOnSlowHardware : public testing::Test {
   SlowBackend backend{clock};
 };
 
-constexpr double kHeld = 50'000.0;  // 4 (1 + 2 + 2) us
+constexpr double kHeld = 20'000.0;  // (196 + 2 + 2) us in the time of 4 steps
 
 TEST_F(MachineOnSlowHardware, KeepsWhatItMeasured) {
   const auto machine = make(kHeld * 2, Measure::kWarn);
@@ -217,7 +238,7 @@ TEST_F(MachineOnSlowHardware, RefusesIfAskedToAndReleasesEveryLineUnmoved) {
     FAIL();
   } catch (const Refused& refused) {
     const std::string text = refused.what();
-    EXPECT_NE(text.find("x needs 50001"), std::string::npos) << text;
+    EXPECT_NE(text.find("x needs 20001"), std::string::npos) << text;
   }
   EXPECT_FALSE(backend.held);
   for (const SlowBackend::Write& write : backend.written) EXPECT_FALSE(write.edge) << write.line;
@@ -234,7 +255,7 @@ TEST_F(MachineOnSlowHardware, MeasuresNothingUnasked) {
 class FormulaOnTheEngine : public MachineOnSlowHardware {
  protected:
   /// @return the slips during moves of 1000 steps and more of all axes at once, each at its top
-  /// speed.
+  /// speed. The first step of each motion may slip.
   std::uint64_t slips(std::vector<config::AxisConfig> configs) {
     for (config::AxisConfig& config : configs) config.start_speed = config.max_speed;
     machine::Machine machine(configs, backend, clock, {false});
@@ -255,11 +276,12 @@ class FormulaOnTheEngine : public MachineOnSlowHardware {
 
 TEST_F(FormulaOnTheEngine, HoldsWhereLatenessLimits) {
   EXPECT_DOUBLE_EQ(held({axisOf(1000.0)}), kHeld);
-  EXPECT_EQ(slips({axisOf(kHeld)}), 0U);
-  EXPECT_GT(slips({axisOf(kHeld * 1.01)}), 900U);
+  EXPECT_LE(slips({axisOf(kHeld)}), 1U);
+  EXPECT_GT(slips({axisOf(kHeld * 1.06)}), 100U);
 }
 
 TEST_F(FormulaOnTheEngine, HoldsWhereThePulseLimits) {
+  setLateness(1'000);
   const auto slow = [](double rate) {
     config::AxisConfig config = axisOf(rate);
     config.driver.timing.step_high_ns = 30'000;
@@ -267,18 +289,43 @@ TEST_F(FormulaOnTheEngine, HoldsWhereThePulseLimits) {
     return config;
   };
   const double rate = held({slow(1000.0)});
-  EXPECT_DOUBLE_EQ(rate, 1e9 / 58'000.0);
-  EXPECT_EQ(slips({slow(rate)}), 0U);
-  EXPECT_GT(slips({slow(rate * 1.01)}), 900U);
+  EXPECT_DOUBLE_EQ(rate, 0.9e9 / 56'000.0);
+  EXPECT_LE(slips({slow(rate)}), 1U);
+  EXPECT_GT(slips({slow(rate * 1.15)}), 900U);
 }
 
 TEST_F(FormulaOnTheEngine, HoldsForAxesThatMoveAtOnce) {
+  setLateness(1'000);
   const double rate = held({axisOf(1000.0), axisOf(1000.0, "y")});
-  EXPECT_DOUBLE_EQ(rate, 1e9 / 36'000.0);
+  EXPECT_DOUBLE_EQ(rate, 0.9e9 / 16'000.0);
   for (const double ratio : {1.0, 0.97, 0.9, 0.77, 0.5, 0.31}) {
-    EXPECT_EQ(slips({axisOf(rate), axisOf(rate * ratio, "y")}), 0U) << "ratio " << ratio;
+    EXPECT_LE(slips({axisOf(rate), axisOf(rate * ratio, "y")}), 2U) << "ratio " << ratio;
   }
   EXPECT_GT(slips({axisOf(rate * 2.0), axisOf(rate * 1.9, "y")}), 100U);
+}
+
+// From the lateness of a real-time kernel to that of a busy computer. Steps of one instant share a
+// write, which the formula doesn't count on.
+TEST_F(FormulaOnTheEngine, HoldsForAllLatenessesAxesAndMicrosteps) {
+  for (const Nanoseconds lateness : {10'000, 60'000, 300'000, 1'000'000}) {
+    for (const std::size_t count : {1U, 2U, 6U}) {
+      for (const int microsteps : {1, 2, 4, 16, 32}) {
+        setLateness(lateness);
+        const auto at = [&](double rate) {
+          std::vector<config::AxisConfig> axes;
+          for (std::size_t i = 0; i < count; ++i) {
+            axes.push_back(axisOf(rate, std::string(1, static_cast<char>('u' + i))));
+            axes.back().driver = driver::driverChip("drv8825");
+            axes.back().microsteps = microsteps;
+          }
+          return axes;
+        };
+        const double rate = held(at(1000.0));
+        EXPECT_LE(slips(at(rate)), count)
+            << lateness << " ns, " << count << " axes, 1/" << microsteps << ", " << rate;
+      }
+    }
+  }
 }
 
 }  // namespace

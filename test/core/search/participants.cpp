@@ -151,7 +151,9 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
       if (config.brake) spec.load_falls = kLoadFalls;
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
-      spec.limits->exact_times = !isEngineLate(schedule);
+      if (isEngineLate(schedule)) {
+        spec.limits->late = machine::MachineOptions().late_steps * config.microsteps;
+      }
       specs.push_back(spec);
     }
   }

@@ -237,17 +237,17 @@ TEST(MotionJudge, CountsInTheConfiguredMicrosteps) {
   EXPECT_GT(judge(limits, coarse).too_fast, 0);
 }
 
-// Late by up to a quarter of the interval, and the next step on time.
-TEST(MotionJudge, AllowsLateStepsIfTimesAreNotExact) {
+// Four steps come late, right after each other.
+TEST(MotionJudge, AllowsLateStepsToCatchUpAsFarAsTheyMayBeBehind) {
   MotorLimits limits{20'000.0, 40'000.0, 0.0};
   auto steps = trapezoid(20'000.0, limits.rate, limits.acceleration);
-  for (std::size_t i = 0; i + 1 < steps.size(); i += 3) {
-    steps[i].time_ns += (steps[i + 1].time_ns - steps[i].time_ns) / 4;
+  for (std::size_t i = 0; i < 4; ++i) {
+    steps[10'000 + i].time_ns = steps[10'004].time_ns - 2'000 * static_cast<int>(4 - i);
   }
   EXPECT_GT(judge(limits, steps).too_fast, 0);
-  limits.exact_times = false;
+  limits.late = 4.0;
   EXPECT_EQ(judge(limits, steps).first, "");
-  steps[5000].time_ns = steps[5001].time_ns - 30'000;
+  limits.late = 3.0;
   EXPECT_GT(judge(limits, steps).too_fast, 0);
 }
 

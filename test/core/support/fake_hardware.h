@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "pulse/hybrid_wait.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -26,7 +27,7 @@ class LateClock : public pulse::Clock {
 
   void pass(Nanoseconds time) { now_ += time; }
 
-  /// The lateness of the next wait that is too late to return at once.
+  /// The lateness of the next wait that is longer than pulse::HybridWait::kShortWait.
   std::function<Nanoseconds()> spun = [] { return 0; };
   std::function<Nanoseconds()> slept = [] { return 0; };
   Nanoseconds spin_guard = 0;
@@ -34,7 +35,10 @@ class LateClock : public pulse::Clock {
 
  private:
   void wait(Nanoseconds time, const std::function<Nanoseconds()>& late) {
-    if (now_ < time) now_ = time + late();
+    if (now_ >= time) return;
+    // The pulse thread's clock spins then.
+    const bool is_short = time - now_ <= pulse::HybridWait::kShortWait;
+    now_ = time + (is_short ? 0 : late());
   }
 
   Nanoseconds now_ = 1'000'000'000;

@@ -54,6 +54,7 @@ class PulseEngineTest : public testing::Test {
     order.profile = profiles.back().get();
     order.continues = continues;
     order.restart_interval = restart_interval;
+    order.full_step = full_step;
     order.stops = engine->stopsServed();
     order.faults = engine->channel(channel).faults();
     return order;
@@ -120,6 +121,7 @@ class PulseEngineTest : public testing::Test {
   std::deque<Follow> follows;
   std::uint64_t serial = 0;
   Nanoseconds restart_interval = 0;
+  int full_step = 0;
 };
 
 }  // namespace stepdriver::pulse

@@ -50,6 +50,11 @@ struct MachineOptions {
   /// A pulse that comes later than this, or so much longer after the last one than planned, at a
   /// speed that the motor can't restart from is a fault.
   double max_lateness = 0.005;  ///< [s]
+  /// [full steps] How far the pulses of an axis may be behind their plan before the timeline of all
+  /// axes slides, from 0 to 0.5. The motor feels it as an angle, and the steps that are overdue
+  /// then follow as closely as its driver chip allows. 0.25 is what a motor feels at each step of
+  /// quarter stepping. A quarter of a step's interval is always allowed.
+  double late_steps = 0.25;
   /// On a real clock, first measure what step rates this computer and its lines can sustain.
   bool measure = false;
   /// Don't start if that is less than the axes need, or if real-time permissions are refused.

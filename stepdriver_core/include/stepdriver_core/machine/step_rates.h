@@ -16,11 +16,12 @@ struct StepRate {
   double asked = 0.0;  ///< [steps/s] at the axis's top speed
   double alone = 0.0;  ///< [steps/s] that can be sustained if no other axis moves
   double held = 0.0;  ///< [steps/s] that can be sustained while all others move at their top speeds
-  std::string limited;  ///< what limits `held`, in words
+  double steps_per_round = 0.0;  ///< of the motor; 0: not known
+  std::string limited;           ///< what limits `held`, in words
 
   /// Whether the computer can sustain the rate that the axis needs.
   bool holds() const { return asked <= held; }
-  /// "x needs 8000 steps/s, and this computer can sustain 12500 steps/s: ..."
+  /// "x needs 8000 steps/s (150 rpm), and this computer can sustain 12500 steps/s (234 rpm): ..."
   std::string text() const;
 };
 
@@ -35,16 +36,20 @@ struct StepRates {
 };
 
 /// The highest step rates, from the lateness l of wake-ups and the costs w of a write and r of an
-/// endstop's read, each at its 99th percentile. With the chip's high and low times h and d, and the
-/// sums over all other axes, an interval T can be sustained if
+/// endstop's read, each at its 99th percentile. With M microsteps in a full step, the chip's high
+/// and low times h and d, and the sums over this and all other axes, an interval T can be sustained
+/// if
 ///
-///   T >= 4 (l + r + w + sum(r + w))           a pulse must be out within a quarter of an interval
-///                                             after its planned time: that is what the engine
-///                                             absorbs
-///   T >= 2 l + r + 2 w + h + d + sum(r + 2 w)  the pulse itself, both of its wake-ups late
-///   T >= g + h + r + 2 w                      if the clock spins for a guard g before an edge,
-///   T >= (g + min(g, h) - s) / 0.8            less what a sleep is late by (s, a median): it may
-///                                             for so much of the time
+///   A T >= l + sum(r + w), A = max(1/4, M Capability::late_steps)
+///                                   a pulse must be out before its field is too far behind the
+///                                   plan: that is what the engine absorbs, if it isn't longer than
+///                                   pulse::kLongestCatchUp; then A is 1/4. If h is so long
+///                                   that the clock sleeps, the end of the pulse is late by another
+///                                   l.
+///   0.9 T >= sum(r + 2 w + h + d)   the pulses themselves, and room to catch up with the plan
+///   T >= g + h + r + 2 w            if the clock spins for a guard g before an edge,
+///   T >= (g + min(g, h) - s) / 0.8  less what a sleep is late by (s, a median): it may for so much
+///                                   of the time
 ///   1 - product(1 - (g + min(g, h)) / T) <= 0.8, over all axes: the same for several
 ///
 /// or if the first two are true with the lateness of waits that don't spin. At higher rates more

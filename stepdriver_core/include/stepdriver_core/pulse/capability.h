@@ -66,6 +66,8 @@ struct RealtimeRights {
 
 /// The measured performance of a computer and its lines.
 struct Capability {
+  /// [full steps] as configured, see machine::MachineOptions: what a lateness means for a motion.
+  double late_steps = 0.25;
   Spread lateness;        ///< of wake-ups, waiting as the pulse thread does
   Spread sleep_lateness;  ///< of wake-ups from waits that don't spin (see Clock::sleepUntil())
   Nanoseconds guard = 0;  ///< Clock::guard()

@@ -35,6 +35,7 @@ struct MachineConfig {
   SimulationConfig simulation;           ///< only for the simulated backend
   std::vector<config::AxisConfig> axes;  ///< in the order of their names
   double max_lateness = 0.005;           ///< [s] a pulse that is later is a fault
+  double late_steps = 0.25;              ///< [full steps] see machine::MachineOptions
   double write_timeout = 0.5;            ///< [s] of a line other than STEP and DIR
   bool enforce_realtime = false;         ///< don't start if the computer is too slow for the axes
   bool keep_cpus_awake = true;           ///< see pulse::kCpuLatencyDevice
@@ -60,6 +61,7 @@ struct MachineConfig {
 ///   policy: warn                 # if the computer is too slow for its axes: warn, or enforce:
 ///                                # don't start
 ///   max_lateness_ms: 5.0
+///   late_steps: 0.25             # full steps by which pulses may be behind their plan
 ///   keep_cpus_awake: true        # with libgpiod; false: they may sleep, and wake late
 ///   cpu: 3                       # the processor of the pulse thread; left out: any
 /// emergency_stop:

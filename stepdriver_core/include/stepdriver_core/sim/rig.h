@@ -66,10 +66,10 @@ struct MotorLimits {
   double rate = 0.0;          ///< [steps/s] the highest; above 0
   double acceleration = 0.0;  ///< [steps/s^2] the highest, speeding up or slowing down; above 0
   double start_rate = 0.0;    ///< [steps/s] by which the speed may jump
-  /// The times of the edges are exactly as planned, on a virtual clock. Otherwise a step may be
-  /// late, and the interval to the next one may be down to three quarters of what was planned:
-  /// then no acceleration can be judged.
-  bool exact_times = true;
+  /// [steps] How far the steps may be behind their plan when they go out. 0: their times are exactly
+  /// as planned, on a virtual clock. Otherwise late steps may catch up with the plan, and no
+  /// acceleration can be judged.
+  double late = 0.0;
 };
 
 /// The motor of an axis: a hybrid stepper whose torque is a sine of the electrical angle between
