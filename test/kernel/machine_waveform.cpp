@@ -95,7 +95,7 @@ void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
     ASSERT_EQ(pulse.forward, steps[k].direction > 0) << "step " << k;
     ASSERT_GE(pulse.time_ns, timeline + steps[k].time_ns) << "step " << k << " came too early";
     if (k + 1 == count) break;
-    // Of the longer one of the intervals beside it.
+    // Of the longer one of the intervals before and after it.
     std::int64_t interval = steps[k + 1].time_ns - steps[k].time_ns;
     if (k > 0) interval = std::max(interval, steps[k].time_ns - steps[k - 1].time_ns);
     timeline = std::max(timeline, pulse.time_ns - steps[k].time_ns - madeUp(interval));

@@ -48,8 +48,8 @@ struct EngineChannel {
     return running && next && next->direction == stepped && config.late_steps > 0.0 &&
            fullStep() > 0;
   }
-  /// By how much the next step may be late by the angle of the motor: no more of its plan is open
-  /// then than late_steps, whether it speeds up or slows down. @pre catchesUp()
+  /// By how much the next step may be late by the angle of the motor, whether it speeds up or slows
+  /// down. @pre catchesUp()
   Nanoseconds angleAsTime(Nanoseconds motion_now) const;
 
   /// Steps with this interval or a longer one can begin and end at once.

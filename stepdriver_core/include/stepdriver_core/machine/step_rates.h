@@ -41,9 +41,9 @@ struct StepRates {
 /// if
 ///
 ///   A T >= l + sum(r + w), A = max(1/4, M Capability::late_steps)
-///                                   a pulse must be out before its field is too far behind the
-///                                   plan: that is what the engine absorbs, if it isn't longer than
-///                                   pulse::kLongestCatchUp; then A is 1/4. If h is so long
+///                                   a pulse must be out before its field is farther behind the
+///                                   plan than the engine absorbs; A is 1/4 for more than
+///                                   pulse::kLongestCatchUp. If h is so long
 ///                                   that the clock sleeps, the end of the pulse is late by another
 ///                                   l.
 ///   0.9 T >= sum(r + 2 w + h + d)   the pulses themselves, and room to catch up with the plan
