@@ -66,8 +66,8 @@ Nanoseconds EngineChannel::restartInterval() const {
   return shared != nullptr ? shared->restartInterval() : restart_interval;
 }
 
-// A step's interval alone would be too long where the motion speeds up, and the present speed
-// alone, where it slows down.
+// A step's interval alone would be too long in a motion that speeds up, and the present speed alone
+// in one that slows down.
 Nanoseconds EngineChannel::angleAsTime(Nanoseconds motion_now) const {
   const double speed = std::abs(shared != nullptr ? shared->velocityOf(*this, motion_now)
                                                   : profile.stateAt(motion_now).velocity);
