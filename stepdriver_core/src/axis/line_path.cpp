@@ -11,6 +11,7 @@
 #include "message_text.h"
 #include "motion/compose.h"
 #include "motion/errors.h"
+#include "motion/extent.h"
 #include "motion/level_off.h"
 #include "motion/planner.h"
 #include "motion/resting_count.h"
@@ -159,8 +160,15 @@ motion::Profile LinePath::plan(std::int64_t at, const motion::MotionState& from,
   limits.max_speed = std::min(speed_ * speed_override, limits_.max_speed);
   // The jerk of a hold may be higher.
   const motion::LevelOff level_off(at, from, limits_, stop_limits_.jerk);
-  return level_off.followedBy(motion::planMove(level_off.endNs(), level_off.end(), length_, limits))
-      .profile;
+  motion::Plan plan =
+      level_off.followedBy(motion::planMove(level_off.endNs(), level_off.end(), length_, limits));
+  if (plan.overshoot <= motion::kNoStep) return plan.profile;
+  // A stop may also speed up, to rest on a whole step, or leave too little room for a lower jerk.
+  // What it has begun can end within its own limits.
+  motion::MotionLimits as_stop = stop_limits_;
+  as_stop.max_speed = limits.max_speed;
+  motion::Plan kept = motion::planMove(at, from, length_, as_stop);
+  return kept.overshoot < plan.overshoot ? kept.profile : plan.profile;
 }
 
 motion::Profile LinePath::planStop(std::int64_t at, const motion::MotionState& from) const {

@@ -206,5 +206,16 @@ TEST(FoundSchedules, AfterAFailureToSwitchTheMotorPowerOffItIsSwitchedOffAgainAn
       {1, {does(0, 0, "emergency stop"), does(1, 16, "a pin fails")}, {{9, Who::kWriter, 40}}});
 }
 
+// The stop had begun to speed up, to rest on a whole step, and the lower jerk of the line took that
+// back only at the highest speed: x ran through its target into its switch.
+TEST(FoundSchedules, ALineThatIsResumedWhileItStopsEndsAtItsTargetWithALowerJerkToo) {
+  for (std::size_t after = 10; after < 120; after += 5) {
+    expectGood({0,
+                {does(1, 16, "gentle limits of x"), does(1, 0, "line of x and y"),
+                 does(1, after, "hold"), does(0, 0, "resume")},
+                {}});
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::search
