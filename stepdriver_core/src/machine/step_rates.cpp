@@ -223,8 +223,8 @@ StepRates stepRates(const std::vector<config::AxisConfig>& configs,
     const Interval interval = shortest(loads[i], others, capability);
     rates.axes.push_back({axes[i].name, 1e9 / loads[i].interval,
                           1e9 / shortest(loads[i], Others{}, capability).ns, 1e9 / interval.ns,
-                          axes[i].steps_per_round,
-                          reasonOf(interval, loads[i], others, capability.guard)});
+                          reasonOf(interval, loads[i], others, capability.guard),
+                          axes[i].steps_per_round});
   }
   return rates;
 }

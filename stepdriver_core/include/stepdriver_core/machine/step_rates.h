@@ -16,8 +16,8 @@ struct StepRate {
   double asked = 0.0;  ///< [steps/s] at the axis's top speed
   double alone = 0.0;  ///< [steps/s] that can be sustained if no other axis moves
   double held = 0.0;  ///< [steps/s] that can be sustained while all others move at their top speeds
-  double steps_per_round = 0.0;  ///< of the motor; 0: not known
   std::string limited;           ///< what limits `held`, in words
+  double steps_per_round = 0.0;  ///< of the motor; 0: not known
 
   /// Whether the computer can sustain the rate that the axis needs.
   bool holds() const { return asked <= held; }
