@@ -21,7 +21,7 @@ MotionJudge::MotionJudge(const MotorLimits& limits)
       start_rate_(limits.start_rate * kMore),
       late_(limits.late) {}
 
-void MotionJudge::forget() { forgets_ = true; }
+void MotionJudge::forget() { forgets_ = kMostCaughtUp + 1; }
 
 std::optional<Violation> MotionJudge::step(double way, std::int64_t time_ns,
                                            std::int64_t slides_ns) {
@@ -30,8 +30,8 @@ std::optional<Violation> MotionJudge::step(double way, std::int64_t time_ns,
   edge.time_ns = time_ns;
   edge.slides_ns = slides_ns;
   position_ += way;
-  if (forgets_) {
-    forgets_ = false;
+  if (forgets_ > 0) {
+    --forgets_;
     steps_ = 0;
     scales_ = {};
     return std::nullopt;

@@ -48,6 +48,8 @@ class MotionJudge {
   static constexpr double kPlaceError = 0.01;
   /// Trajectories may exceed a limit by a hundredth of it.
   static constexpr double kMore = 1.01;
+  /// Half a full step, at most, in the finest mode.
+  static constexpr int kMostCaughtUp = 128;
 
   explicit MotionJudge(const MotorLimits& limits);
 
@@ -59,7 +61,8 @@ class MotionJudge {
   /// @return the limit that the motion has exceeded, if it has.
   std::optional<Violation> step(double way, std::int64_t time_ns, std::int64_t slides_ns);
 
-  /// Steps may be late from now on: the next one of this motor isn't judged, nor what was before.
+  /// Steps may be late from now on: the next one of this motor isn't judged, nor those that catch
+  /// up with the plan, nor what was before.
   void forget();
 
   /// The first violation, in words; empty if there is none.
@@ -98,7 +101,7 @@ class MotionJudge {
   const double late_;
   std::uint64_t steps_ = 0;
   double position_ = 0.0;
-  bool forgets_ = false;
+  int forgets_ = 0;  // the next steps, this many
   std::array<Scale, kScales> scales_;
   std::string first_violation_;
 };

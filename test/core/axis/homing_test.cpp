@@ -199,7 +199,7 @@ TEST_F(HomingTest, TakesSoftLimitsForNothingWhileItHomes) {
   config::AxisConfig config = homingAxis();
   config.min_position = -0.01;
   config.max_position = 0.2;
-  config.homing->offset = 0.0;
+  config.homing->offset = -0.01;
   build(config);
   expectHomed(x().home());
   EXPECT_REFUSED(x().moveTo(-0.05), "min_position");

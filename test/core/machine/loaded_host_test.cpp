@@ -31,6 +31,7 @@ TEST(SlidTime, OfSecondsLosesNoStepBunchesNoneAndIsInTheDuration) {
   };
   machine::MachineOptions options;
   options.threaded = false;
+  options.late_steps = 0.0;
   machine::Machine machine({linearAxis("x")}, backend, clock, options);
   clock.spun = clock.slept = late;
   axis::Axis& x = machine.axis("x");

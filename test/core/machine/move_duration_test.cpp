@@ -17,7 +17,7 @@ using test::kStep;
 class LateMove : public testing::Test {
  protected:
   LateMove() {
-    backend.write_cost = [this] { return ++writes % 50 == 0 ? 800'000 : 0; };
+    backend.write_cost = [this] { return ++writes % 50 == 0 ? 1'300'000 : 0; };
     std::vector<config::AxisConfig> axes{test::linearAxis("x"), test::linearAxis("y")};
     for (config::AxisConfig& axis : axes) {
       axis.start_speed = axis.max_speed;
@@ -44,7 +44,7 @@ class LateMove : public testing::Test {
 };
 
 // From the beginning to the first edge, from the last edge to the end, and one late write.
-constexpr double kLatestEnd = 1.2e-3;  // [s]
+constexpr double kLatestEnd = 1.8e-3;  // [s]
 
 TEST_F(LateMove, LastsAsLongAsItsEdges) {
   axis::Axis& x = machine->axis("x");
