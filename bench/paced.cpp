@@ -77,8 +77,8 @@ void write(const std::vector<Row>& rows, const std::string& file) {
         row.what.c_str(), row.axes, row.rate, row.loaded ? "true" : "false", figures.edges,
         us(figures.percentile(0.5)), us(figures.percentile(0.99)), us(figures.percentile(0.999)),
         us(figures.percentile(1.0)), static_cast<unsigned long long>(figures.slips),
-        static_cast<double>(figures.slipped) * 1e-6, figures.too_short, figures.early,
-        figures.cpu, &row == &rows.back() ? "" : ",");
+        static_cast<double>(figures.slipped) * 1e-6, figures.too_short, figures.early, figures.cpu,
+        &row == &rows.back() ? "" : ",");
   }
   std::fprintf(json, "]\n");
   std::fclose(json);

@@ -16,9 +16,9 @@ struct PacedFigures {
   std::uint64_t slips = 0;         ///< number of times that the timeline slid
   pulse::Nanoseconds slipped = 0;  ///< total time by which it slid
   std::size_t too_short = 0;       ///< pulses and pauses shorter than the chip's time
-  std::size_t early = 0;      ///< steps before their planned time
-  double cpu = 0.0;           ///< of one core, of the whole process
-  int scheduler_error = -1;   ///< from pulse::RealtimeRights
+  std::size_t early = 0;           ///< steps before their planned time
+  double cpu = 0.0;                ///< of one core, of the whole process
+  int scheduler_error = -1;        ///< from pulse::RealtimeRights
 
   pulse::Nanoseconds percentile(double part) const;
 };

@@ -16,8 +16,8 @@
 
 /// What the kernel's lines did while whole machines moved, compared with the plan and the chips.
 ///
-/// On a machine that stalls, pulses come late. Then later pulses come late, too, except for what may
-/// be made up for, and none is left out.
+/// On a machine that stalls, pulses come late. Then later pulses come late, too, except for what
+/// may be made up for, and none is left out.
 namespace stepdriver::kernel {
 
 /// [ns] By how much a late pulse may be made up for: a quarter of a full step, at most 2 ms, or a

@@ -66,9 +66,9 @@ struct MotorLimits {
   double rate = 0.0;          ///< [steps/s] the highest; above 0
   double acceleration = 0.0;  ///< [steps/s^2] the highest, speeding up or slowing down; above 0
   double start_rate = 0.0;    ///< [steps/s] by which the speed may jump
-  /// [steps] How far the steps may be behind their plan when they go out. 0: their times are exactly
-  /// as planned, on a virtual clock. Otherwise late steps may catch up with the plan, and no
-  /// acceleration can be judged.
+  /// [steps] How far the steps may be behind their plan when they go out. 0: their times are
+  /// exactly as planned, on a virtual clock. Otherwise late steps may catch up with the plan, and
+  /// no acceleration can be judged.
   double late = 0.0;
 };
 
