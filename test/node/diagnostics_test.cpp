@@ -119,7 +119,9 @@ TEST_F(DiagnosticsTest, WarnOfAnActiveEndstopWhileItIs) {
   node.start();
   declareAt(0.0);
   EXPECT_FALSE(node.moveTo(0.1, true, 0.01).success);
-  EXPECT_TRUE(waitFor("x", DiagnosticStatus::WARN, "the max endstop is active"));
+  EXPECT_TRUE(waitFor("x", DiagnosticStatus::WARN,
+                      "its last motion ended early: the max endstop was met at 0.05 m; the max "
+                      "endstop is active"));
   EXPECT_EQ(valueOf("max endstop"), "active");
   EXPECT_TRUE(node.moveTo(0.03, true).success);
   declareAt(0.03);

@@ -114,7 +114,7 @@ TEST_F(WizardTest, WritesAConfigurationThatIsRightForTheMachine) {
   EXPECT_NEAR(carriage(), 0.1 - 0.0016, 1e-9);
   ASSERT_NO_FATAL_FAILURE(answer("How far should x move", ""));
   ASSERT_TRUE(terminal.waitFor("x can't move 22 mm towards minus: the min switch ahead of it"));
-  ASSERT_NO_FATAL_FAILURE(answer("towards your minus end?", ""));
+  ASSERT_NO_FATAL_FAILURE(answer("towards your minus end:", ""));
   ASSERT_TRUE(terminal.waitFor("take up the play"));
   terminal.type("y");
   ASSERT_TRUE(terminal.waitFor("Mark where x stands"));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "stepdriver_core/error.h"
@@ -15,8 +16,16 @@ namespace {
 using config::ConfigValue;
 using Map = ConfigValue::Map;
 
+// The order of keys makes no difference.
 bool same(const ConfigValue& one, const ConfigValue& other) {
-  return yaml::textOf(one) == yaml::textOf(other);
+  const Map* const map = one.as<Map>();
+  const Map* const other_map = other.as<Map>();
+  if (map == nullptr || other_map == nullptr) return yaml::textOf(one) == yaml::textOf(other);
+  return map->size() == other_map->size() &&
+         std::all_of(map->begin(), map->end(), [&](const auto& entry) {
+           const auto found = other_map->find(entry.first);
+           return found != other_map->end() && same(entry.second, found->second);
+         });
 }
 
 /// What a text means; nothing if an edit has made it unreadable.
