@@ -11,8 +11,10 @@ namespace {
 const ros::WallDuration kSayPeriod(1.0);
 
 std::string withoutNumbers(std::string text) {
-  const auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
-  text.erase(std::remove_if(text.begin(), text.end(), is_digit), text.end());
+  const auto is_of_number = [](unsigned char c) {
+    return std::isdigit(c) != 0 || c == '.' || c == '-';
+  };
+  text.erase(std::remove_if(text.begin(), text.end(), is_of_number), text.end());
   return text;
 }
 
