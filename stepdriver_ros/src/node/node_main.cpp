@@ -109,10 +109,10 @@ std::string usage() {
   std::string line;
   for (const std::string& name : parameterNames()) {
     if (indent.size() + line.size() + name.size() + 1 > kWidth) {
-      names += line + "\n" + indent;
+      names.append(line).append("\n").append(indent);
       line.clear();
     }
-    line += "~" + name + "  ";
+    line.append("~").append(name).append("  ");
   }
   return fmt::format(kUsage, names + line + "\n" + indent);
 }

@@ -20,9 +20,9 @@ namespace {
 
 using test::kMillisecond;
 
-constexpr Nanoseconds kInterval = 100'000;
-constexpr double kSpeed = 1e9 / kInterval;
-constexpr Nanoseconds kStart = kMillisecond;
+constexpr Nanoseconds kStepInterval = 100'000;
+constexpr double kStepSpeed = 1e9 / kStepInterval;
+constexpr Nanoseconds kMotionStart = kMillisecond;
 
 class LateSteps : public PulseEngineTest {
  protected:
@@ -38,7 +38,7 @@ class LateSteps : public PulseEngineTest {
   }
   // Of the k-th step of a cruise.
   static Nanoseconds planned(std::size_t k) {
-    return kStart + kInterval / 2 + static_cast<Nanoseconds>(k) * kInterval;
+    return kMotionStart + kStepInterval / 2 + static_cast<Nanoseconds>(k) * kStepInterval;
   }
   std::vector<motion::Step> planOf(std::size_t order) const {
     std::vector<motion::Step> steps;
@@ -50,30 +50,31 @@ class LateSteps : public PulseEngineTest {
 
 TEST_F(LateSteps, FollowAsCloselyAsTheChipAllowsUntilThePlanIsReached) {
   make({config(0)});
-  follow(cruise(kStart, 0, 100, kSpeed));
-  stall(planned(49) + 10'000, planned(50) + 4 * kInterval);
+  follow(cruise(kMotionStart, 0, 100, kStepSpeed));
+  stall(planned(49) + 10'000, planned(50) + 4 * kStepInterval);
   runOut();
   const auto rises = lines.rises(0);
   ASSERT_EQ(rises.size(), 100U);
   EXPECT_EQ(engine->state().slips, 0U);
   for (std::size_t k = 0; k < rises.size(); ++k) {
-    const Nanoseconds overdue = planned(50) + 4 * kInterval + 4'000 * static_cast<int>(k - 50);
+    const Nanoseconds overdue = planned(50) + 4 * kStepInterval + 4'000 * static_cast<int>(k - 50);
     EXPECT_EQ(rises[k], k < 50 ? planned(k) : std::max(planned(k), overdue)) << k;
   }
-  EXPECT_EQ(engine->state().worst_lateness, 4 * kInterval);
+  EXPECT_EQ(engine->state().worst_lateness, 4 * kStepInterval);
   expectTimes(config(0));
 }
 
 TEST_F(LateSteps, SlideTheTimelineOnlyByWhatIsBeyond) {
   make({config(0), config(1)});
-  follow(cruise(kStart, 0, 100, kSpeed));
-  follow(cruise(kStart, 0, 10, kSpeed / 10.0), 1);
-  stall(planned(49) + 10'000, planned(50) + 4 * kInterval + 30'000);
+  follow(cruise(kMotionStart, 0, 100, kStepSpeed));
+  follow(cruise(kMotionStart, 0, 10, kStepSpeed / 10.0), 1);
+  stall(planned(49) + 10'000, planned(50) + 4 * kStepInterval + 30'000);
   runOut();
   EXPECT_EQ(engine->state().slips, 1U);
   EXPECT_EQ(engine->state().slipped, 30'000);
   EXPECT_EQ(lines.rises(0).back(), planned(99) + 30'000);
-  EXPECT_EQ(lines.rises(2).back(), kStart + 95 * kInterval + 30'000) << "the same for all axes";
+  EXPECT_EQ(lines.rises(2).back(), kMotionStart + 95 * kStepInterval + 30'000)
+      << "the same for all axes";
 }
 
 TEST_F(LateSteps, AreAllowedNoMoreThanAreConfigured) {
@@ -83,48 +84,50 @@ TEST_F(LateSteps, AreAllowedNoMoreThanAreConfigured) {
     channel.late_steps = late_steps;
     make({channel});
     const Nanoseconds start = clock.now() + kMillisecond;
-    follow(cruise(start, 0, 100, kSpeed));
-    stall(start + 50 * kInterval, start + 50 * kInterval + kInterval / 2 + 10 * kInterval);
+    follow(cruise(start, 0, 100, kStepSpeed));
+    stall(start + 50 * kStepInterval,
+          start + 50 * kStepInterval + kStepInterval / 2 + 10 * kStepInterval);
     runOut();
     const double allowed = std::max(0.25, 16.0 * late_steps);
-    EXPECT_EQ(engine->state().slipped, 10 * kInterval - std::llround(allowed * kInterval));
+    EXPECT_EQ(engine->state().slipped, 10 * kStepInterval - std::llround(allowed * kStepInterval));
   }
 }
 
 // A rotor that stands, or turns back, doesn't expect the field ahead of it.
 TEST_F(LateSteps, OfAFirstStepOrATurnAreNotCaughtUp) {
   make({config(0)});
-  follow(cruise(kStart, 0, 100, kSpeed));
-  stall(kStart, kStart + kInterval / 2 + 300'000);
+  follow(cruise(kMotionStart, 0, 100, kStepSpeed));
+  stall(kMotionStart, kMotionStart + kStepInterval / 2 + 300'000);
   runOut();
-  EXPECT_EQ(engine->state().slipped, 300'000 - kInterval / 8) << "its interval is half of one";
+  EXPECT_EQ(engine->state().slipped, 300'000 - kStepInterval / 8) << "its interval is half of one";
 
   make({config(0)});
   const Nanoseconds start = clock.now() + kMillisecond;
-  motion::Profile turn(start, {{motion::DoubleDouble(0.01), motion::DoubleDouble(0.0), kSpeed},
-                               {motion::DoubleDouble(0.01), motion::DoubleDouble(100.0), -kSpeed}});
+  motion::Profile turn(start,
+                       {{motion::DoubleDouble(0.01), motion::DoubleDouble(0.0), kStepSpeed},
+                        {motion::DoubleDouble(0.01), motion::DoubleDouble(100.0), -kStepSpeed}});
   follow(std::move(turn));
   stall(start + 10 * kMillisecond, start + 10 * kMillisecond + 350'000);
   runOut();
   EXPECT_EQ(engine->channel(0).count, 0);
   // The step back was to be an interval after the last one forward.
-  EXPECT_EQ(engine->state().slipped, 350'000 - kInterval / 2 - kInterval / 4);
+  EXPECT_EQ(engine->state().slipped, 350'000 - kStepInterval / 2 - kStepInterval / 4);
 }
 
 TEST_F(LateSteps, OfAMotionThatMeasuresAreNotCaughtUp) {
   full_step = 0;
   make({config(0)});
-  follow(cruise(kStart, 0, 100, kSpeed));
-  stall(planned(49) + 10'000, planned(50) + 3 * kInterval);
+  follow(cruise(kMotionStart, 0, 100, kStepSpeed));
+  stall(planned(49) + 10'000, planned(50) + 3 * kStepInterval);
   runOut();
-  EXPECT_EQ(engine->state().slipped, 3 * kInterval - kInterval / 4);
+  EXPECT_EQ(engine->state().slipped, 3 * kStepInterval - kStepInterval / 4);
 }
 
 TEST_F(LateSteps, OfASlowMotionAreCaughtUpForNoLongerThanARotorTakesToRest) {
   make({config(0)}, 1'000 * kMillisecond);
   constexpr Nanoseconds kSlow = 2 * kMillisecond;
-  follow(cruise(kStart, 0, 100, 1e9 / kSlow));
-  stall(kStart + 10 * kSlow, kStart + 10 * kSlow + kSlow / 2 + 5 * kMillisecond);
+  follow(cruise(kMotionStart, 0, 100, 1e9 / kSlow));
+  stall(kMotionStart + 10 * kSlow, kMotionStart + 10 * kSlow + kSlow / 2 + 5 * kMillisecond);
   runOut();
   EXPECT_EQ(engine->state().slipped, 5 * kMillisecond - kLongestCatchUp);
 }
@@ -133,8 +136,8 @@ TEST_F(LateSteps, OnBothEdgesAreCaughtUpToo) {
   ChannelConfig channel = config(0);
   channel.both_edges = true;
   make({channel});
-  follow(cruise(kStart, 0, 100, kSpeed));
-  stall(planned(49) + 10'000, planned(50) + 3 * kInterval);
+  follow(cruise(kMotionStart, 0, 100, kStepSpeed));
+  stall(planned(49) + 10'000, planned(50) + 3 * kStepInterval);
   runOut();
   EXPECT_EQ(engine->state().slips, 0U);
   ASSERT_EQ(lines.edges.size(), 101U) << "one is of DIR";
@@ -154,10 +157,10 @@ TEST_F(LateSteps, OfSharedMotorsAreJudgedByTheSpeedOfTheMotor) {
         lines, clock, std::vector<ChannelConfig>{config(0), config(1)}, 5'000'000, std::nullopt,
         std::vector<SharedAxes>{shared});
     const Nanoseconds start = clock.now() + kMillisecond;
-    follow(cruise(start, 0, 100, kSpeed), 0);
-    follow(cruise(start, 0, 100, kSpeed), 1);
-    const Nanoseconds due = start + 50 * kInterval + kInterval / 4;
-    stall(due - 5'000, due + 2 * kInterval + beyond);
+    follow(cruise(start, 0, 100, kStepSpeed), 0);
+    follow(cruise(start, 0, 100, kStepSpeed), 1);
+    const Nanoseconds due = start + 50 * kStepInterval + kStepInterval / 4;
+    stall(due - 5'000, due + 2 * kStepInterval + beyond);
     runOut();
     EXPECT_EQ(engine->state().slipped, beyond) << "four steps of the motor are two intervals";
     EXPECT_EQ(lines.rises(0).size(), 200U);
@@ -167,8 +170,8 @@ TEST_F(LateSteps, OfSharedMotorsAreJudgedByTheSpeedOfTheMotor) {
 
 TEST_F(LateSteps, EndAtOnceWithTheirMotion) {
   make({config(0)});
-  follow(cruise(kStart, 0, 100, kSpeed));
-  stall(planned(49) + 10'000, planned(50) + 3 * kInterval);
+  follow(cruise(kMotionStart, 0, 100, kStepSpeed));
+  stall(planned(49) + 10'000, planned(50) + 3 * kStepInterval);
   engine->serve();
   engine->emergencyStop();
   runOut();

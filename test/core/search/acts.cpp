@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "search/participants.h"
+#include "support/constants.h"
 
 /// The acts that a script is made of.
 namespace stepdriver::search {
@@ -33,7 +34,7 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
   return {name, [=](Participants& all, int client) { all.post(client, name, wanted, meaning); }};
 }
 
-constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
+using test::kMillisecond;
 
 /// While z still decelerates at the configured jerk it gets a target within a lower one, and is
 /// stopped again. The pauses differ with the steps before.

@@ -9,13 +9,14 @@
 #include "machine/queued_path.h"
 #include "motor/input_shaping.h"
 #include "stepdriver_core/error.h"
+#include "support/constants.h"
 #include "support/corexy_bench.h"
 #include "support/gantry_bench.h"
 
 namespace stepdriver::search {
 namespace {
 
-constexpr pulse::Nanoseconds kMillisecond = 1'000'000;
+using test::kMillisecond;
 constexpr pulse::Nanoseconds kSecond = 1'000 * kMillisecond;
 constexpr pulse::Nanoseconds kWriteTimeout = 500 * kMillisecond;
 constexpr pulse::Nanoseconds kInputPeriod = 100 * kMillisecond;
