@@ -531,6 +531,16 @@ void PulseEngine::written(Channel& channel, Nanoseconds now) {
   }
   channel.behind = channel.overdue(now);
   channel.rose = now;
+  if (channel.fullStep() > 0) {
+    // The write itself has taken time.
+    const Nanoseconds motion_now = now - state_.slipped;
+    const Nanoseconds lag = motion_now - channel.next->time_ns;
+    const Nanoseconds excess = lag > 0 ? lag - absorbed(channel, motion_now) : 0;
+    if (excess > 0) {
+      slide(excess);
+      slid_in_write_ = true;
+    }
+  }
   ++state_.pulses;
   state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
   lateness_.add(now, channel.late);
@@ -693,7 +703,7 @@ void PulseEngine::changedTogether(const Channel& channel) {
 }
 
 void PulseEngine::scheduleChanged() {
-  bool slid = false;
+  bool slid = std::exchange(slid_in_write_, false);
   for (Channel* channel : changed_) {
     channel->changed = false;
     slid = schedule(*channel) || slid;

@@ -223,6 +223,7 @@ class PulseEngine {
   std::vector<Channel*> writers_;
   std::vector<int> errors_;
   bool slid_ = false;
+  bool slid_in_write_ = false;
   Mailbox<Command, 64> mail_;
 
   StopCounts stops_;
