@@ -30,7 +30,7 @@ driver::Timing slowOptos() {
   driver::Timing timing = driver::driverChip("tb6600").timing;
   timing.step_high_ns = 150'000;
   timing.step_low_ns = 330'000;
-  timing.dir_setup_ns = timing.dir_hold_ns = 40'000'000;
+  timing.dir_setup_ns = timing.dir_hold_ns = 480'000;
   return timing;
 }
 
