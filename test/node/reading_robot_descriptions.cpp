@@ -13,14 +13,19 @@
 namespace stepdriver::node_test {
 namespace {
 
-/// The mistake that is found in a robot description for one axis, x; empty: none.
-std::string mistakeIn(const std::string& urdf) {
+/// An axis x, which no robot description has limited yet.
+config::AxisConfig axisX() {
   config::AxisConfig x;
   x.name = "x";
   x.joint = "x_joint";
   x.max_speed = 0.1;
   x.steps_per_unit = 80000.0;
-  std::vector<config::AxisConfig> axes{x};
+  return x;
+}
+
+/// The mistake that is found in a robot description for one axis, x; empty: none.
+std::string mistakeIn(const std::string& urdf) {
+  std::vector<config::AxisConfig> axes{axisX()};
   std::vector<ConfigIssue> issues;
   ros_node::applyRobotDescription(urdf, "/robot_description", axes, issues);
   EXPECT_LE(issues.size(), 1U);
@@ -79,12 +84,7 @@ TEST(ReadingARobotDescription, RefusesWhatIsNestedTooDeep) {
 /// An axis x that was fitted to a joint with this limit.
 config::AxisConfig fitted(const std::string& limit, std::vector<std::string>* warnings = nullptr,
                           std::vector<ConfigIssue>* issues = nullptr) {
-  config::AxisConfig x;
-  x.name = "x";
-  x.joint = "x_joint";
-  x.max_speed = 0.1;
-  x.steps_per_unit = 80000.0;
-  std::vector<config::AxisConfig> axes{x};
+  std::vector<config::AxisConfig> axes{axisX()};
   std::vector<ConfigIssue> found;
   const std::string urdf =
       "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>"
