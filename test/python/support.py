@@ -27,6 +27,7 @@ def axis(**changes):
                      "max": {"pin": "GPIO24", "active_level": "high"}},
         "homing": {"switch": "min", "seek_speed_mm_s": 50.0, "latch_speed_mm_s": 5.0, "pull_off_mm": 4.0,
                    "offset_mm": -2.0, "max_travel_mm": 250.0},
+        "require_homing": False,
         "enable_on_start": True,
     }
     config.update(changes)

@@ -3,7 +3,7 @@
 
 usage: test/panel/browser/pictures.py [FOLDER]
 
-Needs an environment with stepdriver. FOLDER: docs/pictures by default.
+Needs an environment with stepdriver. FOLDER: docs/screens by default.
 """
 
 import pathlib
@@ -32,21 +32,10 @@ def drawing_screen(page):
     time.sleep(6.0)
 
 
-def plots_screen(page):
-    from stepdriver.srv import MoveTo
-    page.click("#tab-plots")
-    for position in (0.03, 0.12, 0.06):
-        page.machine.call("x/move_to", MoveTo, position=position, wait=True)
-        page.machine.call("y/move_to", MoveTo, position=position / 2, wait=True)
-    time.sleep(1.5)
-
-
 SHOTS = [
     ("panel_machine_phone", machine_screen, PHONE, False),
     ("panel_machine_desktop_dark", machine_screen, DESKTOP, True),
     ("panel_drawing_desktop", drawing_screen, DESKTOP, False),
-    ("panel_drawing_phone_dark", drawing_screen, PHONE, True),
-    ("panel_plots_desktop", plots_screen, DESKTOP, False),
 ]
 
 
@@ -73,4 +62,4 @@ def main(folder):
 
 
 if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else SOURCES / "docs/pictures")
+    main(pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else SOURCES / "docs/screens")
