@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -43,17 +44,20 @@ class Input {
 
   std::size_t any(std::size_t count) { return byte() % count; }
 
-  /// From -size to size; a few are any double that isn't tiny.
+  /// From -size to size, ordinary or in one of twelve decades; a few are any double.
   double number(double size) {
     const int kind = byte();
-    if (kind < 250) return size * (kind - 125) / 125.0;
+    if (kind < 160) return size * (kind - 80) / 80.0;
+    if (kind < 250) return (kind % 2 == 0 ? 1.0 : -1.0) * inDecades(size);
     std::array<std::uint8_t, sizeof(double)> bytes{};
     for (std::uint8_t& each : bytes) each = byte();
     double number = 0.0;
     std::memcpy(&number, bytes.data(), sizeof number);
-    // A motion that takes longer than a run would be correct, but would show nothing.
-    return std::abs(number) < size / 1000.0 ? 0.0 : number;
+    return number;
   }
+
+  /// Down to a millionth of a millionth of the most.
+  double inDecades(double most) { return most * std::pow(10.0, -12.0 * byte() / 255.0); }
 
   /// From least to most.
   double between(double least, double most) { return least + (most - least) * byte() / 255.0; }
@@ -75,8 +79,6 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
 }
 
 /// An act with numbers of the input, as machine::Machine hands them over: it refuses some itself.
-/// The last act of a run moves each axis by 2 mm in two minutes, so the limits are at least that
-/// high.
 Act readAct(Input& input) {
   constexpr std::size_t kKinds = 14;
   const std::size_t kind = input.any(kKinds);
@@ -100,7 +102,10 @@ Act readAct(Input& input) {
                                    input.any(2) == 1,
                                    input.any(4) == 0 ? input.number(0.1) : 0.0,
                                    input.any(4) == 0 ? input.number(3.0) : 0.0};
-      return request(fmt::format("line of {} and {}", axis, other), line, moving({axis, other}));
+      const std::string name = fmt::format("line of {} and {} {} {} and {} at {} or in {} s", axis,
+                                           other, line.relative ? "by" : "to", line.positions[0],
+                                           line.positions[1], line.velocity, line.duration);
+      return request(name, line, moving({axis, other}));
     }
     case 3: {
       const double velocity = input.number(0.1);
@@ -118,22 +123,28 @@ Act readAct(Input& input) {
       for (const std::size_t moved : {axis, other}) {
         wanted.setpoints.push_back({moved, input.number(most), {}});
       }
-      return request(fmt::format("setpoints of {} and {}", axis, other), wanted,
-                     moving({axis, other}));
+      const std::string name = fmt::format(
+          "{} of {} and {}: {} and {} within {} s", positions ? "setpoints" : "velocities", axis,
+          other, wanted.setpoints[0].value, wanted.setpoints[1].value, wanted.timeout);
+      return request(name, wanted, moving({axis, other}));
     }
     case 9: {
       const std::size_t other = (axis + 1) % search::kAxes;
       const machine::JogTogether jogs{
           {{axis, input.number(0.1), {}}, {other, input.number(0.1), {}}}};
-      return request(fmt::format("jog {} and {}", axis, other), jogs, moving({axis, other}));
+      const std::string name = fmt::format("jog {} and {} at {} and {}", axis, other,
+                                           jogs.jogs[0].velocity, jogs.jogs[1].velocity);
+      return request(name, jogs, moving({axis, other}));
     }
     case 4: {
       axis::AxisLimits limits;
-      limits.max_speed = input.between(0.01, 0.11);
-      limits.acceleration = input.between(0.05, 2.1);
-      limits.deceleration = input.between(0.05, 2.1);
-      if (input.any(2) == 1) limits.jerk = input.between(1.0, 60.0);
-      return request(fmt::format("limits of {}", axis), machine::SetLimits{axis, limits}, {});
+      limits.max_speed = input.inDecades(0.11);
+      limits.acceleration = input.inDecades(2.1);
+      limits.deceleration = input.inDecades(2.1);
+      if (input.any(2) == 1) limits.jerk = input.inDecades(60.0);
+      const std::string name = fmt::format("limits of {}: {} {} {} {}", axis, limits.max_speed,
+                                           limits.acceleration, limits.deceleration, limits.jerk);
+      return request(name, machine::SetLimits{axis, limits}, {});
     }
     case 5: {
       const double position = input.number(0.02);
@@ -141,7 +152,7 @@ Act readAct(Input& input) {
                      machine::SetPosition{axis, position}, {});
     }
     case 6: {
-      const double factor = input.between(0.1, 2.0);
+      const double factor = std::max(0.01, input.inDecades(2.0));  // as setSpeedOverride() allows
       return request(fmt::format("override {}", factor), machine::SetSpeedOverride{factor}, {});
     }
     case 7: {
@@ -185,7 +196,8 @@ Act readAct(Input& input) {
 
 search::Schedule readSchedule(Input input) {
   search::Schedule schedule;
-  schedule.variant = static_cast<int>(input.any(2));
+  schedule.variant = static_cast<int>(input.any(search::kVariants));
+  schedule.may_last = true;
   while (!input.isOver() && schedule.items.size() < kMostItems) {
     const std::uint8_t what = input.byte();
     if (what >= 240 && schedule.deviations.size() < kMostDeviations) {

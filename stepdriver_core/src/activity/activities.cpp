@@ -31,6 +31,9 @@ void Activities::begin(std::unique_ptr<Activity> activity, const Why& why) {
     at_speed = at_speed && (now == nullptr || now->canHandOver());
   }
   if (at_speed) activity->prepare();
+  if (!activity->isInBackground() && !activity->followsSetpoints()) {
+    for (axis::AxisModel* axis : activity->axes()) axis->setpoints.end();
+  }
   if (!activity->leavesLaterMotions()) {
     for (const axis::AxisModel* axis : activity->axes()) schedule_.drop(*axis, why);
   }

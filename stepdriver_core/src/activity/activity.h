@@ -70,6 +70,8 @@ class Activity {
   virtual std::vector<Part> takeParts() { return {}; }
   /// Whether it lasts only as long as its client sends messages, also before it moves.
   virtual bool isStreamed() const { return false; }
+  /// Whether it belongs to a stream of setpoints of position, which any other command ends.
+  virtual bool followsSetpoints() const { return false; }
   /// Whether other commands wait for it instead of being refused, because no client has requested
   /// it.
   virtual bool isInBackground() const { return false; }

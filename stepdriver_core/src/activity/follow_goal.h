@@ -23,6 +23,7 @@ class FollowGoal : public Script {
   void prepare() override;
   void hold(const Ack& call) override;
   bool isStreamed() const override { return orders_.front().goal.isStreamed(); }
+  bool followsSetpoints() const override { return orders_.front().goal.isSetpointOfPosition(); }
   bool leavesLaterMotions() const override { return begins_ns_ > 0 || isStreamed(); }
 
  protected:

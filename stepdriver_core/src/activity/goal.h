@@ -72,6 +72,7 @@ struct Goal {
   bool runs() const {
     return kind == Kind::kJog || (kind == Kind::kSetpoint && !setpoint.of_position);
   }
+  bool isSetpointOfPosition() const { return kind == Kind::kSetpoint && setpoint.of_position; }
   /// It lasts only as long as its client sends messages: a hold ends it.
   bool isStreamed() const { return kind == Kind::kJog || kind == Kind::kSetpoint; }
 };

@@ -27,6 +27,9 @@ class StartTogether : public Script {
   void hold(const Ack& call) override { end(kEndedByHold, call); }
   std::vector<Part> takeParts() override;
   bool isStreamed() const override { return true; }
+  bool followsSetpoints() const override {
+    return starts_.front().order.goal.isSetpointOfPosition();
+  }
 
  protected:
   Steps plan() override;

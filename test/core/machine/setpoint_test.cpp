@@ -387,6 +387,38 @@ TEST_F(Setpoints, AMoveTakesOverFromASetpointAndTheOtherWayRound) {
   expectClean();
 }
 
+// The velocity of a stream between the setpoints before and after another command is none.
+TEST_F(Setpoints, ASetpointAfterAnotherCommandIsReachedAsByAMove) {
+  const std::vector<std::function<void()>> commands = {
+      [this] { x().moveTo(0.009); }, [this] { x().jog(0.03); },
+      [this] {
+        bench->machine->moveLine({{"x", "y"}, {0.009, 0.002}});
+      }};
+  for (const auto& command : commands) {
+    build({configOf("x"), configOf("y")});
+    const auto set_position = [this](double position) {
+      constexpr double kLongTimeout = 0.5;  // s
+      const auto refused = bench->machine->followSetpoints(SetpointMode::kPosition, kLongTimeout,
+                                                           {{"x", position, {}}});
+      EXPECT_EQ(refused.front(), "");
+    };
+    set_position(0.006);
+    advance(0.04);
+    command();
+    advance(0.04);
+    set_position(0.001);
+    double lowest = place();
+    while (x().state().moving) {
+      advance(0.001);
+      lowest = std::min(lowest, place());
+    }
+    EXPECT_EQ(bench->pulses(), 100);
+    EXPECT_EQ(std::lround(lowest * kScale), 100);
+    expectWithinLimits(configOf("x"));
+    expectClean();
+  }
+}
+
 TEST_F(Setpoints, NothingIsDoneWithWhatIsNoNumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<std::string> why =

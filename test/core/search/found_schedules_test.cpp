@@ -14,6 +14,15 @@ Item does(int client, std::size_t after, const std::string& act) {
   return {actNamed(act), client, after};
 }
 
+Item requests(int client, std::size_t after, const std::string& name,
+              const machine::Request& wanted, const std::vector<std::size_t>& axes) {
+  Meaning meaning;
+  meaning.moves = true;
+  for (const std::size_t axis : axes) meaning.axes[axis] = true;
+  const Act act{name, [=](Participants& all, int by) { all.post(by, name, wanted, meaning); }};
+  return {0, client, after, std::make_shared<const Act>(act)};
+}
+
 void expectGood(const Schedule& schedule) {
   EXPECT_EQ(Participants(schedule).run(), std::vector<std::string>());
 }
@@ -165,6 +174,20 @@ TEST(FoundSchedules, AStreamThatTheAxisHasNotCaughtUpWithIsNotFollowedBeyondItsE
   expectGood({0,
               {does(0, 0, "stream setpoints of x and z")},
               {{10, Who::kRequest, 10}, {583, Who::kEngine, 10}}});
+}
+
+// The change of position since the setpoint before the line was taken for a stream's velocity, and
+// x passed its target by as much.
+TEST(FoundSchedules, ASetpointBeforeALineDoesNotBelongToAStreamWithOneAfterIt) {
+  const auto goes_to = [](std::size_t after, double position) {
+    const machine::FollowSetpoints wanted{
+        machine::SetpointMode::kPosition, 0.3, {{0, position, {}}}};
+    return requests(0, after, "setpoint of x", wanted, {0});
+  };
+  for (int variant = 0; variant < static_cast<int>(kVariants); ++variant) {
+    expectGood(
+        {variant, {goes_to(40, 0.0068), does(0, 8, "line of x and y"), goes_to(120, 0.0)}, {}});
+  }
 }
 
 // The accelerations of the parts cancelled each other out but for rounding, and all steps of such a

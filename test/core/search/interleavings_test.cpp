@@ -18,7 +18,6 @@ namespace {
 
 /// Steps between the two requests: from none to a long way into a motion.
 constexpr std::array<std::size_t, 9> kAfter = {0, 1, 2, 4, 8, 16, 60, 200, 500};
-constexpr std::size_t kVariants = 5;
 constexpr std::size_t kShards = 16;
 
 std::string textOf(const Schedule& schedule) {

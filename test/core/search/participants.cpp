@@ -1513,6 +1513,8 @@ void Participants::probeAxis(std::size_t axis) {
     const activity::Reply reply = ask(what, std::move(request), meaning);
     if (reply.failure) oracle_.complain(name + ": " + what + ": " + reply.failure->text);
   };
+  must("all limits", machine::SetLimits{axis, {}});
+  must("override 1", machine::SetSpeedOverride{1.0});
   must("wake", machine::Sleep{axis, false});
   must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
@@ -1555,7 +1557,7 @@ std::vector<std::string> Participants::run() {
     return !clients_[0].waits_for_stops && !clients_[1].waits_for_stops &&
            controller_->snapshot()->axes.front().state.held;
   };
-  if (!playUntil(played, kLongestCall) && !held()) {
+  if (!playUntil(played, kLongestCall) && !held() && !schedule_.may_last) {
     for (const auto& [id, asked] : open_) oracle_.complain(asked.name + " isn't answered");
     for (const Client& client : clients_) {
       if (client.waits_for_stops) oracle_.complain("the emergency stop isn't answered");
@@ -1568,7 +1570,7 @@ std::vector<std::string> Participants::run() {
     playUntil([&] { return clock_.now() >= later; }, kLongestCall);
   }
   script_ = false;
-  if (oracle_.complaints.empty()) checkEnds();
+  if (oracle_.complaints.empty() && !schedule_.may_last) checkEnds();
   if (oracle_.complaints.empty()) {
     checkInPosition();
     checkPower();

@@ -62,11 +62,15 @@ struct Item {
   std::shared_ptr<const Act> own{};  ///< done instead of the one in acts(), if there is any
 };
 
+/// Machines that a schedule can be played on.
+constexpr std::size_t kVariants = 5;
+
 /// Everything that determines the course of a run.
 struct Schedule {
   int variant = 0;
   std::vector<Item> items;
   std::vector<Deviation> deviations;
+  bool may_last = false;  ///< its motions may take longer than a run; a stop ends them
 };
 
 class Participants;
