@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any, Callable, Dict, Iterable, Optional
+from typing import Any, Callable, Dict, Generic, Iterable, Optional, TypeVar
 
 from . import _core
 from ._errors import NotReached, Timeout
@@ -34,16 +34,64 @@ def _await(
     return result
 
 
-class Move:
+_Handle = TypeVar("_Handle", _core.MoveHandle, _core.CoordinatedMoveHandle)
+_Result = TypeVar("_Result", MoveResult, CoordinatedResult)
+
+
+class _Accepted(Generic[_Handle, _Result]):
+    """What a motion of one axis and one of several have in common."""
+
+    def __init__(self, handle: _Handle, threaded: bool) -> None:
+        self._handle: _Handle = handle
+        self._threaded = threaded
+
+    def _result(self, fields: Dict[str, Any]) -> _Result:
+        raise NotImplementedError
+
+    @property
+    def duration(self) -> float:
+        """[s] that it takes, as planned."""
+        return self._handle.duration
+
+    @property
+    def result(self) -> Optional[_Result]:
+        """How it ended, however long ago; None if it hasn't ended."""
+        fields = self._handle.result()
+        return None if fields is None else self._result(fields)
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, in whatever way."""
+        return self._handle.result() is not None
+
+    def wait(self, timeout: Optional[float] = None, *, check: bool = True) -> _Result:
+        """Returns when it has ended. Other threads run meanwhile, and Ctrl-C ends the waiting, not the motion.
+
+        timeout: [s] None: as long as it takes. It counts real time, or the virtual time of the machine.
+        check: raise NotReached if it ended before its target; False: return its result in any case.
+
+        Raises Timeout if it hasn't ended by then; it continues.
+        """
+        result = self._result(_await(self._handle.wait, self._threaded, timeout))
+        if check and result.end is not MoveEnd.REACHED:
+            raise NotReached(result.message, result)
+        return result
+
+    def cancel(self) -> None:
+        """Decelerates the axes to rest, along the path of several, if they still make this motion; one that has
+        replaced it continues."""
+        self._handle.stop()
+
+
+class Move(_Accepted[_core.MoveHandle, MoveResult]):
     """A motion of one axis that was accepted, and is under way or has ended.
 
     All calls are safe from any thread. The object keeps its machine.
     """
 
     def __init__(self, handle: _core.MoveHandle, axis: str, threaded: bool) -> None:
-        self._handle = handle
+        super().__init__(handle, threaded)
         self._axis = axis
-        self._threaded = threaded
 
     @property
     def axis(self) -> str:
@@ -61,89 +109,29 @@ class Move:
         return self._handle.rest
 
     @property
-    def duration(self) -> float:
-        """[s] that the move takes, as planned."""
-        return self._handle.duration
-
-    @property
     def overshoot(self) -> float:
         """[unit] how far the axis goes beyond the target, if it can't stop before it."""
         return self._handle.overshoot
 
-    @property
-    def result(self) -> Optional[MoveResult]:
-        """How the move ended, however long ago; None if it hasn't ended."""
-        fields = self._handle.result()
-        return None if fields is None else _move_result(fields)
-
-    @property
-    def done(self) -> bool:
-        """Whether it has ended, in whatever way."""
-        return self._handle.result() is not None
-
-    def wait(self, timeout: Optional[float] = None, *, check: bool = True) -> MoveResult:
-        """Returns when the move has ended. Other threads run meanwhile, and Ctrl-C ends the waiting, not the move.
-
-        timeout: [s] None: as long as it takes. It counts real time, or the virtual time of the machine.
-        check: raise NotReached if the move ended before its target; False: return its result in any case.
-
-        Raises Timeout if the move hasn't ended by then; it continues.
-        """
-        result = _move_result(_await(self._handle.wait, self._threaded, timeout))
-        if check and result.end is not MoveEnd.REACHED:
-            raise NotReached(result.message, result)
-        return result
-
-    def cancel(self) -> None:
-        """Decelerates the axis to rest if it still makes this move; a motion that has replaced it continues."""
-        self._handle.stop()
+    def _result(self, fields: Dict[str, Any]) -> MoveResult:
+        fields["end"] = MoveEnd(fields["end"])
+        return MoveResult(**fields)
 
     def __repr__(self) -> str:
         result = self.result
         return f"<Move of {self._axis} to {self.target:g}: {result.message if result else 'under way'}>"
 
 
-class CoordinatedMove:
+class CoordinatedMove(_Accepted[_core.CoordinatedMoveHandle, CoordinatedResult]):
     """A motion of several axes that was accepted: a line, a path or a trajectory.
 
     All calls are safe from any thread. The object keeps its machine.
     """
 
-    def __init__(self, handle: _core.CoordinatedMoveHandle, threaded: bool) -> None:
-        self._handle = handle
-        self._threaded = threaded
-
     @property
     def targets(self) -> Dict[str, float]:
         """[unit] the commanded positions at its end, by the names of the axes."""
         return self._handle.targets
-
-    @property
-    def duration(self) -> float:
-        """[s] that it takes, as planned."""
-        return self._handle.duration
-
-    @property
-    def result(self) -> Optional[CoordinatedResult]:
-        """How the motion ended, however long ago; None if it hasn't ended."""
-        fields = self._handle.result()
-        return None if fields is None else self._result(fields)
-
-    @property
-    def done(self) -> bool:
-        """Whether it has ended, in whatever way."""
-        return self._handle.result() is not None
-
-    def wait(self, timeout: Optional[float] = None, *, check: bool = True) -> CoordinatedResult:
-        """Returns when the motion has ended: see Move.wait()."""
-        result = self._result(_await(self._handle.wait, self._threaded, timeout))
-        if check and result.end is not MoveEnd.REACHED:
-            raise NotReached(result.message, result)
-        return result
-
-    def cancel(self) -> None:
-        """Decelerates the axes along the path, if they still make this motion."""
-        self._handle.stop()
 
     def append(self, segments: Iterable[Segment], *, more_follows: bool = False) -> PathAhead:
         """Appends segments to a path that began with ``more_follows``, while the axes follow it.
@@ -170,11 +158,6 @@ class CoordinatedMove:
     def __repr__(self) -> str:
         result = self.result
         return f"<CoordinatedMove of {', '.join(self.targets)}: {result.message if result else 'under way'}>"
-
-
-def _move_result(fields: Dict[str, Any]) -> MoveResult:
-    fields["end"] = MoveEnd(fields["end"])
-    return MoveResult(**fields)
 
 
 def _path_ahead(fields: Dict[str, Any]) -> PathAhead:
