@@ -126,7 +126,7 @@ TEST(WizardSwitches, RightOnesChangeNothing) {
   Machine machine;
   handle(person, machine, &AxisView::min_active, &AxisView::max_active);
   const Findings findings = switchesFound(person, machine);
-  EXPECT_FALSE(findings.changesAnything()) << person.heard;
+  EXPECT_TRUE(changesText(findings, axisConfig("x")).empty()) << person.heard;
   EXPECT_FALSE(person.heardOf("ATTENTION")) << person.heard;
   EXPECT_TRUE(machine.moves.empty());
 }
@@ -163,7 +163,7 @@ TEST(WizardSwitches, SaysWhichOneIsDead) {
   Machine machine;
   handle(person, machine, &AxisView::min_active, nullptr);
   const Findings findings = switchesFound(person, machine);
-  EXPECT_FALSE(findings.changesAnything()) << person.heard;
+  EXPECT_TRUE(changesText(findings, axisConfig("x")).empty()) << person.heard;
   EXPECT_TRUE(person.heardOf("ATTENTION: endstops/max")) << person.heard;
   EXPECT_FALSE(person.heardOf("ATTENTION: endstops/min")) << person.heard;
 }

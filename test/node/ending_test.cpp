@@ -14,6 +14,7 @@
 #include "support/recorder.h"
 #include "support/says.h"
 #include "support/temporary_file.h"
+#include "support/two_axes.h"
 #include "support/vcd_reader.h"
 #include "support/wait.h"
 
@@ -97,13 +98,7 @@ TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
   node.set("simulation/speed", 1.0);
   node.set("axes/x/max_speed_mm_s", 50.0);
   node.set("axes/x/deceleration_mm_s2", 12.5);  // four seconds to stop
-  node.set("axes/y/driver", "tb6600");
-  node.set("axes/y/pins/step", "y_step");
-  node.set("axes/y/pins/dir", "y_dir");
-  node.set("axes/y/microsteps", 8);
-  node.set("axes/y/steps_per_mm", 80.0);
-  node.set("axes/y/max_speed_mm_s", 50.0);
-  node.set("axes/y/acceleration_mm_s2", 500.0);
+  addSecondAxis(node);
   node.start();
   const Recorder<AxisStates> states(node.full("axis_states"));
   EXPECT_TRUE(node.moveTo(0.2, false).success);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/node_under_test.h"
+#include "support/rotary_axis.h"
 #include "support/says.h"
 #include "support/wait.h"
 
@@ -202,26 +203,14 @@ TEST(Moves, RefusesABadTargetWhileMovingAndKeepsTheOneItHas) {
 
 TEST(Moves, CountsRadiansOnARotaryAxis) {
   NodeUnderTest node;
-  node.erase("axes/x");
-  node.set("axes/r/driver", "drv8825");
-  node.set("axes/r/pins/step", "r_step");
-  node.set("axes/r/pins/dir", "r_dir");
-  node.set("axes/r/pins/enable", "r_enable");
-  node.set("axes/r/microsteps", 16);
-  node.set("axes/r/full_steps_per_round", 200);
-  node.set("axes/r/max_speed_deg_s", 180.0);
-  node.set("axes/r/acceleration_deg_s2", 360.0);
-  node.set("axes/r/enable_on_start", true);
+  makeRotary(node);
   node.start();
-  MoveTo::Request request;
-  request.position = std::acos(-1.0) / 2.0;
-  request.wait = true;
-  const auto answer = node.call<MoveTo>("r/move_to", request);
+  const auto answer = node.moveTo(kPi / 2.0, true);
   EXPECT_TRUE(answer.success) << answer.message;
-  EXPECT_NEAR(answer.position, request.position, 1e-9);
+  EXPECT_NEAR(answer.position, kPi / 2.0, 1e-9);
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward.at(0), 800);
-  EXPECT_NEAR(report.carriage.at(0), request.position, 1e-9);
+  EXPECT_NEAR(report.carriage.at(0), kPi / 2.0, 1e-9);
 }
 
 }  // namespace

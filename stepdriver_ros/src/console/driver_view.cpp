@@ -69,10 +69,6 @@ bool DriverView::anyFault() const {
                      [](const AxisView& axis) { return !axis.fault.empty(); });
 }
 
-bool DriverView::anyMoving() const {
-  return std::any_of(axes_.begin(), axes_.end(), [](const AxisView& axis) { return axis.moving; });
-}
-
 double stepOf(const config::AxisConfig& config, const AxisView& axis) {
   const double steps_per_unit = config.steps_per_unit / config::configUnitsPerUnit(config.kind);
   return config.microsteps / (steps_per_unit * axis.microsteps);

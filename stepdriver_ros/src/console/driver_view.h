@@ -59,7 +59,6 @@ class DriverView {
   /// The number of states so far.
   int updates() const { return updates_; }
   bool anyFault() const;
-  bool anyMoving() const;
 
  private:
   struct Switches {

@@ -17,10 +17,6 @@ struct Findings {
   bool min_inverted = false;      ///< the switch that is configured as min reads the wrong way
   bool max_inverted = false;
   std::optional<double> scale;  ///< commanded distance divided by the measured one
-
-  bool changesAnything() const {
-    return wrong_way || switches_swapped || min_inverted || max_inverted || scale;
-  }
 };
 
 /// The driver's parameters, corrected according to these findings; nothing else is changed.
