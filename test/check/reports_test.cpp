@@ -189,12 +189,12 @@ TEST(SystemFacts, AreThereOnAnyMachine) {
 
 TEST(RatesText, TellsAskedAndHeldRatesAndTheReason) {
   machine::StepRates rates;
-  rates.axes.push_back({"x", 8000.0, 20'000.9, 10'000.0, "because"});
+  rates.axes.push_back({"x", 8000.0, 20'000.9, 10'000.0, "because", 3200.0});
   rates.axes.push_back({"y", 1e6, 20'000.0, 10'000.0, "so"});
   EXPECT_EQ(ratesText(rates),
-            "  axis  needs    sustained alone  sustained with all  [steps/s]\n"
-            "  x     8000     20000            10000               ok\n"
-            "  y     1000000  20000            10000               TOO FAST\n"
+            "  [steps/s]  needs    rpm  sustained alone  rpm  sustained with all  rpm\n"
+            "  x          8000     150  20000            375  10000               187.5  ok\n"
+            "  y          1000000  -    20000            -    10000               -      TOO FAST\n"
             "  What limits the rate with all axes moving:\n"
             "  x: because\n"
             "  y: so\n");

@@ -29,6 +29,13 @@ std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spr
 /// Rounded down: a user who enters this value must not be told that it is too high.
 std::string rateText(double rate) { return roundedText(std::floor(rate)); }
 
+/// The speed of the motor at a step rate, rounded down to a tenth; "-" if its steps per revolution
+/// are not known.
+std::string rpmText(double rate, double steps_per_round) {
+  if (steps_per_round <= 0.0) return "-";
+  return roundedText(std::floor(600.0 * rate / steps_per_round) / 10.0);
+}
+
 }  // namespace
 
 std::string measurementsText(const std::vector<config::AxisConfig>& axes,
@@ -46,11 +53,13 @@ std::string measurementsText(const std::vector<config::AxisConfig>& axes,
 
 std::string ratesText(const machine::StepRates& rates) {
   std::vector<std::vector<std::string>> rows = {
-      {"axis", "needs", "sustained alone", "sustained with all", "[steps/s]"}};
+      {"[steps/s]", "needs", "rpm", "sustained alone", "rpm", "sustained with all", "rpm"}};
   std::string reasons;
   for (const machine::StepRate& rate : rates.axes) {
-    rows.push_back({rate.axis, roundedText(rate.asked), rateText(rate.alone), rateText(rate.held),
-                    rate.holds() ? "ok" : "TOO FAST"});
+    const double per_round = rate.steps_per_round;
+    rows.push_back({rate.axis, roundedText(rate.asked), rpmText(rate.asked, per_round),
+                    rateText(rate.alone), rpmText(rate.alone, per_round), rateText(rate.held),
+                    rpmText(rate.held, per_round), rate.holds() ? "ok" : "TOO FAST"});
     reasons += fmt::format("  {}: {}\n", rate.axis, rate.limited);
   }
   return table(rows) + "  What limits the rate with all axes moving:\n" + reasons;

@@ -13,7 +13,7 @@ namespace stepdriver::check {
 std::string measurementsText(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability);
 
-/// The needed and the sustainable step rates, axis by axis.
+/// The needed and the sustainable step rates and revolutions per minute, axis by axis.
 std::string ratesText(const machine::StepRates& rates);
 
 /// The axes that need more than the computer can sustain: `x, y`.
