@@ -74,8 +74,6 @@ source "$root/scripts/sysroots.sh"
 # Those that depend on time, look into the node's process, load a library into it, or start this computer's node
 # by a launch file.
 tests_of_this_computer=(line_action_test wall_clock_test descriptors_test exhausted_test failing_disk_test examples_test launch_test)
-# At its start, the emulator of a processor with 32 bits reserves all addresses: what the node reserves is not seen.
-[[ $arch != armhf ]] || tests_of_this_computer+=(frame_memory_test)
 test_emulated_node() {
   local tests=("$@") name status=0
   quietly "node-$arch-packages" bash "$root/scripts/package.sh" --arch "$arch"

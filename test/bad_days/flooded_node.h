@@ -16,7 +16,7 @@
 namespace stepdriver::bad_days {
 
 /// A node with one axis. Each test begins a flood, calls endure(), and ends the flood. Afterwards
-/// the node must be as it was before.
+/// the node must serve as before. It has the limits of the unit of systemd.
 class FloodedNode : public testing::Test {
  protected:
   FloodedNode();
@@ -44,12 +44,11 @@ class FloodedNode : public testing::Test {
   bool recover();
   void expectAlive();
   void expectDescriptorsBack();
-  void expectMemoryBack();
+  void expectLittleMemory();
   /// [kB] of the node's own memory, since the beginning of the flood.
   std::size_t growth();
   void expectNothingMoves();
   void expectCountsEqual();
-  std::size_t descriptors();
   void print();
 
   const std::chrono::duration<double> seconds_;

@@ -24,7 +24,6 @@ using node_test::bytesOf;
 using node_test::headerBytes;
 using node_test::lengthBytes;
 using node_test::servicePort;
-using node_test::TcprosClient;
 
 constexpr std::size_t kConnections = 1000;
 
@@ -189,23 +188,6 @@ TEST_F(HostileClients, ThatSendGarbageByXmlRpc) {
     }
   });
   endure([&] { return perSecond(flood.rate(), "connections with false calls of XML-RPC"); });
-}
-
-TEST_F(HostileClients, ThatNestXmlRpcDeeply) {
-  std::string values;
-  std::string ends;
-  for (int i = 0; i < 20'000; ++i) {
-    values += "<value><array><data>";
-    ends += "</data></array></value>";
-  }
-  const std::string call = xmlRpcCall("getPid", "<param>" + values + ends + "</param>");
-  const Flood flood(10.0, [&] {
-    const TcprosClient client(xml_rpc);
-    client.resetAtEnd();
-    EXPECT_TRUE(client.send(call));
-    EXPECT_EQ(client.receive(4), "HTTP");
-  });
-  endure([&] { return perSecond(flood.rate(), "calls of XML-RPC with 20,000 nested arrays"); });
 }
 
 }  // namespace

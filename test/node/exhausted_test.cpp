@@ -3,7 +3,6 @@
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/MoveTo.h>
 
-#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <future>
@@ -14,7 +13,6 @@
 #include "support/node_under_test.h"
 #include "support/recorder.h"
 #include "support/says.h"
-#include "support/vcd_reader.h"
 #include "support/wait.h"
 
 // A computer that has no thread or no memory left.
@@ -25,7 +23,6 @@ namespace {
 constexpr int kExitGpio = 2;
 constexpr int kExitExhausted = 5;
 constexpr int kAborted = 128 + SIGABRT;
-constexpr std::int64_t kAll = std::int64_t{1} << 60;
 
 class Exhausted : public testing::Test {
  protected:
@@ -110,7 +107,6 @@ TEST_F(ExhaustedMemory, AtTheStartEndsTheNode) {
   for (int part = 1; part < 20; ++part) {
     SCOPED_TRACE(part);
     faults->allocations_left = needed * part / 20;
-    faults->allocations_to_fail = kAll;
     const int exit_code = launch();
     if (exit_code == -1) {
       node.process().signal(SIGKILL);
@@ -123,27 +119,7 @@ TEST_F(ExhaustedMemory, AtTheStartEndsTheNode) {
   EXPECT_GE(ended, 4);
 }
 
-TEST_F(ExhaustedMemory, DuringAMoveEndsTheNodeInOrderWithItsReserve) {
-  const std::string trace = node.traced();
-  node.start();
-  auto waiting = std::async(std::launch::async, [this] { return node.moveTo(0.15, true); });
-  ASSERT_TRUE(waitUntil([this] { return node.pulses() > 4000; }));
-  faults->allocations_to_fail = 1;
-  faults->allocations_left = 0;
-  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), kExitExhausted);
-  expectSays(node.process().output(), "no memory left");
-  const auto answer = waiting.get();
-  EXPECT_FALSE(answer.success);
-  expectSays(answer.message, "shut down");
-  auto pins = readVcd(trace);
-  const std::int64_t steps = pins["x/step"].changesTo(true);
-  EXPECT_EQ(steps, std::llround(answer.position * 80000.0));
-  EXPECT_LT(steps, 12000) << "it decelerates before its target";
-  EXPECT_FALSE(pins["x/step"].last());
-  EXPECT_TRUE(pins["x/enable"].last()) << "ENABLE is active low: high is disabled";
-}
-
-TEST_F(ExhaustedMemory, WithoutTheReserveEndsTheNodeLikeSigkill) {
+TEST_F(ExhaustedMemory, DuringAMoveEndsTheNodeLikeSigkill) {
   const TemporaryFile state(".state");
   const TemporaryFile lock(".state.lock");
   node.set("state_file", state.path());
@@ -155,7 +131,6 @@ TEST_F(ExhaustedMemory, WithoutTheReserveEndsTheNodeLikeSigkill) {
     const std::string text = state.text();
     return text.find("80000 0.008") != std::string::npos && text.find(" 1\n") != std::string::npos;
   })) << state.text();
-  faults->allocations_to_fail = kAll;
   faults->allocations_left = 0;
   MoveTo call;
   call.request.position = 0.1;

@@ -104,6 +104,10 @@ for unit in stepdriver stepdriver-roscore; do
   ends 0 systemd-analyze security --no-pager --offline=true --threshold=30 "$units/$unit.service"
   says "Overall exposure level for $unit.service"
 done
+# What bounds a client that may connect: docs/security.md.
+for limit in MemoryMax=512M LimitNOFILE=4096; do
+  grep -qx "$limit" "$units/stepdriver.service" || fail "no line $limit in stepdriver.service"
+done
 # A new master knows nothing of the node.
 grep -qx 'PartOf=stepdriver-roscore.service' "$units/stepdriver.service" || fail "the node doesn't follow its master"
 grep -qx 'WantedBy=.* stepdriver-roscore.service' "$units/stepdriver.service" ||
@@ -119,8 +123,8 @@ fi
 
 # unit_values KEY [UNIT]: the values of a key of the unit.
 unit_values() { sed -n "s/^$1=-\{0,1\}//p" "$units/${2:-stepdriver}.service"; }
-raised=(prlimit "--rtprio=$(unit_values LimitRTPRIO)" "--memlock=$(unit_values LimitMEMLOCK |
-  sed s/infinity/unlimited/)")
+raised=(prlimit "--rtprio=$(unit_values LimitRTPRIO)" "--nofile=$(unit_values LimitNOFILE)"
+  "--memlock=$(unit_values LimitMEMLOCK | sed s/infinity/unlimited/)")
 chmod 755 "$scratch"
 mkdir -m 777 "$scratch/state"
 log_format=$(sed -n 's/^Environment="\(ROSCONSOLE_FORMAT=.*\)"$/\1/p' "$units/stepdriver.service")

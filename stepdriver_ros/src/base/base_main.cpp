@@ -15,7 +15,6 @@
 #include "common/end_requests.h"
 #include "common/node_config.h"
 #include "common/node_start.h"
-#include "common/xml_depth.h"
 #include "driver_wheels.h"
 
 namespace stepdriver::base {
@@ -81,7 +80,6 @@ Parameters readParameters() {
 int main(int argc, char** argv) {
   namespace base = stepdriver::base;
   namespace ros_node = stepdriver::ros_node;
-  ros_node::limitXmlDepth();
   ros_node::EndRequests end_requests;
   if (const auto code = ros_node::handleArguments(argc, argv, base::kUsage)) return *code;
   ros::init(argc, argv, "base", ros::init_options::NoSigintHandler);

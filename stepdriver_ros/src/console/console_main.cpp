@@ -14,7 +14,6 @@
 #include "common/end_requests.h"
 #include "common/loopback_only.h"
 #include "common/node_start.h"
-#include "common/xml_depth.h"
 #include "console.h"
 #include "driver_parameters.h"
 #include "options.h"
@@ -99,7 +98,6 @@ int start(int argc, char** argv, EndRequests& end_requests) {
 }  // namespace stepdriver::console
 
 int main(int argc, char** argv) {
-  stepdriver::ros_node::limitXmlDepth();
   stepdriver::ros_node::EndRequests end_requests;
   return stepdriver::console::start(argc, argv, end_requests);
 }

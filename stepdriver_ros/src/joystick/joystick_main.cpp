@@ -13,7 +13,6 @@
 #include "common/client_node.h"
 #include "common/end_requests.h"
 #include "common/node_start.h"
-#include "common/xml_depth.h"
 #include "common/xmlrpc_value.h"
 #include "driver_axes.h"
 #include "joystick.h"
@@ -87,7 +86,6 @@ std::unique_ptr<Joystick> start(ros::NodeHandle& node, const Parameters& paramet
 int main(int argc, char** argv) {
   namespace joystick = stepdriver::joystick;
   namespace ros_node = stepdriver::ros_node;
-  ros_node::limitXmlDepth();
   ros_node::EndRequests end_requests;
   if (const auto code = ros_node::handleArguments(argc, argv, joystick::kUsage)) return *code;
   ros::init(argc, argv, "joystick", ros::init_options::NoSigintHandler);

@@ -27,7 +27,6 @@
 #include "common/master_watch.h"
 #include "common/node_config.h"
 #include "common/node_start.h"
-#include "common/xml_depth.h"
 #include "node/actions/action_topics.h"
 #include "node/actions/homing_action.h"
 #include "node/actions/line_action.h"
@@ -35,13 +34,9 @@
 #include "node/actions/path_action.h"
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
-#include "node/calls/descriptor_watch.h"
-#include "node/calls/frame_memory.h"
-#include "node/calls/memory_watch.h"
 #include "node/diagnostics/diagnostics.h"
 #include "node/flight_recorder_service.h"
 #include "node/master/end_despite_master.h"
-#include "node/memory_reserve.h"
 #include "node/parameters/read_parameters.h"
 #include "node/services/axis_home_service.h"
 #include "node/services/axis_services.h"
@@ -289,9 +284,8 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
                                  if (config.stop_on_master_lost) stopForLostMaster(machine);
                                },
                                [&] { return latched.lookAgain(); }));
-  DescriptorWatch descriptors;
   const Diagnostics diagnostics(
-      node, private_node, machine, queues, master_watch, descriptors,
+      node, private_node, machine, queues, master_watch,
       config.hardware_id.empty() ? hardwareId(config.axes, description) : config.hardware_id,
       config, recorder);
   std::optional<ClockPublisher> clock_publisher;
@@ -305,29 +299,22 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
                  machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
                  machine.figures().realtime.c_str());
 
-  MemoryWatch memory;
   std::string who;
   for (int polls = 1; who.empty(); ++polls) {
     who = end_requests.waitFor(kPoll);
     if (polls == kPollsUntilClock) warnWithoutClock();
-    descriptors.look();
-    memory.look();
     if (end_requests.takeRecordingRequest()) recorder.request("SIGUSR1");
     if (const std::string error = machine.stateFileError(); !error.empty()) {
       ROS_ERROR_THROTTLE_NAMED(60.0, "state_file", "%s", error.c_str());
     }
   }
-  if (MemoryReserve::isUsed()) {
-    ROS_FATAL_NAMED("node", "Ending: the computer has no memory left for this node");
-  } else {
-    ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
-  }
+  ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
   ServiceManager::tellEnding();
   master_watch.stop();
   const int exit_code = shutDown(machine, queues, move_actions, line_action, path_action,
                                  trajectory_action, publisher, end);
   if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
-  return MemoryReserve::isUsed() ? kExitExhausted : exit_code;
+  return exit_code;
 }
 
 /// @return the exit code.
@@ -388,9 +375,6 @@ int start(EndRequests& end_requests) {
 int main(int argc, char** argv) {
   namespace node = stepdriver::ros_node;
   node::setThreadStacks();
-  const node::MemoryReserve memory_reserve;
-  node::limitXmlDepth();
-  node::limitFrameMemory();
   node::EndRequests end_requests(node::EndRequests::Usr1::kAsksForARecording);
   if (const auto code = node::handleArguments(argc, argv, node::usage())) return *code;
   ros::init(argc, argv, "stepdriver", ros::init_options::NoSigintHandler);

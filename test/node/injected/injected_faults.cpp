@@ -88,10 +88,6 @@ bool allocationFails() {
     return false;
   }
   injected->allocations_left.store(0);
-  if (injected->allocations_to_fail.fetch_sub(1) <= 0) {
-    injected->allocations_left.store(-1);
-    return false;
-  }
   return true;
 }
 

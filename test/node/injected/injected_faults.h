@@ -25,10 +25,8 @@ struct InjectedFaults {
   /// How many threads can still be started; the next one fails with EAGAIN. Below 0: any number.
   std::atomic<std::int64_t> threads_left;
 
-  /// How many calls of operator new still succeed; the next `allocations_to_fail` calls fail.
-  /// Below 0: all succeed.
+  /// How many calls of operator new still succeed; all later ones fail. Below 0: all succeed.
   std::atomic<std::int64_t> allocations_left;
-  std::atomic<std::int64_t> allocations_to_fail;
   std::atomic<std::int64_t> allocations;  ///< calls of operator new until now
 };
 

@@ -9,7 +9,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 #include "support/wait.h"
@@ -72,6 +74,11 @@ std::size_t NodeProcess::kilobytes(const std::string& field) const {
     if (name == field + ":" && status >> value) return value;
   }
   throw std::runtime_error("no " + field + " in the process's status");
+}
+
+std::size_t NodeProcess::descriptors() const {
+  const std::filesystem::directory_iterator open("/proc/" + std::to_string(pid_) + "/fd");
+  return static_cast<std::size_t>(std::distance(begin(open), end(open)));
 }
 
 std::optional<int> NodeProcess::waitForExit(std::chrono::duration<double> bound) {

@@ -37,6 +37,8 @@ class NodeProcess {
   /// A size from its /proc/PID/status, such as `VmRSS` [kB].
   /// @throw std::runtime_error if it has none.
   std::size_t kilobytes(const std::string& field) const;
+  /// How many file descriptors it has open.
+  std::size_t descriptors() const;
 
   /// Both of its streams; complete after waitForExit().
   std::string output();

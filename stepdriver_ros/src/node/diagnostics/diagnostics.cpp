@@ -17,7 +17,6 @@ namespace {
 const ros::WallDuration kReportPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 constexpr const char* kMasterName = "ROS master";
-constexpr const char* kDescriptorsName = "file descriptors";
 constexpr const char* kStateFileName = "state file";
 constexpr const char* kRecorderName = "flight recorder";
 
@@ -39,12 +38,10 @@ void readRates(const machine::Machine& machine, EngineReading& reading) {
 
 Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
                          const machine::Machine& machine, CallQueues& queues,
-                         const MasterWatch& master, const DescriptorWatch& descriptors,
-                         const std::string& hardware_id, const NodeConfig& config,
-                         const FlightRecorderService& recorder)
+                         const MasterWatch& master, const std::string& hardware_id,
+                         const NodeConfig& config, const FlightRecorderService& recorder)
     : machine_(machine),
       master_(master),
-      descriptors_(descriptors),
       recorder_(recorder),
       max_lateness_(config.max_lateness),
       state_file_(config.state_file),
@@ -55,7 +52,6 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   }
   updater_.add(kEngineName, [this](Status& status) { tellEngine(status); });
   updater_.add(kMasterName, [this](Status& status) { tellMaster(status); });
-  updater_.add(kDescriptorsName, [this](Status& status) { tellDescriptors(status); });
   if (!state_file_.empty()) {
     updater_.add(kStateFileName, [this](Status& status) { tellStateFile(status); });
   }
@@ -100,18 +96,6 @@ void Diagnostics::tellMaster(Status& status) const {
   status.add("URI", reading.uri);
   status.add("silent [s]", fmt::format("{:.0f}", reading.silent));
   status.add("times registered again", reading.restarts);
-}
-
-void Diagnostics::tellDescriptors(Status& status) const {
-  const DescriptorWatch::Figures figures = descriptors_.figures();
-  if (figures.few_left) {
-    status.summary(Status::WARN, "few are left: idle connections are ended");
-  } else {
-    status.summary(Status::OK, "enough are left");
-  }
-  status.add("in use", figures.open);
-  status.add("limit", figures.limit);
-  status.add("idle connections ended", figures.ended);
 }
 
 void Diagnostics::tellStateFile(Status& status) const {

@@ -11,7 +11,6 @@
 #include "common/master_watch.h"
 #include "common/node_config.h"
 #include "node/calls/call_queues.h"
-#include "node/calls/descriptor_watch.h"
 #include "node/flight_recorder_service.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/machine.h"
@@ -19,16 +18,16 @@
 namespace stepdriver::ros_node {
 
 /// The topic /diagnostics at 1 Hz: a status for each axis, and one each for the pulse engine, the
-/// state file if there is one, the ROS master and the file descriptors.
+/// ROS master, the state file and the flight recorder, if there are these.
 class Diagnostics {
  public:
   /// @param node, private_node handles of the node, and of its private names.
-  /// @param machine, queues, master, descriptors outlive the diagnostics.
+  /// @param machine, queues, master outlive the diagnostics.
   /// @param hardware_id name of the hardware.
   Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_node,
               const machine::Machine& machine, CallQueues& queues, const MasterWatch& master,
-              const DescriptorWatch& descriptors, const std::string& hardware_id,
-              const NodeConfig& config, const FlightRecorderService& recorder);
+              const std::string& hardware_id, const NodeConfig& config,
+              const FlightRecorderService& recorder);
   Diagnostics(const Diagnostics&) = delete;
   Diagnostics& operator=(const Diagnostics&) = delete;
 
@@ -38,13 +37,11 @@ class Diagnostics {
   static void tellAxis(const axis::Axis& axis, Status& status);
   void tellEngine(Status& status);
   void tellMaster(Status& status) const;
-  void tellDescriptors(Status& status) const;
   void tellStateFile(Status& status) const;
   void tellRecorder(Status& status) const;
 
   const machine::Machine& machine_;
   const MasterWatch& master_;
-  const DescriptorWatch& descriptors_;
   const FlightRecorderService& recorder_;
   const double max_lateness_;
   const std::string state_file_;
