@@ -56,6 +56,20 @@ motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
   });
 }
 
+// With the overshoot of the joint: if it passes its target and returns, the motor goes back to a
+// place before the one at which the joint first met its target, and may not seem to pass its own.
+motion::Plan ofJoint(const axis::AxisModel& axis, const Goal& goal, const motion::MotionState& from,
+                     motion::Plan plan) {
+  if (goal.kind != Goal::Kind::kMove || goal.of_motor || axis.backlash() == 0) return plan;
+  const double joint = axis.jointAt(from.position.value());
+  const motion::Extent motor = motion::extentOf(plan.profile);
+  const motion::Extent reached{
+      std::min(joint, motor.lowest),
+      std::max(joint, motor.highest - static_cast<double>(axis.backlash()))};
+  plan.overshoot = motion::overshootOf(reached, joint, static_cast<double>(*goal.target));
+  return plan;
+}
+
 // How far a motion goes beyond its target or a soft limit [microsteps].
 double excessOf(const axis::AxisModel& axis, const Goal& goal, const motion::Plan& plan) {
   // To follow a stream of setpoints, an axis may have to pass the last one.
@@ -104,15 +118,17 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at
     axis.refuse("no other setpoint came before the timeout");
   }
   if (areTheSame(before, within)) {
-    return {planFrom(axis, goal, from, at, within), within, slows_ns};
+    return {ofJoint(axis, goal, from, planFrom(axis, goal, from, at, within)), within, slows_ns};
   }
   const motion::LevelOff level_off(at, from, within, before.jerk);
-  GoalPlan changed{
-      level_off.followedBy(planFrom(axis, goal, level_off.end(), level_off.endNs(), within)),
-      level_off.isNeeded() ? before : within, slows_ns};
+  GoalPlan changed{ofJoint(axis, goal, from,
+                           level_off.followedBy(
+                               planFrom(axis, goal, level_off.end(), level_off.endNs(), within))),
+                   level_off.isNeeded() ? before : within, slows_ns};
   const double excess = excessOf(axis, goal, changed.plan);
   if (excess <= motion::kNoStep) return changed;
-  GoalPlan kept{planFrom(axis, goal, from, at, before), before, slows_ns};
+  GoalPlan kept{ofJoint(axis, goal, from, planFrom(axis, goal, from, at, before)), before,
+                slows_ns};
   return excessOf(axis, goal, kept.plan) < excess ? kept : changed;
 }
 

@@ -20,14 +20,20 @@ Extent extentOf(const Profile& profile) {
   return extent;
 }
 
+double overshootOf(const Extent& extent, double from, double target) {
+  const double above = extent.highest - target;
+  const double below = target - extent.lowest;
+  const double beyond = target - from > kNoStep   ? above
+                        : from - target > kNoStep ? below
+                                                  : std::max(above, below);
+  return beyond > kNoStep ? beyond : 0.0;
+}
+
 double overshootOf(const Profile& profile) {
   const Extent extent = extentOf(profile);
   const double end = profile.endPosition().value();
   const double way = (profile.endPosition() - profile.startPosition()).value();
-  const double above = extent.highest - end;
-  const double below = end - extent.lowest;
-  const double beyond = way > 0.0 ? above : way < 0.0 ? below : std::max(above, below);
-  return beyond > kNoStep ? beyond : 0.0;
+  return overshootOf(extent, end - way, end);
 }
 
 }  // namespace stepdriver::motion

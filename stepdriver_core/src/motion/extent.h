@@ -16,6 +16,10 @@ struct Extent {
 /// Takes time in proportion to the number of pieces.
 Extent extentOf(const Profile& profile);
 
+/// How far a motion from one position passes a target before it comes back to it [microsteps]; 0 if
+/// it makes no step beyond it. From less than half a microstep away, it may pass it on either side.
+double overshootOf(const Extent& extent, double from, double target);
+
 /// How far a motion passes its own end before it comes back [microsteps]; 0 if it makes no step
 /// beyond it.
 double overshootOf(const Profile& profile);

@@ -138,6 +138,54 @@ TEST_F(Backlash, IsThereForATargetThatIsReplacedOnTheWay) {
   expectClean();
 }
 
+// The joint's farthest position follows from the motor's: upwards all of the backlash is taken up.
+TEST_F(Backlash, IsNoPartOfTheOvershootThatAMoveAnnounces) {
+  for (const double sign : {1.0, -1.0}) {
+    for (const std::int64_t ahead : {10, 29, 31, 80, 250}) {
+      SetUp();
+      x().moveTo(sign * 0.080);
+      bench->machine->advance(0.3);
+      const double target = position() + sign * static_cast<double>(ahead) / 80'000.0;
+      const axis::Move near = x().moveTo(target);
+      std::int64_t farthest = motor();
+      while (x().state().moving) {
+        bench->machine->advance(0.0005);
+        farthest = sign > 0.0 ? std::max(farthest, motor()) : std::min(farthest, motor());
+      }
+      const std::int64_t joint = sign > 0.0 ? farthest - kBacklash : farthest;
+      const double passed = sign * (static_cast<double>(joint) - target * 80'000.0);
+      EXPECT_NEAR(near.overshoot * 80'000.0, passed, 1.0)
+          << sign << ", " << ahead << " steps ahead";
+      EXPECT_NEAR(position(), target, 1e-12);
+      expectClean();
+    }
+  }
+}
+
+// The turn back to the target takes the backlash up again, so the motor's end lies before the place
+// at which the joint passes its target.
+TEST_F(Backlash, DoesNotHideThatLowerLimitsWouldPassTheTarget) {
+  for (const double target : {0.004, -0.004}) {
+    std::int64_t farthest = 0;
+    for (int i = 0; i < 140; ++i) {
+      SetUp();
+      x().moveTo(target);
+      bench->machine->advance(0.001 * i);
+      axis::AxisLimits gentle;
+      gentle.acceleration = gentle.deceleration = 0.15;
+      gentle.jerk = i % 2 == 0 ? 0.0 : 2.5;
+      x().setLimits(gentle);
+      while (x().state().moving) {
+        bench->machine->advance(0.001);
+        farthest = target > 0.0 ? std::max(farthest, motor()) : std::min(farthest, motor());
+      }
+      EXPECT_NEAR(position(), target, 1e-12);
+      expectClean();
+    }
+    EXPECT_EQ(farthest, target > 0.0 ? 320 + kBacklash : -320);
+  }
+}
+
 TEST_F(Backlash, IsTakenUpBeforeALine) {
   moveTo(0.010);
   const auto line = bench->machine->moveLine({{"x", "y"}, {0.005, 0.010}});

@@ -190,6 +190,19 @@ TEST(FoundSchedules, ASetpointBeforeALineDoesNotBelongToAStreamWithOneAfterIt) {
   }
 }
 
+// The motor's end lay before the place at which the joint would turn, as its backlash is taken up
+// on the way back: the overshoot by the lower limits was neither seen nor announced.
+TEST(FoundSchedules, LowerLimitsDoNotTakeAnAxisWithABacklashPastItsTarget) {
+  for (const std::size_t after : {385, 392, 399}) {
+    for (const int variant : {0, 1, 4}) {
+      expectGood({variant,
+                  {does(0, 0, "move y to -5 mm"), does(1, 3, "override 0.4"),
+                   does(0, after, "gentle limits of y")},
+                  {}});
+    }
+  }
+}
+
 // The accelerations of the parts cancelled each other out but for rounding, and all steps of such a
 // stretch came at once.
 TEST(FoundSchedules, AnAxisThatIsShapedTwiceMakesNoBursts) {

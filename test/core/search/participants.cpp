@@ -728,9 +728,8 @@ void Participants::noteLimits(const machine::SetLimits& set) {
   };
   lower(lowest.deceleration, std::min(set.limits.deceleration, set.limits.acceleration));
   lower(lowest.jerk, set.limits.jerk);
-  // They apply to the motion under way too.
-  const bool moves = controller_->snapshot()->axes.at(set.axis).state.moving;
-  if (moves || had_setpoints_[set.axis]) hulls_[set.axis].widen(stoppingWay(set.axis));
+  // Setpoints may be passed; a motion to a target keeps its limits if it would pass it otherwise.
+  if (had_setpoints_[set.axis]) hulls_[set.axis].widen(stoppingWay(set.axis));
 }
 
 void Participants::passes(std::size_t motor) {
