@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "motion/planner.h"
+#include "point_to_point/planner.h"
 #include "pulse/pin_ring.h"
 #include "pulse/pulse_engine.h"
 #include "support/free_hardware.h"

@@ -5,15 +5,15 @@
 #include <cstdint>
 #include <vector>
 
-#include "motion/compose.h"
-#include "motion/input_shaper.h"
-#include "motion/profile_sum.h"
-#include "motion/shaped_profile.h"
-#include "motion/spline.h"
-#include "motion/step_finder.h"
+#include "profile/composition.h"
+#include "profile/input_shaper.h"
+#include "profile/profile_sum.h"
+#include "profile/shaped_profile.h"
+#include "profile/step_finder.h"
 #include "support/exact_steps.h"
 #include "support/plan_from_rest.h"
 #include "support/reference_steps.h"
+#include "trajectory/spline.h"
 
 // Measures how long finding the next step takes, and how far its time is from the exact one. The
 // times are per step (items_per_second); the errors in ns.

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "axis/path_axis.h"
-#include "axis/prepared_trajectory.h"
-#include "machine/path_plan.h"
+#include "trajectory/path_axis.h"
+#include "trajectory/path_plan.h"
+#include "trajectory/prepared_trajectory.h"
 
 // Measures the planning of paths in one thread: from the request to the trajectory that the
 // controller only has to join.

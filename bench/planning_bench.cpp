@@ -9,10 +9,10 @@
 #include <random>
 #include <vector>
 
-#include "axis/line_path.h"
-#include "motion/planner.h"
-#include "motion/step_finder.h"
+#include "point_to_point/planner.h"
+#include "profile/step_finder.h"
 #include "support/allocations.h"
+#include "trajectory/line_path.h"
 
 // Measures the time and memory that planning a move takes.
 

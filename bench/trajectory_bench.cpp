@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "axis/prepared_trajectory.h"
 #include "machine/disposer.h"
 #include "support/allocations.h"
+#include "trajectory/prepared_trajectory.h"
 
 // Measures long trajectories: preparing one, in the client's thread; and joining, holding, resuming
 // and running one at another speed, while the machine waits for that.

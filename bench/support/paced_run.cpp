@@ -14,8 +14,8 @@
 #include <string>
 #include <thread>
 
-#include "motion/profile.h"
-#include "motion/step_finder.h"
+#include "profile/profile.h"
+#include "profile/step_finder.h"
 #include "pulse/cpu_latency.h"
 #include "pulse/pulse_engine.h"
 #include "pulse/pulse_thread.h"

@@ -11,7 +11,8 @@ import sys
 
 import pages
 
-ROOMS = ("activity", "axis", "config", "driver", "gpio", "machine", "motion", "motor", "pulse", "setup", "sim")
+ROOMS = ("activity", "axis", "config", "driver", "geometry", "gpio", "kinematics", "machine", "math", "motor",
+         "path_timing", "point_to_point", "profile", "pulse", "setup", "sim", "trajectory")
 ENDINGS = "cpp|h|launch|md|msg|py|rst|rules|sh|srv|svg|test|txt|urdf|yaml"
 
 

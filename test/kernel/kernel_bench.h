@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "kernel_trace.h"
-#include "motion/planner.h"
-#include "motion/step_finder.h"
+#include "point_to_point/planner.h"
+#include "profile/step_finder.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/machine.h"

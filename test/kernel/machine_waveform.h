@@ -10,7 +10,7 @@
 
 #include "kernel_bench.h"
 #include "kernel_trace.h"
-#include "motion/step_finder.h"
+#include "profile/step_finder.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "waveform.h"
 

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "axis/line_path.h"
-#include "axis/path_axis.h"
 #include "script.h"
 #include "steps.h"
+#include "trajectory/line_path.h"
+#include "trajectory/path_axis.h"
 
 namespace stepdriver::activity {
 

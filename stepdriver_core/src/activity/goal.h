@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "axis/axis_model.h"
-#include "axis/shared_path.h"
 #include "call.h"
-#include "motion/limits.h"
+#include "point_to_point/motion_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "trajectory/shared_path.h"
 
 namespace stepdriver::activity {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "message_text.h"
-#include "motion/resting_count.h"
 #include "nanoseconds.h"
+#include "profile/resting_count.h"
 #include "stepdriver_core/error.h"
 #include "steps.h"
 

@@ -8,7 +8,7 @@
 
 #include "activity.h"
 #include "manoeuvre.h"
-#include "motion/shaped_profile.h"
+#include "profile/shaped_profile.h"
 #include "script.h"
 #include "stepdriver_core/axis/axis_state.h"
 

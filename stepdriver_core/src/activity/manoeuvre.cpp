@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "message_text.h"
-#include "motion/errors.h"
-#include "motion/resting_count.h"
 #include "point_motion.h"
+#include "profile/errors.h"
+#include "profile/resting_count.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::activity {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <optional>
 
-#include "axis/move_between.h"
-#include "motion/extent.h"
-#include "motion/level_off.h"
-#include "motion/resting_count.h"
+#include "point_to_point/acceleration_ramp_down.h"
+#include "point_to_point/move_between.h"
+#include "profile/position_range.h"
+#include "profile/resting_count.h"
 #include "setpoint_motion.h"
 
 namespace stepdriver::activity {

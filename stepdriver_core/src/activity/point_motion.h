@@ -6,8 +6,8 @@
 
 #include "context.h"
 #include "goal.h"
-#include "motion/planner.h"
-#include "motion/shaped_profile.h"
+#include "point_to_point/planner.h"
+#include "profile/shaped_profile.h"
 
 namespace stepdriver::activity {
 

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "motion/errors.h"
 #include "point_motion.h"
+#include "profile/errors.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::activity {

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "axis/path_axis.h"
-#include "axis/shared_path.h"
 #include "context.h"
 #include "follow_goal.h"
 #include "goal.h"
+#include "trajectory/path_axis.h"
+#include "trajectory/shared_path.h"
 
 namespace stepdriver::activity {
 

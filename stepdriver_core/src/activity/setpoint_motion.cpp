@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "motion/extent.h"
-#include "motion/pursuit.h"
-#include "motion/resting_count.h"
 #include "point_motion.h"
+#include "point_to_point/moving_target.h"
+#include "profile/position_range.h"
+#include "profile/resting_count.h"
 
 namespace stepdriver::activity {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "goal.h"
-#include "motion/limits.h"
-#include "motion/planner.h"
+#include "point_to_point/motion_limits.h"
+#include "point_to_point/planner.h"
 
 namespace stepdriver::activity {
 

@@ -9,11 +9,11 @@
 
 #include "config/restart_speed.h"
 #include "message_text.h"
-#include "motion/backlash.h"
-#include "motion/resting_count.h"
+#include "profile/resting_count.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/chip_table.h"
+#include "trajectory/backlash.h"
 
 namespace stepdriver::axis {
 AxisModel::AxisModel(config::AxisConfig axis_config, const motor::MotorLines& motor_lines,

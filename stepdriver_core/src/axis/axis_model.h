@@ -9,20 +9,20 @@
 #include <vector>
 
 #include "axis/axis_memory.h"
-#include "ended_path.h"
 #include "fault.h"
 #include "input_levels.h"
 #include "line_failure.h"
 #include "line_names.h"
 #include "machine_mode.h"
-#include "motion/limits.h"
-#include "motion/profile.h"
 #include "motor/motor.h"
-#include "path_axis.h"
+#include "point_to_point/motion_limits.h"
+#include "point_to_point/setpoint_stream.h"
 #include "position.h"
-#include "setpoint_stream.h"
+#include "profile/profile.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "trajectory/ended_path.h"
+#include "trajectory/path_axis.h"
 
 namespace stepdriver::axis {
 

@@ -16,9 +16,7 @@
 #include "machine/disposer.h"
 #include "machine_axis.h"
 #include "message_text.h"
-#include "motion/backlash.h"
 #include "nanoseconds.h"
-#include "path_plan.h"
 #include "pulse/measure.h"
 #include "pulse/pulse_engine.h"
 #include "read_options.h"
@@ -26,6 +24,8 @@
 #include "state_keeper.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
+#include "trajectory/backlash.h"
+#include "trajectory/path_plan.h"
 #include "wiring.h"
 
 namespace stepdriver::machine {

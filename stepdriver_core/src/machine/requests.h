@@ -12,12 +12,12 @@
 #include "activity/context.h"
 #include "activity/goal.h"
 #include "axis/axis_memory.h"
-#include "axis/prepared_trajectory.h"
 #include "pulse/channel.h"
-#include "queued_path.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/streams.h"
+#include "trajectory/prepared_trajectory.h"
+#include "trajectory/queued_path.h"
 
 namespace stepdriver::machine {
 

@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "axis/axis_memory.h"
-#include "axis/ended_path.h"
-#include "axis/path_axis.h"
-#include "axis/shared_path.h"
-#include "motion/shaped_profile.h"
+#include "profile/shaped_profile.h"
 #include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "trajectory/ended_path.h"
+#include "trajectory/path_axis.h"
+#include "trajectory/shared_path.h"
 
 namespace stepdriver::machine {
 

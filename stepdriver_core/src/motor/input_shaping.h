@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "motion/input_shaper.h"
+#include "profile/input_shaper.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::motor {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "motion/limits.h"
-#include "motion/shaped_profile.h"
+#include "point_to_point/motion_limits.h"
+#include "profile/shaped_profile.h"
 #include "pulse/channel.h"
 
 namespace stepdriver::motor {

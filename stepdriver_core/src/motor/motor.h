@@ -7,11 +7,11 @@
 
 #include "brake.h"
 #include "driver_pins.h"
-#include "motion/input_shaper.h"
-#include "motion/shaped_profile.h"
 #include "motions.h"
 #include "motor_lines.h"
 #include "power.h"
+#include "profile/input_shaper.h"
+#include "profile/shaped_profile.h"
 #include "pulse/channel.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "translator.h"

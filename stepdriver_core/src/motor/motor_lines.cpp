@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "motion/resting_count.h"
 #include "nanoseconds.h"
+#include "profile/resting_count.h"
 
 namespace stepdriver::motor {
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "channel.h"
-#include "motion/shaped_profile.h"
+#include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "motion/resting_count.h"
+#include "profile/resting_count.h"
 #include "shared_motors.h"
 
 namespace stepdriver::pulse {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "motion/profile_sum.h"
-#include "motion/shaped_profile.h"
-#include "motion/step_finder.h"
+#include "profile/profile_sum.h"
+#include "profile/shaped_profile.h"
+#include "profile/step_finder.h"
 #include "pulse/channel.h"
 #include "pulse/command.h"
 #include "pulse/snapshot.h"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "motion/resting_count.h"
+#include "profile/resting_count.h"
 
 namespace stepdriver::pulse {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine_channel.h"
-#include "motion/profile_sum.h"
+#include "profile/profile_sum.h"
 
 namespace stepdriver::pulse {
 

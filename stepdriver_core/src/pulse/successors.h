@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "motion/shaped_profile.h"
+#include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {

@@ -1,5 +1,5 @@
 """Finding what rings on a machine: oscillations of an axis, what an accelerometer shows of them, and the
-input shapers that stop it. The formulas of the shapers are those of motion/input_shaper.h."""
+input shapers that stop it. The formulas of the shapers are those of profile/input_shaper.h."""
 
 import cmath
 import math

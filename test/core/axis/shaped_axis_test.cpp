@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "motion/planner.h"
-#include "motion/shaped_profile.h"
 #include "motor/input_shaping.h"
+#include "point_to_point/planner.h"
+#include "profile/shaped_profile.h"
 #include "sim/spring_mass.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/error.h"

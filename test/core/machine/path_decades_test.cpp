@@ -12,13 +12,13 @@
 #include <utility>
 #include <vector>
 
-#include "machine/path_reader.h"
-#include "motion/contour.h"
-#include "motion/spline.h"
+#include "geometry/path.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "support/constants.h"
 #include "support/planned_path.h"
+#include "trajectory/path_reader.h"
+#include "trajectory/spline.h"
 
 // Paths whose lengths, speeds, accelerations, jerks and tolerances are drawn over many decades:
 // what their steps say, not their plans.

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "motion/spline.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/constants.h"
 #include "support/refusal.h"
 #include "support/trajectory_bench.h"
+#include "trajectory/spline.h"
 
 // Trajectories of axes with a jerk limit, and trajectories at the limits, which have to slow down.
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "motion/step_finder.h"
+#include "profile/step_finder.h"
 #include "support/constants.h"
 #include "support/pulse_engine_bench.h"
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "motion/compose.h"
-#include "motion/step_finder.h"
+#include "profile/composition.h"
+#include "profile/step_finder.h"
 #include "support/constants.h"
 #include "support/pulse_engine_bench.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <map>
 
-#include "motion/step_finder.h"
+#include "profile/step_finder.h"
 #include "support/pulse_engine_bench.h"
 
 namespace stepdriver::pulse {

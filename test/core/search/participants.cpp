@@ -5,13 +5,13 @@
 #include <cerrno>
 #include <cmath>
 
-#include "machine/path_plan.h"
-#include "machine/queued_path.h"
 #include "motor/input_shaping.h"
 #include "stepdriver_core/error.h"
 #include "support/constants.h"
 #include "support/corexy_bench.h"
 #include "support/gantry_bench.h"
+#include "trajectory/path_plan.h"
+#include "trajectory/queued_path.h"
 
 namespace stepdriver::search {
 namespace {

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "axis/prepared_trajectory.h"
 #include "machine/controller.h"
 #include "machine/shell_core.h"
 #include "machine/wiring.h"
@@ -25,6 +24,7 @@
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/sim/rig.h"
+#include "trajectory/prepared_trajectory.h"
 
 namespace stepdriver::search {
 

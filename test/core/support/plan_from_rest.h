@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "motion/planner.h"
+#include "point_to_point/planner.h"
 
 namespace stepdriver::motion {
 

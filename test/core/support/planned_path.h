@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "axis/path_axis.h"
-#include "axis/prepared_trajectory.h"
-#include "axis/trajectory_path.h"
-#include "machine/path_plan.h"
-#include "machine/queued_path.h"
-#include "motion/profile.h"
+#include "profile/profile.h"
 #include "support/steps_of.h"
+#include "trajectory/path_axis.h"
+#include "trajectory/path_plan.h"
+#include "trajectory/prepared_trajectory.h"
+#include "trajectory/queued_path.h"
+#include "trajectory/trajectory_path.h"
 
 // Paths from the request to the steps that come out, without a machine.
 

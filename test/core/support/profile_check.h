@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "motion/limits.h"
-#include "motion/profile.h"
-#include "motion/step_finder.h"
+#include "point_to_point/motion_limits.h"
+#include "profile/profile.h"
+#include "profile/step_finder.h"
 
 namespace stepdriver::motion {
 

@@ -6,8 +6,8 @@
 #include <ostream>
 #include <random>
 
-#include "motion/limits.h"
-#include "motion/profile.h"
+#include "point_to_point/motion_limits.h"
+#include "profile/profile.h"
 
 namespace stepdriver::motion {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "motion/contour_motion.h"
+#include "path_timing/acceleration_limited.h"
 
 namespace stepdriver::test {
 

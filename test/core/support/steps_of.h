@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "motion/profile.h"
-#include "motion/step_finder.h"
+#include "profile/profile.h"
+#include "profile/step_finder.h"
 
 namespace stepdriver::motion {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "stepdriver_core/bias.h"
-#include "stepdriver_core/config/kinematics.h"
 #include "stepdriver_core/driver/driver_chip.h"
+#include "stepdriver_core/kinematics/kinematics.h"
 
 namespace stepdriver::config {
 

@@ -1,0 +1,666 @@
+#include "acceleration_limited.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "geometry/path_grid.h"
+#include "give_way.h"
+#include "profile/errors.h"
+#include "profile/profile.h"
+#include "reachability.h"
+
+namespace stepdriver::motion {
+namespace {
+
+// Of an acceleration: rounded times and positions change it by no more. The times of both ends of a
+// cubic of the duration h are rounded by e each, which changes its acceleration a by 6 a e/h, and a
+// position that is rounded by r changes it by 6 r/h^2: knots aren't closer than that allows.
+constexpr double kMostRounding = 1.5e-4;
+// The same if the axes would move by more than a microstep in such a time.
+constexpr double kMostRoundingOfFast = 5e-3;
+// What exceeds a limit after so many plans slows the whole motion down; one that begins at a speed
+// can't be slowed down.
+constexpr int kMostPlans = 6;
+constexpr int kMostPlansFromSpeed = 12;
+// Of a limit: less is left for the whole motion to be slowed down by.
+constexpr double kSmallExcess = 1e-3;
+// Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
+// right, makes fewer plans.
+constexpr double kLowerBy = 1.002;
+
+// An interval is divided if it isn't at a limit to this part, unless it takes less than a small
+// part of its segment's time.
+constexpr double kFullUse = 0.92;
+constexpr double kMostSquareRatio = 1.5;
+constexpr double kSmallPart = 0.005;
+// If both ends of an interval are checked, and that lowers the speed by so much, it is divided,
+// unless it is too short even for that.
+constexpr double kMostLoss = 1.02;
+constexpr double kSmallestPart = 1e-4;
+// Of a limit: if a cubic exceeds it by so much, both ends of its interval are checked, and it is
+// divided if that is still possible.
+constexpr double kPoorCubic = 1.01;
+// Of the duration of an interval with constant acceleration along it.
+constexpr double kMostStretch = 0.1;
+constexpr double kMostDeviation = 0.02;  // of the resolution
+constexpr double kMostLeftOut = 0.01;    // of the resolution
+constexpr int kMostDivisions = 4;
+constexpr std::size_t kPartsOfDivided = 2;
+
+// A straight part, from a speed to another one, and what lies between.
+struct Trapezoid {
+  double ramp_up = 0.0;  // s
+  double way_up = 0.0;   // unit
+  double cruise = 0.0;   // s
+  double way_cruise = 0.0;
+  double ramp_down = 0.0;  // s
+  double peak = 0.0;       // unit/s
+
+  double duration() const { return ramp_up + cruise + ramp_down; }
+};
+
+// @param shortest [s] shorter ramps become so long if there is room for that.
+Trapezoid trapezoidOf(double length, double begin_square, double end_square,
+                      const ContourSpeed::Ramp& ramp, double peak_square, double shortest) {
+  Trapezoid made;
+  made.peak = std::sqrt(peak_square);
+  made.ramp_up = (made.peak - std::sqrt(begin_square)) / ramp.up;
+  made.ramp_down = (made.peak - std::sqrt(end_square)) / ramp.down;
+  made.way_up = (peak_square - begin_square) / (2.0 * ramp.up);
+  const double way_down = (peak_square - end_square) / (2.0 * ramp.down);
+  made.way_cruise = std::max(0.0, length - made.way_up - way_down);
+  made.cruise = made.way_cruise / made.peak;
+  // From a speed that is too high for the ramp, it has to slow down more steeply.
+  const double way_left = length - made.way_up;
+  if (way_down > way_left) made.ramp_down = 2.0 * way_left / (made.peak + std::sqrt(end_square));
+  const auto longer = [&](double time) { return time > 0.0 ? std::max(time, shortest) : 0.0; };
+  const double up = longer(made.ramp_up);
+  const double down = longer(made.ramp_down);
+  const double gentle_up = up * (made.peak + std::sqrt(begin_square)) / 2.0;
+  const double gentle_down = down * (made.peak + std::sqrt(end_square)) / 2.0;
+  const double gentle_cruise = length - gentle_up - gentle_down;
+  const bool is_short = up > made.ramp_up || down > made.ramp_down;
+  if (is_short && gentle_cruise > shortest * made.peak) {
+    return {up, gentle_up, gentle_cruise / made.peak, gentle_cruise, down, made.peak};
+  }
+  return made;
+}
+
+// The demands of a cubic on the axes, in parts of their limits: the largest of all axes.
+struct Demand {
+  double acceleration_at_begin = 0.0;
+  double acceleration_at_end = 0.0;
+  double speed = 0.0;
+
+  double acceleration() const { return std::max(acceleration_at_begin, acceleration_at_end); }
+};
+
+// The motion at a planned speed: the durations of the intervals, and its knots. What follows from
+// the speeds at both ends of an interval is kept until they change.
+class Knots {
+ public:
+  Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits, double resolution)
+      : grid_(grid), limits_(limits), resolution_(resolution), axes_(grid.axes()) {
+    kept_.reserve(grid.capacity());
+    kept_.resize(grid.size());
+  }
+
+  /// After ContourGrid::divideEach().
+  void regrid(const Division& division) {
+    division.spread(kept_);
+    for (std::size_t i = 0; i < division.intervals.size(); ++i) {
+      for (std::size_t k = 0; k < division.parts; ++k) kept_[division.firstPartOf(i) + k] = {};
+    }
+  }
+
+  void findDurations(const ContourSpeed& speed) {
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      giveWayAt(i);
+      const double begin = speed.square(i);
+      const double end = speed.square(i + 1);
+      Kept& kept = kept_[i];
+      const bool changed = begin != kept.begin_square || end != kept.end_square;
+      if (changed) kept = {begin, end, std::sqrt(begin), std::sqrt(end)};
+      if (grid_[i].straight) {
+        kept.duration = trapezoid(i, speed).duration();
+      } else if (changed) {
+        kept.duration = durationOf(i, kept.begin, kept.end);
+      }
+    }
+  }
+
+  void make(const ContourSpeed& speed) {
+    findDurations(speed);
+    findClosest();
+    knots_.clear();
+    inner_.clear();
+    // A straight part may have two more.
+    knots_.reserve(2 * grid_.size());
+    appendPlace(0, 0.0, kept_[0].begin, 0);
+    double time = 0.0;
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      giveWayAt(i);
+      if (grid_[i].straight) appendStraight(i, speed, time);
+      time += kept_[i].duration;
+      appendPlace(i + 1, time, kept_[i].end, i);
+    }
+  }
+
+  double beginSpeed(std::size_t interval) const { return kept_[interval].begin; }
+  double endSpeed(std::size_t interval) const { return kept_[interval].end; }
+  double duration(std::size_t interval) const { return kept_[interval].duration; }  ///< [s]
+  /// Whether settle() has been called since the speeds of an interval changed.
+  bool isSettled(std::size_t interval) const { return kept_[interval].settled; }
+  void settle(std::size_t interval) { kept_[interval].settled = true; }
+  /// Of the cubic of an interval that isn't straight.
+  const Demand& demandOf(std::size_t interval) {
+    Kept& kept = kept_[interval];
+    if (!kept.demand) {
+      kept.demand = cubicDemand(
+          kept.duration,
+          [&](std::size_t j) -> Joint {
+            return {grid_.position(interval)[j], grid_.firstAtBegin(interval)[j] * kept.begin};
+          },
+          [&](std::size_t j) -> Joint {
+            return {grid_.position(interval + 1)[j], grid_.firstAtEnd(interval)[j] * kept.end};
+          });
+    }
+    return *kept.demand;
+  }
+
+  std::size_t size() const { return knots_.size(); }
+  double time(std::size_t knot) const { return knots_[knot].time; }
+  std::size_t interval(std::size_t knot) const { return knots_[knot].interval; }
+  double position(std::size_t knot, std::size_t axis) const {
+    return jointAt(knots_[knot], axis).position;
+  }
+  double velocity(std::size_t knot, std::size_t axis) const {
+    return jointAt(knots_[knot], axis).velocity;
+  }
+  double parameter(std::size_t knot) const { return knots_[knot].parameter; }
+  double speed(std::size_t knot) const { return knots_[knot].speed; }
+  /// Whether it is a place of the contour, or on a straight part of it.
+  bool isOnContour(std::size_t knot) const { return knots_[knot].inner == kNone; }
+  /// The first interval that contains the way from a knot to the next one.
+  std::size_t intervalAfter(std::size_t knot) const {
+    const Knot& of = knots_[knot];
+    return of.place == kNone || of.place == 0 ? of.interval : of.interval + 1;
+  }
+  /// On the way from the knot before it.
+  bool isStraight(std::size_t knot) const {
+    if (knots_[knot].skipped) return false;
+    const std::size_t last = interval(knot);
+    const std::size_t first = interval(knot - 1);
+    const bool whole = first + 1 == last && parameter(knot - 1) == grid_[first].to;
+    return grid_[last].straight && (first == last || whole);
+  }
+  /// [s] Of the last knot that isn't after a place.
+  double timeAt(std::size_t place) const {
+    const auto later = std::lower_bound(
+        knots_.begin() + 1, knots_.end(), place,
+        [](const Knot& knot, std::size_t wanted) { return knot.interval < wanted; });
+    return (later - 1)->time;
+  }
+
+  /// Of the cubic that ends at a knot.
+  Demand demandBefore(std::size_t knot) {
+    const std::size_t place = knots_[knot].place;
+    const bool whole = place != kNone && knots_[knot - 1].place + 1 == place;
+    if (whole && !grid_[place - 1].straight) return demandOf(place - 1);
+    return cubicDemand(
+        time(knot) - time(knot - 1),
+        [&](std::size_t j) -> Joint {
+          return {position(knot - 1, j), velocity(knot - 1, j)};
+        },
+        [&](std::size_t j) -> Joint {
+          return {position(knot, j), velocity(knot, j)};
+        });
+  }
+
+ private:
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  static constexpr double kForever = std::numeric_limits<double>::infinity();
+
+  // Of an interval.
+  struct Kept {
+    double begin_square = -1.0;  // unit^2/s^2
+    double end_square = -1.0;
+    double begin = 0.0;  // unit/s
+    double end = 0.0;
+    double duration = 0.0;  // s
+    std::optional<Demand> demand = {};
+    bool settled = false;
+  };
+  struct Knot {
+    double time;
+    std::size_t interval;  // of the grid, which ends at the knot or contains it
+    std::size_t place;     // or kNone, within an interval
+    double way;            // unit, from the begin of a straight part
+    double parameter;
+    double speed;
+    bool rests = false;         // at a place
+    std::size_t inner = kNone;  // first of its states, within an interval that isn't straight
+    bool skipped = false;       // whether others were left out between the one before and it
+  };
+  struct Joint {
+    double position;
+    double velocity;
+  };
+
+  // @param from, to return the joint of an axis at the begin and at the end.
+  template <typename From, typename To>
+  Demand cubicDemand(double duration, const From& from, const To& to) const {
+    Demand demand;
+    const double rate = 1.0 / duration;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      const auto [p0, v0] = from(j);
+      const auto [p1, v1] = to(j);
+      const double mean = (p1 - p0) * rate;
+      const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) * rate;
+      const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) * rate;
+      const int direction = directionOf(v0, v1);
+      const auto part = [&](double a) {
+        return std::abs(a) / accelerationTowards(limits_[j], direction, a > 0.0 ? 1 : -1);
+      };
+      demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
+      demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
+      double speed = std::max(std::abs(v0), std::abs(v1));
+      if (begin * end < 0.0) {
+        const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
+        speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
+      }
+      demand.speed = std::max(demand.speed, speed / limits_[j].speed);
+    }
+    return demand;
+  }
+
+  // [s] The duration closest to T = 2 length/(begin + end), that of a constant s'', for which the
+  // accelerations at both ends of the cubic keep to their limits. For T (1 + e), they are
+  // a - 6 e way/T^2 at the begin and b + 6 e way/T^2 at the end, but for e^2. If there is none, the
+  // excess is the same at both limits.
+  double durationOf(std::size_t interval, double begin, double end) const {
+    const double even = 2.0 * grid_[interval].length / (begin + end);
+    const double rate = 1.0 / even;
+    double least = -kMostStretch;
+    double most = kMostStretch;
+    for (std::size_t j = 0; j < axes_; ++j) {
+      const double way = grid_.position(interval + 1)[j] - grid_.position(interval)[j];
+      const double v0 = grid_.firstAtBegin(interval)[j] * begin;
+      const double v1 = grid_.firstAtEnd(interval)[j] * end;
+      const double slope = 6.0 * way * rate * rate;
+      const double at_begin = slope - (4.0 * v0 + 2.0 * v1) * rate;
+      const double at_end = (2.0 * v0 + 4.0 * v1) * rate - slope;
+      const int direction = directionOf(v0, v1);
+      const double up = accelerationTowards(limits_[j], direction, 1);
+      const double down = -accelerationTowards(limits_[j], direction, -1);
+      if (std::abs(slope) * kMostStretch < kSmallExcess * up) continue;
+      const double with = slope > 0.0 ? up : down;
+      const double against = slope > 0.0 ? down : up;
+      const double by = 1.0 / slope;
+      least = std::max(least, std::max((at_begin - with) * by, (against - at_end) * by));
+      most = std::min(most, std::min((at_begin - against) * by, (with - at_end) * by));
+    }
+    const double stretch = least > most ? (least + most) / 2.0 : std::clamp(0.0, least, most);
+    return even * (1.0 + std::clamp(stretch, -kMostStretch, kMostStretch));
+  }
+
+  Trapezoid trapezoid(std::size_t interval, const ContourSpeed& speed) const {
+    constexpr double kRounding = 1.001;  // for differences of times
+    return trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
+                       speed.ramp(interval), speed.peakSquare(interval), kRounding * closest_);
+  }
+
+  void appendStraight(std::size_t interval, const ContourSpeed& speed, double time) {
+    const Trapezoid made = trapezoid(interval, speed);
+    kept_[interval].duration = made.duration();
+    appendOnLine(interval, time + made.ramp_up, made.way_up, made.peak);
+    appendOnLine(interval, time + made.ramp_up + made.cruise, made.way_up + made.way_cruise,
+                 made.peak);
+  }
+
+  void appendOnLine(std::size_t interval, double time, double way, double speed) {
+    append(onLine(interval, time, way, speed));
+  }
+
+  Knot onLine(std::size_t interval, double time, double way, double speed) const {
+    const ContourGrid::Interval& of = grid_[interval];
+    const double part = std::min(1.0, way / of.length);
+    return {time, interval, kNone, way, of.from + part * (of.to - of.from), speed};
+  }
+
+  void appendPlace(std::size_t place, double time, double speed, std::size_t interval) {
+    const double parameter = place == 0 ? grid_[0].from : grid_[interval].to;
+    append({time, interval, place, 0.0, parameter, speed, speed == 0.0});
+  }
+
+  // Of knots that are too close to each other, only the first one stays, or one at rest. If the
+  // others make a difference, they are replaced by a state of the same motion at the shortest time
+  // from the one that stays. What is left out is then only how the axes move in that time; before
+  // and after it, the motion is as planned.
+  void append(const Knot& next) {
+    const double since = knots_.empty() ? kForever : next.time - knots_.back().time;
+    if (since < closest_ && next.rests) {
+      appendRest(next);
+    } else {
+      if (skips_ && since >= 2.0 * closest_ && matters(knots_.back(), seen_, next)) {
+        push(within(seen_, next, knots_.back().time + closest_));
+      }
+      if (since >= closest_) {
+        push(next);
+      } else {
+        skips_ = true;
+      }
+    }
+    seen_ = next;
+  }
+
+  void push(const Knot& next) {
+    knots_.push_back(next);
+    knots_.back().skipped = skips_;
+    skips_ = false;
+  }
+
+  // @pre it is too close to the last knot.
+  void appendRest(const Knot& rest) {
+    if (knots_.size() > 1 && !knots_.back().rests) {
+      const Knot close = knots_.back();
+      knots_.pop_back();
+      const Knot& before = knots_.back();
+      const bool has_room = rest.time - before.time >= 2.0 * closest_;
+      if (has_room && !close.skipped && matters(before, close, rest)) {
+        push(within(before, close, rest.time - closest_));
+        knots_.back().skipped = false;
+      }
+      skips_ = true;
+    }
+    push(rest);
+  }
+
+  // Whether the cubic between two knots is off by more than a small part of the resolution because
+  // one between them is left out. If it is off by dp and dv there, it is off by up to
+  // dp + 4/27 h dv in the time h before or after that.
+  bool matters(const Knot& from, const Knot& left_out, const Knot& to) const {
+    const double longest = std::max(left_out.time - from.time, to.time - left_out.time);
+    for (std::size_t j = 0; j < axes_; ++j) {
+      const Joint is = cubicAt(from, to, left_out.time, j);
+      const Joint wanted = jointAt(left_out, j);
+      const double most = std::abs(is.position - wanted.position) +
+                          4.0 / 27.0 * longest * std::abs(is.velocity - wanted.velocity);
+      if (most > kMostLeftOut * resolution_) return true;
+    }
+    return false;
+  }
+
+  // On the cubic between two knots.
+  Joint cubicAt(const Knot& from, const Knot& to, double time, std::size_t axis) const {
+    const double whole = to.time - from.time;
+    const double passed = time - from.time;
+    const Joint begin = jointAt(from, axis);
+    const Joint end = jointAt(to, axis);
+    const double mean = (end.position - begin.position) / whole;
+    const double a = (6.0 * mean - 4.0 * begin.velocity - 2.0 * end.velocity) / whole;
+    const double jerk = 6.0 * (begin.velocity + end.velocity - 2.0 * mean) / (whole * whole);
+    return {begin.position + passed * (begin.velocity + passed * (a / 2.0 + passed * jerk / 6.0)),
+            begin.velocity + passed * (a + passed * jerk / 2.0)};
+  }
+
+  // The state at a time between two knots with no other one between them.
+  Knot within(const Knot& from, const Knot& to, double time) {
+    const double whole = to.time - from.time;
+    const double passed = time - from.time;
+    const double speed = from.speed + (to.speed - from.speed) * (passed / whole);
+    const std::size_t interval = to.interval;
+    if (grid_[interval].straight) {
+      const bool both = from.place == kNone && from.interval == interval;
+      const double begin = both ? from.way : 0.0;
+      return onLine(interval, time, begin + passed * (from.speed + speed) / 2.0, speed);
+    }
+    const double begin = from.interval == interval ? from.parameter : grid_[interval].from;
+    Knot made{time, interval, kNone, 0.0, begin + (to.parameter - begin) * (passed / whole), speed};
+    made.inner = inner_.size();
+    for (std::size_t j = 0; j < axes_; ++j) inner_.push_back(cubicAt(from, to, time, j));
+    return made;
+  }
+
+  Joint jointAt(const Knot& knot, std::size_t axis) const {
+    if (knot.inner != kNone) return inner_[knot.inner + axis];
+    if (knot.place == kNone) {
+      const double direction = grid_.firstAtBegin(knot.interval)[axis];
+      return {grid_.position(knot.interval)[axis] + direction * knot.way, direction * knot.speed};
+    }
+    const double* direction =
+        knot.place > 0 ? grid_.firstAtEnd(knot.interval) : grid_.firstAtBegin(knot.interval);
+    return {grid_.position(knot.place)[axis], direction[axis] * knot.speed};
+  }
+
+  // [s] See kMostRounding.
+  void findClosest() {
+    constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+    double duration = 0.0;
+    for (const Kept& kept : kept_) duration += kept.duration;
+    const double time = 6.0 * std::max(0.5e-9, 2.0 * kEpsilon * duration);
+    closest_ = time / kMostRounding;
+    double rounded = time / kMostRoundingOfFast;
+    for (std::size_t j = 0; j < axes_; ++j) {
+      double farthest = 0.0;
+      bool moves = false;
+      for (std::size_t i = 0; i <= grid_.size(); ++i) {
+        farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
+        moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
+      }
+      if (!moves) continue;
+      const auto [least, most] = std::minmax(limits_[j].acceleration, limits_[j].deceleration);
+      closest_ = std::min(closest_, std::sqrt(resolution_ / most));
+      rounded =
+          std::max(rounded, std::sqrt(6.0 * 2.0 * kEpsilon * farthest / (kMostRounding * least)));
+    }
+    closest_ = std::max(closest_, rounded);
+  }
+
+  const ContourGrid& grid_;
+  const std::vector<ContourLimits>& limits_;
+  double resolution_;  // [unit] of the contour
+  std::size_t axes_;
+  std::vector<Kept> kept_;  // of each interval
+  std::vector<Knot> knots_;
+  std::vector<Joint> inner_;  // of each axis, of some of them
+  double closest_ = 0.0;      // [s] knots, but for two at rest
+  bool skips_ = false;        // whether knots were left out after the last one
+  Knot seen_{};               // the last one, even if it was left out
+};
+
+// By what factor limits are exceeded; 1 if they aren't.
+struct Excess {
+  double acceleration = 1.0;
+  double speed = 1.0;
+};
+
+// Whether an interval is so long that the motion isn't close to any limit at one of its ends, or
+// that the highest speed differs much between them: a motion that is as fast as possible is at one
+// of its limits everywhere.
+bool wastesTime(const ContourSpeed& speed, std::size_t interval, const Demand& demand) {
+  const double begin = speed.square(interval);
+  const double end = speed.square(interval + 1);
+  const double begin_use = begin / speed.capAtBegin(interval);
+  const double end_use = end / speed.capAtEnd(interval);
+  if (std::min(begin_use, end_use) > kFullUse)
+    return std::max(begin, end) > kMostSquareRatio * std::min(begin, end);
+  return std::min(std::max(demand.acceleration_at_begin, begin_use),
+                  std::max(demand.acceleration_at_end, end_use)) < kFullUse;
+}
+
+// How far the cubic of an interval may be from the contour [unit] if its curvature changes evenly.
+// Let L be its length, b the angle by which it turns, and r = (v1 - v0)/(v1 + v0) for the speeds at
+// its ends. The fourth derivative of q(s(t)) with constant s'' and curvature is 3 q'' s''^2 +
+// 6 q''' s'' s'^2 + q'''' s'^4, and the cubic deviates by T^4/384 of that.
+double evenDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end) {
+  double square = 0.0;
+  for (std::size_t j = 0; j < grid.axes(); ++j) {
+    const double change = grid.firstAtEnd(interval)[j] - grid.firstAtBegin(interval)[j];
+    square += change * change;
+  }
+  const double r = std::abs(end - begin) / (end + begin);
+  const double b = std::sqrt(square);
+  return grid[interval].length * b * (r * r + b * r + b * b / 12.0) / 32.0;
+}
+
+// How far the middle of that cubic is from the contour [unit], at a right angle to the contour's
+// direction in the middle of the interval.
+double middleDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end,
+                       double duration) {
+  const ContourPoint& middle = grid.evaluateMiddle(interval);
+  const double eighth = duration / 8.0;
+  double off_square = 0.0;
+  double along = 0.0;
+  double rate_square = 0.0;
+  for (std::size_t j = 0; j < grid.axes(); ++j) {
+    const double change =
+        grid.firstAtBegin(interval)[j] * begin - grid.firstAtEnd(interval)[j] * end;
+    const double off = (grid.position(interval)[j] + grid.position(interval + 1)[j]) / 2.0 +
+                       eighth * change - middle.position[j];
+    off_square += off * off;
+    along += off * middle.first[j];
+    rate_square += middle.first[j] * middle.first[j];
+  }
+  return std::sqrt(std::max(0.0, off_square - along * along / rate_square));
+}
+
+// Whether an interval wastes time, unless it takes only a small part of its segment's, or deviates.
+bool isLong(std::size_t interval, double part, double deviation, const ContourGrid& grid,
+            ContourSpeed& speed, Knots& knots) {
+  if (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) return true;
+  if (part >= kSmallPart && wastesTime(speed, interval, knots.demandOf(interval))) return true;
+  const double begin = knots.beginSpeed(interval);
+  const double end = knots.endSpeed(interval);
+  return evenDeviation(grid, interval, begin, end) > deviation ||
+         middleDeviation(grid, interval, begin, end, knots.duration(interval)) > deviation;
+}
+
+// Divides the intervals that are too long, and those whose cubics are poor.
+bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots& knots) {
+  std::vector<bool> divided(grid.size(), false);
+  std::vector<double> times(grid[grid.size() - 1].segment + 1, 0.0);  // of the segments
+  for (std::size_t i = 0; i < grid.size(); ++i) times[grid[i].segment] += knots.duration(i);
+  bool any = false;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    giveWayAt(i);
+    if (grid[i].straight || knots.isSettled(i)) continue;
+    const bool poor = knots.demandOf(i).acceleration() > kPoorCubic;
+    if (poor) speed.checkBothEnds(i);
+    const double part = knots.duration(i) / times[grid[i].segment];
+    if (poor || isLong(i, part, deviation, grid, speed, knots)) {
+      divided[i] = any = true;
+    } else {
+      knots.settle(i);
+    }
+  }
+  if (!any) return false;
+  const Division division = grid.divideEach(divided, kPartsOfDivided);
+  speed.regrid(division);
+  knots.regrid(division);
+  return true;
+}
+
+// Lowers the limits of the intervals of the cubics that exceed them, or has both ends of them
+// checked; returns the largest excess.
+Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, ContourSpeed& speed,
+                   Knots& knots) {
+  Excess worst;
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    const Demand demand = knots.demandBefore(i);
+    const Excess excess{std::max(1.0, demand.acceleration()), std::max(1.0, demand.speed)};
+    worst.acceleration = std::max(worst.acceleration, excess.acceleration);
+    worst.speed = std::max(worst.speed, excess.speed);
+    if (excess.acceleration == 1.0 && excess.speed == 1.0) continue;
+    const std::size_t last = knots.interval(i);
+    const std::size_t first = std::min(knots.intervalAfter(i - 1), last);
+    const auto by = [&](double factor) { return factor > 1.0 ? factor * by_more : 1.0; };
+    for (std::size_t k = first; k <= last; ++k) {
+      const bool checks = excess.acceleration > poor && !grid[k].straight && speed.checkBothEnds(k);
+      speed.lower(k, checks ? 1.0 : by(excess.acceleration), by(excess.speed));
+    }
+  }
+  return worst;
+}
+
+// The same motion, slower by a factor, at times of whole nanoseconds.
+std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
+                                    const ContourGrid& grid, double factor, double ago) {
+  const double last = knots.time(knots.size() - 1) * factor;
+  if (!(last < Profile::kLongest)) {
+    throw TooLong("the motion along the path would take longer than 4e9 s");
+  }
+  std::vector<ContourKnot> made;
+  made.reserve(knots.size());
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    const double time = knots.time(i) * factor - ago;
+    ContourKnot& knot = made.emplace_back();
+    knot.time_ns = std::llround(time * 1e9);
+    const double later = static_cast<double>(knot.time_ns) * 1e-9 - time;
+    knot.segment = grid[knots.interval(i)].segment;
+    knot.parameter = knots.parameter(i);
+    knot.speed = knots.speed(i) / factor;
+    knot.may_begin = knots.isOnContour(i) && knot.parameter >= contour.roundedUntil(knot.segment);
+    knot.straight = i + 1 < knots.size() && knots.isStraight(i + 1);
+    knot.positions.resize(grid.axes());
+    knot.velocities.resize(grid.axes());
+    for (std::size_t j = 0; j < grid.axes(); ++j) {
+      const double velocity = knots.velocity(i, j) / factor;
+      knot.positions[j] = knots.position(i, j) + velocity * later;
+      knot.velocities[j] = velocity;
+    }
+  }
+  return made;
+}
+
+// The largest part of a limit that the motion uses if that is more than 1, and the factor by which
+// it has to be slowed down as a whole for that.
+struct Outcome {
+  double excess = 1.0;
+  double slowdown = 1.0;
+  double settled = 0.0;  // [s] see ContourPlan, of the motion that isn't slowed down
+};
+
+Outcome planKnots(const Contour& contour, const std::vector<ContourLimits>& limits,
+                  double begin_speed, ContourGrid& grid, Knots& knots) {
+  ContourSpeed speed(contour, grid, limits, begin_speed * begin_speed, CheckedAcceleration::kMean);
+  for (int i = 0; i < kMostDivisions; ++i) {
+    speed.plan();
+    knots.findDurations(speed);
+    if (!divideLong(kMostDeviation * contour.resolution(), grid, speed, knots)) break;
+  }
+  // From a speed, what still exceeds the limits isn't slowed down afterwards.
+  const bool from_speed = begin_speed > 0.0;
+  const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
+  for (int plans = 1;; ++plans) {
+    speed.plan();
+    knots.make(speed);
+    const bool first = plans == 1;
+    const double poor = from_speed && !first ? 1.0 : kPoorCubic;
+    const Excess excess = lowerLimits(first ? 1.0 : kLowerBy, poor, grid, speed, knots);
+    Outcome outcome{std::max(excess.acceleration, excess.speed)};
+    if (outcome.excess > 1.0 + kSmallExcess && plans < most_plans) continue;
+    if (!from_speed) outcome.slowdown = std::max(std::sqrt(excess.acceleration), excess.speed);
+    outcome.settled = knots.timeAt(speed.settledUntil());
+    return outcome;
+  }
+}
+
+}  // namespace
+
+ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                        const ContourBegin& begin) {
+  ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
+  Knots knots(grid, limits, contour.resolution());
+  const Outcome outcome = planKnots(contour, limits, begin.speed, grid, knots);
+  ContourPlan plan;
+  if (begin.speed > 0.0) plan.excess = outcome.excess;
+  plan.settled_ns = std::llround(outcome.settled * outcome.slowdown * 1e9);
+  plan.knots = slowedDown(knots, contour, grid, outcome.slowdown, begin.ago);
+  return plan;
+}
+
+}  // namespace stepdriver::motion

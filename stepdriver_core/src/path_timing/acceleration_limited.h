@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "geometry/path.h"
+
+namespace stepdriver::motion {
+
+/// The limits of one axis on a contour, all above 0 and finite but for the jerk [unit/s, unit/s^2].
+struct ContourLimits {
+  double speed = 0.0;
+  double acceleration = 0.0;                              ///< while its speed rises
+  double deceleration = 0.0;                              ///< while its speed falls
+  double jerk = std::numeric_limits<double>::infinity();  ///< [unit/s^3] infinity: no limit
+};
+
+/// A place of a contour, the time at which the motion is there, and its velocity.
+struct ContourKnot {
+  std::int64_t time_ns = 0;
+  std::size_t segment = 0;
+  std::vector<double> positions;   ///< [unit]
+  std::vector<double> velocities;  ///< [unit/s]
+  /// [unit/s^2] Empty if accelerations may jump.
+  std::vector<double> accelerations;
+  double parameter = 0.0;     ///< of the segment
+  double speed = 0.0;         ///< [unit/s] along the contour
+  double acceleration = 0.0;  ///< [unit/s^2] along the contour; 0 if accelerations may jump
+  /// Another contour can begin here: no corner before it is being rounded, or if accelerations may
+  /// not jump, the state of the motion here allows all that has been planned for the time after it.
+  bool may_begin = false;
+  double average = 0.0;  ///< [s] the time over which planSmoothContour() averaged
+  /// On the way to the next knot, the segment of that one is straight, and the acceleration
+  /// constant.
+  bool straight = false;
+};
+
+/// The place and the speed at which a motion along a contour begins.
+struct ContourBegin {
+  double parameter = 0.0;  ///< of the first segment
+  double speed = 0.0;      ///< [unit/s] along the contour
+  /// @name Ignored if accelerations may jump
+  /// @{
+  double acceleration = 0.0;  ///< [unit/s^2] along the contour
+  double average = 0.0;       ///< [s] of the motion so far; 0: unknown
+  /// @}
+  /// [s] How long ago the motion was exactly there; less than half a nanosecond.
+  double ago = 0.0;
+};
+
+/// The motion along a contour.
+struct ContourPlan {
+  std::vector<ContourKnot> knots;  ///< the first one at time 0 and at the begin
+  /// Up to this time the motion is also the fastest one if the contour continues at its end,
+  /// however its corner there is rounded.
+  std::int64_t settled_ns = 0;
+  /// The largest part of a limit that the motion uses if that is more than 1: if it begins at a
+  /// speed, it can't be slowed down as a whole.
+  double excess = 1.0;
+};
+
+/// The fastest motion along a contour to rest at its end, within the limits of the axes and the
+/// speeds of the segments. Jerk limits are ignored: accelerations jump. See
+/// planSmoothContour().
+///
+/// The axes move on the cubics that have the positions and velocities of the knots at both ends.
+/// Between knots they are within a tenth of the resolution of the contour. In the whole of each
+/// cubic, velocities and accelerations are within the limits, apart from rounding.
+///
+/// The contour is divided at places between which its direction turns by little, and straight parts
+/// aren't divided. With x = s'^2 as a function of the length s, the limits are linear in x and s'':
+///
+///     -a <= q'(s) s'' + q''(s) x <= a,   q'(s)^2 x <= v^2
+///
+/// A pass from the end computes the largest x at each place from which the motion can still be
+/// slowed down, a pass from the start the largest of these that the motion can reach (H. Pham and
+/// Q.-C. Pham, A new approach to time-optimal path parameterization based on reachability analysis,
+/// 2018). On straight parts the motion is an exact trapezoid.
+///
+/// On curves, an axis that accelerates at its limit does so evenly, and s'' changes on the way. So
+/// what is limited between two places is the mean of an axis's acceleration, and the time of the
+/// cubic is chosen with which its accelerations keep to the limits at both ends. If there is no
+/// such time, because the axis at its limit changes or turns on the way, the interval is divided,
+/// and the limits hold at both ends of its parts with a constant s''. That makes the motion slower,
+/// so these are divided further if they are long.
+///
+/// A motion that is as fast as possible is at one of its limits at every time: intervals in which
+/// it isn't are divided, and so are those whose cubic would deviate. Limits that a cubic exceeds
+/// are then lowered there, and the passes are repeated. If an excess is left, a motion from rest is
+/// slowed down by that factor as a whole.
+///
+/// @param limits one for each axis.
+/// @throw motion::TooLong if it takes Profile::kLongest or longer.
+ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                        const ContourBegin& begin = {});
+
+}  // namespace stepdriver::motion

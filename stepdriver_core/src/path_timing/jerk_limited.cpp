@@ -1,0 +1,662 @@
+#include "jerk_limited.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "geometry/path_grid.h"
+#include "give_way.h"
+#include "jerk_limited_knots.h"
+#include "limit_usage.h"
+#include "moving_average.h"
+#include "profile/errors.h"
+#include "profile/profile.h"
+#include "reachability.h"
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+// Of a jerk limit: rounded times and numbers change a jerk by no more. The times of both ends of a
+// quintic of the duration h are rounded by e each, which changes its jerk j by 9 j e/h, and numbers
+// that are rounded by r change it by 60 r/h^3 if they are positions, and by 24 r/h^2 if they are
+// speeds: knots aren't closer than that allows.
+constexpr double kMostRoundingOfTimes = 4.5e-5;
+constexpr double kMostRounding = 1e-3;
+constexpr int kMostPlans = 12;  // with one time of the average
+constexpr double kNoExcess = 1e-3;
+constexpr double kNoPart = 1e-9;          // of a segment
+constexpr double kSquareRounding = 1e-9;  // of the square of a speed
+constexpr double kNoDifference = 1e-6;
+constexpr double kLowerMoreBy = 2e-3;  // at first, than by what exceeds a limit
+constexpr double kLowerMostMoreBy = 0.1;
+constexpr double kShorterBy = 0.7;             // the time of the average
+constexpr double kShortestAverage = 1e-3;      // s
+constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
+constexpr double kNearFoot = 1e-3;             // of the resolution
+constexpr int kMostDivisionRounds = 4;
+constexpr std::size_t kPartsOfDivision = 4;
+
+// The motion between two stops, or from a speed to a stop.
+class SmoothSection {
+ public:
+  SmoothSection(const Contour& contour, const std::vector<ContourLimits>& limits,
+                const ContourBegin& begin)
+      : contour_(contour), limits_(limits), begin_(begin), grid_(contour, begin.parameter) {
+    findCaps();
+  }
+
+  struct Plan {
+    SmoothKnots knots;
+    std::vector<std::size_t> segments;  // of the knots
+    std::vector<bool> straight;         // the way to the next knot, at constant acceleration
+    double time = 0.0;                  // of the average
+    double settled = 0.0;               // s
+    double slowdown = 1.0;
+    double excess = 1.0;  // if it begins at a speed: it can't be slowed down as a whole
+    bool possible() const { return excess <= 1.0 + kNoExcess; }
+    double duration() const { return knots.back().time * slowdown; }
+    bool isBetterThan(const Plan& other) const {
+      if (!possible() || !other.possible()) return excess < other.excess;
+      return duration() < other.duration();
+    }
+  };
+
+  // Divides intervals in which quintics would deviate from the contour.
+  Plan fastest() {
+    for (int i = 0;; ++i) {
+      Plan best = bestOfTimes();
+      std::vector<bool> deviates(grid_.size(), false);
+      if (!best.possible() || i == kMostDivisionRounds || !findDeviations(best.knots, deviates)) {
+        return best;
+      }
+      grid_.divideEach(deviates, kPartsOfDivision);
+      findCaps();
+    }
+  }
+
+ private:
+  // What has been lowered because a quintic exceeded a limit.
+  struct Lowered {
+    std::vector<CeilingSpan> speeds;
+    std::vector<CeilingSpan> accelerations;
+    // The first places are many, and near to their limits. The last ones move with each plan.
+    double more = kLowerMoreBy;
+  };
+
+  // What the average contains when it begins at a speed: a motion at constant acceleration for the
+  // time T that has this mean place, speed and acceleration.
+  struct History {
+    double begin = 0.0;  // unit
+    double begin_speed = 0.0;
+    double end = 0.0;
+    double end_speed = 0.0;
+  };
+  History historyOver(double time) const {
+    double change = begin_.acceleration * time;
+    if (std::abs(change) < kNoDifference * begin_.speed) change = 0.0;
+    const double end = (begin_.speed + change / 6.0) * time / 2.0;
+    return {end - begin_.speed * time, begin_.speed - change / 2.0, end,
+            begin_.speed + change / 2.0};
+  }
+  bool moves() const { return begin_.speed > 0.0; }
+  static Plan impossible(std::size_t axes) {
+    Plan plan{SmoothKnots(axes), {}, {}};
+    plan.excess = kUnlimited;
+    return plan;
+  }
+
+  void findCaps() {
+    const ContourSpeed speed(contour_, grid_, limits_);
+    caps_.clear();
+    double distance = 0.0;
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      caps_.push_back({distance, distance + grid_[i].length, capOf(i, speed)});
+      distance += grid_[i].length;
+    }
+  }
+
+  bool moves(std::size_t axis) const {
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      if (std::abs(grid_.firstAtBegin(i)[axis]) > kNoDifference) return true;
+    }
+    return false;
+  }
+
+  // [s] See kMostRounding. @param time of the average [s].
+  double closestKnots(const std::vector<SmoothPart>& parts, double time) const {
+    constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+    const double duration = parts.back().time;
+    double speed = 0.0;
+    for (const SmoothPart& part : parts) speed = std::max(speed, part.speed);
+    double closest = 9.0 * std::max(0.5e-9, kEpsilon * duration) / kMostRoundingOfTimes;
+    // The speed is a difference of places at times that are rounded.
+    const double speed_rounding = kEpsilon * duration * speed / time;
+    const double sums = std::sqrt(static_cast<double>(parts.size())) * parts.back().distance;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      double farthest = sums;
+      bool moves = false;
+      for (std::size_t i = 0; i <= grid_.size(); ++i) {
+        farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
+        moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
+      }
+      const double rounding = kEpsilon * farthest;
+      const double most = kMostRounding * limits_[j].jerk;
+      if (!moves) continue;
+      closest = std::max(
+          {closest, std::cbrt(60.0 * rounding / most), std::sqrt(24.0 * speed_rounding / most)});
+    }
+    return closest;
+  }
+
+  // How far the middle of the quintic that ends at a knot is from an interval, at a right angle.
+  double deviationOf(const SmoothKnots& knots, std::size_t index, std::size_t interval,
+                     double distance, ContourPoint& point) const {
+    const double h = knots[index].time - knots[index - 1].time;
+    const ContourGrid::Interval& of = grid_[interval];
+    const double part = (distance - caps_[interval].from) / of.length;
+    double parameter = of.from + std::clamp(part, 0.0, 1.0) * (of.to - of.from);
+    double square = 0.0;
+    constexpr int kProjections = 4;
+    for (int i = 0; i < kProjections; ++i) {
+      contour_.evaluate(of.segment, parameter, point);
+      double along = 0.0;
+      double rate = 0.0;  // squared, as the two others
+      double turn = 0.0;
+      square = 0.0;
+      for (std::size_t j = 0; j < limits_.size(); ++j) {
+        const SmoothKnots::State& begin = knots.state(index - 1, j);
+        const SmoothKnots::State& end = knots.state(index, j);
+        const double off = (begin.position + end.position) / 2.0 +
+                           h * (5.0 / 32.0 * (begin.velocity - end.velocity) +
+                                h * (begin.acceleration + end.acceleration) / 64.0) -
+                           point.position[j];
+        square += off * off;
+        along += off * point.first[j];
+        rate += point.first[j] * point.first[j];
+        turn += point.second[j] * point.second[j];
+      }
+      square -= along * along / rate;
+      const double change = along / rate;  // of the parameter
+      parameter = std::clamp(parameter + change, of.from, of.to);
+      // Nearer to the foot, the contour is where its tangent is.
+      if (std::sqrt(turn) * change * change < kNearFoot * contour_.resolution()) break;
+    }
+    return std::sqrt(std::max(0.0, square));
+  }
+
+  bool findDeviations(const SmoothKnots& knots, std::vector<bool>& deviates) const {
+    bool found = false;
+    std::size_t interval = 0;
+    ContourPoint point;
+    for (std::size_t i = 1; i < knots.size(); ++i) {
+      giveWayAt(i);
+      const double middle = (knots[i - 1].distance + knots[i].distance) / 2.0;
+      while (interval + 1 < grid_.size() && caps_[interval].to < middle) ++interval;
+      if (grid_[interval].straight) continue;
+      if (deviationOf(knots, i, interval, middle, point) <
+          kMostSmoothDeviation * contour_.resolution())
+        continue;
+      deviates[interval] = found = true;
+    }
+    return found;
+  }
+
+  // The plans with one time of the average: each lowers what the one before exceeded, and takes
+  // longer, apart from what a plan is slowed down by as a whole.
+  class Rounds {
+   public:
+    Rounds(const SmoothSection& section, double time)
+        : section_(&section), time_(time), best_(section.planOnce(time, lowered_)) {
+      see(best_);
+    }
+
+    // [s] No later plan takes less.
+    double shortest() const { return shortest_; }
+    // [s] Of the best plan so far.
+    double duration() const { return best_.excess < kUnlimited ? best_.duration() : kUnlimited; }
+    // Whether a later plan may be better.
+    bool isOpen() const { return open_; }
+    const Plan& best() const& { return best_; }
+    Plan best() && { return std::move(best_); }
+
+    void next() {
+      Plan plan = section_->planOnce(time_, lowered_);
+      see(plan);
+      if (plan.isBetterThan(best_)) best_ = std::move(plan);
+    }
+
+   private:
+    void see(const Plan& plan) {
+      ++plans_;
+      const bool planned = plan.excess < kUnlimited;
+      const bool done = plan.slowdown <= 1.0 + kNoExcess && plan.possible();
+      open_ = planned && !done && plans_ < kMostPlans;
+      shortest_ = planned ? plan.knots.back().time : kUnlimited;
+    }
+
+    const SmoothSection* section_;
+    double time_;
+    Lowered lowered_;
+    Plan best_;
+    double shortest_ = 0.0;
+    int plans_ = 0;
+    bool open_ = true;
+  };
+
+  // The longest average that can be of use [s].
+  double longestAverage() const {
+    double time = 0.0;
+    double jerk = kUnlimited;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      if (!moves(j)) continue;
+      const double acceleration = std::max(limits_[j].acceleration, limits_[j].deceleration);
+      time = std::max(time, acceleration / limits_[j].jerk);
+      jerk = std::min(jerk, limits_[j].jerk);
+    }
+    // On a straight line without other limits, four parts of this duration are the fastest.
+    return std::max(kShortestAverage, std::min(time, std::cbrt(caps_.back().to / (2.0 * jerk))));
+  }
+
+  // Of all times of the average, the one whose last plan is the shortest gets the next plan, until
+  // no other one can become faster than the best plan so far.
+  Plan bestOfTimes() const {
+    std::vector<Rounds> all;
+    const auto begin = [&](double time) {
+      all.emplace_back(*this, time);
+      return all.back().duration();
+    };
+    double time = longestAverage();
+    double duration = begin(time);
+    const auto shorten = [&] { return (time *= kShorterBy) > kShortestAverage; };
+    while (shorten()) {
+      const double before = std::exchange(duration, begin(time));
+      if (duration > before) break;
+    }
+    if (begin_.average > 0.0) begin(begin_.average);
+    for (;;) {
+      const auto best = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+        return a.best().isBetterThan(b.best());
+      });
+      const auto next = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+        return (a.isOpen() ? a.shortest() : kUnlimited) < (b.isOpen() ? b.shortest() : kUnlimited);
+      });
+      const bool possible = best->best().possible();
+      if (next->isOpen() && !(possible && next->shortest() >= best->best().duration())) {
+        next->next();
+      } else if (!possible && shorten()) {
+        begin(time);
+      } else {
+        return std::move(*best).best();
+      }
+    }
+  }
+
+  double capOf(std::size_t interval, const ContourSpeed& speed) const;
+
+  // Adds to what is lowered.
+  Plan planOnce(double time, Lowered& lowered) const {
+    History history;
+    if (moves()) {
+      history = historyOver(time);
+      const bool fits = history.begin_speed > 0.0 &&
+                        history.end_speed > kLeastSpeed * begin_.speed &&
+                        history.end < caps_.back().to * (1.0 - kMargin);
+      if (!fits) return impossible(limits_.size());
+    }
+    std::vector<CeilingSpan> spans;
+    spans.reserve(caps_.size() + lowered.speeds.size());
+    const double averaged_until = history.end + history.end_speed * time;
+    const auto append = [&](const CeilingSpan& span) {
+      const double reach = span.value * time / 2.0;
+      spans.push_back({span.from - reach, span.to + reach, span.value});
+    };
+    for (const CeilingSpan& span : caps_) append(span);
+    for (CeilingSpan span : lowered.speeds) {
+      // What exceeds a limit near the begin is the change of its speed.
+      if (moves() && span.from < averaged_until)
+        span.value = std::max(span.value, history.end_speed);
+      append(span);
+    }
+    const Ceiling speeds(std::move(spans));
+    const Ceiling accelerations(lowered.accelerations);
+    std::vector<double> cuts;
+    std::merge(speeds.places().begin(), speeds.places().end(), accelerations.places().begin(),
+               accelerations.places().end(), std::back_inserter(cuts));
+    if (moves())
+      cuts.insert(std::upper_bound(cuts.begin(), cuts.end(), averaged_until), averaged_until);
+    const ContourGrid grid = grid_.divided(cuts);
+    std::optional<ContourGrid> rest;
+    if (moves()) rest.emplace(grid.after(history.end));
+    const ContourGrid& ahead = rest ? *rest : grid;
+    const double begin_square = history.end_speed * history.end_speed;
+    ContourSpeed speed(contour_, ahead, limits_, begin_square);
+    double begin = history.end;
+    for (std::size_t i = 0; i < ahead.size(); ++i) {
+      giveWayAt(i);
+      const double end = begin + ahead[i].length;
+      const double margin = kMargin * ahead[i].length;
+      double highest = speeds.lowest(begin + margin, end - margin);
+      if (moves() && (begin + end) / 2.0 < averaged_until) {
+        highest = nearBegin(highest, history.end_speed);
+      }
+      speed.restrict(i, highest * highest,
+                     std::min(time * highestJerk(ahead, i, limits_, time),
+                              accelerations.lowest(begin + margin, end - margin)));
+      begin = end;
+    }
+    speed.plan();
+    if (speed.controllable(0) < begin_square * (1.0 - kSquareRounding))
+      return impossible(limits_.size());
+    std::vector<SpeedPlace> given = placesOf(ahead, speed, history.end);
+    const SpeedPlace past{history.begin, history.begin_speed * history.begin_speed};
+    if (moves()) given.insert(given.begin(), past);
+    std::vector<SpeedPlace> places = flattenPeaks(given, time);
+    if (moves() && !keepPast(places, past, {history.end, begin_square})) {
+      return impossible(limits_.size());
+    }
+    const std::vector<SmoothPart> parts = smoothed(places, time, moves());
+    Plan plan{
+        makeKnots(grid, limits_, parts, time, closestKnots(parts, time), contour_.resolution()),
+        {},
+        {}};
+    for (std::size_t i = 0; i < plan.knots.size(); ++i) {
+      plan.segments.push_back(grid[plan.knots[i].interval].segment);
+      plan.straight.push_back(i + 1 < plan.knots.size() && isEven(plan.knots, i, parts, grid));
+    }
+    const SmoothDemand demand = lower(plan.knots, parts, grid, lowered);
+    if (moves()) {
+      plan.excess = demand.most();
+    } else {
+      plan.slowdown = demand.slowdown();
+    }
+    plan.time = time;
+    const double settled = settledIn(ahead, history.end, time, speed);
+    plan.settled = timeBefore(parts, beforePeak(given, places, settled));
+    return plan;
+  }
+
+  // Whether the motion up to its begin is as it was; then the begin is the second place.
+  static bool keepPast(std::vector<SpeedPlace>& places, const SpeedPlace& past,
+                       const SpeedPlace& begin) {
+    const double close = kNoDifference * (begin.distance - past.distance);
+    const auto next = std::find_if(places.begin() + 1, places.end(), [&](const SpeedPlace& place) {
+      return place.distance > begin.distance + close;
+    });
+    if (next == places.end()) return false;
+    const SpeedPlace& before = *(next - 1);
+    const double part = (begin.distance - before.distance) / (next->distance - before.distance);
+    const double square = before.square + part * (next->square - before.square);
+    const auto differs = [](double a, double b) { return std::abs(a - b) > kNoDifference * b; };
+    if (differs(places.front().square, past.square) || differs(square, begin.square)) return false;
+    places.erase(places.begin() + 1, next);
+    places.front() = past;
+    places.insert(places.begin() + 1, begin);
+    return true;
+  }
+
+  // [unit/s] The speed limits there hold for the average, which has been within them so far.
+  double nearBegin(double highest, double speed) const {
+    if (begin_.acceleration < 0.0) highest = std::min(highest, speed);
+    const bool close = highest < speed && speed < kMostOver * highest;
+    return close ? speed : highest;
+  }
+
+  // Whether the way to the next knot is straight, at constant acceleration.
+  static bool isEven(const SmoothKnots& knots, std::size_t index,
+                     const std::vector<SmoothPart>& parts, const ContourGrid& grid) {
+    const SmoothKnots::Knot& from = knots[index];
+    const SmoothKnots::Knot& to = knots[index + 1];
+    if (!from.even) return false;
+    for (std::size_t k = from.part; k < to.part; ++k) {
+      if (!parts[k + 1].even || parts[k].jerk != 0.0) return false;
+    }
+    if (!to.even || parts[from.part].jerk != 0.0) return false;
+    // A knot at the end of an interval belongs to it, so the way may begin after that.
+    const bool whole = from.parameter == grid[from.interval].to && from.interval < to.interval;
+    for (std::size_t k = from.interval + (whole ? 1 : 0); k <= to.interval; ++k) {
+      if (!grid[k].straight || grid[k].segment != grid[to.interval].segment) return false;
+    }
+    return true;
+  }
+
+  // [unit] The place after which the averaged motion depends on what follows the contour, apart
+  // from peaks.
+  double settledIn(const ContourGrid& grid, double begin, double time, ContourSpeed& speed) const {
+    const Contour::Place open = contour_.openFrom();
+    double lowest = kUnlimited;  // that will be higher
+    double from = kUnlimited;
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      const ContourGrid::Interval& interval = grid_[i];
+      const bool before = interval.segment < open.segment ||
+                          (interval.segment == open.segment && interval.to <= open.parameter);
+      if (before) continue;
+      from = std::min(from, caps_[i].from);
+      lowest = std::min(lowest, caps_[i].value);
+    }
+    if (lowest < kUnlimited) from -= lowest * time / 2.0;
+    std::size_t place = 0;
+    double distance = begin;
+    while (place < grid.size() && distance < from) distance += grid[place++].length;
+    const std::size_t until = speed.settledUntil(place);
+    for (place = 0, distance = begin; place < until; ++place) distance += grid[place].length;
+    return distance;
+  }
+
+  // The begin of the last peak before a distance if that has been lowered: if the contour
+  // continues, it may be higher.
+  static double beforePeak(const std::vector<SpeedPlace>& given,
+                           const std::vector<SpeedPlace>& flattened, double distance) {
+    auto begin =
+        std::upper_bound(flattened.begin() + 1, flattened.end() - 1, distance,
+                         [](double x, const SpeedPlace& place) { return x < place.distance; });
+    --begin;
+    while (begin != flattened.begin() && (begin - 1)->square >= begin->square) --begin;
+    const double most = begin->square * (1.0 + kNoDifference);
+    const bool lowered = std::any_of(given.begin(), given.end(), [&](const SpeedPlace& place) {
+      return place.distance >= begin->distance && place.distance <= distance && place.square > most;
+    });
+    return lowered ? begin->distance : distance;
+  }
+
+  // [s] When the given motion comes to a distance.
+  static double timeBefore(const std::vector<SmoothPart>& parts, double distance) {
+    const auto later =
+        std::upper_bound(parts.begin() + 1, parts.end(), distance,
+                         [](double x, const SmoothPart& part) { return x < part.front; });
+    return (later - 1)->time;
+  }
+
+  static std::vector<SpeedPlace> placesOf(const ContourGrid& grid, const ContourSpeed& speed,
+                                          double begin) {
+    std::vector<SpeedPlace> places{{begin, speed.square(0)}};
+    places.reserve(3 * grid.size());
+    const auto append = [&](double distance, double square) {
+      if (distance > places.back().distance) places.push_back({distance, square});
+    };
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      const double end = begin + grid[i].length;
+      if (grid[i].straight) {
+        const ContourSpeed::Ramp ramp = speed.ramp(i);
+        const double peak = speed.peakSquare(i);
+        // Rounding makes a way of its own out of a ramp that hardly rises.
+        append(std::min(end, begin + (peak - speed.square(i)) / (2.0 * ramp.up)), peak);
+        append(std::min(end, end - (peak - speed.square(i + 1)) / (2.0 * ramp.down)), peak);
+      }
+      append(end, speed.square(i + 1));
+      begin = end;
+    }
+    return places;
+  }
+
+  SmoothDemand lower(const SmoothKnots& knots, const std::vector<SmoothPart>& parts,
+                     const ContourGrid& grid, Lowered& lowered) const {
+    double steepest = 0.0;
+    for (const SmoothPart& part : parts) {
+      steepest = std::max(steepest, std::abs(part.front_acceleration));
+    }
+    const double more = 1.0 + lowered.more;
+    lowered.more = std::min(2.0 * lowered.more, kLowerMostMoreBy);
+    SmoothDemand worst;
+    for (std::size_t i = 1; i < knots.size(); ++i) {
+      giveWayAt(i);
+      SmoothDemand demand;
+      for (std::size_t j = 0; j < limits_.size(); ++j) {
+        demand.include(demandOf(knots.state(i - 1, j), knots.state(i, j),
+                                knots[i].time - knots[i - 1].time, limits_[j]));
+      }
+      worst.include(demand);
+      if (demand.most() < 1.0 + kNoDifference) continue;
+      const double slowdown = demand.slowdown();
+      const double speed = std::max(knots[i - 1].speed, knots[i].speed);
+      bool straight = true;
+      for (std::size_t k = knots[i - 1].interval; k <= knots[i].interval; ++k) {
+        straight = straight && grid[k].straight;
+      }
+      // So slowly, a curve makes no difference.
+      if (speed < kSlow * lowestCap(knots[i - 1].distance, knots[i].distance)) straight = true;
+      const std::size_t last = std::min(knots[i].part + 1, parts.size() - 1);
+      double acceleration = 0.0;
+      for (std::size_t k = knots[i - 1].part; k < last; ++k) {
+        acceleration = std::max({acceleration, std::abs(parts[k].rear_acceleration),
+                                 std::abs(parts[k].front_acceleration)});
+      }
+      if (!straight || demand.speed > 1.0) {
+        lowered.speeds.push_back({knots[i - 1].distance, knots[i].distance,
+                                  speed / ((straight ? demand.speed : slowdown) * more)});
+      }
+      if (acceleration > kNoDifference * steepest) {
+        const double by =
+            straight ? std::max(demand.acceleration, demand.jerk) : slowdown * slowdown;
+        lowered.accelerations.push_back(
+            {parts[knots[i - 1].part].rear, parts[last].front, acceleration / (by * more)});
+      }
+    }
+    return worst;
+  }
+
+  // [unit/s] Of the intervals between two distances.
+  double lowestCap(double from, double to) const {
+    const double margin = kMargin * (to - from);
+    auto span = std::upper_bound(caps_.begin(), caps_.end(), from + margin,
+                                 [](double x, const CeilingSpan& cap) { return x < cap.to; });
+    double lowest = kUnlimited;
+    for (; span != caps_.end() && span->from < to - margin; ++span) {
+      lowest = std::min(lowest, span->value);
+    }
+    return lowest;
+  }
+
+  static constexpr double kMargin = 1e-9;  // of an interval, for rounding
+  static constexpr double kSlow = 0.2;     // of the highest constant speed along an interval
+  // Of the speed at the begin: no average that would first come nearer to rest.
+  static constexpr double kLeastSpeed = 0.1;
+  // The places of another grid, and what was lowered for it, make such a difference to a speed.
+  static constexpr double kMostOver = 1.01;
+
+  const Contour& contour_;
+  const std::vector<ContourLimits>& limits_;
+  const ContourBegin& begin_;
+  ContourGrid grid_;
+  std::vector<CeilingSpan> caps_;  // of the speed, of each interval
+};
+
+// [unit/s] The highest constant speed along an interval.
+double SmoothSection::capOf(std::size_t interval, const ContourSpeed& speed) const {
+  double cap = std::sqrt(std::min(speed.capAtBegin(interval), speed.capAtEnd(interval)));
+  if (grid_[interval].straight) return cap;
+  ContourPoint middle;
+  const double length = grid_[interval].length;
+  grid_.evaluateAt(interval, length / 2.0, middle);
+  for (std::size_t j = 0; j < limits_.size(); ++j) {
+    const double begin = grid_.secondAtBegin(interval)[j];
+    const double end = grid_.secondAtEnd(interval)[j];
+    // Of the parabola through the three.
+    const double third = std::max(std::abs(-3.0 * begin + 4.0 * middle.second[j] - end),
+                                  std::abs(begin - 4.0 * middle.second[j] + 3.0 * end)) /
+                         length;
+    const double second = std::max({std::abs(begin), std::abs(middle.second[j]), std::abs(end)});
+    const double acceleration = std::min(limits_[j].acceleration, limits_[j].deceleration);
+    if (second > 0.0) cap = std::min(cap, std::sqrt(acceleration / second));
+    if (third > 0.0) cap = std::min(cap, std::cbrt(limits_[j].jerk / third));
+  }
+  return cap;
+}
+
+// The end of a segment, at rest.
+ContourKnot restAtEnd(const Contour& contour, std::size_t segment) {
+  ContourPoint end;
+  contour.evaluate(segment, 1.0, end);
+  ContourKnot knot;
+  knot.segment = segment;
+  knot.positions = std::move(end.position);
+  knot.velocities.assign(contour.axes(), 0.0);
+  knot.accelerations.assign(contour.axes(), 0.0);
+  knot.parameter = 1.0;
+  knot.may_begin = true;
+  return knot;
+}
+
+}  // namespace
+
+ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourLimits>& limits,
+                              const ContourBegin& begin) {
+  ContourPlan made;
+  std::int64_t begin_ns = 0;
+  ContourBegin from = begin;
+  for (std::size_t first = 0; first < contour.size();) {
+    std::size_t last = first;
+    while (last + 1 < contour.size() && !contour.stopsAfter(last)) ++last;
+    if (first == last && from.parameter > 1.0 - kNoPart) {  // it begins at a stop
+      if (from.speed > 0.0) made.excess = kUnlimited;
+      made.knots.push_back(restAtEnd(contour, first));
+      from = {};
+      ++first;
+      continue;
+    }
+    const Contour part = contour.part(first, last);
+    const SmoothSection::Plan plan = SmoothSection(part, limits, from).fastest();
+    made.excess = std::max(made.excess, plan.excess);
+    if (!plan.possible()) return made;
+    const double end = static_cast<double>(begin_ns) * 1e-9 + plan.duration();
+    if (!(end < Profile::kLongest)) {
+      throw TooLong("the motion along the path would take longer than 4e9 s");
+    }
+    const double factor = plan.slowdown;
+    made.settled_ns = begin_ns + std::llround(plan.settled * factor * 1e9);
+    for (std::size_t i = made.knots.empty() ? 0 : 1; i < plan.knots.size(); ++i) {
+      const SmoothKnots::Knot& planned = plan.knots[i];
+      const double time = planned.time * factor - from.ago;
+      const std::int64_t time_ns = std::llround(time * 1e9);
+      const double later = static_cast<double>(time_ns) * 1e-9 - time;
+      ContourKnot knot;
+      knot.time_ns = begin_ns + time_ns;
+      knot.segment = first + plan.segments[i];
+      knot.parameter = planned.parameter;
+      knot.speed = planned.speed / factor;
+      knot.acceleration = planned.acceleration / (factor * factor);
+      knot.may_begin = planned.even;
+      knot.average = plan.time * factor;
+      knot.straight = plan.straight[i];
+      for (std::size_t j = 0; j < contour.axes(); ++j) {
+        const SmoothKnots::State& state = plan.knots.state(i, j);
+        const double velocity = state.velocity / factor;
+        const double acceleration = state.acceleration / (factor * factor);
+        knot.positions.push_back(state.position + later * (velocity + later * acceleration / 2.0));
+        knot.velocities.push_back(velocity + later * acceleration);
+        knot.accelerations.push_back(acceleration);
+      }
+      made.knots.push_back(std::move(knot));
+    }
+    begin_ns = made.knots.back().time_ns;
+    first = last + 1;
+    from = {};
+  }
+  return made;
+}
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,145 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "acceleration_limited.h"
+#include "geometry/path.h"
+#include "geometry/path_grid.h"
+
+namespace stepdriver::motion {
+
+/// What keeps to the accelerations of the axes in an interval that isn't straight.
+enum class CheckedAcceleration {
+  kMean,
+  kAtBothEnds,  ///< with a constant s''
+};
+
+/// The square of the highest speed along a contour at each place of its grid, see planContour().
+class ContourSpeed {
+ public:
+  /// @param contour, grid, limits outlive this.
+  /// @param begin [unit^2/s^2] the square of the speed at the begin.
+  ContourSpeed(const Contour& contour, const ContourGrid& grid,
+               const std::vector<ContourLimits>& limits, double begin = 0.0,
+               CheckedAcceleration checked = CheckedAcceleration::kAtBothEnds);
+
+  /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
+  /// these.
+  void lower(std::size_t interval, double acceleration, double speed);
+  /// Limits the square of the speed in an interval [unit^2/s^2], and the acceleration along it
+  /// [unit/s^2], for the next plan().
+  void restrict(std::size_t interval, double square, double acceleration);
+  /// From the next plan() on, an interval keeps to the accelerations at both ends.
+  ///
+  /// @return whether that is new.
+  bool checkBothEnds(std::size_t interval);
+  /// By what factor the square of the speed before an interval would be higher if only the mean of
+  /// its accelerations counted; 1 if it is lower anyway. Call it after plan().
+  double lossOfBothEnds(std::size_t interval);
+  /// After ContourGrid::divideEach().
+  void regrid(const Division& division);
+  /// Plans everything the first time, then only what has changed since.
+  void plan();
+
+  /// [unit^2/s^2] The highest that the speeds alone allow before an interval and at its end.
+  double capAtBegin(std::size_t interval) const {
+    return stale_[interval] ? capAt(interval, grid_.firstAtBegin(interval))
+                            : allowed_[interval].cap_at_begin;
+  }
+  double capAtEnd(std::size_t interval) const {
+    return stale_[interval] ? capAt(interval, grid_.firstAtEnd(interval))
+                            : allowed_[interval].cap_at_end;
+  }
+
+  /// [unit^2/s^2] @param place from 0 to the size of the grid.
+  double square(std::size_t place) const { return squares_[place]; }
+  /// [unit^2/s^2] The highest from which the motion can still slow down for everything ahead.
+  double controllable(std::size_t place) const { return controllable_[place]; }
+  /// A place up to which the plan stays the same if the contour continues at its end, whether it
+  /// needn't slow down there or must be at rest half a segment before it, at the first place at
+  /// which the rounding of a corner may begin. Call it after plan().
+  ///
+  /// @param open from this place on, its speed may be higher then.
+  std::size_t settledUntil(std::size_t open = std::numeric_limits<std::size_t>::max());
+
+  /// The accelerations along a straight interval that the axes allow [unit/s^2].
+  struct Ramp {
+    double up = 0.0;
+    double down = 0.0;
+  };
+  const Ramp& ramp(std::size_t interval) const { return allowed_[interval].ramp; }
+  /// [unit^2/s^2] The highest square of the speed in a straight interval.
+  double peakSquare(std::size_t interval) const;
+
+ private:
+  // A bound of u = s'' for x = s'^2: offset + slope x.
+  struct Bound {
+    double offset = 0.0;
+    double slope = 0.0;
+    double at(double x) const { return offset + slope * x; }
+  };
+  // u is from least + slope x to most + slope x.
+  struct Band {
+    double least = 0.0;
+    double most = 0.0;
+    double slope = 0.0;
+  };
+  // What the limits allow in an interval: a ramp if it is straight, or else bands.
+  struct Allowed {
+    double cap_at_begin = 0.0;  // of x
+    double cap_at_end = 0.0;
+    Ramp ramp;
+    double most_x = 0.0;
+    std::size_t first_band = 0;
+    std::size_t bands = 0;
+    std::size_t most_bands = 0;  // that have room from first_band on
+  };
+  // The lowest and the highest u at an x.
+  struct Range {
+    Bound low;
+    Bound high;
+  };
+
+  double capAt(std::size_t interval, const double* first) const;
+  double capBefore(std::size_t place) const;
+  void findAllowed(std::size_t interval);
+  void collectBands(std::size_t interval, Allowed& allowed);
+  Range tightestAt(std::size_t interval, double end, double x) const;
+  double largestBefore(std::size_t interval, double end) const;
+  double largestAfter(std::size_t interval, double begin, double end) const;
+
+  const Contour& contour_;
+  const ContourGrid& grid_;
+  const std::vector<ContourLimits>& limits_;
+  std::vector<double> acceleration_shares_;  // of each interval
+  std::vector<double> speed_shares_;
+  std::vector<double> most_squares_;
+  std::vector<double> most_accelerations_;
+  std::vector<CheckedAcceleration> checked_;
+  std::vector<char> stale_;  // whether each interval has changed since the last plan
+  std::vector<Allowed> allowed_;
+  std::vector<Band> bands_;           // of the intervals
+  std::vector<double> controllable_;  // the largest x at each place from which it can slow down
+  std::vector<double> squares_;       // x at each place
+};
+
+/// The sign of the motion of an axis in an interval that begins and ends with these velocities; 0:
+/// it turns, or doesn't move.
+inline int directionOf(double begin, double end) {
+  const double rounding = 1e-9 * std::max(std::abs(begin), std::abs(end));
+  if (begin > rounding || end > rounding) return begin < -rounding || end < -rounding ? 0 : 1;
+  return begin < -rounding || end < -rounding ? -1 : 0;
+}
+
+/// The highest acceleration towards plus or minus of an axis that moves in this direction.
+inline double accelerationTowards(const ContourLimits& limits, int direction, int sign) {
+  if (direction == 0) return std::min(limits.acceleration, limits.deceleration);
+  return direction == sign ? limits.acceleration : limits.deceleration;
+}
+
+}  // namespace stepdriver::motion

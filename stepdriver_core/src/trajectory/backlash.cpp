@@ -1,0 +1,390 @@
+#include "backlash.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "give_way.h"
+#include "nanoseconds.h"
+#include "point_to_point/planner.h"
+#include "profile/negligible_time.h"
+#include "profile/peak_tree.h"
+#include "profile/profile_parts.h"
+
+namespace stepdriver::motion {
+namespace {
+
+constexpr double kNear = 1e-9;     // microsteps: rounding
+constexpr double kNoTravel = 0.5;  // microsteps
+constexpr double kNoRoom = 0.001;  // of a limit
+constexpr double kLonger = 1.1;
+
+// The joint reverses at a time.
+struct Turn {
+  double time_s;
+  double sign;
+};
+
+class Turns {
+ public:
+  explicit Turns(DoubleDouble start) : furthest_(start) {}
+
+  /// A piece that begins at a time [s].
+  void take(const Piece& piece, double start) {
+    const double end = piece.duration.value();
+    // A turn next to an end of the piece is that end, whose time has no rounding error.
+    const double margin = 1e-9 * end;
+    for (double t = piece.firstTurn(0.0); t < end; t = piece.firstTurn(t)) {
+      if (t > margin && t < end - margin) take(piece.positionAt(t), start + t);
+    }
+    take(piece.positionAt(piece.duration), start + end);
+  }
+  const std::vector<Turn>& found() const { return found_; }
+  /// Whether both find the same turns from now on. @param later how much the other one's times are.
+  bool coincideWith(const Turns& other, double later) const {
+    return sign_ != 0.0 && sign_ == other.sign_ && (furthest_ - other.furthest_).hi == 0.0 &&
+           std::abs(time_s_ - (other.time_s_ + later)) < kSameTime;
+  }
+
+ private:
+  static constexpr double kSameTime = 1e-9;  // s
+
+  void take(DoubleDouble position, double time_s) {
+    const double way = (position - furthest_).value();
+    if (sign_ != 0.0 && way * sign_ > 0.0) {
+      furthest_ = position;
+      time_s_ = time_s;
+    } else if (std::abs(way) >= kNoTravel) {
+      sign_ = std::copysign(1.0, way);
+      found_.push_back({time_s_, sign_});
+      furthest_ = position;
+      time_s_ = time_s;
+    }
+  }
+
+  DoubleDouble furthest_;  // in the current direction
+  double time_s_ = 0.0;    // when it reached it
+  double sign_ = 0.0;
+  std::vector<Turn> found_;
+};
+
+std::vector<Turn> turnsOf(const Profile& joint) {
+  Turns turns(joint.startPosition());
+  for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
+    turns.take(joint.piece(i), joint.pieceStart(i).value());
+  }
+  return turns.found();
+}
+
+// The joint's highest values between two times.
+using PeaksBetween = std::function<Highest(DoubleDouble, DoubleDouble)>;
+
+// The part of the limits that the joint leaves free between two times; empty if there is almost no
+// room.
+std::optional<MotionLimits> roomBeside(const PeaksBetween& joint, double from, double to,
+                                       const MotionLimits& limits) {
+  const Highest meanwhile = joint(from, to);
+  const double speed = limits.max_speed - meanwhile.speed;
+  const double acceleration = limits.acceleration - meanwhile.acceleration;
+  const double jerk = limits.jerk - (limits.jerk > 0.0 ? meanwhile.jerk : 0.0);
+  if (speed < kNoRoom * limits.max_speed || acceleration < kNoRoom * limits.acceleration ||
+      jerk < kNoRoom * limits.jerk) {
+    return std::nullopt;
+  }
+  return MotionLimits{0.0, speed, acceleration, acceleration, jerk};
+}
+
+// Changes the part that is taken up, within the time that this takes; empty if there is no room.
+std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const MotionState& from,
+                              std::int64_t to, const MotionLimits& limits) {
+  double until = time_s + 1e-6;
+  while (const auto room = roomBeside(joint, time_s, until, limits)) {
+    Profile taken = planMove(nanoseconds(time_s), from, to, *room).profile;
+    const double end = time_s + taken.duration().value();
+    if (end <= until) return taken;
+    until = time_s + kLonger * (end - time_s);
+  }
+  return std::nullopt;
+}
+
+// The motions that take up the backlash, one reversal after the other.
+class TakeUps {
+ public:
+  TakeUps(double slack, std::int64_t backlash, const MotionLimits& limits, PeaksBetween joint)
+      : backlash_(backlash), limits_(limits), joint_(std::move(joint)), last_(0, slack) {}
+
+  std::int64_t wanted(const Turn& turn) const { return turn.sign > 0.0 ? backlash_ : 0; }
+  MotionState stateAt(const Turn& turn) const { return last_.stateAt(nanoseconds(turn.time_s)); }
+  /// Whether it rests at the position that the previous reversal asked for.
+  bool restsAt(std::int64_t slack, const Turn& turn) const {
+    const MotionState state = stateAt(turn);
+    return state.velocity == 0.0 && std::abs((state.position - fromInteger(slack)).hi) < kNear;
+  }
+
+  /// The motion that a reversal starts, until the next one at the latest; empty if there is nothing
+  /// to do. If there is no room it is empty too, and noRoom() says so.
+  std::optional<Profile> at(const Turn& turn, const Turn* next) {
+    const MotionState from = stateAt(turn);
+    const std::int64_t to = wanted(turn);
+    if (from.velocity == 0.0 && (from.position - fromInteger(to)).value() == 0.0) return {};
+    auto taken = takeUp(joint_, turn.time_s, from, to, limits_);
+    if (!taken) {
+      no_room_ = turn.time_s;
+      return {};
+    }
+    last_ = *taken;
+    constexpr double kEver = Profile::kLongest;
+    const std::int64_t until = nanoseconds(next != nullptr ? next->time_s : kEver);
+    const DoubleDouble left = secondsOf(until) - secondsOf(last_.startNs());
+    return part(last_, 0.0, std::min(last_.duration(), left));
+  }
+  std::optional<double> noRoom() const { return no_room_; }
+  const Profile& last() const { return last_; }
+
+ private:
+  std::int64_t backlash_;
+  MotionLimits limits_;
+  PeaksBetween joint_;
+  Profile last_;
+  std::optional<double> no_room_;
+};
+
+// Rests before its start too.
+void append(std::vector<Piece>& pieces, DoubleDouble& time, const Profile& taken) {
+  const DoubleDouble start = secondsOf(taken.startNs());
+  if (const DoubleDouble rest = start - time; rest.hi > kNoTime) {
+    pieces.push_back({rest, taken.startPosition()});
+  }
+  for (const Piece& piece : taken.pieces()) pieces.push_back(piece);
+  time = start + taken.duration();
+}
+
+Profile offsetOf(TakeUps& take_ups, const std::vector<Turn>& turns, std::size_t first,
+                 double slack) {
+  std::vector<Piece> pieces;
+  DoubleDouble time;
+  for (std::size_t i = first; i < turns.size() && !take_ups.noRoom(); ++i) {
+    const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
+    if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
+  }
+  return pieces.empty() ? Profile(0, slack) : Profile(0, std::move(pieces));
+}
+
+}  // namespace
+
+MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
+                    const MotionLimits& limits) {
+  const PeakTree peaks(joint);
+  TakeUps take_ups(slack, backlash, limits,
+                   [&](DoubleDouble from, DoubleDouble to) { return peaks.between(from, to); });
+  const Profile offset = offsetOf(take_ups, turnsOf(joint), 0, slack);
+  if (take_ups.noRoom()) return {joint, take_ups.noRoom()};
+  return {sum(joint, offset), {}};
+}
+
+// ---- joining ----
+
+struct MotorTail::Plan {
+  std::vector<Turn> turns;      // of the tail alone, after its beginning
+  std::size_t moves_after = 0;  // pieces up to the first reversal
+  // for each reversal: whether the motion for the previous one had ended
+  std::vector<bool> from_rest;
+  PeakTree peaks;
+
+  explicit Plan(const Profile& joint) : peaks(joint) {
+    Turns all(joint.startPosition());
+    for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
+      giveWayAt(i);
+      all.take(joint.piece(i), joint.pieceStart(i).value());
+      if (all.found().empty()) moves_after = i + 1;
+    }
+    turns = all.found();
+  }
+};
+
+MotorTail::MotorTail(const Profile& joint, std::int64_t backlash, const MotionLimits& limits)
+    : joint_(joint), backlash_(backlash), limits_(limits), motor_(0, 0.0) {
+  auto plan = std::make_unique<Plan>(joint);
+  const std::vector<Turn>& turns = plan->turns;
+  plan->from_rest.assign(turns.size(), false);
+  const bool up = !turns.empty() && turns.front().sign > 0.0;
+  const double slack = up ? static_cast<double>(backlash) : 0.0;
+  TakeUps take_ups(slack, backlash, limits, [&plan](DoubleDouble from, DoubleDouble to) {
+    return plan->peaks.between(from, to);
+  });
+  std::vector<Piece> pieces;
+  DoubleDouble time;
+  for (std::size_t i = 1; i < turns.size() && !take_ups.noRoom(); ++i) {
+    giveWay(i);
+    plan->from_rest[i] = take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i]);
+    const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
+    if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
+  }
+  no_room_ = take_ups.noRoom();
+  motor_ = sum(joint, pieces.empty() ? Profile(0, slack) : Profile(0, std::move(pieces)));
+  plan_ = std::move(plan);
+}
+
+MotorTail::~MotorTail() = default;
+
+namespace {
+
+// Joining a motion to a tail examines no more than this.
+constexpr std::size_t kMostPieces = 1000;
+constexpr std::size_t kMostTurns = 64;
+
+// The sections of a motor's motion: the joint's motion, shifted by the part that is taken up, and
+// sums of both while that part changes.
+class MotorSections {
+ public:
+  MotorSections(std::shared_ptr<const Profile> joint, double slack)
+      : joint_(std::move(joint)), slack_(slack) {}
+
+  void rest(DoubleDouble until) {
+    const DoubleDouble from = time_;
+    if (!((until - from).hi > kNoTime)) return;
+    const DoubleDouble end = std::min(until, joint_->duration());
+    if (from < end) sections_.add(Excerpt{joint_, from, end, 1.0, slack_});
+    const DoubleDouble left = until - std::max(from, joint_->duration());
+    if (left.hi > 0.0) sections_.add(Piece{left, joint_->endPosition() + slack_});
+    time_ = until;
+  }
+  void take(const Profile& taken) {
+    if (taken.pieceCount() == 0) return;
+    const DoubleDouble start = secondsOf(taken.startNs());
+    rest(start);
+    const DoubleDouble end = start + taken.duration();
+    const Profile both = sum(part(*joint_, start, end), Profile(0, asPieces(taken)));
+    sections_.add(asPieces(both));
+    slack_ = taken.endPosition();
+    time_ = end;
+  }
+  void add(Excerpt tail) { sections_.add(std::move(tail)); }
+  DoubleDouble time() const { return time_; }
+  Sections take() { return std::move(sections_); }
+
+ private:
+  static std::vector<Piece> asPieces(const Profile& profile) {
+    std::vector<Piece> pieces;
+    for (const Piece& piece : profile.pieces()) pieces.push_back(piece);
+    return pieces;
+  }
+
+  std::shared_ptr<const Profile> joint_;
+  DoubleDouble slack_;
+  DoubleDouble time_;
+  Sections sections_;
+};
+
+}  // namespace
+
+std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail>& own,
+                                           const std::shared_ptr<const Profile>& joint,
+                                           DoubleDouble begin, double slack) const {
+  const double later = begin.value();
+  // The turns from the start on, until they are those of the tail.
+  Turns all(joint->startPosition());
+  const std::size_t head = joint->pieceAt(begin);
+  for (std::size_t i = 0; i < head; ++i) all.take(joint->piece(i), joint->pieceStart(i).value());
+  Turns tail(joint_.startPosition());
+  const std::size_t first_move = plan_->moves_after;
+  const std::size_t looked_at = std::min(joint_.pieceCount(), kMostPieces + first_move);
+  bool coincide = false;
+  for (std::size_t i = 0; i < looked_at && !coincide; ++i) {
+    // A tail may begin with many pieces that hardly move: skip to its first reversal.
+    if (i > kMostPieces && i < first_move) i = first_move;
+    if (i >= looked_at) break;
+    const double start = joint_.pieceStart(i).value();
+    tail.take(joint_.piece(i), start);
+    all.take(joint_.piece(i), start + later);
+    coincide = all.coincideWith(tail, later);
+  }
+  if (!coincide && looked_at < joint_.pieceCount()) return std::nullopt;
+  std::vector<Turn> turns = all.found();
+  const std::size_t known = turns.size();
+  const std::size_t same_from = coincide ? tail.found().size() : plan_->turns.size();
+  const std::size_t same_to = std::min(plan_->turns.size(), same_from + kMostTurns);
+  for (std::size_t i = same_from; i < same_to; ++i) {
+    turns.push_back({plan_->turns[i].time_s + later, plan_->turns[i].sign});
+  }
+
+  const Profile of_head = part(*joint, 0.0, begin);
+  const PeakTree head_peaks(of_head);
+  TakeUps take_ups(slack, backlash_, limits_, [&](DoubleDouble from, DoubleDouble to) {
+    Highest highest;
+    if (from < begin) highest = head_peaks.between(from, std::min(to, begin));
+    if (!(begin < to)) return highest;
+    return larger(highest, plan_->peaks.between(std::max(from, begin) - begin, to - begin));
+  });
+  MotorSections sections(joint, slack);
+  JoinedMotor joined{Profile(0, 0.0), {{0.0, later}}, {}};
+  const Turn* tail_from = nullptr;
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const std::size_t of_tail = i < known ? 0 : same_from + i - known;
+    if (of_tail > 0 && plan_->from_rest[of_tail] &&
+        take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i])) {
+      tail_from = &turns[i];
+      break;
+    }
+    const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
+    if (const auto taken = take_ups.at(turns[i], next)) {
+      sections.take(*taken);
+      const double from = static_cast<double>(taken->startNs()) * 1e-9;
+      joined.fresh.push_back({from, from + taken->duration().value()});
+    }
+    if (take_ups.noRoom()) {
+      joined.no_room = take_ups.noRoom();
+      return joined;
+    }
+  }
+  if (tail_from != nullptr) {
+    sections.rest(std::max(begin, secondsOf(nanoseconds(tail_from->time_s))));
+    const std::shared_ptr<const Profile> motor(own, &motor_);
+    sections.add(Excerpt{motor, sections.time() - begin, motor_.duration()});
+  } else if (same_to < plan_->turns.size()) {
+    return std::nullopt;
+  } else {
+    sections.rest(std::max(sections.time(), joint->duration()));
+  }
+  joined.profile = Profile(0, sections.take());
+  return joined;
+}
+
+std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::int64_t backlash) {
+  constexpr std::size_t kMostLookedAt = 500;
+  const double most = static_cast<double>(backlash);
+  if (backlash == 0) return 0.0;
+  if (motor.pieceCount() == 0) return std::nullopt;
+  // Backwards, from turn to turn, until the motor has come over the whole backlash: what was before
+  // that doesn't matter.
+  const DoubleDouble time = secondsOf(std::max<std::int64_t>(0, time_ns - motor.startNs()));
+  std::vector<double> turns{motor.stateAt(time_ns).position.value()};
+  double lowest = turns.front();
+  double highest = turns.front();
+  const auto take = [&](DoubleDouble position) {
+    turns.push_back(position.value());
+    lowest = std::min(lowest, turns.back());
+    highest = std::max(highest, turns.back());
+  };
+  std::size_t index = motor.pieceAt(time);
+  for (std::size_t pieces = 0; highest - lowest < most; --index, ++pieces) {
+    if (pieces == kMostLookedAt) return std::nullopt;
+    const Piece piece = motor.piece(index);
+    const double until = std::min((time - motor.pieceStart(index)).value(), piece.duration.value());
+    std::vector<double> own;
+    for (double t = piece.firstTurn(0.0); t < until; t = piece.firstTurn(t)) own.push_back(t);
+    for (auto turn = own.rbegin(); turn != own.rend(); ++turn) take(piece.positionAt(*turn));
+    take(piece.p0);
+    if (index == 0) break;
+  }
+  if (highest - lowest < most) return std::nullopt;
+  double slack = 0.0;
+  for (std::size_t i = turns.size(); i-- > 1;) {
+    slack = std::clamp(slack + turns[i - 1] - turns[i], 0.0, most);
+  }
+  return slack;
+}
+
+}  // namespace stepdriver::motion

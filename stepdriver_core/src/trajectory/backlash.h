@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "point_to_point/motion_limits.h"
+#include "profile/profile.h"
+
+namespace stepdriver::motion {
+
+/// The motion of a motor whose joint behind a backlash makes a given motion.
+struct MotorPlan {
+  Profile profile;
+  /// [s] after the start: the reversal after which the joint has so much speed, acceleration or
+  /// jerk that the limits leave no room to take up the backlash. The profile is then the joint's.
+  std::optional<double> no_room;
+};
+
+/// The joint's motion plus the motion that takes up the backlash: all of the backlash is taken up
+/// while the joint moves up, nothing while it moves down. From the joint's last turning point on,
+/// the added motion is as fast as the limits allow in addition to the joint's own speed,
+/// acceleration and jerk in that time; the joint lags behind until it is done. Reversals of less
+/// than half a microstep are ignored: they make no step.
+///
+/// @param joint [microsteps] from its own start on. The motor's motion begins at the same time. It
+///   ends at the same time or later, when the backlash is taken up.
+/// @param slack [microsteps] part of the backlash that is taken up at the start: from 0 to all.
+/// @param limits of the motor. The deceleration is ignored, because a motor that speeds up on one
+///   side of the backlash slows down on the other.
+MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
+                    const MotionLimits& limits);
+
+/// The part of a backlash that is taken up at a time of a motor's motion [microsteps]. It is empty
+/// if the motion before that doesn't determine it: the motor turned so little, or so often.
+std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::int64_t backlash);
+
+/// A motor's plan for a joint's motion whose first part was unknown when the rest was planned.
+struct JoinedMotor {
+  Profile profile;
+  /// [s] after the start: parts of the profile that weren't planned in advance. The first one is
+  /// everything up to the tail.
+  struct Stretch {
+    double from;
+    double to;
+  };
+  std::vector<Stretch> fresh;
+  std::optional<double> no_room;  ///< as in MotorPlan
+};
+
+/// A motor's motion for the tail of a joint's motion, planned in advance: as planMotor() from the
+/// first reversal on before which the backlash was completely taken up or completely free.
+/// Immutable.
+class MotorTail {
+ public:
+  /// @param joint the tail's, from its own beginning on; outlives this.
+  MotorTail(const Profile& joint, std::int64_t backlash, const MotionLimits& limits);
+  ~MotorTail();
+  MotorTail(const MotorTail&) = delete;
+  MotorTail& operator=(const MotorTail&) = delete;
+
+  /// The motor's motion, as if the backlash were already taken up when it first moves.
+  const Profile& profile() const { return motor_; }
+  /// As in MotorPlan, after the tail's beginning; if set, nothing can be joined.
+  std::optional<double> noRoom() const { return no_room_; }
+
+  /// The plan for a head and the tail. It takes up the backlash from the start on until the result
+  /// coincides with the tail's plan, mostly at the first reversal.
+  ///
+  /// @param own the owner of this, which the profile shares.
+  /// @param joint the joint's whole motion, with the tail from `begin` [s] on.
+  /// @param slack as planMotor().
+  /// @return empty if the two don't coincide within a bounded number of reversals and pieces.
+  std::optional<JoinedMotor> join(const std::shared_ptr<const MotorTail>& own,
+                                  const std::shared_ptr<const Profile>& joint, DoubleDouble begin,
+                                  double slack) const;
+
+ private:
+  struct Plan;
+  const Profile& joint_;
+  std::int64_t backlash_;
+  MotionLimits limits_;
+  std::unique_ptr<const Plan> plan_;
+  Profile motor_;
+  std::optional<double> no_room_;
+};
+
+}  // namespace stepdriver::motion

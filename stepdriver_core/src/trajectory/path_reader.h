@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "geometry/path.h"
+#include "path_axis.h"
+#include "stepdriver_core/trajectory/requests.h"
+
+namespace stepdriver::machine {
+
+/// What all segments of a path have in common.
+struct PathFrame {
+  std::vector<std::string> names;  ///< of the axes
+  std::vector<double> zero;        ///< [unit] positions of the segments count from here
+  double velocity = 0.0;           ///< see PathRequest
+  double tolerance = 0.0;
+};
+
+/// Reads the segments of a path, one after the other, and checks them.
+class PathReader {
+ public:
+  /// @param frame, axes outlive this. @param from [unit] where the first segment begins.
+  PathReader(const PathFrame& frame, const std::vector<axis::PathAxis>& axes,
+             std::vector<double> from)
+      : frame_(frame), axes_(axes), before_(std::move(from)) {}
+
+  /// Appends a segment to those of its path, unless it makes no step because it leads nowhere: then
+  /// the corner before it is rounded by no more than its own tolerance.
+  ///
+  /// @throw Refused naming the segment, by the number of those that were read before it.
+  void read(const PathSegment& given, std::vector<motion::ContourSegment>& segments);
+
+ private:
+  [[noreturn]] void refuse(const std::string& why) const;
+  std::vector<double> positions(const std::vector<double>& given, const char* what) const;
+  double place(std::size_t axis, double given, const char* what) const;
+  void requirePositive(const char* what, double value) const;
+  motion::ContourSegment segmentOf(const PathSegment& given) const;
+  void readArc(const PathSegment& given, motion::ContourSegment& segment) const;
+  std::size_t axisOf(const std::string& name) const;
+  void requireCircle(const axis::PathAxis& axis, const std::array<double, 2>& from,
+                     const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
+  bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
+               const std::array<double, 2>& to) const;
+  bool leadsNowhere(const PathSegment& given, const motion::ContourSegment& segment) const;
+  void requireRate(double velocity, double finest, const char* unit) const;
+  void readSpeed(const PathSegment& given, motion::ContourSegment& segment) const;
+  bool isLinear(std::size_t axis) const { return axes_[axis].kind == config::Kind::kLinear; }
+  bool moves(const motion::ContourSegment& segment, std::size_t axis) const;
+
+  const PathFrame& frame_;
+  const std::vector<axis::PathAxis>& axes_;
+  std::vector<double> before_;  // [unit] the end of the segment before
+  std::size_t index_ = 0;
+};
+
+/// "segment 3 of the path"
+std::string segmentText(std::size_t index);
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,142 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "geometry/path.h"
+#include "path_axis.h"
+#include "path_reader.h"
+#include "path_timing/acceleration_limited.h"
+#include "shared_path.h"
+#include "stepdriver_core/trajectory/requests.h"
+#include "trajectory_path.h"
+
+namespace stepdriver::machine {
+
+/// The segments that axes follow, without those that they have passed, and what is known about the
+/// motion along them. Positions are in the units of the axes, times in seconds or nanoseconds of
+/// the path since its begin.
+struct PathWindow {
+  /// A place at which the motion is known.
+  struct Knot {
+    std::int64_t time_ns = 0;
+    std::size_t segment = 0;
+    double parameter = 0.0;
+    double speed = 0.0;  ///< [unit/s] along the path
+    /// See motion::ContourKnot.
+    double acceleration = 0.0;
+    double average = 0.0;
+    bool may_begin = false;
+    bool straight = false;
+  };
+
+  PathFrame frame;
+  std::vector<axis::PathAxis> axes;
+  std::vector<double> start;  ///< where the first segment begins
+  /// With a jerk limit, also those before them whose corners are rounded as far as the first one
+  /// ahead, and the `blend` of each is that of the plan.
+  std::vector<motion::ContourSegment> segments;
+  std::vector<Knot> knots;      ///< the last one is the end of the path
+  std::int64_t settled_ns = 0;  ///< see motion::ContourPlan
+
+  /// The end of the last segment; the start if none has made a step yet.
+  const std::vector<double>& end() const { return segments.empty() ? start : segments.back().end; }
+};
+
+/// A path to which segments can be appended while axes follow it. Immutable: the longer path is
+/// another one. The motion up to some time ahead stays as it is; from there on, the rest of the old
+/// segments and the new ones are planned again, from the speed that the axes have there to rest at
+/// the new end. The corner at the former end is rounded if the axes can still slow down before it.
+///
+/// The plan uses a thousandth less than the limits of the axes: what planning from a speed may miss
+/// by.
+class QueuedPath : public axis::SharedPath {
+ public:
+  static constexpr double kShareOfLimits = 0.999;
+
+  /// @param motion along the window, from time 0 on.
+  /// @param more_follows it isn't complete: the axes wait at its end.
+  QueuedPath(const std::shared_ptr<const axis::SharedPath>& motion,
+             std::shared_ptr<const PathWindow> window, bool more_follows);
+
+  /// A path that continues this one, and the positions between which both are the same.
+  struct Longer {
+    std::shared_ptr<const QueuedPath> path;
+    double same_from = 0.0;   ///< [s]
+    double same_until = 0.0;  ///< [s]
+    bool moves_on = false;    ///< whether it leads beyond the end of this one
+  };
+  /// Takes time in proportion to the segments that are planned again: those between the point from
+  /// which the axes slow down to rest at the present end, and the new end. With a jerk limit, the
+  /// motion changes at a knot before that point at which the speed is highest or lowest, or rises.
+  ///
+  /// @param segments may be empty, to tell that this is the end.
+  /// @param passed [s] a position that the axes have passed: what is before it is forgotten.
+  /// @param changeable [s] the first position from which the motion may change.
+  /// @throw Refused if it is complete, if too many segments would lie ahead, or if one of them
+  /// isn't
+  ///   possible, by its number among the new ones.
+  Longer extended(const std::vector<PathSegment>& segments, bool more_follows, double passed,
+                  double changeable) const;
+
+  /// What lies ahead of a position [s].
+  PathAhead aheadOf(double position) const;
+  std::vector<double> targets() const;  ///< [microsteps] of each joint, its end
+
+  motion::MotionState begin() const override { return motion_->begin(); }
+  motion::MotionState restart(motion::DoubleDouble position) const override {
+    return motion_->restart(position);
+  }
+  motion::Profile plan(std::int64_t at, const motion::MotionState& from,
+                       double speed_override) const override {
+    return motion_->plan(at, from, speed_override);
+  }
+  motion::Profile planStop(std::int64_t at, const motion::MotionState& from) const override {
+    return motion_->planStop(at, from);
+  }
+  motion::Profile profileOf(std::size_t member, const motion::Profile& path) const override {
+    return motion_->profileOf(member, path);
+  }
+  bool waitsAtEnd() const override { return more_follows_; }
+
+ private:
+  struct Start;
+  struct Continuation;
+  // Of all axes [unit, unit/s].
+  struct JointPlace {
+    std::vector<double> position;
+    std::vector<double> velocity;
+  };
+
+  std::vector<motion::ContourSegment> read(const std::vector<PathSegment>& given) const;
+  std::size_t segmentAt(std::int64_t time_ns) const;
+  std::size_t firstRoundedInto(std::size_t segment) const;
+  std::vector<motion::ContourSegment> aroundStart(const Start& start, std::size_t first) const;
+  std::vector<Start> startsFrom(std::int64_t from_ns) const;
+  static Start atKnot(const PathWindow::Knot& knot);
+  Start onStraight(std::size_t knot, std::int64_t time_ns) const;
+  Start atRest() const;
+  std::optional<Continuation> continueFrom(Start start,
+                                           const std::vector<motion::ContourSegment>& added,
+                                           bool more_follows, int most_halvings) const;
+  Longer continued(const Start& start, Continuation continuation,
+                   const std::vector<motion::ContourSegment>& added, bool more_follows,
+                   std::int64_t passed_ns) const;
+  JointPlace jointAt(const Start& start, const motion::ContourPoint& place) const;
+  void adjust(Start& start, const motion::ContourPoint& planned,
+              const std::vector<axis::PathStart>& states) const;
+  std::optional<std::vector<axis::PathStart>> statesAt(const Start& start,
+                                                       const JointPlace& joint) const;
+  std::shared_ptr<const axis::TrajectoryPath> joined(
+      const Start& start, const Continuation& continuation,
+      const std::vector<axis::TrajectoryPoint>& points, std::int64_t passed_ns) const;
+
+  std::shared_ptr<const axis::TrajectoryPath> motion_;
+  std::shared_ptr<const PathWindow> window_;
+  bool more_follows_;
+};
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "spline.h"
+
+namespace stepdriver::motion {
+
+/// One end of a segment.
+struct Knot {
+  std::int64_t time_ns = 0;
+  DoubleDouble position;
+  std::optional<double> velocity;
+  std::optional<double> acceleration;
+};
+
+/// A quintic over u from 0 to 1: p0 + c1 u + ... + c5 u^5 [microsteps].
+struct Quintic {
+  DoubleDouble p0, c1, c2, c3, c4, c5;
+
+  DoubleDouble positionAt(DoubleDouble u) const;
+  DoubleDouble slopeAt(DoubleDouble u) const;
+  double thirdDerivativeAt(double u) const;
+  /// The largest absolute value over the whole quintic.
+  double largestFourthDerivative() const;
+  double reach() const;
+};
+
+/// The kind of curve of a segment, see planSpline().
+enum class SegmentKind { kLine, kCubic, kQuintic };
+
+struct Segment {
+  Knot begin;
+  Knot end;
+  std::size_t index = 0;  ///< of the waypoint at its end
+
+  SegmentKind kind() const;
+  DoubleDouble duration() const;  ///< [s]
+  /// @pre kind() is kQuintic
+  Quintic quintic() const;
+};
+
+/// The segments of a trajectory, each made on demand. The first one begins at the start of the
+/// motion, each other one at a waypoint.
+class Segments {
+ public:
+  /// @param waypoints outlive this. @pre requirePlannable()
+  explicit Segments(const std::vector<Waypoint>& waypoints);
+
+  std::size_t size() const { return waypoints_.size() - skipped_; }
+  Segment first(const MotionState& from) const;
+  /// @pre index > 0
+  Segment at(std::size_t index) const;
+  /// From a segment to the next one.
+  void advance(Segment& segment) const;
+
+ private:
+  Knot knot(std::size_t waypoint) const;
+
+  const std::vector<Waypoint>& waypoints_;
+  std::size_t skipped_;  // waypoints: one at time 0 has passed when the motion starts
+};
+
+}  // namespace stepdriver::motion

@@ -1,0 +1,463 @@
+#include "path_timing/jerk_limited.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "geometry/path_grid.h"
+#include "support/constants.h"
+#include "support/path_line.h"
+#include "support/random_path.h"
+#include "support/smooth_optimum.h"
+
+// The motion along a path with jerk limits: within all limits, on the path, and how much longer it
+// takes than without them. A unit is a microstep.
+
+namespace stepdriver {
+namespace {
+
+using motion::Continuity;
+using motion::Contour;
+using motion::ContourKnot;
+using motion::ContourLimits;
+using motion::ContourPoint;
+using motion::ContourSegment;
+using test::kPi;
+using test::lineTo;
+
+double secondsOf(const std::vector<ContourKnot>& knots) {
+  return static_cast<double>(knots.back().time_ns) * 1e-9;
+}
+
+// A quintic between two knots, at a part u of its duration.
+struct QuinticState {
+  double position;
+  double velocity;
+  double acceleration;
+  double jerk;
+};
+
+QuinticState quinticAt(const ContourKnot& from, const ContourKnot& to, std::size_t axis, double u) {
+  const double h = static_cast<double>(to.time_ns - from.time_ns) * 1e-9;
+  const double way = to.positions[axis] - from.positions[axis];
+  const double v0 = h * from.velocities[axis];
+  const double v1 = h * to.velocities[axis];
+  const double a0 = h * h * from.accelerations[axis] / 2.0;
+  const double a1 = h * h * to.accelerations[axis] / 2.0;
+  const double c3 = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * a0 + a1;
+  const double c4 = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * a0 - 2.0 * a1;
+  const double c5 = 6.0 * way - 3.0 * v0 - 3.0 * v1 - a0 + a1;
+  return {from.positions[axis] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5)))),
+          (v0 + u * (2.0 * a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / h,
+          (2.0 * a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / (h * h),
+          (6.0 * c3 + u * (24.0 * c4 + u * 60.0 * c5)) / (h * h * h)};
+}
+
+// How far a point is from the contour near some of its segments.
+class NearContour {
+ public:
+  NearContour(const Contour& contour, std::size_t first, std::size_t last)
+      : contour_(contour), first_(first), last_(last) {
+    for (std::size_t near = first - std::min<std::size_t>(first, 1);
+         near < std::min(last + 2, contour.size()); ++near) {
+      for (int i = 0; i <= kParts; ++i) {
+        contour.evaluate(near, static_cast<double>(i) / kParts, point_);
+        places_.push_back({near, static_cast<double>(i) / kParts, point_.position});
+      }
+    }
+  }
+  bool isOf(std::size_t first, std::size_t last) const { return first == first_ && last == last_; }
+
+  double distance(const std::vector<double>& position) {
+    std::vector<double> squares;
+    for (const Place& place : places_) squares.push_back(squareTo(position, place.position));
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      const bool before = i % (kParts + 1) == 0 || squares[i] <= squares[i - 1];
+      const bool after = i % (kParts + 1) == kParts || squares[i] <= squares[i + 1];
+      if (before && after) least = std::min(least, leastAround(places_[i], position));
+    }
+    return std::sqrt(least);
+  }
+
+ private:
+  static constexpr int kParts = 400;
+  struct Place {
+    std::size_t segment;
+    double parameter;
+    std::vector<double> position;
+  };
+
+  static double squareTo(const std::vector<double>& a, const std::vector<double>& b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sum;
+  }
+
+  double leastAround(const Place& place, const std::vector<double>& position) {
+    const auto square_at = [&](double u) {
+      contour_.evaluate(place.segment, u, point_);
+      return squareTo(position, point_.position);
+    };
+    double low = std::max(0.0, place.parameter - 1.0 / kParts);
+    double high = std::min(1.0, place.parameter + 1.0 / kParts);
+    for (int i = 0; i < 60; ++i) {
+      const double third = (high - low) / 3.0;
+      if (square_at(low + third) < square_at(high - third)) {
+        high -= third;
+      } else {
+        low += third;
+      }
+    }
+    return square_at(low);
+  }
+
+  const Contour& contour_;
+  std::size_t first_;
+  std::size_t last_;
+  ContourPoint point_;
+  std::vector<Place> places_;
+};
+
+TEST(SmoothContourMotion, OfALineHasTheSevenPhasesOfTheFastest) {
+  const auto duration = [](double length, const ContourLimits& limits) {
+    const Contour contour({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    return secondsOf(motion::planSmoothContour(contour, {limits}).knots);
+  };
+  // 1000/1000 + 1000/5000 + 5000/50000
+  EXPECT_NEAR(duration(1000.0, {1000.0, 5000.0, 5000.0, 50'000.0}), 1.3, 1e-6);
+  // Without the highest speed: sqrt((a/j)^2 + 4 length/a) + a/j
+  EXPECT_NEAR(duration(1000.0, {1e6, 5000.0, 5000.0, 50'000.0}), std::sqrt(0.01 + 0.8) + 0.1, 1e-6);
+  // Without the highest acceleration 4 cbrt(length/(2 j)), apart from the choice of the time.
+  const double optimum = 4.0 * std::cbrt(1000.0 / (2.0 * 50'000.0));
+  EXPECT_LE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), 1.02 * optimum);
+  EXPECT_GE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), optimum - 1e-9);
+}
+
+TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
+  std::vector<ContourSegment> segments;
+  for (int i = 1; i <= 100; ++i) {
+    const double angle = 2.0 * kPi * i / 100.0;
+    segments.push_back(lineTo({1600.0 * std::cos(angle) - 1600.0, 1600.0 * std::sin(angle)}, 1.6));
+  }
+  const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Contour contour({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  const double smooth = secondsOf(motion::planSmoothContour(contour, limits).knots);
+  const double fastest = secondsOf(motion::planContour(contour, limits).knots);
+  RecordProperty("smooth", std::to_string(smooth));
+  RecordProperty("fastest", std::to_string(fastest));
+  EXPECT_LE(smooth, 1.5 * fastest);
+}
+
+// On random paths: limits, rest at both ends, the distance from the path, and the duration against
+// that without a jerk limit, which no motion with one can go below. The Beziers of the last paths
+// lack handles.
+TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
+  std::mt19937 random(2027);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  constexpr int kPaths = 1000;
+  constexpr int kWithoutHandles = 200;
+  double worst_ratio = 0.0;
+  double ratios = 0.0;
+  double worst_jerk = 0.0;
+  double worst_distance = 0.0;
+  for (int i = 0; i < kPaths + kWithoutHandles; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    if (i >= kPaths) test::dropHandles(path);
+    // Accelerations that take 1 to 100 ms to build up; some axes have no jerk limit.
+    for (std::size_t axis = 0; axis < path.limits.size(); ++axis) {
+      if (axis > 0 && number(0.0, 1.0) < 0.3) continue;
+      path.limits[axis].jerk = path.limits[axis].acceleration * std::pow(10.0, number(1.0, 3.0));
+    }
+    const Contour contour = path.contour(Continuity::kCurvature);
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits).knots;
+    ASSERT_EQ(knots.front().time_ns, 0);
+    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+      ASSERT_NEAR(knots.back().positions[axis], path.segments.back().end[axis], 1e-9);
+      for (const ContourKnot* end : {&knots.front(), &knots.back()}) {
+        ASSERT_EQ(end->velocities[axis], 0.0);
+        ASSERT_EQ(end->accelerations[axis], 0.0);
+      }
+    }
+    std::vector<NearContour> near;
+    for (std::size_t k = 1; k < knots.size(); ++k) {
+      const ContourKnot& from = knots[k - 1];
+      const ContourKnot& to = knots[k];
+      ASSERT_LT(from.time_ns, to.time_ns);
+      constexpr int kParts = 10;
+      std::vector<double> middle;
+      for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+        const ContourLimits& limits = path.limits[axis];
+        for (int part = 0; part <= kParts; ++part) {
+          const QuinticState state = quinticAt(from, to, axis, static_cast<double>(part) / kParts);
+          const double most = std::max(limits.acceleration, limits.deceleration);
+          ASSERT_LE(std::abs(state.velocity), limits.speed * (1.0 + 1e-6)) << "path " << i;
+          ASSERT_LE(std::abs(state.acceleration), most * (1.0 + 1e-3)) << "path " << i;
+          ASSERT_LE(std::abs(state.jerk), limits.jerk * (1.0 + 1e-3))
+              << "path " << i << " knot " << k << " axis " << axis;
+          worst_jerk = std::max(worst_jerk, std::abs(state.jerk) / limits.jerk);
+          if (2 * part == kParts) middle.push_back(state.position);
+        }
+      }
+      if (i % 10 != 0) continue;
+      if (near.empty() || !near.back().isOf(from.segment, to.segment)) {
+        near.emplace_back(contour, from.segment, to.segment);
+      }
+      const double distance = near.back().distance(middle);
+      worst_distance = std::max(worst_distance, distance);
+      ASSERT_LE(distance, 0.1) << "path " << i << " knot " << k << " of " << knots.size();
+    }
+    const double ratio =
+        secondsOf(knots) / secondsOf(motion::planContour(contour, path.limits).knots);
+    EXPECT_GE(ratio, 0.995) << "path " << i;
+    if (i >= kPaths) continue;
+    worst_ratio = std::max(worst_ratio, ratio);
+    ratios += ratio;
+  }
+  EXPECT_LE(ratios / kPaths, 1.15);
+  RecordProperty("mean_ratio", std::to_string(ratios / kPaths));
+  RecordProperty("worst_ratio", std::to_string(worst_ratio));
+  RecordProperty("worst_jerk", std::to_string(worst_jerk));
+  RecordProperty("worst_distance", std::to_string(worst_distance));
+}
+
+// The largest part of its limits that an axis uses between two knots.
+double demandBetween(const ContourKnot& from, const ContourKnot& to,
+                     const std::vector<ContourLimits>& limits) {
+  double most = 0.0;
+  constexpr int kParts = 10;
+  for (std::size_t axis = 0; axis < limits.size(); ++axis) {
+    for (int part = 0; part <= kParts; ++part) {
+      const QuinticState state = quinticAt(from, to, axis, static_cast<double>(part) / kParts);
+      most = std::max({most, std::abs(state.velocity) / limits[axis].speed,
+                       std::abs(state.acceleration) / limits[axis].acceleration,
+                       std::abs(state.jerk) / limits[axis].jerk});
+    }
+  }
+  return most;
+}
+
+// Only the places at which a limit is exceeded become slower: on 500 lines in random directions,
+// the motion is at a limit in every part that takes a second.
+TEST(SmoothContourMotion, IsNotSlowedDownAsAWholeForOnePlace) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> way(-160.0, 160.0);
+  std::vector<ContourSegment> segments;
+  std::vector<double> place(3, 0.0);
+  for (int i = 0; i < 500; ++i) {
+    for (double& x : place) x += way(random);
+    segments.push_back(lineTo(place, 4.0));
+  }
+  const std::vector<ContourLimits> limits(3, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Contour contour({0.0, 0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
+  std::vector<double> demands(static_cast<std::size_t>(secondsOf(knots)) + 1, 0.0);
+  for (std::size_t k = 1; k < knots.size(); ++k) {
+    double& most = demands[static_cast<std::size_t>(knots[k].time_ns / 1'000'000'000)];
+    most = std::max(most, demandBetween(knots[k - 1], knots[k], limits));
+  }
+  demands.pop_back();  // is shorter
+  const double least = *std::min_element(demands.begin(), demands.end());
+  EXPECT_GE(least, 0.99);
+  RecordProperty("least", std::to_string(least));
+  RecordProperty("seconds", std::to_string(secondsOf(knots)));
+}
+
+// The distance and the speed along a section at a time, from its knots.
+class AlongSection {
+ public:
+  AlongSection(const motion::ContourGrid& grid, const std::vector<ContourKnot>& knots)
+      : knots_(knots) {
+    double begin = 0.0;
+    std::size_t interval = 0;
+    for (const ContourKnot& knot : knots) {
+      const auto ends_before = [&](const motion::ContourGrid::Interval& of) {
+        return of.segment < knot.segment || (of.segment == knot.segment && of.to < knot.parameter);
+      };
+      while (interval + 1 < grid.size() && ends_before(grid[interval])) {
+        begin += grid[interval++].length;
+      }
+      const motion::ContourGrid::Interval& in = grid[interval];
+      const double part = std::clamp((knot.parameter - in.from) / (in.to - in.from), 0.0, 1.0);
+      distances_.push_back(begin + part * in.length);
+    }
+  }
+
+  struct State {
+    double distance;
+    double speed;
+  };
+  State at(double time) const {
+    std::size_t k = 1;
+    while (k + 1 < knots_.size() && static_cast<double>(knots_[k].time_ns) * 1e-9 < time) ++k;
+    const double begin = static_cast<double>(knots_[k - 1].time_ns) * 1e-9;
+    const double h = static_cast<double>(knots_[k].time_ns) * 1e-9 - begin;
+    const double u = std::clamp((time - begin) / h, 0.0, 1.0);
+    const double v0 = h * knots_[k - 1].speed;
+    const double v1 = h * knots_[k].speed;
+    const double way = distances_[k] - distances_[k - 1];
+    const double c2 = 3.0 * way - 2.0 * v0 - v1;
+    const double c3 = v0 + v1 - 2.0 * way;
+    return {distances_[k - 1] + u * (v0 + u * (c2 + u * c3)),
+            (v0 + u * (2.0 * c2 + u * 3.0 * c3)) / h};
+  }
+
+ private:
+  const std::vector<ContourKnot>& knots_;
+  std::vector<double> distances_;
+};
+
+// [s] The optimum between two stops, at places that the planned motion passes at even times.
+double optimumOf(const Contour& section, const std::vector<ContourLimits>& limits,
+                 const std::vector<ContourKnot>& knots, int parts) {
+  const motion::ContourGrid grid(section);
+  std::vector<double> begins{0.0};
+  for (std::size_t i = 0; i < grid.size(); ++i) begins.push_back(begins.back() + grid[i].length);
+  const AlongSection along(grid, knots);
+  std::vector<test::SmoothOptimum::Place> places;
+  std::vector<double> squares;
+  ContourPoint point;
+  ContourPoint before;
+  ContourPoint after;
+  std::size_t interval = 0;
+  for (int i = 0; i <= parts; ++i) {
+    const AlongSection::State state = along.at(secondsOf(knots) * i / parts);
+    const double distance = i == parts ? begins.back() : state.distance;
+    if (i > 0 && i < parts && distance < places.back().distance + 1e-9 * begins.back()) continue;
+    while (interval + 1 < grid.size() && begins[interval + 1] <= distance) ++interval;
+    const double in = std::clamp(distance - begins[interval], 0.0, grid[interval].length);
+    grid.evaluateAt(interval, in, point);
+    test::SmoothOptimum::Place place{distance, std::numeric_limits<double>::infinity(), point.first,
+                                     point.second, std::vector<double>(limits.size())};
+    if (!grid[interval].straight) {
+      const double near = std::max(0.0, in - 1e-3 * grid[interval].length);
+      const double far = std::min(grid[interval].length, in + 1e-3 * grid[interval].length);
+      grid.evaluateAt(interval, near, before);
+      grid.evaluateAt(interval, far, after);
+      for (std::size_t j = 0; j < limits.size(); ++j) {
+        place.third[j] = (after.second[j] - before.second[j]) / (far - near);
+      }
+    }
+    const std::vector<bool>& measured = section.measured(grid[interval].segment);
+    double sum = 0.0;
+    for (std::size_t j = 0; j < limits.size(); ++j) {
+      const double square = point.first[j] * point.first[j];
+      if (measured.empty() || measured[j]) sum += square;
+      if (square > 0.0)
+        place.most = std::min(place.most, limits[j].speed * limits[j].speed / square);
+    }
+    const double speed = section.speed(grid[interval].segment);
+    if (sum > 0.0) place.most = std::min(place.most, speed * speed / sum);
+    places.push_back(std::move(place));
+    squares.push_back(std::max(1e-12, state.speed * state.speed));
+  }
+  return test::SmoothOptimum(std::move(places), limits, std::move(squares)).duration();
+}
+
+TEST(SmoothContourMotion, HasAKnownOptimumOnALine) {
+  const auto durations = [](double length, const ContourLimits& limit) {
+    const Contour contour({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    const std::vector<ContourLimits> limits{limit};
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
+    return std::pair(secondsOf(knots), optimumOf(contour, limits, knots, 400));
+  };
+  for (const double jerk : {20'000.0, 50'000.0, 1e6}) {
+    const auto [planned, found] = durations(1000.0, {1000.0, 5000.0, 5000.0, jerk});
+    EXPECT_NEAR(found, 1.0 + 0.2 + 5000.0 / jerk, 0.01 * planned);
+    EXPECT_NEAR(found, planned, 0.01 * planned);
+  }
+}
+
+// How much longer the planned motion takes than an optimum with the same limits.
+TEST(SmoothContourMotion, IsNearTheOptimumOnRandomPaths) {
+  std::mt19937 random(2027);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  constexpr int kPaths = 100;
+  double ratios = 0.0;
+  double worst = 0.0;
+  double jerk_ratios = 0.0;
+  for (int i = 0; i < kPaths; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    for (ContourLimits& limits : path.limits) {
+      limits.jerk = limits.acceleration * std::pow(10.0, number(1.0, 3.0));
+    }
+    const Contour contour = path.contour(Continuity::kCurvature);
+    double planned = 0.0;
+    double optimum = 0.0;
+    for (std::size_t first = 0; first < contour.size();) {
+      std::size_t last = first;
+      while (!contour.stopsAfter(last) && last + 1 < contour.size()) ++last;
+      const Contour section = contour.part(first, last);
+      const std::vector<ContourKnot> knots = motion::planSmoothContour(section, path.limits).knots;
+      planned += secondsOf(knots);
+      optimum += optimumOf(section, path.limits, knots, 600);
+      first = last + 1;
+    }
+    const double ratio = planned / optimum;
+    EXPECT_GE(ratio, 0.98) << "path " << i;
+    ratios += ratio;
+    worst = std::max(worst, ratio);
+    jerk_ratios += optimum / secondsOf(motion::planContour(contour, path.limits).knots);
+  }
+  EXPECT_LE(ratios / kPaths, 1.13);
+  EXPECT_LE(worst, 2.0);
+  RecordProperty("mean_ratio", std::to_string(ratios / kPaths));
+  RecordProperty("worst_ratio", std::to_string(worst));
+  RecordProperty("optimum_with_jerk_to_without", std::to_string(jerk_ratios / kPaths));
+}
+
+// Far from 0, with a tiny and a very long line at the end, and accelerations that take 10 us to 10
+// s to build up: rounding doesn't take the jerk beyond what a trajectory may have.
+TEST(SmoothContourMotion, KeepsTheJerkAtExtremes) {
+  std::mt19937 random(77);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  for (int i = 0; i < 100; ++i) {
+    test::RandomContour path = test::randomContour(random);
+    const double offset = number(0.0, 1.0) < 0.5 ? 0.0 : 1e7;
+    const auto shift = [&](std::vector<double>& position) {
+      for (double& x : position) x += offset;
+    };
+    shift(path.start);
+    for (ContourSegment& segment : path.segments) {
+      shift(segment.end);
+      shift(segment.control1);
+      shift(segment.control2);
+      for (double& x : segment.centre) x += offset;
+    }
+    std::vector<double> end = path.segments.back().end;
+    for (const double length : {0.001, 1e6}) {
+      end[0] += length;
+      path.segments.push_back(lineTo(end, 0.1));
+    }
+    for (ContourLimits& limits : path.limits) {
+      limits.jerk = limits.acceleration * std::pow(10.0, number(-1.0, 5.0));
+    }
+    const Contour contour = path.contour(Continuity::kCurvature);
+    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits).knots;
+    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+      for (std::size_t k = 1; k < knots.size(); ++k) {
+        for (const double u : {0.0, 0.5, 1.0}) {
+          const QuinticState state = quinticAt(knots[k - 1], knots[k], axis, u);
+          ASSERT_LE(std::abs(state.jerk), 1.01 * path.limits[axis].jerk)
+              << "path " << i << " knot " << k << " axis " << axis;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stepdriver
