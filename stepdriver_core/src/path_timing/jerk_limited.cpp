@@ -26,8 +26,8 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 // that are rounded by r change it by 60 r/h^3 if they are positions, and by 24 r/h^2 if they are
 // speeds: knots aren't closer than that allows.
 constexpr double kMostRoundingOfTimes = 4.5e-5;
-constexpr double kMostRounding = 1e-3;
-constexpr int kMostPlans = 12;  // with one time of the average
+constexpr double kLargestRounding = 1e-3;
+constexpr int kMostPlansOfAverage = 12;  // with one time of the average
 constexpr double kNoExcess = 1e-3;
 constexpr double kNoPart = 1e-9;          // of a segment
 constexpr double kSquareRounding = 1e-9;  // of the square of a speed
@@ -127,7 +127,7 @@ class SmoothSection {
     return false;
   }
 
-  // [s] See kMostRounding. @param time of the average [s].
+  // [s] See kLargestRounding. @param time of the average [s].
   double closestKnots(const std::vector<SmoothPart>& parts, double time) const {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double duration = parts.back().time;
@@ -145,7 +145,7 @@ class SmoothSection {
         moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
       }
       const double rounding = kEpsilon * farthest;
-      const double most = kMostRounding * limits_[j].jerk;
+      const double most = kLargestRounding * limits_[j].jerk;
       if (!moves) continue;
       closest = std::max(
           {closest, std::cbrt(60.0 * rounding / most), std::sqrt(24.0 * speed_rounding / most)});
@@ -235,7 +235,7 @@ class SmoothSection {
       ++plans_;
       const bool planned = plan.excess < kUnlimited;
       const bool done = plan.slowdown <= 1.0 + kNoExcess && plan.possible();
-      open_ = planned && !done && plans_ < kMostPlans;
+      open_ = planned && !done && plans_ < kMostPlansOfAverage;
       shortest_ = planned ? plan.knots.back().time : kUnlimited;
     }
 

@@ -15,7 +15,7 @@ constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no
 // h^2 times the integral of what the jerk of the motion differs from a constant (the largest value
 // of the Peano kernel).
 constexpr double kPeanoKernel = 0.0173;
-constexpr double kMostDeviation = 0.01;  // of the resolution, of that
+constexpr double kMostJerkDeviation = 0.01;  // of the resolution, of that
 
 // When a part of a smoothed motion has moved by a distance [s], before it ends.
 double timeUntilMoved(const SmoothPart& part, double distance, double duration) {
@@ -44,7 +44,7 @@ class KnotMaker {
         parts_(parts),
         time_(time),
         closest_(closest),
-        most_(kMostDeviation * resolution / kPeanoKernel),
+        most_(kMostJerkDeviation * resolution / kPeanoKernel),
         last_(parts.back().time - closest),
         knots_(grid.axes()) {}
 
