@@ -40,8 +40,7 @@ class Manoeuvre {
 
   /// There is news from the engine, or time has passed. @return whether the manoeuvre has ended.
   bool look();
-  bool isOver() const { return over_; }
-  /// How the first axis's goal ended. @pre isOver()
+  /// How the first axis's goal ended, once look() has said that the manoeuvre has.
   const axis::MoveResult& result() const { return result_; }
   /// Why it did not begin; empty if it did.
   const std::optional<Failure>& failure() const { return failure_; }

@@ -106,7 +106,6 @@ class Controller {
   void setTarget(activity::Goal& goal, axis::AxisModel& axis, double position, bool relative);
   /// [microsteps] The position of the joint from which a relative move counts.
   double relativeOrigin(const axis::AxisModel& axis) const;
-  activity::Goal newGoal() { return goalWithOutcome({}); }
   activity::Goal goalWithOutcome(activity::Goal goal);
   /// Requires that the axis neither moves nor changes its pins. @param what is refused, in words.
   void refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const;

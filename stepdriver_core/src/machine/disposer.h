@@ -6,7 +6,9 @@
 namespace stepdriver::machine {
 
 /// Frees large objects, such as a plan of hundreds of thousands of points, in a thread of its own
-/// with a low priority, and never in the thread that happens to use them last.
+/// with a low priority, and never in the thread that happens to use them last. That would often be
+/// the controller's, and 300,000 points of three axes take 17 ms on a PC, although they are flat
+/// arrays: the kernel has to take back 80 MB.
 ///
 /// The thread starts with the first object. Handing over is lock-free and doesn't allocate. All
 /// calls are safe from any thread.

@@ -87,11 +87,6 @@ bool ShellCore::hasInput() const {
   return !seen_.empty();
 }
 
-bool ShellCore::hasRequest() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return !requests_.empty();
-}
-
 bool ShellCore::takeNews() {
   if (!news_.exchange(false, std::memory_order_acq_rel)) return false;
   EngineNews news;

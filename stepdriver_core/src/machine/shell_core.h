@@ -71,7 +71,6 @@ class ShellCore {
 
   bool hasNews() const { return news_.load(std::memory_order_acquire); }
   bool hasInput() const;
-  bool hasRequest() const;
 
   /// @name Each handles an event, if there is one of its kind
   /// @return whether there was.

@@ -194,7 +194,7 @@ struct AxisConfig : MotorConfig {
   std::optional<HomingConfig> homing;
   /// [unit] How far the motors may get apart while a homing squares them.
   double max_skew = 0.0;
-  bool require_homing = false;  ///< absolute moves are refused until the axis is homed
+  bool require_homing = false;  ///< no absolute move until homed; in files true with a homing
 
   bool enable_on_start = false;
   bool disable_on_shutdown = true;
