@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "point_to_point/planner.h"
-#include "pulse/pin_ring.h"
+#include "port/pin_ring.h"
 #include "pulse/pulse_engine.h"
 #include "support/free_hardware.h"
 

@@ -4,7 +4,7 @@
 
 #include "line_names.h"
 #include "motor/motor_lines.h"
-#include "pulse/channel.h"
+#include "port/channel.h"
 
 namespace stepdriver::axis {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "activity/context.h"
-#include "pulse/pin_ring.h"
-#include "pulse/record_ring.h"
+#include "port/pin_ring.h"
+#include "port/record_ring.h"
 #include "requests.h"
 #include "snapshot.h"
 #include "stepdriver_core/config/axis_config.h"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "axis/axis_memory.h"
+#include "port/channel.h"
 #include "profile/shaped_profile.h"
-#include "pulse/channel.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "trajectory/ended_path.h"

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "pulse/hybrid_wait.h"
-#include "pulse/pulse_engine.h"
 #include "stepdriver_core/error.h"
+#include "timeline/follower.h"
 
 namespace stepdriver::machine {
 namespace {
@@ -18,7 +18,7 @@ enum class RateLimit { kLateness, kPulse, kSpinning };
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 // [steps] What the engine absorbs in any case.
-constexpr double kLeastAbsorbed = 1.0 - pulse::PulseEngine::kClosest;
+constexpr double kLeastAbsorbed = 1.0 - pulse::Follower::kClosest;
 // The part of the time that pulses may take: the rest is for catching up.
 constexpr double kMostPulses = 0.9;
 
@@ -35,7 +35,7 @@ struct Load {
 
   /// [steps] How much lateness of so many nanoseconds is absorbed.
   double absorbedIn(double ns) const {
-    return ns > pulse::kLongestCatchUp ? kLeastAbsorbed : absorbed;
+    return ns > pulse::Follower::kLongestCatchUp ? kLeastAbsorbed : absorbed;
   }
 };
 

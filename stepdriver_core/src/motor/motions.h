@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "point_to_point/motion_limits.h"
+#include "port/channel.h"
 #include "profile/shaped_profile.h"
-#include "pulse/channel.h"
 
 namespace stepdriver::motor {
 

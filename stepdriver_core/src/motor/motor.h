@@ -9,10 +9,10 @@
 #include "driver_pins.h"
 #include "motions.h"
 #include "motor_lines.h"
+#include "port/channel.h"
 #include "power.h"
 #include "profile/input_shaper.h"
 #include "profile/shaped_profile.h"
-#include "pulse/channel.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "translator.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "enable_line.h"
-#include "pulse/channel.h"
+#include "port/channel.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 

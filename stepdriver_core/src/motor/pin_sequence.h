@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "pulse/channel.h"
+#include "port/channel.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::motor {

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "pulse/channel.h"
+#include "port/channel.h"
 #include "pulse/cpu_latency.h"
 #include "pulse/measure.h"
 #include "pulse/realtime.h"

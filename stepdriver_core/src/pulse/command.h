@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "channel.h"
+#include "port/channel.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 

@@ -7,15 +7,16 @@
 #include <optional>
 #include <vector>
 
-#include "pulse/channel.h"
+#include "guard/emergency_stops.h"
+#include "port/channel.h"
+#include "port/due_tree.h"
+#include "port/gpio_port.h"
+#include "port/watched_lines.h"
 #include "pulse/command.h"
-#include "pulse/due_tree.h"
 #include "pulse/heartbeat.h"
 #include "pulse/lateness_record.h"
 #include "pulse/mailbox.h"
-#include "pulse/pin_ring.h"
 #include "pulse/snapshot.h"
-#include "pulse/stop_counts.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -30,7 +31,9 @@ struct EngineState {
 };
 
 struct EngineChannel;
-class SharedMotors;
+struct Objection;
+class Follower;
+class Kin;
 
 /// Is told when the engine has news for the controller: an order was accepted or refused, a motion
 /// has ended, a chip has reported a fault, or an emergency stop was served.
@@ -43,7 +46,10 @@ class NewsListener {
   virtual void onNews() noexcept = 0;
 };
 
-/// Turns profiles into edges on lines, for all axes.
+/// Turns profiles into edges on lines, for all axes. It asks three rooms: what comes next, and when
+/// (Follower)? May it go out (EmergencyStops, AxisGuard)? How does it go out (PulseTrain,
+/// GpioPort)? Itself it says when a channel is due, what becomes of lateness, and what ends
+/// together.
 ///
 /// Only the pulse thread calls serve(). post() is for one thread at a time, all other functions are
 /// for any thread. Nothing in serve() allocates, locks, throws or waits; its only system calls are
@@ -58,7 +64,7 @@ class NewsListener {
 ///   allow, until the plan is reached. Only what is beyond that slides the timeline of all channels
 ///   (a slip). This is so in the middle of a motion in one direction. For the first step of a
 ///   motion, for one after a turn, and without a full step, a quarter of an interval is absorbed,
-///   and the next step follows no sooner than kClosest of their planned interval.
+///   and the next step follows no sooner than Follower::kClosest of their planned interval.
 /// - If a write for several channels fails, those whose own lines can be written continue.
 /// - The switch is read before each step towards an endstop; no step goes out while it reads
 ///   active.
@@ -75,11 +81,6 @@ class PulseEngine {
   ~PulseEngine();
   PulseEngine(const PulseEngine&) = delete;
   PulseEngine& operator=(const PulseEngine&) = delete;
-
-  /// The shortest interval after a late step that isn't caught up, as a part of the planned one.
-  static constexpr double kClosest = 0.75;
-  /// From an emergency stop with a ramp until each channel must have an order to decelerate.
-  static constexpr Nanoseconds kRampBegins = 100'000'000;
 
   /// Does what is due. @return the clock time at which it must be called again, which may be in the
   /// past.
@@ -103,12 +104,12 @@ class PulseEngine {
   /// The same, and ends a ramp. @return as above
   std::uint64_t stopAtOnce();
   /// Emergency stops let the axes decelerate first, but not for longer than this. The listener must
-  /// order that: a channel that has no order for it (Follow::slows) by kRampBegins is stopped
-  /// at once, like each channel after this time or at another call of emergencyStop(). The input
-  /// ends no ramp, because its contacts bounce. Set before the first serve().
-  void rampStops(Nanoseconds longest) { longest_ramp_ = longest; }
+  /// order that: a channel that has no order for it (Follow::slows) by EmergencyStops::kRampBegins
+  /// is stopped at once, like each channel after this time or at another call of emergencyStop().
+  /// The input ends no ramp, because its contacts bounce. Set before the first serve().
+  void rampStops(Nanoseconds longest) { stops_.rampStops(longest); }
   /// The count of requested stops when the last ramp began.
-  std::uint64_t stopsRamping() const { return ramping_.load(std::memory_order_acquire); }
+  std::uint64_t stopsRamping() const { return stops_.ramping(); }
   std::uint64_t stopsAsked() const { return stops_.asked(); }
   std::uint64_t stopsServed() const { return stops_.served(); }
   /// @param served a count that stopsServed() has returned: all stops up to it are cleared.
@@ -116,7 +117,7 @@ class PulseEngine {
   bool emergencyStopped() const { return stops_.stopped(); }
 
   /// How often the emergency-stop input requested a stop.
-  std::uint64_t inputStops() const { return input_stops_.load(std::memory_order_acquire); }
+  std::uint64_t inputStops() const { return stops_.inputStops(); }
   /// @}
 
   /// @param listener outlives the engine; set before the first serve().
@@ -128,7 +129,7 @@ class PulseEngine {
 
   /// @param ring records each edge of STEP, DIR and heartbeat lines at the end of its write. It
   ///   outlives the engine; set before the first serve().
-  void recordTo(PinRing& ring) { ring_ = &ring; }
+  void recordTo(PinRing& ring) { port_.recordTo(ring); }
 
   /// The state of a channel, consistent and from one instant.
   ChannelState channel(int index) const;
@@ -136,7 +137,7 @@ class PulseEngine {
 
   /// A line for which serve() waits now, or has waited last: if that doesn't return, its chip
   /// doesn't answer. The error is ETIMEDOUT.
-  LineFailure lineAtWork() const;
+  LineFailure lineAtWork() const { return lines_.atWork(); }
 
   /// The lateness of active STEP edges, relative to their planned times.
   LatenessFigures lateness() const { return lateness_.sinceStart(); }
@@ -146,6 +147,10 @@ class PulseEngine {
 
  private:
   using Channel = EngineChannel;
+
+  void add(std::size_t index, const ChannelConfig& config, Follower& follower, Kin& kin);
+  std::size_t addShared(const SharedAxes& shared, const std::vector<ChannelConfig>& configs,
+                        std::size_t motor);
 
   // Orders.
   void takeMail(Nanoseconds now);
@@ -159,87 +164,67 @@ class PulseEngine {
   // Inputs and emergency stops.
   void serveStops();
   void stopAll(Nanoseconds now);
-  bool mayRamp(Nanoseconds now);
-  bool isRamping() const;
   bool allSlow() const;
-  Nanoseconds rampDue() const;
   void readInputs(Nanoseconds now);
   void readEmergencyStop();
-  void readFault(Channel& channel, Nanoseconds now);
-  bool mayStep(Channel& channel, Nanoseconds now);
-  bool mayStepTogether(Channel& channel, Nanoseconds now);
-  bool mayStepShared(Channel& motor, Nanoseconds now);
-  bool mayStepOn(Channel& channel, std::size_t motor, Nanoseconds now);
-  bool mayStepTowards(Channel& channel, std::size_t motor, bool forward, Nanoseconds now);
-
-  // Lines.
-  int writeLines(const gpio::LineWrite* writes, std::size_t count);
-  int readLine(int input);
+  void readFaults(Channel& channel, Nanoseconds now);
+  bool mayStep(Channel& channel, Nanoseconds now) {
+    return !isGuarded(channel) || askGuards(channel, now);
+  }
+  static bool isGuarded(const Channel& channel);
+  bool askGuards(Channel& channel, Nanoseconds now);
 
   // Edges.
   void collectDue(Nanoseconds now);
-  void addPulses(Channel& channel, bool fall);
   bool meetLateness(Nanoseconds now);
   void writeSteps(Nanoseconds now);
-  void dropEnded();
-  void writeOneByOne(int error, Nanoseconds now);
-  void record(const gpio::LineWrite& write, Nanoseconds now);
+  void playFailed(Nanoseconds now);
   void written(Channel& channel, Nanoseconds now);
   void writeOthers(Nanoseconds now);
   void writeHeartbeat(Nanoseconds now);
-  void turn(Channel& channel, Nanoseconds now);
   void finish(Channel& channel, Nanoseconds now);
+
+  // Ends.
+  void object(Channel& channel, const Objection& objection, Nanoseconds now);
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
-  void endShared(Channel& channel, EndReason reason, Nanoseconds now);
-  void endOne(Channel& channel, EndReason reason, Nanoseconds now);
+  void endEarly(Channel& channel, EndReason reason, Nanoseconds now);
+  void endOne(Channel& channel, EndReason reason, bool abrupt, Nanoseconds now);
 
   // Times.
   void changed(Channel& channel);
-  void changedTogether(const Channel& channel);
   void scheduleChanged();
   void scheduleAll();
   bool schedule(Channel& channel);
-  void scheduleShared(const Channel& axis);
   bool scheduleRise(Channel& channel);
-  static Nanoseconds absorbed(const Channel& channel, Nanoseconds motion_now);
+  Nanoseconds finishDue(const Channel& channel) const;
   static Nanoseconds closestRise(const Channel& channel);
   bool slideFor(const Channel& channel, Nanoseconds earliest);
   void slide(Nanoseconds by);
 
-  gpio::Lines& lines_;
+  WatchedLines lines_;
   Clock& clock_;
+  GpioPort port_;
   const Nanoseconds max_lateness_;
   const std::optional<Signal> emergency_input_;
-  bool emergency_input_active_ = false;  // its last reading
   const std::size_t axes_;
-  std::vector<Channel> channels_;  // of the axes, and then of motors that they share
-  std::vector<std::unique_ptr<SharedMotors>> shared_;
+  std::vector<std::unique_ptr<Kin>> kins_;
+  std::vector<std::unique_ptr<Follower>> followers_;  // of axes with motors of their own
+  std::vector<std::unique_ptr<Channel>>
+      channels_;  // of the axes, and then of motors that they share
   DueTree dues_;
-  // Of one pass: the due channels, those to schedule, and the writes with their channels.
+  // Of one pass: the due channels, and those to schedule.
   std::vector<std::size_t> due_;
   std::vector<Channel*> changed_;
-  std::vector<gpio::LineWrite> writes_;
-  std::vector<Channel*> writers_;
-  std::vector<int> errors_;
   bool slid_ = false;
   bool slid_in_write_ = false;
   Mailbox<Command, 64> mail_;
 
-  StopCounts stops_;
-  std::atomic<std::uint64_t> input_stops_{0};
-  std::atomic<std::uint64_t> at_once_{0};  // stops up to this count have no ramp
-  std::atomic<std::uint64_t> ramping_{0};  // count of stops at the beginning of the last ramp
-  std::uint64_t ramps_until_stop_ = 0;     // the ramp ends at a stop with a higher count
-  Nanoseconds longest_ramp_ = 0;           // 0: no ramp
-  Nanoseconds ramp_began_ = 0;
+  EmergencyStops stops_;
   NewsListener* listener_ = nullptr;
-  PinRing* ring_ = nullptr;
   std::optional<Heartbeat> heartbeat_;
   bool news_ = false;  // of this pass
   std::atomic<bool> inputs_changed_{false};
-  std::atomic<int> output_at_work_{-1};
-  std::atomic<int> input_at_work_{-1};  // -1: an output is
   EngineState state_;
   LatenessRecord lateness_;
   Snapshot<EngineState> figures_;

@@ -1,4 +1,4 @@
-#include "pulse/due_tree.h"
+#include "port/due_tree.h"
 
 #include <gtest/gtest.h>
 

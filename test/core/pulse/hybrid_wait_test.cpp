@@ -12,6 +12,7 @@
 #include "support/constants.h"
 #include "support/plan_from_rest.h"
 #include "support/recording_lines.h"
+#include "timeline/follower.h"
 
 namespace stepdriver::pulse {
 namespace {
@@ -296,7 +297,7 @@ TEST_P(EngineBehind, LeavesTheOtherThreadsTheirShareAndOnlyEverSpreadsThePulses)
   for (int i = 0; i < GetParam(); ++i) {
     const auto rises = lines.rises(2 * i);
     ASSERT_EQ(rises.size(), 2'000U);
-    const double closest = PulseEngine::kClosest * 1e9 / (kSpeed * (1.0 - 0.07 * i));
+    const double closest = Follower::kClosest * 1e9 / (kSpeed * (1.0 - 0.07 * i));
     for (std::size_t k = 1; k < rises.size(); ++k) {
       ASSERT_GE(static_cast<double>(rises[k] - rises[k - 1]), closest - 1.0);
     }

@@ -12,6 +12,7 @@
 #include "profile/step_finder.h"
 #include "support/constants.h"
 #include "support/pulse_engine_bench.h"
+#include "timeline/follower.h"
 
 // Late steps of a motor at 1/16: a quarter of a full step is four microsteps.
 
@@ -129,7 +130,7 @@ TEST_F(LateSteps, OfASlowMotionAreCaughtUpForNoLongerThanARotorTakesToRest) {
   follow(cruise(kMotionStart, 0, 100, 1e9 / kSlow));
   stall(kMotionStart + 10 * kSlow, kMotionStart + 10 * kSlow + kSlow / 2 + 5 * kMillisecond);
   runOut();
-  EXPECT_EQ(engine->state().slipped, 5 * kMillisecond - kLongestCatchUp);
+  EXPECT_EQ(engine->state().slipped, 5 * kMillisecond - Follower::kLongestCatchUp);
 }
 
 TEST_F(LateSteps, OnBothEdgesAreCaughtUpToo) {

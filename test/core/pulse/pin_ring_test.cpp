@@ -1,4 +1,4 @@
-#include "pulse/pin_ring.h"
+#include "port/pin_ring.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "pulse/record_ring.h"
+#include "port/record_ring.h"
 
 namespace stepdriver::pulse {
 namespace {

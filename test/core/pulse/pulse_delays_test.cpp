@@ -11,6 +11,7 @@
 #include "profile/step_finder.h"
 #include "support/constants.h"
 #include "support/pulse_engine_bench.h"
+#include "timeline/follower.h"
 
 namespace stepdriver::pulse {
 namespace {
@@ -71,7 +72,7 @@ class DelayedLine : public PulseEngineTest {
     ASSERT_LE(rises.size(), plan.size());
     for (std::size_t k = 1; k < rises.size(); ++k) {
       const auto planned = static_cast<double>(plan[k].time_ns - plan[k - 1].time_ns);
-      ASSERT_GE(static_cast<double>(rises[k] - rises[k - 1]), PulseEngine::kClosest * planned - 1.0)
+      ASSERT_GE(static_cast<double>(rises[k] - rises[k - 1]), Follower::kClosest * planned - 1.0)
           << "axis " << axis << ", step " << k;
     }
   }

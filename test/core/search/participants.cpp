@@ -1183,7 +1183,7 @@ void Participants::emergencyStop(int client) {
 // A controller that is late decelerates late.
 std::optional<pulse::Nanoseconds> Participants::rampBegins() const {
   if (!ramps()) return std::nullopt;
-  return schedule_.deviations.empty() ? 0 : pulse::PulseEngine::kRampBegins;
+  return schedule_.deviations.empty() ? 0 : pulse::EmergencyStops::kRampBegins;
 }
 
 bool Participants::ramps() const {

@@ -1,4 +1,4 @@
-#include "pulse/pin_ring.h"
+#include "port/pin_ring.h"
 
 namespace stepdriver::pulse {
 

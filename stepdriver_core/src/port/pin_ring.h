@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "pulse/record_ring.h"
+#include "port/record_ring.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {

@@ -52,11 +52,6 @@ inline std::int64_t skewOf(const MotorCounts& now, const MotorCounts& square, st
   return most - least;
 }
 
-/// The longest lateness that is caught up by the angle of a motor. After a longer one a rotor has
-/// come to rest where the field stands: catching up is no gentler then than starting again, and
-/// the axes of a line would be apart for that long.
-constexpr Nanoseconds kLongestCatchUp = 2'000'000;
-
 /// What the engine needs to know about an axis: its first motor, and all else.
 struct ChannelConfig : MotorSignals {
   /// Further motors, at most kMostMotors - 1: they step in the same write as the first one, with

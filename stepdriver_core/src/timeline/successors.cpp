@@ -1,4 +1,4 @@
-#include "successors.h"
+#include "timeline/successors.h"
 
 #include <algorithm>
 

@@ -1,0 +1,132 @@
+#include "guard/axis_guard.h"
+
+#include <algorithm>
+
+namespace stepdriver::pulse {
+namespace {
+
+// How often the in-position output is read at the end of a motion, if no edge is reported.
+constexpr Nanoseconds kLookPeriod = 1'000'000;
+
+bool hasAny(const ChannelConfig& config, std::optional<Signal> MotorSignals::*signal) {
+  const MotorSignals& first = config;
+  return (first.*signal).has_value() ||
+         std::any_of(config.twins.begin(), config.twins.end(),
+                     [signal](const MotorSignals& twin) { return (twin.*signal).has_value(); });
+}
+
+}  // namespace
+
+AxisGuard::AxisGuard(const ChannelConfig& config, ChannelState& state, WatchedLines& lines)
+    : config_(config),
+      state_(state),
+      lines_(lines),
+      all_motors_(static_cast<MotorSet>(motorBit(motors()) - 1)),
+      has_switch_(has(&MotorSignals::endstop_min) || has(&MotorSignals::endstop_max)),
+      idle_(!has_switch_ && !has(&MotorSignals::fault) && config.twins.empty()) {}
+
+bool AxisGuard::has(std::optional<Signal> MotorSignals::*signal) const {
+  return hasAny(config_, signal);
+}
+
+void AxisGuard::begin(bool squares, bool is_square) {
+  squares_ = squares;
+  if (is_square) square_lags_ = state_.lags;
+}
+
+void AxisGuard::reserve() {
+  reserved_ = true;
+  faulty_ = 0;  // it must be read again when the pins have been written
+}
+
+void AxisGuard::release() {
+  reserved_ = false;
+  unchecked_ = has(&MotorSignals::fault);
+}
+
+std::optional<Objection> AxisGuard::readFault(std::size_t number) {
+  const auto& fault = motor(number).fault;
+  if (!fault) return std::nullopt;
+  const int level = lines_.read(fault->line);
+  const bool faulty = level < 0 || (level != 0) == fault->active;
+  const bool was_faulty = (faulty_ & motorBit(number)) != 0;
+  if (faulty == was_faulty) return std::nullopt;
+  faulty_ ^= motorBit(number);
+  if (!faulty) return std::nullopt;
+  if (level < 0) return Objection{EndReason::kLineError, {-level, fault->line, true}};
+  ++state_.chip_faults;
+  state_.chip_at_fault = static_cast<std::uint8_t>(number);
+  return Objection{EndReason::kChipFault, {}};
+}
+
+std::optional<Objection> AxisGuard::mayStep(int direction) {
+  if (has_switch_ && direction != 0) {
+    for (std::size_t i = 0; i < motors(); ++i) {
+      if ((state_.still & motorBit(i)) != 0) continue;
+      if (auto objection = readSwitch(i, direction > 0)) return objection;
+    }
+  }
+  if (squares_ && state_.still != 0 && wouldSkew(direction)) {
+    return Objection{EndReason::kSkewed, {}};
+  }
+  return std::nullopt;
+}
+
+// A motor that squares stops at its own switch, and the others continue.
+std::optional<Objection> AxisGuard::readSwitch(std::size_t number, bool forward) {
+  const MotorSignals& signals = motor(number);
+  const auto& endstop = forward ? signals.endstop_max : signals.endstop_min;
+  if (!endstop) return std::nullopt;
+  const int level = lines_.read(endstop->line);
+  if (level < 0) return Objection{EndReason::kLineError, {-level, endstop->line, true}};
+  if ((level != 0) != endstop->active) return std::nullopt;
+  if (squares_) state_.still |= motorBit(number);
+  if (squares_ && state_.still != all_motors_) return std::nullopt;
+  return Objection{forward ? EndReason::kEndstopMax : EndReason::kEndstopMin, {}};
+}
+
+std::int64_t AxisGuard::skewAfter(int direction) const {
+  MotorCounts lags = state_.lags;
+  for (std::size_t i = 0; i < motors(); ++i) {
+    if ((state_.still & motorBit(i)) != 0) lags[i] -= direction;
+  }
+  return skewOf(lags, square_lags_, motors());
+}
+
+bool AxisGuard::wouldSkew(int direction) const {
+  const std::int64_t after = skewAfter(direction);
+  return after > config_.max_skew && after > skewAfter(0);
+}
+
+AxisGuard::Settling AxisGuard::settle(Nanoseconds now) {
+  std::size_t unsettled = motors();
+  for (std::size_t i = motors(); i-- > 0;) {
+    const auto& in_position = motor(i).in_position;
+    if (!in_position) continue;
+    const int level = lines_.read(in_position->line);
+    if (level < 0) {
+      failure_ = {-level, in_position->line, true};
+      return Settling::kFailed;
+    }
+    if ((level != 0) != in_position->active) unsettled = i;
+  }
+  if (unsettled == motors()) return Settling::kDone;
+  state_.unsettled = static_cast<std::uint8_t>(unsettled);
+  if (!settling_) settling_since_ = now;
+  settling_ = true;
+  const Nanoseconds latest = settling_since_ + config_.in_position_timeout;
+  if (now >= latest) {
+    state_.waited = now - settling_since_;
+    return Settling::kTooLong;
+  }
+  look_at_ = std::min(now + kLookPeriod, latest);
+  return Settling::kWaits;
+}
+
+// A plan without a step, as for another speed, doesn't begin the wait again.
+void AxisGuard::adopted(bool steps) {
+  if (steps) settling_ = false;
+  look_at_ = 0;
+}
+
+}  // namespace stepdriver::pulse
