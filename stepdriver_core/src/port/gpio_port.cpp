@@ -5,30 +5,18 @@
 namespace stepdriver::pulse {
 
 GpioPort::GpioPort(WatchedLines& lines, Clock& clock, std::size_t motors)
-    : lines_(lines), clock_(clock) {
-  writes_.reserve(motors);
-  channels_.reserve(motors);
+    : lines_(lines), clock_(clock), writes_(motors), channels_(motors) {
   played_.reserve(motors);
 }
 
-// The motors of a channel follow each other in the write. A pulse ends on each motor on which it
-// has begun, also if one has become still meanwhile.
-void GpioPort::add(std::size_t channel, const PulseTrain& train) {
-  for (std::size_t i = 0; i < train.motors(); ++i) {
-    if (!train.hasPulsed(i)) continue;
-    writes_.push_back(train.edgeOf(i));
-    channels_.push_back(channel);
-  }
-}
-
 bool GpioPort::play() {
-  if (const int error = lines_.write(writes_.data(), writes_.size())) {
+  if (const int error = lines_.write(writes_.data(), size_)) {
     playOneByOne(error);
     return false;
   }
   done_ = clock_.now();
   if (ring_ != nullptr) {
-    for (const gpio::LineWrite& write : writes_) record(write, done_);
+    for (std::size_t i = 0; i < size_; ++i) record(writes_[i], done_);
   }
   return true;
 }
@@ -36,8 +24,8 @@ bool GpioPort::play() {
 // Lines that the failed write has already set keep their level.
 void GpioPort::playOneByOne(int error) {
   played_.clear();
-  for (std::size_t i = 0; i < writes_.size(); ++i) {
-    const int its_own = writes_.size() > 1 ? lines_.write(&writes_[i], 1) : error;
+  for (std::size_t i = 0; i < size_; ++i) {
+    const int its_own = size_ > 1 ? lines_.write(&writes_[i], 1) : error;
     const Nanoseconds done = clock_.now();
     if (its_own == 0) record(writes_[i], done);
     played_.push_back({channels_[i], isFirst(i), done, {its_own, writes_[i].output}});

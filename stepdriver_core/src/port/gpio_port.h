@@ -31,16 +31,22 @@ class GpioPort {
 
   /// @name Edges of STEP, together
   /// @{
-  void begin() {
-    writes_.clear();
-    channels_.clear();
-  }
+  void begin() { size_ = 0; }
   /// The next edge of all motors of a channel that take part.
-  void add(std::size_t channel, const PulseTrain& train);
+  ///
+  /// The motors of a channel follow each other in the write. A pulse ends on each motor on which it
+  /// has begun, also if one has become still meanwhile.
+  void add(std::size_t channel, const PulseTrain& train) {
+    for (std::size_t i = 0; i < train.motors(); ++i) {
+      if (!train.hasPulsed(i)) continue;
+      train.putEdge(i, writes_[size_]);
+      channels_[size_++] = channel;
+    }
+  }
   /// Leaves out the edges of the channels for which that is true.
   template <typename Dropped>
   void drop(const Dropped& dropped);
-  std::size_t size() const { return writes_.size(); }
+  std::size_t size() const { return size_; }
   /// The channel of an edge.
   std::size_t channelOf(std::size_t edge) const { return channels_[edge]; }
   /// It is the edge of the first motor of its channel.
@@ -70,8 +76,9 @@ class GpioPort {
   WatchedLines& lines_;
   Clock& clock_;
   PinRing* ring_ = nullptr;
-  std::vector<gpio::LineWrite> writes_;
-  std::vector<std::size_t> channels_;  // by write
+  std::vector<gpio::LineWrite> writes_;  // the first size_ of them
+  std::vector<std::size_t> channels_;    // by write
+  std::size_t size_ = 0;
   std::vector<Played> played_;
   Nanoseconds done_ = 0;
 };
@@ -79,13 +86,12 @@ class GpioPort {
 template <typename Dropped>
 void GpioPort::drop(const Dropped& dropped) {
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < channels_.size(); ++i) {
+  for (std::size_t i = 0; i < size_; ++i) {
     if (dropped(channels_[i])) continue;
     writes_[kept] = writes_[i];
     channels_[kept++] = channels_[i];
   }
-  writes_.resize(kept);
-  channels_.resize(kept);
+  size_ = kept;
 }
 
 }  // namespace stepdriver::pulse

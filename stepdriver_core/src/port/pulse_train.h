@@ -47,14 +47,12 @@ class PulseTrain {
   /// @{
   /// A pulse begins on all motors but those.
   void beginPulse(MotorSet still) { pulsed_ = all_motors_ & static_cast<MotorSet>(~still); }
-  /// The line of a motor and its level after the next edge.
-  gpio::LineWrite edgeOf(std::size_t motor) const {
+  /// The line of a motor and its level after the next edge. It is put there member by member: the
+  /// processor would wait for a copy of a complete pair.
+  void putEdge(std::size_t motor, gpio::LineWrite& write) const {
     const Signal& step = stepOf(motor, direction_);
-    const bool toggled = (toggled_ & motorBit(motor)) != 0;
-    gpio::LineWrite write{};
     write.output = step.line;
-    write.level = step.active != (high_ || toggled);
-    return write;
+    write.level = step.active != (high_ || (toggled_ & motorBit(motor)) != 0);
   }
   /// Of a motor's DIR line.
   gpio::LineWrite turnOf(std::size_t motor, bool forward) const {

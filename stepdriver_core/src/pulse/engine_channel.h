@@ -87,6 +87,7 @@ struct EngineChannel {
   AxisGuard guard;
   PulseTrain train;
   Kin* kin = nullptr;
+  EngineChannel* next_of_kin = this;  // a ring through all of them
 
   std::uint64_t group = 0;  // of the last order; 0: no group
   bool slows = false;       // the last order brings it to rest

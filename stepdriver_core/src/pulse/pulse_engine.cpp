@@ -79,13 +79,12 @@ std::vector<ChannelConfig> withSharedChips(std::vector<ChannelConfig> channels,
 
 inline void PulseEngine::changed(Channel& channel) {
   if (channel.changed) return;
-  channel.changed = true;
-  changed_.push_back(&channel);
-  for (Channel* one : channel.kin->all) {
-    if (one->changed) continue;
+  Channel* one = &channel;
+  do {
+    if (!one->changed) changed_.push_back(one);
     one->changed = true;
-    changed_.push_back(one);
-  }
+    one = one->next_of_kin;
+  } while (one != &channel);
 }
 
 PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
@@ -122,8 +121,13 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
 void PulseEngine::add(std::size_t index, const ChannelConfig& config, Follower& follower,
                       Kin& kin) {
   channels_.at(index) = std::make_unique<Channel>(index, config, follower, lines_);
-  channels_[index]->kin = &kin;
-  kin.all.push_back(channels_[index].get());
+  Channel& channel = *channels_[index];
+  channel.kin = &kin;
+  if (!kin.all.empty()) {
+    channel.next_of_kin = kin.all.front();
+    kin.all.back()->next_of_kin = &channel;
+  }
+  kin.all.push_back(&channel);
 }
 
 std::size_t PulseEngine::addShared(const SharedAxes& shared,
@@ -162,10 +166,8 @@ Nanoseconds PulseEngine::serve() {
   if (meetLateness(now)) collectDue(now);
   writeSteps(now);
   scheduleChanged();
-  collectDue(now);
-  writeOthers(now);
-  writeHeartbeat(now);
-  scheduleChanged();
+  if (dues_.earliest() <= now) writeOthers(now);
+  if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
   serveStops();
   tell();
   const Nanoseconds due = std::min(dues_.earliest(), stops_.due([this] { return allSlow(); }));
@@ -446,6 +448,7 @@ void PulseEngine::written(Channel& channel, Nanoseconds now) {
 }
 
 void PulseEngine::writeOthers(Nanoseconds now) {
+  collectDue(now);
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
     const Action action = channel.action();
@@ -456,15 +459,16 @@ void PulseEngine::writeOthers(Nanoseconds now) {
       finish(channel, now);
     }
   }
+  scheduleChanged();
 }
 
 void PulseEngine::writeHeartbeat(Nanoseconds now) {
-  if (!heartbeat_ || now < heartbeat_->due()) return;
   const gpio::LineWrite write = heartbeat_->next();
   const int error = port_.write(write);
   if (!heartbeat_->done(error == 0, now)) return;
   // Whatever watches the line now takes the motors' power away.
   for (const auto& channel : channels_) fail(*channel, {error, write.output}, now);
+  scheduleChanged();
 }
 
 void PulseEngine::finish(Channel& channel, Nanoseconds now) {
