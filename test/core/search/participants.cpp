@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "guard/emergency_stops.h"
-#include "machine/path_plan.h"
-#include "machine/queued_path.h"
 #include "motor/input_shaping.h"
 #include "stepdriver_core/error.h"
 #include "support/constants.h"
 #include "support/corexy_bench.h"
 #include "support/gantry_bench.h"
+#include "trajectory/path_plan.h"
+#include "trajectory/queued_path.h"
 
 namespace stepdriver::search {
 namespace {
@@ -729,9 +729,8 @@ void Participants::noteLimits(const machine::SetLimits& set) {
   };
   lower(lowest.deceleration, std::min(set.limits.deceleration, set.limits.acceleration));
   lower(lowest.jerk, set.limits.jerk);
-  // They apply to the motion under way too.
-  const bool moves = controller_->snapshot()->axes.at(set.axis).state.moving;
-  if (moves || had_setpoints_[set.axis]) hulls_[set.axis].widen(stoppingWay(set.axis));
+  // Setpoints may be passed; a motion to a target keeps its limits if it would pass it otherwise.
+  if (had_setpoints_[set.axis]) hulls_[set.axis].widen(stoppingWay(set.axis));
 }
 
 void Participants::passes(std::size_t motor) {
@@ -1514,6 +1513,8 @@ void Participants::probeAxis(std::size_t axis) {
     const activity::Reply reply = ask(what, std::move(request), meaning);
     if (reply.failure) oracle_.complain(name + ": " + what + ": " + reply.failure->text);
   };
+  must("all limits", machine::SetLimits{axis, {}});
+  must("override 1", machine::SetSpeedOverride{1.0});
   must("wake", machine::Sleep{axis, false});
   must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
@@ -1556,7 +1557,7 @@ std::vector<std::string> Participants::run() {
     return !clients_[0].waits_for_stops && !clients_[1].waits_for_stops &&
            controller_->snapshot()->axes.front().state.held;
   };
-  if (!playUntil(played, kLongestCall) && !held()) {
+  if (!playUntil(played, kLongestCall) && !held() && !schedule_.may_last) {
     for (const auto& [id, asked] : open_) oracle_.complain(asked.name + " isn't answered");
     for (const Client& client : clients_) {
       if (client.waits_for_stops) oracle_.complain("the emergency stop isn't answered");
@@ -1569,7 +1570,7 @@ std::vector<std::string> Participants::run() {
     playUntil([&] { return clock_.now() >= later; }, kLongestCall);
   }
   script_ = false;
-  if (oracle_.complaints.empty()) checkEnds();
+  if (oracle_.complaints.empty() && !schedule_.may_last) checkEnds();
   if (oracle_.complaints.empty()) {
     checkInPosition();
     checkPower();
