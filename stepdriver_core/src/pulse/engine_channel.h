@@ -27,7 +27,7 @@ class Kin {
 
   /// A step of a channel has gone out: tells the places of the axes.
   virtual void stepped(EngineChannel& channel);
-  /// Tells where the axes are after all of them have ended early.
+  /// All axes have ended early: tells their places.
   virtual void halted() {}
 
   bool follows() const;     ///< an axis follows a profile
