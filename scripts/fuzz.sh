@@ -21,7 +21,7 @@ earlier runs have found, which remain in the folder fuzz of the build folder. Pr
 target. If one breaks a promise, it also prints why, and the file of the input. To try such a file again,
 give it as the argument of the target's program. With --build it only builds.
 
-With --repeatable, as in scripts/test.sh, each computer plays the same inputs: as many for each target as
+With --repeatable, as in scripts/test.sh --fuzz, each computer plays the same inputs: as many for each target as
 test/fuzz/repeatable.txt says, from seed 1, without those that earlier runs have found, and regardless of time.
 
 Exit code 0: nothing was found.

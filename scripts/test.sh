@@ -1,28 +1,30 @@
 #!/usr/bin/env bash
-# Installs, builds and runs every test. .ci/run calls it.
+# Installs, builds and tests; .ci/run calls it with --all.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 source "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/common.sh"
 
 usage() {
   cat <<'END'
-usage: scripts/test.sh [--lint] [--core] [--kernel] [--node] [--ros] [--sanitize] [--bad-days]
-                       [--soak] [--fuzz] [--arm64]
+usage: scripts/test.sh [--all | [--lint] [--core] [--kernel] [--node] [--ros] [--sanitize] [--bad-days]
+                       [--soak] [--fuzz] [--arm64]]
 
-Installs missing packages, builds, and runs the named parts; by default all but --soak.
+Installs missing packages, builds, and runs the named stages. Without an option it runs those that most
+changes need, --ros and --core without their longest searches: about a quarter of an hour on two processors.
 
+  --all   everything below but --soak, with the longest searches and the benchmarks of --core
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
           headers; the keys of package.xml; the links of the pages, and the files that they name; the table of
           their commands; the tests that docs/reliability.md names; the English of pages and comments
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, its Python package, and
-          programs that use the installed library; the exact results of its benchmarks; the pictures of docs/motion.md drawn
-          with this build
+          programs that use the installed library; the pictures of docs/motion.md drawn with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips
-          (test/kernel), with each libgpiod of this Debian; includes --core
+          (test/kernel), with each libgpiod of this Debian; with --node also the whole node on that kernel's
+          GPIO chips; includes --core
   --node  the catkin package and its rostests
   --ros   the same, its install space with all commands and the service, which other computers can reach
           the node, a package that depends on it, and the trace of a move, read by sigrok-cli; the commands
-          of the pages; with --kernel also the whole node on that kernel's GPIO chips
+          of the pages
   --sanitize  some tests of the core with AddressSanitizer and UndefinedBehaviorSanitizer, and with
           ThreadSanitizer; a node with each of them in a storm of requests
   --bad-days  floods of clients against a node (test/bad_days), for two seconds each
@@ -32,38 +34,38 @@ Installs missing packages, builds, and runs the named parts; by default all but 
           times of its steps, which must be those of this computer; a whole emulated machine that moves an
           axis by libgpiod (scripts/cross.sh)
 
-If a stage fails, the others still run. Exit code 0: every stage passed.
+The last lines are a table of the stages with their times. A stage has parts; if one of them fails, the others
+still run, and the table names it. Exit code 0: nothing failed.
 END
 }
 
-parts=() flood_seconds=2
+everything=(lint core kernel ros sanitize bad-days fuzz arm64)
+wanted=() thorough='' flood_seconds=2
 for argument; do
   case $argument in
-    --soak) parts+=(bad-days) flood_seconds=60 ;;
-    --lint | --core | --kernel | --node | --ros | --sanitize | --bad-days | --fuzz | --arm64) parts+=("${argument#--}") ;;
+    --all) wanted+=("${everything[@]}") thorough=ON ;;
+    --soak) wanted+=(bad-days) flood_seconds=60 ;;
+    --lint | --core | --kernel | --node | --ros | --sanitize | --bad-days | --fuzz | --arm64) wanted+=("${argument#--}") ;;
     -h | --help) usage && exit ;;
     *) usage >&2 && exit 2 ;;
   esac
 done
-((${#parts[@]} > 0)) || parts=(lint core kernel ros sanitize bad-days fuzz arm64)
-wants() { [[ " ${parts[*]} " == *" $1 "* ]]; }
-! wants kernel || wants core || parts+=(core)
-! wants ros || wants node || parts+=(node)
+((${#wanted[@]} > 0)) || wanted=(core ros)
+wants() { [[ " ${wanted[*]} " == *" $1 "* ]]; }
+! wants kernel || wants core || wanted+=(core)
+! wants ros || wants node || wanted+=(node)
 
 # ---- stages ----
 
-passed=0 failed=0 skipped=0 summary=''
-declare -A outcome
-# A stage that can't run here ends with this status, and writes its reason to log/skipped.
+declare -A outcome parts_that
+summary='' stage='' stage_start=0
+stages_passed=0 stages_failed=0 stages_skipped=0
+failed_parts=()
+# A part that can't run here ends with this status, and writes its reason to log/skipped.
 skip_status=77
 skip() {
   say "$*" >"$build/log/skipped"
   exit "$skip_status"
-}
-
-conclude() {
-  outcome[$1]=$2
-  summary+=$(printf '%-12s %-8s %s' "$1" "$2" "$3")$'\n'
 }
 
 # timed NAME FUNCTION: in a shell of its own, which writes the times of the processor, its own and that of
@@ -74,52 +76,75 @@ timed() {
   "$2"
   exit  # bash 5.0 forgets the trap without it
 }
-# kept NAME FUNCTION: the same, and what it prints is also kept in log/stage-NAME.log.
-kept() { timed "$1" "$2" 2>&1 | tee "$build/log/stage-$1.log"; }
-# processor_seconds NAME...: the sum of those.
+# kept NAME FUNCTION: the same, and what it prints is also kept in log/NAME.log.
+kept() { timed "$1" "$2" 2>&1 | tee "$build/log/$1.log"; }
+# processor_seconds PATTERN: the sum of the times in log/PATTERN.times.
 processor_seconds() {
-  cat "${@/#/$build/log/}" | awk -F '[ms ]+' '{ sum += 60 * ($1 + $3) + $2 + $4 } END { printf "%.0f", sum }'
+  # shellcheck disable=SC2086  # the pattern may match several, or none
+  (cat "$build/log"/$1.times 2>/dev/null || true) |
+    awk -F '[ms ]+' '{ sum += 60 * ($1 + $3) + $2 + $4 } END { printf "%.0f", sum }'
 }
-# took NAME START: how long a stage ran, and how long processors worked for it.
-took() { printf '%5d s %7d s' "$((SECONDS - $2))" "$(processor_seconds "$1.times")"; }
 
-# stage NAME FUNCTION [NEEDED...]: runs a function, unless a stage that it needs didn't pass.
+# stage NAME: ends the previous stage; the parts that follow belong to this one.
 stage() {
-  local name=$1 function=$2 needed start=$SECONDS
+  end_stage
+  stage=$1 stage_start=$SECONDS
+  parts_that=()
+  say "" "==== $stage"
+}
+# part NAME FUNCTION [NEEDED...]: runs a function as a part of the stage, unless a part that it needs, of any
+# stage ("core build"), didn't pass.
+part() {
+  local name=$1 function=$2 needed log=stage-$stage-$1
   for needed in "${@:3}"; do
     [[ ${outcome[$needed]:-} != passed ]] || continue
-    skipped=$((skipped + 1))
-    conclude "$name" skipped "needs $needed"
+    parts_that[waited]+=" $name"
     return
   done
-  say "" "==== $name"
-  run kept "$name" "$function"
+  say "---- $stage: $name"
+  run kept "$log" "$function"
   if ((run_status == 0)); then
-    passed=$((passed + 1))
-    conclude "$name" passed "$(took "$name" "$start")"
+    outcome[$stage $name]=passed
+    parts_that[passed]+=" $name"
   elif ((run_status == skip_status)); then
-    skipped=$((skipped + 1))
-    conclude "$name" skipped "$(tail -n 1 "$build/log/skipped")"
+    parts_that[skipped]+="; without $name: $(tail -n 1 "$build/log/skipped")"
   else
-    failed=$((failed + 1))
-    conclude "$name" FAILED "$(took "$name" "$start")"
-    failed_stages+=("$name")
+    parts_that[failed]+=" $name"
+    failed_parts+=("$log")
   fi
 }
-# The findings of a stage that failed, and its end, for a reader of the last lines of all output.
+# Writes the row of the stage into the table.
+end_stage() {
+  local result=passed note
+  [[ -n $stage ]] || return 0
+  note="${parts_that[failed]:+; failed:${parts_that[failed]}}${parts_that[waited]:+; not run:${parts_that[waited]}}"
+  note+=${parts_that[skipped]:-}
+  if [[ -n ${parts_that[failed]:-} ]]; then
+    result=FAILED
+    stages_failed=$((stages_failed + 1))
+  elif [[ -n ${parts_that[passed]:-} ]]; then
+    stages_passed=$((stages_passed + 1))
+  else
+    result=skipped
+    stages_skipped=$((stages_skipped + 1))
+  fi
+  summary+=$(printf '%-12s %-8s %5d s %7d s  %s' "$stage" "$result" "$((SECONDS - stage_start))" \
+    "$(processor_seconds "stage-$stage-*")" "${note#; }")$'\n'
+  stage=''
+}
+# The findings of a part that failed, and its end, for a reader of the last lines of all output.
 show_failure() {
-  local log=$build/log/stage-$1.log
+  local log=$build/log/$1.log
   say "" "==== why $1 failed ($log)"
   grep -E -A 10 "$signs_of_failure" "$log" | head -n 50 || true
   say "---- its end"
   tail -n 20 "$log"
 }
-failed_stages=()
 signs_of_failure=': Failure$|[*]{3}(Failed|Exception|Timeout)|\[FAILURE\]|(Thread|Address)Sanitizer:|runtime error:| error: '
 
 # clang-tidy and the builds with sanitizers take longest. They run in the background with low priority,
-# one after the other, from the kernel's stages on: many tests leave them a processor. The stage that needs
-# one waits for its end.
+# one after the other, once the core is tested: many of the other tests leave them a processor. The part that
+# needs one waits for its end.
 background_group=
 begin_background() {
   (($# > 0)) || return 0
@@ -163,7 +188,12 @@ own_files() {
   fi
 }
 
+# The format and the findings are those of Debian 12's clang; other versions differ.
+has_clang_14() { [[ $(clang-format --version) == *' 14.'* ]]; }
+needs_clang_14() { has_clang_14 || skip "needs clang 14, which Debian 12 has"; }
+
 check_format() {
+  needs_clang_14
   own_files '*.cpp' '*.h' | (cd "$root" && xargs -d '\n' clang-format --dry-run -Werror)
 }
 
@@ -188,6 +218,7 @@ check_doxygen() { bash "$root/scripts/doxygen.sh"; }
 # Checks each file with the compile commands of the build that compiles it. Only the adapter for the
 # installed version of libgpiod is compiled.
 tidy_all() {
+  in_group=1 quietly tidy-configure configure_tidy || return 1
   local status=0 together=--checks=-bugprone-suspicious-include  # a file of several includes .cpp files
   own_files '*.cpp' | grep -E '^(stepdriver_core|bench|test/core|test/kernel|test/bad_days/soak)/' |
     compiled_alone_by core | tidy core || status=1
@@ -209,7 +240,6 @@ configure_tidy() {
     cp "$src/test/.clang-tidy" "$build/tidy/core/test/" &&
     cp "$src/test/.clang-tidy" "$build/tidy/catkin/test/"
 }
-check_tidy_setup() { quietly tidy-configure configure_tidy; }
 # Those of the files on standard input that no other file includes.
 compiled_alone_by() {
   local name
@@ -233,7 +263,10 @@ tidy() {
     --header-filter="^$src/(stepdriver_core|stepdriver_ros|bench|test)/"
 }
 
-check_tidy() { await tidy_all; }
+check_tidy() {
+  needs_clang_14
+  await tidy_all
+}
 
 # Ubuntu 20.04 has an older pybind11.
 python_option() {
@@ -249,11 +282,17 @@ build_core() {
   quietly core-build build_core_quietly
 }
 build_core_quietly() {
-  configure_core "$strict" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
+  configure_core "${options[@]}" "-DSTEPDRIVER_BENCH=${thorough:-OFF}" "$(python_option)" &&
     cmake --build "$build/core" -j "$jobs"
 }
+# The search takes more than half of the time of all these tests: usually it plays a part of its schedules.
 test_core() {
-  (cd "$build/core" && ctest -j "$jobs" --timeout 300 --no-tests=error --output-on-failure)
+  local usual=()
+  if [[ -z $thorough ]]; then
+    export STEPDRIVER_SCHEDULES=5000
+    usual=(--exclude-regex ForEachPairOfRequests)
+  fi
+  (cd "$build/core" && ctest -j "$jobs" --timeout 300 --no-tests=error --output-on-failure "${usual[@]}")
 }
 
 check_pictures() { bash "$root/scripts/motion_pictures.sh" --check; }
@@ -276,6 +315,8 @@ test_lines_in_kernel() {
   STEPDRIVER_GPIO_SIM=1 bash "$src/test/kernel/run.sh" --timeout 300 -- "$1/test/core/gpio_tests" \
     --gtest_filter='*LinesConformance.*:Libgpiod*'
 }
+
+build_for_kernel() { quietly kernel-build cmake --build "$build/core" -j "$jobs" --target kernel_programs; }
 
 # Runs whole machines on that kernel, and compares their pulses with the kernel's own trace.
 test_waveform_in_kernel() {
@@ -314,11 +355,12 @@ build_gpiod2() {
 }
 
 build_node() {
-  quietly node-build build_catkin "$strict" &&
+  quietly node-build build_catkin "${options[@]}" &&
     quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
 }
 test_node() {
-  (cd "$build/catkin" && ctest -j "$jobs" --timeout 600 --no-tests=error --output-on-failure)
+  # Most of them wait for a node or for the rig, which moves in real time.
+  (cd "$build/catkin" && ctest -j "$((2 * jobs))" --timeout 600 --no-tests=error --output-on-failure)
 }
 
 # The shipped launch and configuration files on a chip whose lines have a Raspberry Pi's names, and other
@@ -469,7 +511,7 @@ sanitize_node() {
   return "$status"
 }
 build_node_tests() {
-  configure_catkin "$strict" && cmake --build "$build/catkin" -j "$jobs" --target "$@"
+  configure_catkin "${options[@]}" && cmake --build "$build/catkin" -j "$jobs" --target "$@"
 }
 sanitize_node_asan() { sanitize_node asan bring_up_test ending_test; }
 sanitize_node_tsan() { sanitize_node tsan ending_test; }
@@ -515,8 +557,8 @@ check_board() { cross --board arm64; }
 choose_build_folder
 rm -rf "$build/ros"
 rm -f "$build"/log/*.times
-install_packages core ccache "${parts[@]}" "$(wants node && echo ros plots panel ros-tests browser)" \
-  "$(wants ros && echo trace)" "$(wants core && echo python python-tests pictures bench)" \
+install_packages core ccache "${wanted[@]}" "$(wants node && echo ros plots panel ros-tests browser)" \
+  "$(wants ros && echo trace)" "$(wants core && echo python python-tests pictures ${thorough:+bench})" \
   "$(wants lint && echo python ros plots ros-tests bench)" \
   "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
   "$(wants fuzz && echo ros)"
@@ -526,78 +568,88 @@ install_packages core ccache "${parts[@]}" "$(wants node && echo ros plots panel
 # shares only results of the same options.
 strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
 [[ $(c++ -dumpversion) != 12* ]] || strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=ON
+# Several files are compiled as one, which takes half the time. Those of the core have the same path in each
+# build, seen from there, so that ccache compiles them once.
+options=("$strict" -DCMAKE_UNITY_BUILD=ON)
+export CCACHE_BASEDIR=$build
 
 later=()  # what runs in the background
 if wants lint; then
-  stage shell check_shell
-  stage doxygen check_doxygen
-  stage packages check_packages
-  stage command-table check_command_table
-  stage links check_links
-  stage reliability check_reliability
-  stage prose check_prose
-  # The format is that of Debian 12's clang; other versions format some lines differently.
-  if [[ $(clang-format --version) == *' 14.'* ]]; then
-    stage format check_format
-  else
-    skipped=$((skipped + 2))
-    conclude format skipped "needs clang-format 14, which Debian 12 has"
-    conclude tidy skipped "needs clang-tidy 14, which Debian 12 has"
-  fi
+  stage lint
+  part shell check_shell
+  part doxygen check_doxygen
+  part packages check_packages
+  part command-table check_command_table
+  part links check_links
+  part reliability check_reliability
+  part prose check_prose
+  part format check_format
+  ! has_clang_14 || later+=(tidy_all)
 fi
 if wants core; then
-  stage core-build build_core
-  stage core-tests test_core core-build
-  stage pictures check_pictures core-build
-fi
-if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
-  stage tidy-setup check_tidy_setup
-  [[ ${outcome[tidy-setup]} != passed ]] || later+=(tidy_all)
+  stage core
+  part build build_core
+  part tests test_core 'core build'
+  part pictures check_pictures 'core build'
 fi
 ! wants sanitize || later+=(build_core_asan build_node_asan build_core_tsan build_node_tsan)
 ! wants fuzz || later+=(build_fuzz)
 ! wants arm64 || later+=(build_arm64)
 begin_background "${later[@]}"
-if wants kernel; then
-  stage kernel test_kernel core-build
-  stage kernel-gpiod2 test_kernel_gpiod2 kernel
-fi
 if wants node; then
-  stage node-build build_node
-  stage node-tests test_node node-build
+  stage node
+  part build build_node
+  part tests test_node 'node build'
 fi
 if wants ros; then
-  ! wants kernel || stage kernel-node test_node_in_kernel kernel node-build
-  ! wants kernel || stage kernel-check test_check_in_kernel kernel node-build
-  stage install check_install node-build
-  stage dependent check_dependent install
-  stage operations check_operations install
-  stage fences check_fences install
-  stage trace check_trace install
-  stage docs check_docs install
+  stage package
+  part install check_install 'node build'
+  part dependent check_dependent 'package install'
+  part operations check_operations 'package install'
+  part fences check_fences 'package install'
+  part trace check_trace 'package install'
+  part pages check_docs 'package install'
 fi
-if wants lint && [[ ${outcome[tidy]:-} != skipped ]]; then
-  stage tidy check_tidy tidy-setup
+if wants kernel; then
+  stage kernel
+  part build build_for_kernel 'core build'
+  part lines test_kernel 'kernel build'
+  part gpiod2 test_kernel_gpiod2 'kernel lines'
+  ! wants node || part node test_node_in_kernel 'kernel lines' 'node build'
+  ! wants node || part check test_check_in_kernel 'kernel lines' 'node build'
+fi
+if wants lint; then
+  stage tidy
+  part tidy check_tidy
 fi
 if wants sanitize; then
-  stage asan-core sanitize_core_asan
-  stage asan-node sanitize_node_asan
-  stage tsan-core sanitize_core_tsan
-  stage tsan-node sanitize_node_tsan
+  stage sanitizers
+  part asan-core sanitize_core_asan
+  part asan-node sanitize_node_asan
+  part tsan-core sanitize_core_tsan
+  part tsan-node sanitize_node_tsan
 fi
-! wants bad-days || stage bad-days test_bad_days
-! wants fuzz || stage fuzz check_fuzz
+if wants bad-days; then
+  stage bad-days
+  part floods test_bad_days
+fi
+if wants fuzz; then
+  stage fuzz
+  part inputs check_fuzz
+fi
 if wants arm64; then
-  stage arm64 check_arm64
-  stage board check_board arm64
+  stage arm64
+  part rooms check_arm64
+  part board check_board 'arm64 rooms'
 fi
+end_stage
 
 for function in "${later[@]}"; do
   [[ ! -f $build/log/background-$function.times ]] || summary+=$(printf '  %-27s %7d s' "$function" \
-    "$(processor_seconds "background-$function.times")")$'\n'
+    "$(processor_seconds "background-$function")")$'\n'
 done
-for name in "${failed_stages[@]}"; do show_failure "$name"; done
-say "" "stage        result    time   processor time" "$summary" \
-  "In all $SECONDS s, and $(cd "$build/log" && processor_seconds ./*.times) s of processor time."
-say "$passed passed, $failed failed, $skipped skipped"
-((failed == 0))
+for log in "${failed_parts[@]}"; do show_failure "$log"; done
+say "" "stage        result     time  processor time" "$summary" \
+  "In all $SECONDS s, and $(processor_seconds '*') s of processor time."
+say "$stages_passed passed, $stages_failed failed, $stages_skipped skipped"
+((stages_failed == 0))

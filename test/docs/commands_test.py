@@ -193,7 +193,7 @@ def main():
     signal.signal(signal.SIGINT, signal.default_int_handler)
     table = yaml.safe_load(TABLE.read_text(encoding="utf-8"))
     wanted = sys.argv[1:] or pages.names()
-    with concurrent.futures.ThreadPoolExecutor(3) as readers:
+    with concurrent.futures.ThreadPoolExecutor(5) as readers:
         done = list(readers.map(lambda page: follow(page, table.get(page, [])), wanted))
     wrong = [text for texts, _ in done for text in texts]
     for text in wrong:
