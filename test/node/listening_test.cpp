@@ -156,6 +156,17 @@ TEST(Listening, JoystickOnTheLoopbackIsClosedToOtherComputers) {
   ros::param::del(space);
 }
 
+TEST(ListeningOfThePage, IsOnTheLoopbackUnlessTheArgumentSaysOtherwise) {
+  const Variable address("ROS_IP", kOtherAddress);
+  const Variable name("ROS_HOSTNAME", nullptr);
+  for (const char* file : {"axis.launch panel:=true", "panel.launch"}) {
+    const std::string dump =
+        std::string("roslaunch --dump-params " STEPDRIVER_SOURCES "/launch/") + file;
+    expectSays(outputOf(dump), "/panel/listen: 127.0.0.1");
+    expectSays(outputOf(dump + " listen:=192.0.2.1"), "/panel/listen: 192.0.2.1");
+  }
+}
+
 /// What `roslaunch --args` prints: the environment and the command of a node.
 std::string nodeOf(const std::string& file, const std::string& node, const std::string& arguments) {
   return outputOf("roslaunch --args " + node + " " + file + " " + arguments);
