@@ -6,9 +6,11 @@
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/node_handle.h>
+#include <ros/param.h>
 #include <ros/spinner.h>
 #include <ros/this_node.h>
 #include <sensor_msgs/JointState.h>
+#include <sensor_msgs/Joy.h>
 #include <std_msgs/Float64.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/Jog.h>
@@ -20,6 +22,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "support/call_service.h"
 #include "support/node_process.h"
@@ -316,6 +319,85 @@ TEST(Console, FindsADriverThatIsRestartedWithTheMaster) {
   terminal.press(" ");
   EXPECT_TRUE(terminal.waitFor("EMERGENCY STOP: the driver has stopped every axis"));
   terminal.press("q");
+}
+
+/// A node under test with the axes left and right, which are wheels, and a node that sends commands
+/// to it.
+class ClientNode : public testing::Test {
+ protected:
+  ClientNode() {
+    node.erase("axes/x");
+    for (const std::string name : {"left", "right"}) {
+      const std::string axis = "axes/" + name + "/";
+      node.set(axis + "driver", "a4988");
+      for (const std::string pin : {"step", "dir"}) node.set(axis + "pins/" + pin, name + pin);
+      node.set(axis + "microsteps", 16);
+      node.set(axis + "full_steps_per_round", 200);
+      node.set(axis + "wheel_diameter_mm", 100.0);
+      node.set(axis + "max_speed_mm_s", 500.0);
+      node.set(axis + "acceleration_mm_s2", 1000.0);
+      node.set(axis + "enable_on_start", true);
+    }
+    node.start();
+  }
+
+  /// @return a parameter of the node of that name.
+  std::string parameter(const std::string& name, const std::string& key) const {
+    return node.beside(name + "/" + key);
+  }
+  void launch(const std::string& name, const std::string& program) {
+    name_ = name;
+    const std::string space = node.beside("");
+    client = std::make_unique<NodeProcess>(
+        std::vector<std::string>{"__ns:=" + space.substr(0, space.size() - 1), "__name:=" + name},
+        program);
+  }
+  bool says(const std::string& words) const {
+    return waitUntil([&] { return client->output().find(words) != std::string::npos; });
+  }
+  void expectThatARestartedMasterFindsIt() {
+    const std::set<std::string> before = registered(node.beside(name_));
+    EXPECT_GE(before.size(), 4U);
+    master->kill();
+    EXPECT_TRUE(says("doesn't answer"));
+    master->start();
+    ASSERT_TRUE(master->answers());
+    EXPECT_TRUE(waitUntil([&] { return registered(node.beside(name_)) == before; }));
+    client->signal(SIGTERM);
+    EXPECT_EQ(client->waitForExit(kBound).value_or(-1), 0);
+    if (HasFailure()) std::fputs(client->output().c_str(), stderr);
+  }
+
+  NodeUnderTest node;
+  std::unique_ptr<NodeProcess> client;
+
+ private:
+  std::string name_;
+};
+
+TEST_F(ClientNode, OfAJoystickRegistersAgainWithARestartedMaster) {
+  ros::param::set(parameter("joystick", "axes/left/joystick_axis"), 0);
+  ros::param::set(parameter("joystick", "axes/left/max_speed_mm_s"), 50.0);
+  launch("joystick", kStepdriverJoystick);
+  auto sticks = ros::NodeHandle().advertise<sensor_msgs::Joy>(node.beside("joy"), 1);
+  const Recorder<Jog> jogs(node.full("jog"));
+  sensor_msgs::Joy deflected;
+  deflected.axes = {1.0F};
+  ASSERT_TRUE(waitUntil([&] {
+    sticks.publish(deflected);
+    return jogs.count() > 0;
+  })) << client->output();
+  expectThatARestartedMasterFindsIt();
+}
+
+TEST_F(ClientNode, OfABaseRegistersAgainWithARestartedMaster) {
+  ros::param::set(parameter("base", "separation_mm"), 300.0);
+  for (const std::string side : {"left", "right"}) {
+    ros::param::set(parameter("base", "wheels/" + side + "/side"), side);
+  }
+  launch("base", kStepdriverBase);
+  ASSERT_TRUE(says("Ready")) << client->output();
+  expectThatARestartedMasterFindsIt();
 }
 
 }  // namespace

@@ -25,8 +25,8 @@
 
 namespace stepdriver::base {
 
-/// From the topic `cmd_vel` to the driver's `jog`, in one message for all wheels, and to `move_to`
-/// of the steering; from the driver's `joint_states` to `odom` and the transform.
+/// Turns the topic `cmd_vel` into the driver's `jog`, in one message for all wheels, and into calls
+/// of the steering's `move_to`, and the driver's `joint_states` into `odom` and the transform.
 ///
 /// Its callbacks run in one thread, which also creates it and calls rest().
 class Base {
@@ -38,6 +38,9 @@ class Base {
 
   /// Stops all wheels that this node drives.
   void rest();
+
+  /// See LatchedMessages. Any thread.
+  bool lookAgain() { return latched_.lookAgain(); }
 
  private:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
@@ -60,7 +63,7 @@ class Base {
   const std::string driver_;
   Drive drive_;
   Odometry odometry_;
-  std::uint32_t joints_seq_ = 0;  // of the last message of all joints
+  std::uint32_t joints_seq_ = 0;  // the last message of all joints had this number
 
   std::optional<Drive::State> logged_state_;
   std::string logged_cause_;

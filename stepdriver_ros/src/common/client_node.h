@@ -11,6 +11,7 @@
 
 #include "end_requests.h"
 #include "loopback_only.h"
+#include "master_watch.h"
 #include "node_start.h"
 #include "stepdriver_core/error.h"
 
@@ -34,7 +35,9 @@ void shutdownAfterLastMessages();
 ///
 /// @param read_parameters a function without arguments.
 /// @param make a function of the node handle and the result of read_parameters(). It returns a
-///   pointer to an object with a function rest(), which is called at the end.
+///   pointer to an object with a function lookAgain(), which is called before this node registers
+///   again with a restarted master, in another thread and until it returns true, and a function
+///   rest(), which is called at the end.
 /// @return the exit code; anything thrown is logged as the reason not to start.
 template <typename ReadParameters, typename Make>
 int runClientNode(EndRequests& end_requests, const ReadParameters& read_parameters,
@@ -47,7 +50,11 @@ int runClientNode(EndRequests& end_requests, const ReadParameters& read_paramete
     closeToOtherComputers();
     end_requests.takeOverShutdownCall();
     const auto client = make(*node, parameters);
+    MasterWatch master(ros::this_node::getName() + "/get_loggers",
+                       loggedEvents([] {}, [&client] { return client->lookAgain(); }));
+    master.start();
     serveUntilEnd(end_requests);
+    master.stop();
     client->rest();
     shutdownAfterLastMessages();
     return kExitOk;

@@ -23,6 +23,7 @@ MasterWatch::MasterWatch(std::string service, Events events)
 MasterWatch::~MasterWatch() { stop(); }
 
 void MasterWatch::start() {
+  look();
   thread_ = std::thread([this] {
     pthread_setname_np(pthread_self(), "master");
     watch();
@@ -47,11 +48,10 @@ MasterWatch::Reading MasterWatch::reading() const {
 
 void MasterWatch::watch() {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (!ending_) {
+  while (!end_.wait_for(lock, kAskPeriod, [this] { return ending_; })) {
     lock.unlock();
     look();
     lock.lock();
-    end_.wait_for(lock, kAskPeriod, [this] { return ending_; });
   }
 }
 
@@ -115,6 +115,27 @@ void MasterWatch::registerAgain() {
     ++restarts_;
   }
   events_.registered(*registrations_);
+}
+
+MasterWatch::Events loggedEvents(const std::function<void()>& lost,
+                                 const std::function<bool()>& forgotten) {
+  MasterWatch::Events events;
+  events.lost = [lost] {
+    ROS_ERROR_NAMED("master",
+                    "The ROS master at %s doesn't answer. Clients that are connected are served; "
+                    "new ones can't find this node until the master is back",
+                    ros::master::getURI().c_str());
+    lost();
+  };
+  events.found = [] { ROS_INFO_NAMED("master", "The ROS master answers again"); };
+  events.forgotten = forgotten;
+  events.registered = [](const Registrations& all) {
+    ROS_WARN_NAMED("master",
+                   "The ROS master was restarted: %zu topics and %zu services are registered "
+                   "again. It has forgotten all parameters, also this node's",
+                   all.topics(), all.services());
+  };
+  return events;
 }
 
 }  // namespace stepdriver::ros_node

@@ -19,7 +19,7 @@ namespace stepdriver::ros_node {
 /// newer node has taken this one's name, nothing is registered again: the name is that one's.
 class MasterWatch {
  public:
-  /// What is called in the watch's thread.
+  /// What is called by start(), and then in the watch's thread.
   struct Events {
     std::function<void()> lost;   ///< the master no longer answers
     std::function<void()> found;  ///< it answers again
@@ -35,7 +35,8 @@ class MasterWatch {
   MasterWatch(const MasterWatch&) = delete;
   MasterWatch& operator=(const MasterWatch&) = delete;
 
-  /// Call it once everything is advertised.
+  /// Asks the master what is registered, and begins to watch it. Call it once everything is
+  /// advertised.
   void start();
   /// Waits at most for the answer to the current call, a second.
   void stop();
@@ -62,7 +63,7 @@ class MasterWatch {
   const std::string service_;
   const Events events_;
   XmlRpcCaller master_;
-  // Of the watch's thread.
+  // For start(), and then for the watch's thread only.
   std::optional<Registrations> registrations_;
   bool registered_ = true;
 
@@ -73,5 +74,12 @@ class MasterWatch {
   int restarts_ = 0;
   std::thread thread_;
 };
+
+/// Events that a node logs.
+///
+/// @param lost is called once that is logged.
+/// @param forgotten as in MasterWatch::Events.
+MasterWatch::Events loggedEvents(const std::function<void()>& lost,
+                                 const std::function<bool()>& forgotten);
 
 }  // namespace stepdriver::ros_node

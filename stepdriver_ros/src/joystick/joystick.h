@@ -19,7 +19,7 @@
 
 namespace stepdriver::joystick {
 
-/// From the topic `joy` to the driver's `jog`, and to the `enable` services of its axes.
+/// Turns the topic `joy` into the driver's `jog`, and calls the `enable` services of its axes.
 ///
 /// Repeats the velocities of deflected sticks at the configured rate; each message of the joystick
 /// takes effect at once. A message that can't be understood, or no message for the configured time,
@@ -33,6 +33,9 @@ class Joystick {
 
   /// Ends all jogs.
   void rest();
+
+  /// See LatchedMessages. Any thread.
+  bool lookAgain() { return latched_.lookAgain(); }
 
  private:
   struct Jogged {

@@ -185,27 +185,6 @@ void warnOfPositions(const machine::Machine& machine) {
   }
 }
 
-MasterWatch::Events loggedEvents(const std::function<void()>& lost,
-                                 const std::function<bool()>& forgotten) {
-  MasterWatch::Events events;
-  events.lost = [lost] {
-    ROS_ERROR_NAMED("master",
-                    "The ROS master at %s doesn't answer. Clients that are connected are served; "
-                    "new ones can't find this node until the master is back",
-                    ros::master::getURI().c_str());
-    lost();
-  };
-  events.found = [] { ROS_INFO_NAMED("master", "The ROS master answers again"); };
-  events.forgotten = forgotten;
-  events.registered = [](const Registrations& all) {
-    ROS_WARN_NAMED("master",
-                   "The ROS master was restarted: %zu topics and %zu services are registered "
-                   "again. It has forgotten all parameters, also this node's",
-                   all.topics(), all.services());
-  };
-  return events;
-}
-
 void stopForLostMaster(machine::Machine& machine) {
   ROS_ERROR_NAMED("master", "All axes come to rest: on_master_lost is stop");
   try {
