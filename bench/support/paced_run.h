@@ -12,12 +12,12 @@ namespace stepdriver::bench {
 struct PacedFigures {
   std::size_t edges = 0;  ///< active STEP edges, or wake-ups
   std::vector<pulse::Nanoseconds>
-      lateness;                    ///< of each edge, against the timeline at that time; sorted
-  std::uint64_t slips = 0;         ///< number of times that the timeline slid
+      lateness;             ///< how late each edge was, against the timeline at that time; sorted
+  std::uint64_t slips = 0;  ///< number of times that the timeline slid
   pulse::Nanoseconds slipped = 0;  ///< total time by which it slid
   std::size_t too_short = 0;       ///< pulses and pauses shorter than the chip's time
   std::size_t early = 0;           ///< steps before their planned time
-  double cpu = 0.0;                ///< of one core, of the whole process
+  double cpu = 0.0;                ///< part of one core that the whole process took
   int scheduler_error = -1;        ///< from pulse::RealtimeRights
 
   pulse::Nanoseconds percentile(double part) const;

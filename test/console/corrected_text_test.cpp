@@ -185,7 +185,8 @@ TEST(CorrectedText, EveryShippedConfigurationKeepsItsComments) {
     if (axes == file.as<config::ConfigValue::Map>()->end()) continue;
     std::vector<Findings> findings;
     for (const auto& [name, axis] : *axes->second.as<config::ConfigValue::Map>()) {
-      if (axis.as<config::ConfigValue::Map>()->count("driver") == 0) continue;  // of the joystick
+      if (axis.as<config::ConfigValue::Map>()->count("driver") == 0)
+        continue;  // it is an axis of the joystick
       findings.push_back(findingsOf(name));
       findings.back().wrong_way = true;
       if (axis.as<config::ConfigValue::Map>()->count("endstops") > 0) {

@@ -27,7 +27,7 @@ namespace {
 using config::AxisConfig;
 using config::ConfigValue;
 
-// Of limits that are computed in two ways.
+// Limits that are computed in two ways may differ by this part.
 constexpr double kRounding = 1e-6;
 
 bool same(const ConfigValue& a, const ConfigValue& b) {

@@ -95,8 +95,8 @@ void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
     ASSERT_EQ(pulse.forward, steps[k].direction > 0) << "step " << k;
     ASSERT_GE(pulse.time_ns, timeline + steps[k].time_ns) << "step " << k << " came too early";
     if (k + 1 == count) break;
-    // Of the longer one of the intervals before and after it. That of the first step begins with
-    // the plan.
+    // A late step makes up for a part of the longer one of the intervals before and after it. The
+    // interval before the first step begins with the plan.
     const std::int64_t before = steps[k].time_ns - (k > 0 ? steps[k - 1].time_ns : 0);
     const std::int64_t interval = std::max(before, steps[k + 1].time_ns - steps[k].time_ns);
     timeline = std::max(timeline, pulse.time_ns - steps[k].time_ns - madeUp(interval));

@@ -43,7 +43,7 @@ class MachineWaveform : public testing::Test {
 /// Compares pulses with the planned steps, beginning with the pulse `first`.
 ///
 /// The timeline may only slide to later times. A late pulse is made up for by at most madeUp().
-/// @param count number of steps to compare; there may be more steps and pulses.
+/// @param count number of steps to compare. There may be more steps and pulses.
 void expectAsPlanned(const std::vector<Pulse>& pulses, std::size_t first,
                      const std::vector<motion::Step>& steps, std::size_t count);
 

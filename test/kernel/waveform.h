@@ -61,7 +61,7 @@ const char* nameOf(Rule rule);
 
 struct Violation {
   Rule rule;
-  std::int64_t time_ns;  ///< of the edge that broke the rule
+  std::int64_t time_ns;  ///< when the edge came that broke the rule
   std::int64_t seen_ns;
   std::int64_t least_ns;  ///< the least allowed time; 0 if the rule has no time
 };

@@ -31,7 +31,8 @@ class FlightRecorder : public testing::Test {
  protected:
   void SetUp() override {
     node_.set("recorder/folder", folder_);
-    node_.set("recorder/seconds", 600.0);  // of the rig: 30 s
+    node_.set("recorder/seconds",
+              600.0);  // 30 s of the wall clock, as the rig runs 20 times as fast
   }
 
   std::vector<std::string> filesThatEndWith(const std::string& end) const {

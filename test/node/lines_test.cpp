@@ -90,7 +90,7 @@ TEST_F(LinesTest, KeepsToAVelocityADurationAndRelativeTargets) {
   EXPECT_TRUE(moveLine({0.01, 0.01}, true).success);
   const auto slow = moveLine({0.03, 0.04}, true, [](MoveLine::Request& r) {
     r.relative = true;
-    r.velocity = 0.025;  // of both axes together: 0.05 m in 2 s and the ramps
+    r.velocity = 0.025;  // along the line of 0.05 m, which takes 2 s and the ramps
   });
   EXPECT_TRUE(slow.success) << slow.message;
   ASSERT_EQ(slow.position.size(), 2U);

@@ -141,7 +141,7 @@ TEST_F(MoveActionTest, ANewerGoalTakesOverWithoutAStop) {
   other.sendGoal(goalTo(0.18));
   EXPECT_EQ(client->await(), State::PREEMPTED);
   client->expectEnd(MoveResult::REPLACED, "a move to 0.18 m took over");
-  client->cancelGoal();  // of a goal that is over
+  client->cancelGoal();  // the goal is over
   EXPECT_EQ(other.await(), State::SUCCEEDED);
   EXPECT_EQ(node.pulses(), 14400);
   for (const AxisStates& s : states.messages()) {

@@ -73,7 +73,7 @@ def confine(settings):
         except ValueError:
             continue  # newer than this library
         if number < 0:
-            continue  # of another architecture
+            continue  # it belongs to another architecture
         known += 1
         for arguments in conditions(call, settings):
             rules.add_rule(seccomp.ALLOW, call, *arguments)

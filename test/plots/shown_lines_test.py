@@ -11,7 +11,7 @@ from stepdriver_plots.svg_path import read_svg
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" %s>%s</svg>'
 MM = 'width="100mm" height="60mm" viewBox="0 0 100 60"'
 PX = 'width="100" height="60" viewBox="0 0 100 60"'
-BOX = [(10, 10), (30, 10), (30, 20), (10, 20), (10, 10)]  # of the paths with this name
+BOX = [(10, 10), (30, 10), (30, 20), (10, 20), (10, 10)]  # what the paths with this name enclose
 PATH = '<path d="M10 10H30V20H10Z"/>'
 ACROSS = '<path d="M0 15H100" stroke="black"/>'
 

@@ -189,7 +189,7 @@ class Axis:
     def __init__(self, name, parameters):
         self.name = name
         linear = "max_speed_mm_s" in parameters
-        self.factor, self.unit = UNITS["m" if linear else "rad"]  # of the page in one of the driver's
+        self.factor, self.unit = UNITS["m" if linear else "rad"]  # how many of the page's units are one of the driver's
         key = "mm" if linear else "deg"
         self.joint = parameters.get("joint", name)
         self.limits = tuple(parameters.get(f"{end}_position_{key}") for end in ("min", "max"))

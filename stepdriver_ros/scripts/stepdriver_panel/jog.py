@@ -20,7 +20,7 @@ class HeldJog:
         self._publish = publish
         self.timeout = timeout
         self._jog = None
-        self._ended = {}  # of each viewer, the number of its newest press that has ended
+        self._ended = {}  # for each viewer, the number of its newest press that has ended
 
     def press(self, viewer, press, axis, velocity, seen, now):
         """A message of the page. press: counts the presses of the page. seen: when the newest update that it

@@ -5,7 +5,7 @@ import math
 from .errors import BadDrawing, refuse_endless
 from .svg_path import read_svg
 
-MARGIN = 0.05  # of the smaller side, if a drawing is fitted into the axes' limits
+MARGIN = 0.05  # part of the smaller side that stays free if a drawing is fitted into the axes' limits
 
 
 def read_drawing(path):

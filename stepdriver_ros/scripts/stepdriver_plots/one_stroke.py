@@ -19,7 +19,7 @@ class OneStroke(namedtuple("OneStroke", "stroke length twice added")):
         return f"one stroke of {self.length:.0f} mm{': ' if more else ''}{' and '.join(more)}"
 
 
-# Of the drawing's size: points that are closer than this count as one. Points of an SVG file have rounding
+# Points that are closer than this part of the drawing's size count as one. Points of an SVG file have rounding
 # errors of up to 3e-6 of its page, if they are stroked with a transform.
 SAME = 1e-5
 

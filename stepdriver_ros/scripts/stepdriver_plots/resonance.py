@@ -9,7 +9,7 @@ Point = namedtuple("Point", "time position velocity")
 Peak = namedtuple("Peak", "frequency damping response")
 Shaper = namedtuple("Shaper", "name parts delays")
 
-POINTS = 12  # of a trajectory, in each period
+POINTS = 12  # points of a trajectory in each period
 RAMP = 3  # periods in which an oscillation rises, and falls again
 ALLOWED = 0.05  # part of the oscillation that EI and 2HUMP_EI, and a proposal, may leave
 UNKNOWN_DAMPING = 0.1

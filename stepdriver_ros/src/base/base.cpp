@@ -26,7 +26,7 @@ constexpr std::uint32_t kNewest = 1;
 constexpr std::uint32_t kSeveral = 10;
 constexpr double kDiagnosticsPeriod = 1.0;  // [s]
 constexpr double kTooTightLogPeriod = 5.0;  // [s]
-constexpr std::size_t kColumns = 6;         // of a covariance
+constexpr std::size_t kColumns = 6;         // a covariance has 6 by 6 numbers
 
 double steadyNow() { return ros::SteadyTime::now().toSec(); }
 

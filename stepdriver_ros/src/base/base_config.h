@@ -14,7 +14,7 @@ namespace stepdriver::base {
 enum class Side {
   kLeft,
   kRight,
-  kMiddle,  ///< of the rear axle of a tricycle
+  kMiddle,  ///< in the middle of the rear axle of a tricycle
   kSteered  ///< the wheel in front of a tricycle, which also drives
 };
 
@@ -67,7 +67,7 @@ struct BaseConfig {
 ///     side: left              # left or right; with a steering, also middle or steered
 ///     diameter_mm: 100.0      # [mm] of a wheel on a rotary axis only
 ///   right: {side: right, diameter_mm: 100.0}
-/// steering:                   # of a tricycle only
+/// steering:                   # only a tricycle has one
 ///   axis: steer               # a rotary axis: 0 is straight ahead, left is positive
 ///   wheelbase_mm: 400.0       # [mm] from the rear axle to the steered wheel
 ///   max_angle_deg: 85.0       # [deg] above 0 and at most 90

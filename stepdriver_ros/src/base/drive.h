@@ -50,7 +50,8 @@ class Drive {
 
   /// @param wanted finite numbers.
   void command(const Twist& wanted, double now);
-  /// @param wheels, steering in the order of the kinematics; the last one only if there is one.
+  /// @param wheels in the order of the kinematics.
+  /// @param steering has a meaning only if the base has a steering.
   void report(const std::vector<AxisReport>& wheels, const AxisReport& steering, double now);
   /// The driver's factor of all velocities. It is multiplied after the commands, and above 1 the
   /// driver limits each wheel by itself.
@@ -109,8 +110,8 @@ class Drive {
   std::string cause_;
   double stopped_at_ = kNever;
   double asked_at_ = kNever;
-  Twist twist_;               // of the last orders, without a steering
-  double speed_ = 0.0;        // of the last orders, with a steering [m/s]
+  Twist twist_;               // what the last orders drive, without a steering
+  double speed_ = 0.0;        // [m/s] the same with a steering
   std::vector<double> told_;  // [unit/s] to the wheels; empty: rest, and they were told
   // Since when an axis stands that should turn, in the order of the wheels; the last is the
   // steering.

@@ -44,7 +44,7 @@ struct SteeredMotion {
 };
 
 /// The steering for a velocity. If the turn is too tight for it, the linear velocity is kept and
-/// the curvature is the highest possible; a turn on the spot then is standstill.
+/// the curvature is the highest possible. A turn on the spot is then standstill.
 SteeredMotion steeredMotion(const Steering& steering, const Twist& wanted);
 
 /// The velocity of a tricycle whose steered wheel has this speed [m/s] at this angle [rad].

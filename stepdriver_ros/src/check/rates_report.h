@@ -9,7 +9,7 @@
 
 namespace stepdriver::check {
 
-/// The measured times; without channels, only those of the wake-ups.
+/// The measured times. Without channels, it has only those of the wake-ups.
 std::string measurementsText(const std::vector<config::AxisConfig>& axes,
                              const pulse::Capability& capability);
 

@@ -80,7 +80,8 @@ class LatchedMessages {
 
  private:
   struct Publisher {
-    /// Of its process; empty: it had ended when it was looked for. No value: it isn't known.
+    /// The address of its process. Empty: it had ended when it was looked for. No value: it isn't
+    /// known.
     std::optional<std::string> address;
     boost::weak_ptr<ros::M_string> connection;  // the last one
     std::uint64_t turn = 0;                     // when it was met last

@@ -22,7 +22,7 @@ std::optional<Publishers> MasterDirectory::publishers() {
   if (!state || state->code != 1) return std::nullopt;
   Publishers publishers;
   try {
-    XmlRpc::XmlRpcValue& topics = state->value[0];  // of [topic, [node, ...]]
+    XmlRpc::XmlRpcValue& topics = state->value[0];  // each is [topic, [node, ...]]
     for (int i = 0; i < topics.size(); ++i) {
       std::vector<std::string>& names = publishers[static_cast<std::string>(topics[i][0])];
       XmlRpc::XmlRpcValue& nodes = topics[i][1];

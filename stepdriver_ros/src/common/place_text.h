@@ -7,7 +7,7 @@
 
 namespace stepdriver::ros_node {
 
-/// A place without its unit; the rounding of sums doesn't show at 0.
+/// A place without its unit. The rounding of sums doesn't show at 0.
 inline std::string placeNumber(double position, double steps_per_unit) {
   return roundedText(std::abs(position) * steps_per_unit < 0.5 ? 0.0 : position);
 }

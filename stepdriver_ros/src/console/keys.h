@@ -48,8 +48,8 @@ enum class JogSpeed { kSlow, kFast };
 /// The command of a key.
 struct Command {
   Action action = Action::kHelp;
-  int direction = 0;                 ///< of a jog or a step: -1 or 1
-  JogSpeed speed = JogSpeed::kSlow;  ///< of a jog
+  int direction = 0;                 ///< a jog or a step goes there: -1 or 1
+  JogSpeed speed = JogSpeed::kSlow;  ///< how fast a jog is
   int index = 0;                     ///< index of the axis to choose, from 0
 };
 

@@ -10,7 +10,7 @@
 namespace stepdriver::console {
 namespace {
 
-constexpr int kFewestMessages = 3;  // rows; they come before the help
+constexpr int kFewestMessages = 3;  // rows of messages that the help leaves free
 
 std::string secondsText(double seconds) { return fmt::format("{:.1f} s", seconds); }
 
@@ -201,10 +201,10 @@ std::vector<Row> helpRows(const Session& session, int columns) {
   return rows;
 }
 
-/// The help leaves room for messages; the whole one, which was asked for, for a single one only. It
-/// is cut if it doesn't fit.
+/// The short help leaves room for messages. The whole help, which the user has asked for, leaves
+/// room for a single message, and is cut if it doesn't fit.
 std::vector<Row> takeHelp(const Session& session, int columns, Body& body) {
-  constexpr int kLines = 2;  // of '-', above the messages and above the help
+  constexpr int kLines = 2;  // those of '-' above the messages and above the help
   std::vector<Row> rows = helpRows(session, columns);
   if (!session.showsHelp()) return body.takeWhole(std::move(rows), kFewestMessages + kLines);
   const int room = body.left() - kLines - 1;
@@ -223,7 +223,7 @@ std::vector<Row> messageRows(const Session& session, int columns, int room) {
     const std::string times = message->times > 1 ? fmt::format(" ({} times)", message->times) : "";
     const std::vector<Row> lines = rowsOf(message->text + times, columns);
     if (static_cast<int>(rows.size() + lines.size()) > room) {
-      // Of the newest message, show at least the beginning.
+      // At least the beginning of the newest message is shown.
       if (rows.empty()) rows.assign(lines.begin(), lines.begin() + room);
       break;
     }

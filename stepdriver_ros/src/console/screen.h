@@ -17,7 +17,7 @@ struct Row {
 /// The contents of the screen: at most this many rows, each of at most this many ASCII characters.
 /// If something doesn't fit, the least important parts are left out, and a row says so.
 ///
-/// @param rows, columns of the window; at least 1.
+/// @param rows, columns size of the window, at least 1.
 std::vector<Row> draw(const Session& session, int rows, int columns, double now);
 
 }  // namespace stepdriver::console

@@ -33,7 +33,7 @@ struct Call {
   std::string axis;       ///< empty: all
   double distance = 0.0;  ///< [m|rad] of a step
   double position = 0.0;  ///< [m|rad] to go to
-  double factor = 1.0;    ///< of a speed override
+  double factor = 1.0;    ///< a speed override of 1.0 changes nothing
 
   /// The call in words: `x: home`. Only one call of a name is in progress at a time.
   std::string name() const;

@@ -15,7 +15,7 @@ namespace stepdriver::console {
 /// The terminal as a screen of rows. The destructor restores the terminal. Output of the process
 /// doesn't disturb the screen meanwhile: printed() returns it.
 ///
-/// For one thread; only one object at a time.
+/// One thread uses it, and there is only one object at a time.
 class Terminal {
  public:
   /// @throw Error if standard input or output is no terminal, or an unsuitable one.

@@ -17,7 +17,7 @@ class RefusalLog {
 
  private:
   std::mutex mutex_;
-  std::map<std::string, ros::SteadyTime> said_;  // of the last second
+  std::map<std::string, ros::SteadyTime> said_;  // the reasons of the last second
 };
 
 /// Logs why a service call or a goal was refused.

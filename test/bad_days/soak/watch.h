@@ -11,7 +11,7 @@ namespace stepdriver::soak {
 /// What a soak has found so far.
 struct Findings {
   std::uint64_t edges = 0;
-  std::int64_t violations = 0;  ///< of the chips' times, as the other side of the lines has seen
+  std::int64_t violations = 0;  ///< chips' times that the other side of the lines saw violated
   std::int64_t mismatches = 0;  ///< positions that weren't the counts of the edges
   std::int64_t errors = 0;      ///< anything else that must not happen
 

@@ -17,8 +17,8 @@ using test::Bench;
 using test::linearAxis;
 using test::violationsOf;
 
-// Of the rig, in real time: a thread reports the edge of an alarm some steps later, and later still
-// on a busy computer.
+// The rig's speed is real time: a thread reports the edge of an alarm some steps later, and later
+// still on a busy computer.
 constexpr double kSpeed = 1.0;
 
 /// An axis whose driver has an alarm output that is high at a fault, as no named chip with RESET

@@ -83,7 +83,7 @@ TEST(Chip, Lv8729DecodesAllEightCodes) {
                {"HHH", 128}});
 }
 
-/// Of chips with two microstep pins: the mode of LL, HL, LH and HH.
+/// A chip with two microstep pins, and the mode of LL, HL, LH and HH.
 struct TwoPinCodes {
   const char* chip;
   int low_low, high_low, low_high, high_high;

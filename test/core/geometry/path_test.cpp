@@ -146,7 +146,7 @@ std::vector<ContourSegment> gentleLines(std::mt19937& random) {
   return lines;
 }
 
-// Of gentle lines: the deviation, continuity, and a derivative that isn't small.
+// What gentle lines must keep: the deviation, continuity, and a derivative that isn't small.
 void expectGentle(const Contour& contour, const std::vector<ContourSegment>& lines, int* overlaps) {
   ContourPoint point;
   ContourPoint given;
@@ -409,7 +409,7 @@ void expectRounded(Continuity continuity) {
         struct Change {
           double direction;
           double curvature;
-          double rounding;  // of the curvature
+          double rounding;  // by which the curvature is rounded
         };
         const auto change = [&](double away) {
           const Shape in = shape_at(segment, edge - away);

@@ -24,7 +24,7 @@ constexpr long double kSteps = 80'000.0L;  // microsteps/m
 constexpr long double kLead =
     1e-3L + 4e-7L;  // s from a request to its motion: 1 ms, and DIR's times
 
-/// Phases of constant jerk, one after the other, of one axis; at rest before and after.
+/// One axis in phases of constant jerk, one after the other, and at rest before and after them.
 class Course {
  public:
   explicit Course(long double start = 0.0L) : start_(start) {}

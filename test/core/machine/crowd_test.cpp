@@ -29,7 +29,7 @@ using test::within;
 
 constexpr unsigned kClients = 4;
 constexpr unsigned kRounds = 150;
-constexpr int kRequests = 12;  // of each client, in a round
+constexpr int kRequests = 12;  // requests of each client in a round
 constexpr double kCrowdSpeed = 10.0;
 const std::vector<std::string> kNames = {"x", "y", "z"};
 

@@ -180,10 +180,11 @@ class Hull {
 
 // The microstep itself, half a one of each axis, and what the plan may deviate by.
 constexpr double kNear = 1.0 + 0.71 + 0.2;
-// Of a speed: each of two steps may come too soon or too late by a hundredth of a microstep, in
-// which cubics replace a quintic, and by as much where a plan leaves out what makes no difference.
+// A speed that is measured between two steps may be this much too high: each of them may come too
+// soon or too late by the hundredth of a microstep within which cubics replace a quintic, and by as
+// much again where a plan leaves out what makes no difference.
 constexpr double kMostOver = 1.05;
-constexpr double kRounding = 2e-9;  // s, of the times of two steps
+constexpr double kRounding = 2e-9;  // [s] the times of two steps are rounded by this
 
 void expectGoodSteps(const Drawn& drawn, const PlannedPath& path) {
   const Hull hull(drawn);

@@ -37,7 +37,7 @@ using test::Place;
 
 class PathQueue : public test::PathBench {
  protected:
-  /// The first segments of a path; the others follow.
+  /// The first segments of a path. The others follow.
   CoordinatedMove begin(const PathRequest& whole, std::size_t count) {
     whole_ = whole;
     fed_ = count;
@@ -376,7 +376,7 @@ TEST_F(PathQueue, EndsWithEverythingThatEndsAPath) {
     const char* name;
     std::function<void()> end;
     MoveEnd how;
-    const char* why;  // of the refusal of an append
+    const char* why;  // the reason by which an append is refused
   };
   const std::vector<Ending> endings = {
       {"stop", [this] { machine().stop(); }, MoveEnd::kStopped, "it was stopped"},

@@ -199,7 +199,7 @@ TEST_F(PositionPoints, TakeUpTheBacklash) {
 // comes while the axes still follow the one before it.
 class StreamedPoints : public PositionPoints {
  protected:
-  // Of the points.
+  // Which velocities the points contain.
   enum class Velocities { kNone, kZero, kOfTheStream };
 
   // The set point moves along a sine of 0.2 m and 0.25 Hz.

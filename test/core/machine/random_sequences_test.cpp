@@ -27,8 +27,8 @@ using test::linearAxis;
 using test::violationsOf;
 
 constexpr int kShards = 10;
-constexpr int kBatches = 50;     // of each shard, on a machine of its own
-constexpr int kSequences = 200;  // in each batch
+constexpr int kBatches = 50;     // batches of each shard, each on a machine of its own
+constexpr int kSequences = 200;  // sequences in each batch
 
 constexpr double kSpeed = 0.1;         // m/s
 constexpr double kAcceleration = 2.0;  // m/s^2
@@ -36,7 +36,7 @@ constexpr double kDeceleration = 1.5;  // m/s^2
 constexpr double kStopping = 3.0;      // m/s^2
 constexpr double kJerk = 60.0;         // m/s^3
 constexpr double kReach = 0.02;        // m
-constexpr int kStopTurns = 30;         // of 10 ms; no stop from kSpeed takes longer
+constexpr int kStopTurns = 30;         // turns of 10 ms, and no stop from kSpeed takes longer
 constexpr double kStepsPerUnit = 80'000.0;
 constexpr int kMicrosteps = 16;
 
@@ -268,7 +268,7 @@ class Batch {
   const bool smooth_;
   Bench bench_;
   std::vector<Watched> axes_{{"x"}, {"y"}};
-  std::size_t first_edge_ = 0;  // of the sequence
+  std::size_t first_edge_ = 0;  // the first edge of the sequence
   double slipped_ = 0.0;        // s, when it began
   int lines_ = 0;
   int endstops_ = 0;

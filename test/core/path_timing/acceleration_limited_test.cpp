@@ -253,8 +253,8 @@ TEST(ContourMotion, IsNearlyTimeOptimalWithFewKnots) {
 // the last ones here, knots 20 us apart are too few for that.
 TEST(ContourMotion, IsNearlyTimeOptimalOnDenseChords) {
   struct Case {
-    double length;  // [microsteps] of a chord
-    double most;    // of the time that the fine grid takes
+    double length;  // [microsteps] the length of a chord
+    double most;    // at most this part of the time that the fine grid takes
   };
   constexpr int kChords = 200;
   for (const Case& each : {Case{30.0, 1.02}, Case{10.0, 1.03}, Case{3.0, 1.03}, Case{0.3, 1.09}}) {

@@ -375,7 +375,7 @@ class Judge {
 
   std::int64_t count() const { return count_; }
 
-  /// Of the sum of all axes, as the engine does when a profile begins, is replaced or ends.
+  /// Follows the sum of all axes, as the engine does when a profile begins, is replaced or ends.
   /// @param until_ns when the engine begins another sum
   /// @param most steps
   /// @return the number of steps

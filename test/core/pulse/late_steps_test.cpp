@@ -37,7 +37,7 @@ class LateSteps : public PulseEngineTest {
     runUntil(from);
     waitUntil(until);
   }
-  // Of the k-th step of a cruise.
+  // When the k-th step of a cruise is planned.
   static Nanoseconds planned(std::size_t k) {
     return kMotionStart + kStepInterval / 2 + static_cast<Nanoseconds>(k) * kStepInterval;
   }

@@ -26,7 +26,7 @@ constexpr std::size_t kAxes = 3;
 struct Delay {
   const char* name;
   Nanoseconds length;
-  double speed;  ///< of the path [microsteps/s]
+  double speed;  ///< [microsteps/s] along the path
   bool faults;
 };
 
@@ -136,9 +136,9 @@ INSTANTIATE_TEST_SUITE_P(
 
 struct DelayInPulse {
   const char* name;
-  bool in_write;  ///< of the first edge of a pulse; otherwise between the two edges
+  bool in_write;  ///< in that of the first edge of a pulse, otherwise between the two edges
   Nanoseconds length;
-  double speed;  ///< of the path [microsteps/s]
+  double speed;  ///< [microsteps/s] along the path
   bool faults;
 };
 
@@ -196,7 +196,7 @@ TEST_F(DelayedLine, CountsOnceWhereTheWriteIsSlowToo) {
   follow(cruise(kMillisecond, 0, 100, 1000.0));
   runUntil(50 * kMillisecond);
   ASSERT_EQ(engine->state().slips, 0U);
-  lines.write_cost = 600'000;  // of an interval of 1 ms
+  lines.write_cost = 600'000;  // more than a half of the interval of 1 ms
   clock.waitUntil(clock.now() + 3 * kMillisecond);
   const Nanoseconds due = engine->serve();  // one pulse, late, and slow
   lines.write_cost = 0;

@@ -14,7 +14,7 @@
 namespace stepdriver::pulse {
 namespace {
 
-/// Of the thread with that name: "0-3"; empty: there is none.
+/// The processors that the thread with that name may use, as "0-3". Empty: there is no such thread.
 std::string processorsOf(const std::string& thread) {
   for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
     std::ifstream status(task.path() / "status");

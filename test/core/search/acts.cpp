@@ -82,8 +82,8 @@ Act beginPath() {
           }};
 }
 
-/// The path is ended in motion, or when it waits at its end; with a segment, or with nothing but
-/// the end.
+/// The path is ended in motion, or when it waits at its end. It ends with a segment, or with
+/// nothing but the end.
 std::deque<Turn> feeds(std::size_t steps) {
   const auto pause = static_cast<pulse::Nanoseconds>(1 + steps % 13 * 30) * kMillisecond;
   return {{0, beginPath()}, {pause, append("end the path", steps % 2 == 0 ? 0.0 : 0.002, true)}};

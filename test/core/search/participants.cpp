@@ -40,7 +40,7 @@ constexpr std::size_t kMostSteps = 200'000;
 /// [microsteps] A motion may be outside of its hull by one, and half of one is between a target and
 /// the place nearest to it. Motors that axes share step one after the other.
 constexpr double kHullTolerance = 1.51;
-/// Of an axis with a brake. [mm/s]
+/// The load of an axis with a brake falls at this speed. [mm/s]
 constexpr double kLoadFalls = 20.0;
 /// How far the second motor of an axis is ahead at the start. [mm]
 constexpr double kRacked = 1.5;
@@ -1047,7 +1047,7 @@ machine::PathSegment lineTo(std::vector<double> end) {
   return segment;
 }
 
-// Of any path that is posted here.
+// The tolerance of any path that is posted here.
 constexpr double kPathTolerance = 0.0012;  // m
 
 Meaning::Reach reachOfPath(double size, double tolerance) {

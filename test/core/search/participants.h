@@ -169,9 +169,9 @@ class Participants : private machine::ShellCore::Host {
     bool begins_later = false;           ///< not when it is answered
     std::optional<std::size_t> enables;  ///< this axis
     bool relative = false;
-    std::vector<double> ways;  ///< of a relative goal, by goal
+    std::vector<double> ways;  ///< how far a relative goal is, for each goal
     std::vector<std::optional<double>> targets;
-    std::array<std::size_t, kAxes> orders{};  ///< of each axis, when the call was served
+    std::array<std::size_t, kAxes> orders{};  ///< the orders of each axis when the call was served
     pulse::Nanoseconds posted = 0;
     std::size_t posted_step = 0;
   };
@@ -337,7 +337,7 @@ class Participants : private machine::ShellCore::Host {
   std::array<axis::AxisLimits, kAxes> lowest_limits_{};
   std::array<bool, kAxes> waits_{};  // something that begins later was asked of it
   std::array<std::vector<double>, kAxes> path_begins_;     // on the rig
-  std::array<std::vector<std::size_t>, kAxes> path_axes_;  // of the last path of each axis
+  std::array<std::vector<std::size_t>, kAxes> path_axes_;  // the axes of the last path of each axis
 
   std::size_t steps_ = 0;
   std::size_t script_began_ = 0;

@@ -35,7 +35,7 @@ inline void giveDrivers(config::AxisConfig& axis, const driver::DriverChip& chip
 }
 
 /// The axis y with the motors left and right, each with both switches, 80 microsteps/mm. Its homing
-/// is homingAxis()'s; the motors may get 6 mm apart.
+/// is homingAxis()'s. The motors may get 6 mm apart.
 inline config::AxisConfig gantryAxis() {
   config::AxisConfig config = homingAxis("y");
   static_cast<config::MotorConfig&>(config) = motorNamed("left");

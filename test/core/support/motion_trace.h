@@ -17,11 +17,11 @@ namespace stepdriver::test {
 class MotionTrace {
  public:
   struct Step {
-    double time = 0.0;       ///< [s] of the edge, after the trace began
-    std::int64_t count = 0;  ///< of the axis after the edge
+    double time = 0.0;       ///< [s] when the edge came, after the trace began
+    std::int64_t count = 0;  ///< [microsteps] where the axis is after the edge
   };
 
-  /// @param bench outlives the trace; its axes are at 0.
+  /// @param bench outlives the trace, and its axes are at 0.
   explicit MotionTrace(Bench& bench) : bench_(bench), begin_ns_(bench.clock.now()) {}
 
   double now() const { return seconds(bench_.clock.now()); }

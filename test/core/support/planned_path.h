@@ -46,7 +46,7 @@ using AxisSteps = std::vector<std::pair<std::int64_t, int>>;
 struct PlannedPath {
   machine::PathPlan plan;
   std::shared_ptr<const axis::SharedPath> path;
-  std::vector<std::shared_ptr<const motion::Profile>> curves;  ///< of each axis
+  std::vector<std::shared_ptr<const motion::Profile>> curves;  ///< one for each axis
 
   AxisSteps steps(std::size_t axis) const { return motion::stepsOf(*curves[axis]); }
   std::int64_t endCount(std::size_t axis) const {

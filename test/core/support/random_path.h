@@ -23,8 +23,8 @@ struct RandomContour {
   }
 };
 
-/// Of 1 to 4 axes and 1 to 10 segments of every shape, with ends on whole microsteps. Tolerances
-/// are 0, or half a microstep or more: rounding by less makes no step.
+/// A contour of 1 to 4 axes and 1 to 10 segments of every shape, with ends on whole microsteps.
+/// Tolerances are 0, or half a microstep or more: rounding by less makes no step.
 inline RandomContour randomContour(std::mt19937& random) {
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);

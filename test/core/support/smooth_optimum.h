@@ -31,9 +31,9 @@ class SmoothOptimum {
     std::vector<double> third;
   };
 
-  /// @param places the first and the last one at rest. @param x [unit^2/s^2] there; a motion to
-  /// begin
-  ///   with, which is slowed down until it is within the limits.
+  /// @param places the motion is at rest at the first and at the last one.
+  /// @param x [unit^2/s^2] at the places: a motion to begin with, which is slowed down until it is
+  ///   within the limits.
   SmoothOptimum(std::vector<Place> places, const std::vector<motion::ContourLimits>& limits,
                 std::vector<double> x)
       : places_(std::move(places)), limits_(limits), x_(std::move(x)) {
@@ -240,7 +240,7 @@ class SmoothOptimum {
   std::vector<Place> places_;
   const std::vector<motion::ContourLimits>& limits_;
   std::vector<double> x_;
-  std::vector<Three> slope_;  // of x at the places between the ends, from its neighbours
+  std::vector<Three> slope_;  // that of x at the places between the ends, from its neighbours
   std::vector<Three> bend_;
 };
 

@@ -32,7 +32,7 @@ struct ThreadCalls {
   std::atomic<std::int64_t> page_faults{0};  ///< until the last call of notePageFaults()
   std::atomic<std::int64_t> page_faults_before{0};
   std::atomic<pid_t> thread{0};
-  std::atomic<bool> memory_locked{false};  ///< of the process
+  std::atomic<bool> memory_locked{false};  ///< whether the process has locked its memory
 };
 
 /// The counts of the process; set before a thread is watched.

@@ -88,7 +88,8 @@ double timeToFall(double v, double change, double rate) {
   for (int i = 0; i < 60; ++i) {
     const double t = (low + high) / 2.0;
     const double place = v * t - kLimit * t * t / 2.0;
-    const double speed = std::sqrt(v * v + 2.0 * change * kLimit * place);  // of the course
+    const double speed =
+        std::sqrt(v * v + 2.0 * change * kLimit * place);  // what the course allows there
     (v - kLimit * t > rate * speed ? low : high) = t;
   }
   return low;

@@ -143,7 +143,7 @@ class SharpPath {
   }
 
  private:
-  static constexpr std::size_t kParts = 32;  // of each segment
+  static constexpr std::size_t kParts = 32;  // parts of each segment
 
   // In a part of a segment, in which the distance has one minimum.
   double leastWithin(std::size_t segment, std::size_t part, const std::vector<double>& place) {
@@ -183,7 +183,7 @@ class SharpPath {
 // @param motions of all axes, from a position on the path on.
 void expectOnPath(SharpPath& path, const std::vector<Profile>& motions) {
   constexpr int kPlaces = 50;
-  constexpr double kDeviation = 0.2;  // of cubics and quintics
+  constexpr double kDeviation = 0.2;  // how far cubics and quintics may be off the path
   double longest = 0.0;
   for (const Profile& motion : motions) longest = std::max(longest, motion.duration().value());
   std::vector<double> place(motions.size());

@@ -41,10 +41,10 @@ struct Stall {
 struct Observation {
   std::vector<AxisFacts> axes;
   std::vector<Request> requests;
-  std::vector<std::vector<Pulse>> pulses;  ///< of each axis
+  std::vector<std::vector<Pulse>> pulses;  ///< those of each axis
   std::vector<RestPoint> rests;
   std::vector<Stall> stalls;
-  std::vector<ClockReading> clock;  ///< of the rig
+  std::vector<ClockReading> clock;  ///< what the rig's clock showed
 };
 
 /// Compares an observation with the node's promises:

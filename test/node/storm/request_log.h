@@ -60,7 +60,7 @@ struct Request {
   bool success = false;
   std::string message;
   std::vector<Arrival> arrivals;
-  std::vector<Reach> reaches;  ///< of all its axes; empty if that isn't known
+  std::vector<Reach> reaches;  ///< one for each of its axes. Empty: that isn't known
 };
 
 std::int64_t steadyNow();

@@ -51,7 +51,7 @@ class RigClockWatch {
   }
 
   std::atomic<bool> ended_{false};
-  std::vector<ClockReading> readings_;  // of the thread until it has ended
+  std::vector<ClockReading> readings_;  // belongs to the thread until it has ended
   ros::ServiceClient client_;
   std::thread thread_;
 };

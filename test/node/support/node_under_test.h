@@ -20,7 +20,7 @@ using test::kInfinity;
 using test::kNan;
 using test::kPi;
 
-/// Of the axis x below.
+/// Distances of the axis x below.
 inline constexpr double kStep = 1.0 / 80'000.0;  // m, a microstep
 inline constexpr double kHalfStep = kStep / 2.0;
 

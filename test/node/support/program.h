@@ -12,7 +12,7 @@ namespace stepdriver::node_test {
 
 struct ProgramEnd {
   int code = -1;
-  std::string output;  ///< of both streams
+  std::string output;  ///< what it wrote to both streams
 };
 
 /// Runs one of the package's programs to its end, as `rosrun stepdriver NAME` does.

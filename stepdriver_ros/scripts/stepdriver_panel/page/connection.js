@@ -32,8 +32,8 @@ export class Connection {
   constructor(update, say) {
     this.#update = update;
     this.#say = say;
-    this.tick = 0; // of the newest update
-    this.number = null; // of this page
+    this.tick = 0; // the number of the newest update
+    this.number = null; // the server's number for this page
     this.key = "";
     this.#open();
     setInterval(() => this.#watch(), 250);

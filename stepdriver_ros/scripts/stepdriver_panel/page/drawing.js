@@ -19,7 +19,7 @@ export class DrawingScreen {
   #shown = { version: 0, state: "none", facts: {} };
   #strokes = [];
   #limits = [];
-  #version = 0; // of the strokes
+  #version = 0; // which strokes are drawn
   #way = [];
   #begin = null;
   #visible = false;

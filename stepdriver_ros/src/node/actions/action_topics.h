@@ -25,7 +25,7 @@ class ActionTopics {
   /// @param publish publishes an action's status; called as long as the queue is served.
   void addStatus(std::function<void()> publish);
 
-  /// Of goals.
+  /// Recognizes goals that were latched before the node could receive them.
   LatchedMessages& latched() { return latched_; }
 
  private:

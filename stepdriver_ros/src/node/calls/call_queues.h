@@ -74,7 +74,8 @@ class CallQueues {
   CallPool waiting_pool_;
   CallPool control_pool_;
   std::deque<PooledQueue> axes_;
-  std::deque<PooledQueue> power_;  // of each axis, and of all
+  // One for the calls of each axis, and the last for those of all axes.
+  std::deque<PooledQueue> power_;
   PooledQueue lines_;
   PooledQueue trajectories_;
   PooledQueue streams_;

@@ -10,7 +10,8 @@ namespace stepdriver::ros_node {
 /// which is logged.
 ///
 /// @param action sets the other fields of the response, and success if it isn't simply true.
-/// @return true: the call is answered; with false, roscpp would tell the client nothing else.
+/// @return true, because the call is answered: with false, roscpp would tell the client nothing
+/// else.
 template <typename Response, typename Action>
 bool respond(Response& response, const Action& action) {
   try {

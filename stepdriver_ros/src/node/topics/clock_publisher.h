@@ -23,7 +23,7 @@ class ClockPublisher {
 
   pulse::Clock& clock_;
   const ros::WallTime began_;
-  const pulse::Nanoseconds began_at_;  // of the clock
+  const pulse::Nanoseconds began_at_;  // what the clock showed then
   ros::Publisher publisher_;
   ros::SteadyTimer timer_;
 };

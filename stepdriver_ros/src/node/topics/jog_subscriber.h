@@ -44,7 +44,7 @@ class JogSubscriber {
   machine::Machine& machine_;
   const ros::WallDuration timeout_;
   std::mutex mutex_;
-  std::vector<MessageStream> streams_;  // of each axis
+  std::vector<MessageStream> streams_;  // one for each axis
   // Time of each axis's last accepted message; zero: there is no jog.
   std::vector<ros::SteadyTime> heard_;
   PeriodicPoll poll_;

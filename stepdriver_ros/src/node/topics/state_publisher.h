@@ -54,7 +54,7 @@ class StatePublisher {
   ros::Publisher controller_state_publisher_;
   ros::Publisher endstop_publisher_;
   ros::Publisher axis_state_publisher_;
-  std::vector<ros::Publisher> own_state_publishers_;  // of each axis
+  std::vector<ros::Publisher> own_state_publishers_;  // one for each axis
 
   // For the thread only.
   sensor_msgs::JointState joint_states_;
@@ -63,7 +63,7 @@ class StatePublisher {
   ros::Time states_read_;
   std::vector<axis::AxisState> published_states_;
   bool endstops_published_ = false;
-  std::vector<bool> endstops_unreadable_;  // of each axis
+  std::vector<bool> endstops_unreadable_;  // one for each axis
 
   std::mutex mutex_;
   std::condition_variable stop_asked_;
