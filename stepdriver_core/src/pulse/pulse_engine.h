@@ -48,7 +48,7 @@ class NewsListener {
 
 /// Turns profiles into edges on lines, for all axes. It asks three rooms: what comes next, and when
 /// (Follower)? May it go out (EmergencyStops, AxisGuard)? How does it go out (PulseTrain,
-/// GpioPort)? Itself it says when a channel is due, what becomes of lateness, and what ends
+/// GpioPort)? Itself it says when a channel is due, how lateness is met, and what ends
 /// together.
 ///
 /// Only the pulse thread calls serve(). post() is for one thread at a time, all other functions are

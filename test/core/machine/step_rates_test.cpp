@@ -305,7 +305,8 @@ TEST_F(FormulaOnTheEngine, HoldsForAxesThatMoveAtOnce) {
 }
 
 // From the lateness of a real-time kernel to that of a busy computer. Steps of one instant share a
-// write, which the formula doesn't count on. Steps are at whole nanoseconds, so the rate itself may slip by one.
+// write, which the formula doesn't count on. Steps are at whole nanoseconds, so the rate itself may
+// slip by one.
 TEST_F(FormulaOnTheEngine, HoldsForAllLatenessesAxesAndMicrosteps) {
   for (const Nanoseconds lateness : {10'000, 60'000, 300'000, 1'000'000}) {
     for (const std::size_t count : {1U, 2U, 6U}) {
