@@ -16,9 +16,9 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNear = 1e-9;     // microsteps: rounding
-constexpr double kNoTravel = 0.5;  // microsteps
-constexpr double kNoRoom = 0.001;  // of a limit
+constexpr double kRoundedPosition = 1e-9;  // microsteps: rounding
+constexpr double kNoTravel = 0.5;          // microsteps
+constexpr double kNoRoom = 0.001;          // of a limit
 constexpr double kLonger = 1.1;
 
 // The joint reverses at a time.
@@ -120,7 +120,8 @@ class TakeUps {
   /// Whether it rests at the position that the previous reversal asked for.
   bool restsAt(std::int64_t slack, const Turn& turn) const {
     const MotionState state = stateAt(turn);
-    return state.velocity == 0.0 && std::abs((state.position - fromInteger(slack)).hi) < kNear;
+    return state.velocity == 0.0 &&
+           std::abs((state.position - fromInteger(slack)).hi) < kRoundedPosition;
   }
 
   /// The motion that a reversal starts, until the next one at the latest; empty if there is nothing
