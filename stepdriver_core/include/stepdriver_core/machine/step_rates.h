@@ -43,7 +43,7 @@ struct StepRates {
 ///   A T >= l + sum(r + w), A = max(1/4, M Capability::late_steps)
 ///                                   a pulse must be out before its field is farther behind the
 ///                                   plan than the engine absorbs; A is 1/4 for more than
-///                                   pulse::Follower::kLongestCatchUp. If h is so long
+///                                   2 ms, the longest that is caught up. If h is so long
 ///                                   that the clock sleeps, the end of the pulse is late by another
 ///                                   l.
 ///   0.9 T >= sum(r + 2 w + h + d)   the pulses themselves, and room to catch up with the plan
