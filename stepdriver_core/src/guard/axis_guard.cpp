@@ -8,13 +8,6 @@ namespace {
 // How often the in-position output is read at the end of a motion, if no edge is reported.
 constexpr Nanoseconds kLookPeriod = 1'000'000;
 
-bool hasAny(const ChannelConfig& config, std::optional<Signal> MotorSignals::*signal) {
-  const MotorSignals& first = config;
-  return (first.*signal).has_value() ||
-         std::any_of(config.twins.begin(), config.twins.end(),
-                     [signal](const MotorSignals& twin) { return (twin.*signal).has_value(); });
-}
-
 }  // namespace
 
 AxisGuard::AxisGuard(const ChannelConfig& config, ChannelState& state, WatchedLines& lines)
@@ -26,7 +19,10 @@ AxisGuard::AxisGuard(const ChannelConfig& config, ChannelState& state, WatchedLi
       idle_(!has_switch_ && !has(&MotorSignals::fault) && config.twins.empty()) {}
 
 bool AxisGuard::has(std::optional<Signal> MotorSignals::*signal) const {
-  return hasAny(config_, signal);
+  for (std::size_t i = 0; i < motors(); ++i) {
+    if (motor(i).*signal) return true;
+  }
+  return false;
 }
 
 void AxisGuard::begin(bool squares, bool is_square) {

@@ -89,10 +89,10 @@ struct EngineChannel {
   Kin* kin = nullptr;
   EngineChannel* next_of_kin = this;  // a ring through all of them
 
-  std::uint64_t group = 0;  // of the last order; 0: no group
+  std::uint64_t group = 0;  // the last order's; 0: no group
   bool slows = false;       // the last order brings it to rest
   bool changed = false;     // it must be scheduled
-  Nanoseconds late = 0;     // of the next step, so far
+  Nanoseconds late = 0;     // how late the next step is so far
   Nanoseconds behind = 0;   // overdue() of the last step when its write had ended
   Snapshot<ChannelState> published;
 

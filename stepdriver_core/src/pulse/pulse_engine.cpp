@@ -324,7 +324,9 @@ void PulseEngine::readFaults(Channel& channel, Nanoseconds now) {
   }
 }
 
-inline bool PulseEngine::isGuarded(const Channel& channel) { return channel.kin->guarded; }
+inline bool PulseEngine::mayStep(Channel& channel, Nanoseconds now) {
+  return !channel.kin->guarded || askGuards(channel, now);
+}
 
 // Each axis that the step moves must be allowed to move on.
 bool PulseEngine::askGuards(Channel& channel, Nanoseconds now) {

@@ -168,10 +168,7 @@ class PulseEngine {
   void readInputs(Nanoseconds now);
   void readEmergencyStop();
   void readFaults(Channel& channel, Nanoseconds now);
-  bool mayStep(Channel& channel, Nanoseconds now) {
-    return !isGuarded(channel) || askGuards(channel, now);
-  }
-  static bool isGuarded(const Channel& channel);
+  bool mayStep(Channel& channel, Nanoseconds now);
   bool askGuards(Channel& channel, Nanoseconds now);
 
   // Edges.
@@ -209,9 +206,9 @@ class PulseEngine {
   const std::optional<Signal> emergency_input_;
   const std::size_t axes_;
   std::vector<std::unique_ptr<Kin>> kins_;
-  std::vector<std::unique_ptr<Follower>> followers_;  // of axes with motors of their own
+  std::vector<std::unique_ptr<Follower>> followers_;  // axes with motors of their own have one
   std::vector<std::unique_ptr<Channel>>
-      channels_;  // of the axes, and then of motors that they share
+      channels_;  // the axes' come first, then those of shared motors
   DueTree dues_;
   // Of one pass: the due channels, and those to schedule.
   std::vector<std::size_t> due_;
