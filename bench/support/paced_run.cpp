@@ -20,6 +20,7 @@
 #include "pulse/pulse_engine.h"
 #include "pulse/pulse_thread.h"
 #include "pulse/realtime.h"
+#include "sim/rotor_model.h"
 #include "support/free_hardware.h"
 
 namespace stepdriver::bench {
@@ -28,6 +29,7 @@ namespace {
 using pulse::Nanoseconds;
 
 constexpr int kMicrosteps = 16;                       // in a full step
+constexpr double kRamp = 0.2;                         // of the motion, for each ramp
 constexpr Nanoseconds kStepTime = 1000;               // an A4988's, high and low
 constexpr Nanoseconds kBegin = 20'000'000;            // from now
 constexpr Nanoseconds kMaxLateness = 60'000'000'000;  // a late edge is a result here, not a fault
@@ -69,14 +71,15 @@ class PacedLines : public FreeLines {
   std::vector<std::vector<Edge>> edges_of_;
 };
 
-std::vector<pulse::ChannelConfig> channelsOf(int axes) {
-  std::vector<pulse::ChannelConfig> channels(static_cast<std::size_t>(axes));
-  for (int i = 0; i < axes; ++i) {
+std::vector<pulse::ChannelConfig> channelsOf(const PacedRun& run) {
+  std::vector<pulse::ChannelConfig> channels(static_cast<std::size_t>(run.axes));
+  for (int i = 0; i < run.axes; ++i) {
     pulse::ChannelConfig& channel = channels[static_cast<std::size_t>(i)];
     channel.step = {2 * i, true};
     channel.dir = {2 * i + 1, true};
     channel.step_high = kStepTime;
     channel.step_low = kStepTime;
+    channel.late_steps = run.late_steps;
   }
   return channels;
 }
@@ -92,23 +95,31 @@ struct Plan {
   std::vector<std::unique_ptr<const motion::Profile>> profiles;
 };
 
-Plan planned(Nanoseconds begin, int axes, double rate, double seconds) {
+// A ramp up to the rate, a constant speed, and a ramp down, over a whole number of steps.
+motion::Profile trapezoid(Nanoseconds begin, double rate, double seconds) {
+  const double ramp = kRamp * seconds;
+  const double steps = std::floor(rate * (seconds - ramp));
+  const motion::Piece up{ramp, 0.0, 0.0, rate / ramp, 0.0};
+  const motion::Piece cruise{steps / rate - ramp, up.positionAt(ramp), rate, 0.0, 0.0};
+  const motion::Piece down{ramp, cruise.positionAt(cruise.duration), rate, -rate / ramp, 0.0};
+  return {begin, std::vector<motion::Piece>{up, cruise, down}};
+}
+
+Plan planned(Nanoseconds begin, const PacedRun& run) {
   Plan plan{begin, {}};
-  for (int i = 0; i < axes; ++i) {
-    const double own = rate * (1.0 - 0.01 * i);
-    const double steps = std::floor(own * seconds);
+  for (int i = 0; i < run.axes; ++i) {
     plan.profiles.push_back(std::make_unique<motion::Profile>(
-        begin, std::vector<motion::Piece>{{steps / own, 0.0, own, 0.0, 0.0}}));
+        trapezoid(begin, run.rate * (1.0 - 0.01 * i), run.seconds)));
   }
   return plan;
 }
 
 // If the machine stalls so long that the order reaches the engine too late, the order is made
 // again.
-Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, int axes, double rate, double seconds) {
+Plan start(pulse::PulseEngine& engine, pulse::Clock& clock, const PacedRun& run) {
   Nanoseconds ahead = kBegin;
   for (std::uint64_t serial = 1;; ++serial, ahead *= 2) {
-    Plan plan = planned(clock.now() - engine.state().slipped + ahead, axes, rate, seconds);
+    Plan plan = planned(clock.now() - engine.state().slipped + ahead, run);
     std::vector<pulse::Follow> follows(plan.profiles.size());
     for (std::size_t i = 0; i < follows.size(); ++i) {
       follows[i].channel = static_cast<int>(i);
@@ -145,9 +156,34 @@ void take(PacedFigures& figures, const std::vector<Edge>& edges, const motion::P
     ++figures.edges;
     figures.lateness.push_back(edge.time - (step.time_ns + edge.slipped));
     if (figures.lateness.back() < 0) ++figures.early;
+    if (rose != nullptr) figures.shortest = std::min(figures.shortest, edge.time - rose->time);
     rose = &edge;
   }
   if (finder.next(step)) throw std::logic_error("fewer steps went out than were planned");
+}
+
+// A common NEMA 17 motor, damped as little as a motor is, with a heavy load.
+sim::MotorSpec loadedMotor() {
+  sim::MotorSpec motor;
+  motor.friction = 0.4 * motor.holding_torque;
+  motor.damping = 0.05;
+  return motor;
+}
+
+// For one axis: what its motor makes of the edges.
+void turnRotor(PacedFigures& figures, const std::vector<Edge>& edges) {
+  constexpr double kMicrostep = 0.5 * sim::kPi / kMicrosteps;  // [electrical rad]
+  constexpr Nanoseconds kAfterwards = 1'000'000'000;
+  sim::RotorModel rotor(loadedMotor());
+  rotor.rest(edges.front().time);
+  for (const Edge& edge : edges) {
+    if (!edge.level) continue;
+    rotor.turnTo(edge.time);
+    rotor.moveField(kMicrostep);
+  }
+  rotor.turnTo(edges.back().time + kAfterwards);
+  figures.largest_lag = std::max(figures.largest_lag, rotor.largestLag() * 180.0 / sim::kPi);
+  figures.lost += 4 * rotor.slips();
 }
 
 }  // namespace
@@ -158,17 +194,17 @@ Nanoseconds PacedFigures::percentile(double part) const {
   return lateness[static_cast<std::size_t>(std::lround(part * last))];
 }
 
-PacedFigures runPaced(int axes, double rate, double seconds) {
+PacedFigures runPaced(const PacedRun& run) {
   pulse::SteadyClock clock;
-  const auto steps = static_cast<std::size_t>(std::ceil(rate * seconds));
-  PacedLines lines(axes, 2 * steps + 2);
-  pulse::PulseEngine engine(lines, clock, channelsOf(axes), kMaxLateness);
+  const auto steps = static_cast<std::size_t>(std::ceil(run.rate * run.seconds));
+  PacedLines lines(run.axes, 2 * steps + 2);
+  pulse::PulseEngine engine(lines, clock, channelsOf(run), kMaxLateness);
   lines.serve(engine);
   pulse::PulseThread thread(engine, clock);
 
-  const Plan plan = start(engine, clock, axes, rate, seconds);
+  const Plan plan = start(engine, clock, run);
   const double used = processSeconds();
-  for (int i = 0; i < axes; ++i) {
+  for (int i = 0; i < run.axes; ++i) {
     while (engine.channel(i).following != 0) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -179,9 +215,10 @@ PacedFigures runPaced(int axes, double rate, double seconds) {
   figures.cpu = (processSeconds() - used) / elapsed;
   figures.scheduler_error = thread.rights().scheduler_error;
   thread.stop();
-  for (int i = 0; i < axes; ++i) {
-    take(figures, lines.edgesOf(static_cast<std::size_t>(i)),
-         *plan.profiles[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < run.axes; ++i) {
+    const auto& edges = lines.edgesOf(static_cast<std::size_t>(i));
+    take(figures, edges, *plan.profiles[static_cast<std::size_t>(i)]);
+    turnRotor(figures, edges);
   }
   figures.slips = engine.state().slips;
   figures.slipped = engine.state().slipped;

@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""Checks that the links, files, messages and launch arguments in the pages exist.
+"""Checks that the links, files, messages and launch arguments in the pages exist, and that no line is too long.
 
 usage: test/docs/links_test.py
 
-Exit code 0: all of them exist; 1: otherwise.
+Exit code 0: nothing is wrong; 1: otherwise.
 """
 
 import re
 import sys
 
 import pages
+
+MOST_COLUMNS = 120
 
 ROOMS = ("activity", "axis", "config", "driver", "geometry", "gpio", "kinematics", "machine", "math", "motor",
          "path_timing", "point_to_point", "profile", "pulse", "setup", "sim", "trajectory")
@@ -94,6 +96,12 @@ def wrong_arguments():
             yield f"{page}: the argument {argument} of {file}"
 
 
+def long_lines(page):
+    for number, line in enumerate(pages.text_of(page).splitlines(), 1):
+        if len(line) > MOST_COLUMNS and not line.startswith("|"):
+            yield f"{page}:{number} has {len(line)} columns; {MOST_COLUMNS} are allowed"
+
+
 def main():
     # Files of the reader, and generated folders.
     of_reader = {"my_axis.yaml", "my_axes.yaml", "NAME.yaml", "controllers.yaml"}
@@ -110,9 +118,10 @@ def main():
     ]
     wrong += [f"{message} isn't there" for message in unsaid_messages()]
     wrong += [f"{argument} isn't both there and on the page" for argument in wrong_arguments()]
+    wrong += [line for page in pages.names() for line in long_lines(page)]
     for text in wrong:
         print(f"FAILED: {text}", file=sys.stderr)
-    print(f"{len(pages.names())} pages, {len(wrong)} dead links, files and messages")
+    print(f"{len(pages.names())} pages, {len(wrong)} faults in links, files, messages and lines")
     return 1 if wrong else 0
 
 

@@ -1,4 +1,4 @@
-"""The project's pages and their testable parts: commands, links, tables; comments of sources."""
+"""The project's pages and their testable parts: commands, links, tables."""
 
 import pathlib
 import re
@@ -72,48 +72,6 @@ def prose(text):
     return "\n".join(
         line for language, lines in _blocks(text) if language is None for line in lines
     )
-
-
-def without_blocks(text):
-    """A page whose fenced blocks are replaced by empty lines, so that each line keeps its number."""
-    kept, in_block = [], False
-    for line in text.splitlines():
-        fence = re.match(r"\s*```", line)
-        kept.append("" if fence or in_block else line)
-        in_block = in_block != bool(fence)
-    return "\n".join(kept)
-
-
-# Strings come first in the patterns: what they contain isn't a comment.
-_CPP = r'''R"\((?:.|\n)*?\)"|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])'|(//[^\n]*(?:\n\s*//[^\n]*)*)'''
-_HASH = r"""'[^'\n]*'|"[^"\n]*"|((?<!\S)#[^\n]*(?:\n\s*#[^\n]*)*)"""
-_PYTHON = r"""'[^'\n]*'|"(?!"")[^"\n]*"|("{3}(?:.|\n)*?"{3}|(?<!\S)#[^\n]*(?:\n\s*#[^\n]*)*)"""
-_XML = r"""((?<=doc=")[^"]*|<!--(?:.|\n)*?-->)"""
-_COMMENTS = {
-    "cpp": _CPP, "h": _CPP, "launch": _XML, "xacro": _XML, "urdf": _XML,
-    "action": _HASH, "msg": _HASH, "srv": _HASH, "yaml": _HASH, "sh": _HASH, "py": _PYTHON,
-}
-
-
-def _language(name):
-    """The ending of a file's name. Programs without an ending say in their first line what they are in."""
-    ending = pathlib.Path(name).suffix[1:]
-    if ending or not (ROOT / name).stat().st_mode & 0o100:
-        return ending
-    return "py" if "python" in text_of(name).partition("\n")[0] else "sh"
-
-
-def comments(name):
-    """Yields the number of the first line of each comment or docstring in a source file, and its text as
-    one line."""
-    pattern = _COMMENTS.get(_language(name))
-    if not pattern:
-        return
-    text = text_of(name)
-    for match in re.finditer(pattern, text):
-        if match[1]:
-            lines = (re.sub(r"^\s*(//+<?|#+)", "", line).strip() for line in match[1].splitlines())
-            yield text.count("\n", 0, match.start(1)) + 1, " ".join(lines)
 
 
 def _of_sentences(text):

@@ -15,6 +15,7 @@ struct Totals {
   std::size_t pulses = 0;
   std::size_t violations = 0;
   std::uint64_t slips = 0;
+  MotorView motors;
 };
 
 Totals& totals() {
@@ -29,13 +30,21 @@ class Summary : public testing::Environment {
     if (all.pulses == 0) return;
     std::printf(
         "[ KERNEL   ] %zu edges read from the kernel, %zu pulses, %zu violations; the "
-        "timeline slid %llu times\n",
-        all.edges, all.pulses, all.violations, static_cast<unsigned long long>(all.slips));
+        "timeline slid %llu times; rotors lagged by up to %.1f electrical degrees and lost %lld "
+        "steps\n",
+        all.edges, all.pulses, all.violations, static_cast<unsigned long long>(all.slips),
+        all.motors.largest_lag_degrees, static_cast<long long>(all.motors.lost_steps));
   }
 };
 
 const testing::Environment* const kSummary =
     testing::AddGlobalTestEnvironment(new Summary);  // NOLINT: GoogleTest deletes it
+
+void noteMotor(const MotorView& motor) {
+  MotorView& all = totals().motors;
+  all.largest_lag_degrees = std::max(all.largest_lag_degrees, motor.largest_lag_degrees);
+  all.lost_steps += motor.lost_steps;
+}
 
 std::string nameOfTest() {
   std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
@@ -78,6 +87,7 @@ std::map<std::string, Waveform> MachineWaveform::read(KernelBench& bench,
     pulses += seen.pulses.size();
     totals().edges += seen.edges;
     totals().violations += seen.violations.size();
+    noteMotor(motorViewOf(seen.pulses, config.microsteps));
   }
   EXPECT_EQ(pulses, figures.pulses);
   totals().pulses += pulses;

@@ -92,6 +92,25 @@ double worstOf(const Waveform& seen, const Moves& moves, const Speed& speed) {
   return worst;
 }
 
+/// The motor feels what the closed form means for it.
+void expectNothingLost(const Waveform& seen, const Moves& moves, const Speed& speed,
+                       int microsteps) {
+  std::vector<Pulse> planned;
+  for (const std::int64_t move : moves) {
+    const std::int64_t n = std::abs(move);
+    if (planned.size() + static_cast<std::size_t>(n) > seen.pulses.size()) return;
+    const std::int64_t begin = seen.pulses[planned.size()].time_ns -
+                               std::llround(dueTime(1, n, speed.steps_s, speed.steps_s2));
+    for (std::int64_t k = 1; k <= n; ++k) {
+      planned.push_back(
+          {begin + std::llround(dueTime(k, n, speed.steps_s, speed.steps_s2)), move > 0});
+    }
+  }
+  const MotorView felt = motorViewOf(seen.pulses, microsteps);
+  EXPECT_EQ(felt.lost_steps, 0);
+  EXPECT_NEAR(felt.largest_lag_degrees, motorViewOf(planned, microsteps).largest_lag_degrees, 0.5);
+}
+
 std::string missing() {
   std::string board = test::gpioSimBoard().missing();
   if (!board.empty()) return board;
@@ -128,6 +147,7 @@ TEST_P(StepTimes, AreThoseOfTheClosedFormToAMicrosecond) {
   EXPECT_TRUE(seen.violations.empty()) << reportOf(seen);
   EXPECT_EQ(seen.position(), position);
   EXPECT_LE(worst, 1'000.0 + kClockRead);
+  expectNothingLost(seen, moves, speed, config.microsteps);
   print(seen.edges, speed.steps_s, worst, seen.violations.size());
 }
 
@@ -168,6 +188,8 @@ TEST_F(StepTimesOfTwoAxes, AreLaterOnlyByTheWritesOfTheOther) {
   EXPECT_TRUE(y.violations.empty()) << reportOf(y);
   const double worst = std::max(worstOf(x, moves_x, speed_x), worstOf(y, moves_y, speed_y));
   EXPECT_LE(worst, 1'000.0 + kOtherWrites);
+  expectNothingLost(x, moves_x, speed_x, configs[0].microsteps);
+  expectNothingLost(y, moves_y, speed_y, configs[1].microsteps);
   print(x.edges + y.edges, speed_x.steps_s, worst, x.violations.size() + y.violations.size());
 }
 

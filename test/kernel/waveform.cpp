@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "sim/rotor_model.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::kernel {
@@ -213,6 +214,21 @@ Waveform waveformOf(const KernelTrace& trace, const WiredAxis& axis) {
   Reader reader(axis);
   for (const LineEvent& event : trace.events()) reader.take(event);
   return reader.finish();
+}
+
+MotorView motorViewOf(const std::vector<Pulse>& pulses, int microsteps) {
+  constexpr std::int64_t kAfterwards = 1'000'000'000;
+  if (pulses.empty()) return {};
+  sim::MotorSpec motor;
+  motor.damping = 0.05;
+  sim::RotorModel rotor(motor);
+  rotor.rest(pulses.front().time_ns);
+  for (const Pulse& pulse : pulses) {
+    rotor.turnTo(pulse.time_ns);
+    rotor.moveField((pulse.forward ? 0.5 : -0.5) * sim::kPi / microsteps);
+  }
+  rotor.turnTo(pulses.back().time_ns + kAfterwards);
+  return {rotor.largestLag() * 180.0 / sim::kPi, 4 * rotor.slips()};
 }
 
 std::string reportOf(const Waveform& waveform) {

@@ -98,6 +98,17 @@ struct Waveform {
 /// @throw Error if one of the lines has no event: its number is wrong, or nothing drove it.
 Waveform waveformOf(const KernelTrace& trace, const WiredAxis& axis);
 
+/// What a motor makes of pulses.
+struct MotorView {
+  double largest_lag_degrees = 0.0;  ///< [electrical degrees] of its rotor behind its field
+  std::int64_t lost_steps = 0;       ///< full steps
+};
+
+/// What a common NEMA 17 motor without a load and with little damping makes of pulses, from rest to
+/// a second after the last of them.
+/// @param microsteps in a full step, the same for all of them.
+MotorView motorViewOf(const std::vector<Pulse>& pulses, int microsteps);
+
 /// The figures of a waveform in a few indented lines, and each broken rule with the first place
 /// where it was broken.
 std::string reportOf(const Waveform& waveform);
