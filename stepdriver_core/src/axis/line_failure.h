@@ -2,9 +2,9 @@
 
 #include <string>
 
+#include "channel/channel_state.h"
 #include "line_names.h"
 #include "motor/motor_lines.h"
-#include "port/channel.h"
 
 namespace stepdriver::axis {
 

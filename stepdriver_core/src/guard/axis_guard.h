@@ -3,8 +3,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "port/channel.h"
-#include "port/watched_lines.h"
+#include "channel/channel_config.h"
+#include "channel/channel_state.h"
+#include "channel/watched_lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {

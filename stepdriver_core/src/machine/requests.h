@@ -12,7 +12,7 @@
 #include "activity/context.h"
 #include "activity/goal.h"
 #include "axis/axis_memory.h"
-#include "port/channel.h"
+#include "channel/channel_state.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/streams.h"

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "axis/axis_memory.h"
-#include "port/channel.h"
+#include "channel/channel_config.h"
+#include "channel/channel_state.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "channel/channel_state.h"
 #include "point_to_point/motion_limits.h"
-#include "port/channel.h"
 #include "profile/shaped_profile.h"
 
 namespace stepdriver::motor {

@@ -6,10 +6,11 @@
 #include <vector>
 
 #include "brake.h"
+#include "channel/channel_config.h"
+#include "channel/channel_state.h"
 #include "driver_pins.h"
 #include "motions.h"
 #include "motor_lines.h"
-#include "port/channel.h"
 #include "power.h"
 #include "profile/input_shaper.h"
 #include "profile/shaped_profile.h"

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "channel/channel_config.h"
 #include "enable_line.h"
-#include "port/channel.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "port/channel.h"
+#include "channel/channel_config.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::motor {

@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "port/channel.h"
+#include "channel/channel_state.h"
+#include "channel/watched_lines.h"
 #include "port/pin_ring.h"
 #include "port/pulse_train.h"
-#include "port/watched_lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "port/channel.h"
+#include "channel/channel_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "port/channel.h"
+#include "channel/channel_config.h"
 #include "pulse/cpu_latency.h"
 #include "pulse/measure.h"
 #include "pulse/realtime.h"

@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "port/channel.h"
+#include "channel/channel_config.h"
+#include "channel/channel_state.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 

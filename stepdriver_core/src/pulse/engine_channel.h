@@ -4,8 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "channel/channel_config.h"
+#include "channel/channel_state.h"
 #include "guard/axis_guard.h"
-#include "port/channel.h"
 #include "port/pulse_train.h"
 #include "pulse/command.h"
 #include "pulse/snapshot.h"

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "port/channel.h"
+#include "channel/channel_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"

@@ -372,7 +372,7 @@ bool PulseEngine::meetLateness(Nanoseconds now) {
       end(channel, EndReason::kTooLate, now);
       continue;
     }
-    excess = std::max(excess, lag - channel.motion->absorbed(motion_now));
+    excess = std::max(excess, channel.motion->excess(motion_now));
   }
   if (excess == 0) return false;
   slide(excess);
@@ -431,16 +431,8 @@ void PulseEngine::written(Channel& channel, Nanoseconds now) {
   channel.behind = channel.overdue(now);
   channel.train.rise(now);
   Follower& motion = *channel.motion;
-  if (motion.mayBeLate()) {
-    // The write itself has taken time.
-    const Nanoseconds motion_now = now - state_.slipped;
-    const Nanoseconds lag = motion_now - motion.next()->time_ns;
-    const Nanoseconds excess = lag > 0 ? lag - motion.absorbed(motion_now) : 0;
-    if (excess > 0) {
-      slide(excess);
-      slid_in_write_ = true;
-    }
-  }
+  // The write itself has taken time.
+  if (motion.mayBeLate()) slide(motion.excess(now - state_.slipped));
   ++state_.pulses;
   state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
   lateness_.add(now, channel.late);
@@ -552,36 +544,33 @@ void PulseEngine::endOne(Channel& channel, EndReason reason, bool abrupt, Nanose
 // ---- times ----
 
 void PulseEngine::scheduleChanged() {
-  bool slid = std::exchange(slid_in_write_, false);
   for (Channel* channel : changed_) {
     channel->changed = false;
-    slid = schedule(*channel) || slid;
+    schedule(*channel);
   }
   changed_.clear();
-  if (slid) scheduleAll();
+  if (outdated_) scheduleAll();
 }
 
 void PulseEngine::scheduleAll() {
   // A slide moves everything scheduled before it; no second slide follows for the same reason.
-  bool slid = true;
-  while (slid) {
-    slid = false;
-    for (const auto& channel : channels_) slid = schedule(*channel) || slid;
-  }
+  do {
+    outdated_ = false;
+    for (const auto& channel : channels_) schedule(*channel);
+  } while (outdated_);
 }
 
-bool PulseEngine::schedule(Channel& channel) {
+void PulseEngine::schedule(Channel& channel) {
   Follower& motion = *channel.motion;
   while (!channel.train.high() && motion.isReplaced()) {
     if (!motion.takeOver()) {
       dues_.set(channel.index, kNever);
-      return false;
+      return;
     }
     channel.adopted();
     channel.publish();
   }
   Nanoseconds due = kNever;
-  bool slid = false;
   switch (channel.action()) {
     case Action::kRise:
       return scheduleRise(channel);
@@ -591,7 +580,7 @@ bool PulseEngine::schedule(Channel& channel) {
       due = channel.train.fallDue();
       // The time that a slow write takes from the next interval belongs to the same slip as its
       // lateness.
-      slid = motion.next() && !motion.isReplaced() && slideFor(channel, closestRise(channel));
+      if (motion.next() && !motion.isReplaced()) slideFor(channel, closestRise(channel));
       break;
     case Action::kTurn:
       due = channel.train.turnDue();
@@ -601,7 +590,6 @@ bool PulseEngine::schedule(Channel& channel) {
       break;
   }
   dues_.set(channel.index, due);
-  return slid;
 }
 
 Nanoseconds PulseEngine::finishDue(const Channel& channel) const {
@@ -617,26 +605,26 @@ Nanoseconds PulseEngine::closestRise(const Channel& channel) {
                                      : channel.train.rose() + channel.motion->closest();
 }
 
-bool PulseEngine::scheduleRise(Channel& channel) {
+void PulseEngine::scheduleRise(Channel& channel) {
   Nanoseconds earliest = std::max(channel.state.ready, channel.train.riseDue());
   if (channel.train.pulses() != 0) earliest = std::max(earliest, closestRise(channel));
   dues_.set(channel.index, std::max(channel.motion->next()->time_ns + state_.slipped, earliest));
-  return slideFor(channel, earliest);
+  slideFor(channel, earliest);
 }
 
 // The next step can't go out before `earliest`.
-bool PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) {
+void PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) {
   const Nanoseconds motion_then = earliest - state_.slipped;
   Nanoseconds lag = motion_then - channel.motion->next()->time_ns;
-  if (lag <= 0) return false;
+  if (lag <= 0) return;
   if (channel.motion->catchesUp()) lag -= channel.motion->angleAsTime(motion_then);
-  if (lag <= 0) return false;
   slide(lag);
-  return true;
 }
 
 void PulseEngine::slide(Nanoseconds by) {
+  if (by <= 0) return;
   state_.slipped += by;
+  outdated_ = true;
   if (!slid_) ++state_.slips;
   slid_ = true;
   figures_.store(state_);

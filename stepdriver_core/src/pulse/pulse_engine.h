@@ -7,11 +7,12 @@
 #include <optional>
 #include <vector>
 
+#include "channel/channel_config.h"
+#include "channel/channel_state.h"
+#include "channel/watched_lines.h"
 #include "guard/emergency_stops.h"
-#include "port/channel.h"
 #include "port/due_tree.h"
 #include "port/gpio_port.h"
-#include "port/watched_lines.h"
 #include "pulse/command.h"
 #include "pulse/heartbeat.h"
 #include "pulse/lateness_record.h"
@@ -192,11 +193,11 @@ class PulseEngine {
   void changed(Channel& channel);
   void scheduleChanged();
   void scheduleAll();
-  bool schedule(Channel& channel);
-  bool scheduleRise(Channel& channel);
+  void schedule(Channel& channel);
+  void scheduleRise(Channel& channel);
   Nanoseconds finishDue(const Channel& channel) const;
   static Nanoseconds closestRise(const Channel& channel);
-  bool slideFor(const Channel& channel, Nanoseconds earliest);
+  void slideFor(const Channel& channel, Nanoseconds earliest);
   void slide(Nanoseconds by);
 
   WatchedLines lines_;
@@ -214,7 +215,7 @@ class PulseEngine {
   std::vector<std::size_t> due_;
   std::vector<Channel*> changed_;
   bool slid_ = false;
-  bool slid_in_write_ = false;
+  bool outdated_ = false;  // the timeline has slid since all channels were scheduled
   Mailbox<Command, 64> mail_;
 
   EmergencyStops stops_;

@@ -117,6 +117,11 @@ class Follower {
   Nanoseconds angleAsTime(Nanoseconds motion_now) const;
   /// How late the next step may be without putting off all that follow.
   Nanoseconds absorbed(Nanoseconds motion_now) const;
+  /// By how much it is later than that if it goes out then; not above 0: it isn't.
+  Nanoseconds excess(Nanoseconds motion_then) const {
+    const Nanoseconds lag = motion_then - next_->time_ns;
+    return lag > 0 ? lag - absorbed(motion_then) : 0;
+  }
   /// How soon the next step may follow the last one, by the motor and not by the chip.
   /// @pre !catchesUp()
   Nanoseconds closest() const {

@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstddef>
 
-#include "port/channel.h"
+#include "channel/channel_state.h"
 #include "stepdriver_core/gpio/lines.h"
 
 namespace stepdriver::pulse {
