@@ -236,6 +236,7 @@ PacedFigures runNanosleep(double rate, double seconds) {
     figures.scheduler_error = pulse::askForScheduler(pulse::kRealtimePriority);
     const pulse::CpuLatencyHold awake;
     const Nanoseconds begin = clock.now() + kBegin;
+    Nanoseconds last = begin;
     for (std::size_t i = 0; i < count; ++i) {
       const Nanoseconds due = begin + std::llround(static_cast<double>(i) * 1e9 / rate);
       timespec deadline{};
@@ -243,7 +244,10 @@ PacedFigures runNanosleep(double rate, double seconds) {
       deadline.tv_nsec = static_cast<decltype(deadline.tv_nsec)>(due % 1'000'000'000);
       while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) != 0) {
       }
-      figures.lateness.push_back(clock.now() - due);
+      const Nanoseconds now = clock.now();
+      figures.lateness.push_back(now - due);
+      if (i > 0) figures.shortest = std::min(figures.shortest, now - last);
+      last = now;
     }
   }).join();
   figures.cpu = (processSeconds() - used) / seconds;

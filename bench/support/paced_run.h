@@ -25,7 +25,7 @@ struct PacedFigures {
   pulse::Nanoseconds slipped = 0;               ///< total time by which it slid
   std::size_t too_short = 0;                    ///< pulses and pauses shorter than the chip's time
   std::size_t early = 0;                        ///< steps before their planned time
-  pulse::Nanoseconds shortest = pulse::kNever;  ///< shortest interval of two steps of an axis
+  pulse::Nanoseconds shortest = pulse::kNever;  ///< between two steps of an axis, or two wake-ups
   double cpu = 0.0;                             ///< part of one core that the whole process took
   double largest_lag = 0.0;  ///< [electrical degrees] of the rotors behind their fields
   std::int64_t lost = 0;     ///< full steps that the rotors lost
