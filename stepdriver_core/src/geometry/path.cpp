@@ -278,6 +278,28 @@ Contour Contour::part(std::size_t first, std::size_t last) const {
   return made;
 }
 
+Contour Contour::withStops(const std::vector<std::size_t>& corners) const {
+  Contour made(*this);
+  for (const std::size_t corner : corners) {
+    made.segments_[corner].stops = true;
+    made.segments_[corner].end.blend = made.segments_[corner + 1].begin.blend = 0.0;
+  }
+  return made;
+}
+
+bool Contour::isSeparate(std::size_t corner) const {
+  const Segment& before = segments_[corner];
+  const Segment& after = segments_[corner + 1];
+  const auto reaches = [](const Segment& segment, double place) {
+    return std::any_of(segment.overlaps.begin(), segment.overlaps.end(),
+                       [&](const Segment::Overlap& overlap) {
+                         return std::abs(place - overlap.place) < overlap.end.blend;
+                       });
+  };
+  return before.end.blend <= std::min(before.end.rate, after.begin.rate) &&
+         !reaches(before, before.end.rate) && !reaches(after, 0.0);
+}
+
 bool Contour::isGentle(std::size_t corner) const {
   const Segment& before = segments_[corner];
   return isLine(corner) && isLine(corner + 1) && !before.stops &&

@@ -130,6 +130,13 @@ class Contour {
 
   /// Some of its segments, rounded as they are here.
   Contour part(std::size_t first, std::size_t last) const;
+  /// The same with stops at some corners, which are not rounded.
+  ///
+  /// @param corners the segments that end at them; each one is separate.
+  Contour withStops(const std::vector<std::size_t>& corners) const;
+  /// Whether no rounding of another corner reaches the end of a segment, and its own one doesn't
+  /// reach beyond this segment and the next one.
+  bool isSeparate(std::size_t corner) const;
 
   /// The lowest and the highest position of an axis on a segment as given.
   std::pair<double, double> range(std::size_t segment, std::size_t axis) const;

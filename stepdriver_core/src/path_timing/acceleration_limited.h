@@ -56,6 +56,9 @@ struct ContourPlan {
   /// Up to this time the motion is also the fastest one if the contour continues at its end,
   /// however its corner there is rounded.
   std::int64_t settled_ns = 0;
+  /// The segments at whose end it stops instead of rounding the corner, which would take longer: in
+  /// increasing order.
+  std::vector<std::size_t> stops;
   /// The largest part of a limit that the motion uses if that is more than 1: if it begins at a
   /// speed, it can't be slowed down as a whole.
   double excess = 1.0;

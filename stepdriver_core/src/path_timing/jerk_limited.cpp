@@ -66,6 +66,30 @@ class SmoothSection {
     }
   };
 
+  /// Whether a stop at the corner at the end of a segment may be faster: whether the corner limits
+  /// the speed to less than half of the peak v that the segments at both sides allow from rest to
+  /// rest. With the highest jerk j, half of that way is v sqrt(v/j). If the corner is passed at
+  /// v/2, it takes 2.72 sqrt(v/j): 2 sqrt(v/2j) up to that speed and the rest of the way at it.
+  /// From rest to rest it takes 3.17 sqrt(v/j).
+  bool mayStopAt(std::size_t corner) const {
+    double length = 0.0;
+    double jerk = 0.0;
+    double fastest = 0.0;
+    double slowest = kUnlimited;
+    for (std::size_t i = firstOf(corner); i < grid_.size(); ++i) {
+      const ContourGrid::Interval& interval = grid_[i];
+      if (interval.segment > corner + 1) break;
+      const bool before = interval.segment == corner;
+      const bool rounded = before ? interval.to > contour_.roundedFrom(corner)
+                                  : interval.from < contour_.roundedUntil(corner + 1);
+      length += interval.length;
+      jerk = std::max(jerk, highestJerk(grid_, i, limits_, 0.0));
+      fastest = std::max(fastest, caps_[i].value);
+      if (rounded) slowest = std::min(slowest, caps_[i].value);
+    }
+    return 2.0 * slowest < std::min(fastest, std::cbrt(length * length * jerk / 4.0));
+  }
+
   // Divides intervals in which quintics would deviate from the contour.
   Plan fastest() {
     for (int i = 0;; ++i) {
@@ -118,6 +142,20 @@ class SmoothSection {
       caps_.push_back({distance, distance + grid_[i].length, capOf(i, speed)});
       distance += grid_[i].length;
     }
+  }
+
+  std::size_t firstOf(std::size_t segment) const {
+    std::size_t low = 0;
+    std::size_t high = grid_.size();
+    while (low < high) {
+      const std::size_t middle = (low + high) / 2;
+      if (grid_[middle].segment < segment) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    return low;
   }
 
   bool moves(std::size_t axis) const {
@@ -587,6 +625,123 @@ double SmoothSection::capOf(std::size_t interval, const ContourSpeed& speed) con
   return cap;
 }
 
+// The motion between two stops of the contour, which may also stop at corners on the way instead of
+// rounding them: if that is faster.
+class StopChoice {
+ public:
+  // The motion along some segments without a stop.
+  struct Run {
+    std::size_t first = 0;
+    std::size_t last = 0;
+    SmoothSection::Plan plan;
+  };
+
+  StopChoice(const Contour& contour, const std::vector<ContourLimits>& limits,
+             const ContourBegin& begin)
+      : contour_(contour), limits_(limits), begin_(begin) {}
+
+  std::vector<Run> fastest() const {
+    SmoothSection section(contour_, limits_, begin_);
+    std::vector<std::size_t> corners;
+    for (std::size_t i = 0; i + 1 < contour_.size(); ++i) {
+      if (contour_.isSeparate(i) && section.mayStopAt(i)) corners.push_back(i);
+    }
+    Run whole{0, contour_.size() - 1, section.fastest()};
+    if (!whole.plan.possible()) corners.clear();
+    return choose(contour_, std::move(whole), stoppingAt(std::move(corners)));
+  }
+
+ private:
+  Run planned(const Contour& contour, std::size_t first, std::size_t last) const {
+    const Contour part = contour.part(first, last);
+    const ContourBegin begin = first == 0 ? begin_ : ContourBegin{};
+    return {first, last, SmoothSection(part, limits_, begin).fastest()};
+  }
+
+  // The runs from one corner to the next. Those at which a motion that begins at a speed can't stop
+  // are left out.
+  std::vector<Run> stoppingAt(std::vector<std::size_t> corners) const {
+    std::vector<Run> runs;
+    for (std::size_t left_out = 1; runs.empty() && !corners.empty(); left_out *= 2) {
+      Run run = planned(contour_.withStops(corners), 0, corners.front());
+      if (run.plan.possible()) {
+        runs.push_back(std::move(run));
+      } else {
+        const std::size_t count = std::min(left_out, corners.size());
+        corners.erase(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count));
+      }
+    }
+    if (corners.empty()) return runs;
+    const Contour contour = contour_.withStops(corners);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const std::size_t end = i + 1 < corners.size() ? corners[i + 1] : contour_.size() - 1;
+      runs.push_back(planned(contour, corners[i] + 1, end));
+    }
+    return runs;
+  }
+
+  // @param contour with the stops that have been chosen. @param stopping the runs from one corner
+  //   to the next along the way of `whole`.
+  std::vector<Run> choose(const Contour& contour, Run whole, std::vector<Run> stopping) const {
+    double duration = 0.0;
+    for (const Run& run : stopping) duration += run.plan.duration();
+    std::vector<Run> chosen;
+    if (stopping.size() < 2 || whole.plan.duration() <= duration) {
+      chosen.push_back(std::move(whole));
+      return chosen;
+    }
+    const std::vector<bool> stops = slowCorners(whole, stopping);
+    std::vector<std::size_t> corners;
+    for (std::size_t i = 0; i + 1 < stopping.size(); ++i) {
+      if (stops[i]) corners.push_back(stopping[i].last);
+    }
+    const Contour stopped = contour.withStops(corners);
+    std::vector<Run> between;  // two stops
+    for (std::size_t i = 0; i < stopping.size(); ++i) {
+      between.push_back(std::move(stopping[i]));
+      if (!stops[i]) continue;
+      if (between.size() > 1) {
+        Run run = planned(stopped, between.front().first, between.back().last);
+        between = choose(stopped, std::move(run), std::move(between));
+      }
+      std::move(between.begin(), between.end(), std::back_inserter(chosen));
+      between.clear();
+    }
+    return chosen;
+  }
+
+  // Whether the two runs at the corner after each run take longer in the whole motion; of a motion
+  // that takes longer than its runs, at least one corner. The last run ends at a stop.
+  static std::vector<bool> slowCorners(const Run& whole, const std::vector<Run>& stopping) {
+    std::vector<double> lost;
+    for (const Run& run : stopping) lost.push_back(timeIn(whole, run) - run.plan.duration());
+    std::vector<bool> slow(stopping.size(), false);
+    std::size_t worst = 0;
+    for (std::size_t i = 0; i + 1 < stopping.size(); ++i) {
+      slow[i] = lost[i] + lost[i + 1] > 0.0;
+      if (lost[i] + lost[i + 1] > lost[worst] + lost[worst + 1]) worst = i;
+    }
+    slow[worst] = slow.back() = true;
+    return slow;
+  }
+
+  // [s] How long a motion takes for the segments of a run.
+  static double timeIn(const Run& whole, const Run& run) {
+    const SmoothSection::Plan& plan = whole.plan;
+    const auto end_of = [&](std::size_t segment) {
+      const auto later =
+          std::upper_bound(plan.segments.begin() + 1, plan.segments.end(), segment - whole.first);
+      return plan.knots[static_cast<std::size_t>(later - plan.segments.begin()) - 1].time;
+    };
+    const double begin = run.first == whole.first ? 0.0 : end_of(run.first - 1);
+    return (end_of(run.last) - begin) * plan.slowdown;
+  }
+
+  const Contour& contour_;
+  const std::vector<ContourLimits>& limits_;
+  const ContourBegin& begin_;
+};
+
 // The end of a segment, at rest.
 ContourKnot restAtEnd(const Contour& contour, std::size_t segment) {
   ContourPoint end;
@@ -601,12 +756,46 @@ ContourKnot restAtEnd(const Contour& contour, std::size_t segment) {
   return knot;
 }
 
+// Appends a motion to rest. @param ago see ContourBegin.
+void appendRun(const SmoothSection::Plan& plan, std::size_t first, double ago, ContourPlan& made) {
+  const std::int64_t begin_ns = made.knots.empty() ? 0 : made.knots.back().time_ns;
+  const double end = static_cast<double>(begin_ns) * 1e-9 + plan.duration();
+  if (!(end < Profile::kLongest)) {
+    throw TooLong("the motion along the path would take longer than 4e9 s");
+  }
+  const double factor = plan.slowdown;
+  made.settled_ns = begin_ns + std::llround(plan.settled * factor * 1e9);
+  for (std::size_t i = made.knots.empty() ? 0 : 1; i < plan.knots.size(); ++i) {
+    const SmoothKnots::Knot& planned = plan.knots[i];
+    const double time = planned.time * factor - ago;
+    const std::int64_t time_ns = std::llround(time * 1e9);
+    const double later = static_cast<double>(time_ns) * 1e-9 - time;
+    ContourKnot knot;
+    knot.time_ns = begin_ns + time_ns;
+    knot.segment = first + plan.segments[i];
+    knot.parameter = planned.parameter;
+    knot.speed = planned.speed / factor;
+    knot.acceleration = planned.acceleration / (factor * factor);
+    knot.may_begin = planned.even;
+    knot.average = plan.time * factor;
+    knot.straight = plan.straight[i];
+    for (std::size_t j = 0; j < plan.knots.axes(); ++j) {
+      const SmoothKnots::State& state = plan.knots.state(i, j);
+      const double velocity = state.velocity / factor;
+      const double acceleration = state.acceleration / (factor * factor);
+      knot.positions.push_back(state.position + later * (velocity + later * acceleration / 2.0));
+      knot.velocities.push_back(velocity + later * acceleration);
+      knot.accelerations.push_back(acceleration);
+    }
+    made.knots.push_back(std::move(knot));
+  }
+}
+
 }  // namespace
 
 ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                               const ContourBegin& begin) {
   ContourPlan made;
-  std::int64_t begin_ns = 0;
   ContourBegin from = begin;
   for (std::size_t first = 0; first < contour.size();) {
     std::size_t last = first;
@@ -619,42 +808,18 @@ ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourL
       continue;
     }
     const Contour part = contour.part(first, last);
-    const SmoothSection::Plan plan = SmoothSection(part, limits, from).fastest();
-    made.excess = std::max(made.excess, plan.excess);
-    if (!plan.possible()) return made;
-    const double end = static_cast<double>(begin_ns) * 1e-9 + plan.duration();
-    if (!(end < Profile::kLongest)) {
-      throw TooLong("the motion along the path would take longer than 4e9 s");
+    const std::vector<StopChoice::Run> runs = StopChoice(part, limits, from).fastest();
+    for (const StopChoice::Run& run : runs) {
+      made.excess = std::max(made.excess, run.plan.excess);
+      if (!run.plan.possible()) return made;
+      if (run.first > 0) made.stops.push_back(first + run.first - 1);
+      const std::int64_t settled_ns = made.settled_ns;
+      appendRun(run.plan, first + run.first, from.ago, made);
+      // If the last run is continued, the corner before it may be passed instead.
+      if (runs.size() > 1 && &run == &runs.back()) made.settled_ns = settled_ns;
+      from = {};
     }
-    const double factor = plan.slowdown;
-    made.settled_ns = begin_ns + std::llround(plan.settled * factor * 1e9);
-    for (std::size_t i = made.knots.empty() ? 0 : 1; i < plan.knots.size(); ++i) {
-      const SmoothKnots::Knot& planned = plan.knots[i];
-      const double time = planned.time * factor - from.ago;
-      const std::int64_t time_ns = std::llround(time * 1e9);
-      const double later = static_cast<double>(time_ns) * 1e-9 - time;
-      ContourKnot knot;
-      knot.time_ns = begin_ns + time_ns;
-      knot.segment = first + plan.segments[i];
-      knot.parameter = planned.parameter;
-      knot.speed = planned.speed / factor;
-      knot.acceleration = planned.acceleration / (factor * factor);
-      knot.may_begin = planned.even;
-      knot.average = plan.time * factor;
-      knot.straight = plan.straight[i];
-      for (std::size_t j = 0; j < contour.axes(); ++j) {
-        const SmoothKnots::State& state = plan.knots.state(i, j);
-        const double velocity = state.velocity / factor;
-        const double acceleration = state.acceleration / (factor * factor);
-        knot.positions.push_back(state.position + later * (velocity + later * acceleration / 2.0));
-        knot.velocities.push_back(velocity + later * acceleration);
-        knot.accelerations.push_back(acceleration);
-      }
-      made.knots.push_back(std::move(knot));
-    }
-    begin_ns = made.knots.back().time_ns;
     first = last + 1;
-    from = {};
   }
   return made;
 }

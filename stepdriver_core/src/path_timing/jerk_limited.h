@@ -30,6 +30,10 @@ namespace stepdriver::motion {
 /// left after some rounds slows the part between the two stops down as a whole. The best of these
 /// rounds and of several T is taken.
 ///
+/// If a corner would have to be passed so slowly that a stop takes less time, the motion stops
+/// there, and the corner isn't rounded (ContourPlan::stops): no motion takes longer than with a
+/// stop at each corner.
+///
 /// If it begins at a speed v and an acceleration a, the average first contains a motion at the
 /// acceleration a which lasted for T and whose mean place, speed and acceleration are those of the
 /// begin: it ended v T/2 + a T^2/12 after the begin, at the speed v + a T/2. So the jerk may jump

@@ -40,6 +40,7 @@ class SmoothKnots {
     double acceleration = 0.0;
   };
 
+  std::size_t axes() const { return axes_; }
   std::size_t size() const { return knots_.size(); }
   const Knot& operator[](std::size_t index) const { return knots_[index]; }
   const Knot& back() const { return knots_.back(); }

@@ -185,11 +185,12 @@ void appendKnots(std::vector<PathWindow::Knot>& window,
 }
 
 void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Contour& contour,
-               std::size_t first) {
+               std::size_t first, const std::vector<std::size_t>& stops) {
   for (std::size_t i = 0; i < segments.size(); ++i) {
     segments[i].kept = 0.0;
     segments[i].blend = contour.blendAfter(first + i);
   }
+  for (const std::size_t stop : stops) segments[stop].blend = 0.0;
 }
 
 // @param segments will have the `blend` of the plan if more follows and there is a jerk limit.
@@ -203,8 +204,10 @@ motion::ContourPlan planAlong(std::vector<motion::ContourSegment>& segments,
   requireRange(contour, axes, segments);
   const std::vector<motion::ContourLimits> limits =
       contourLimits(axes, more_follows ? QueuedPath::kShareOfLimits : 1.0);
-  if (more_follows && smooth) setBlends(segments, contour, 0);
-  return smooth ? motion::planSmoothContour(contour, limits) : motion::planContour(contour, limits);
+  if (!smooth) return motion::planContour(contour, limits);
+  motion::ContourPlan plan = motion::planSmoothContour(contour, limits);
+  if (more_follows) setBlends(segments, contour, 0, plan.stops);
+  return plan;
 }
 
 // The way to rest if no segment makes a step: the axes stay at rest.

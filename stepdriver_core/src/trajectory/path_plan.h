@@ -68,9 +68,9 @@ std::vector<axis::TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> kno
                                             const std::vector<motion::ContourSegment>& segments);
 
 /// Sets how far the corners of segments are rounded. @param first the number of the first of them
-///   in the contour.
+///   in the contour. @param stops the segments at whose end the motion stops instead.
 void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Contour& contour,
-               std::size_t first);
+               std::size_t first, const std::vector<std::size_t>& stops);
 /// @param time_ns, segment are added to those of the knots.
 void appendKnots(std::vector<PathWindow::Knot>& window,
                  const std::vector<motion::ContourKnot>& knots, std::int64_t time_ns,

@@ -337,7 +337,7 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
     }
     if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcess) {
       made.segments.assign(segments.begin() + static_cast<std::ptrdiff_t>(before), segments.end());
-      if (smooth) setBlends(made.segments, contour, before);
+      if (smooth) setBlends(made.segments, contour, before, made.plan.stops);
       return made;
     }
     if (corner == before) break;

@@ -598,9 +598,9 @@ TEST_F(SmoothPathQueue, FollowsACircleInPiecesNearlyAsFastAsInOneGo) {
 TEST_F(SmoothPathQueue, FollowsLinesCurvesAndCornersInPieces) {
   const double in_one_go = finish(test::mixed()).duration;
   buildSmooth();
-  const CoordinatedResult result = feedInTime(test::mixed(), 1, 0.25);
+  const CoordinatedResult result = feedInTime(test::mixed(), 1, 0.3);
   EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
-  EXPECT_LE(result.duration, 1.1 * in_one_go);
+  EXPECT_LE(result.duration, 1.02 * in_one_go);
   EXPECT_NEAR(result.positions[0], -0.010, kMicrostep / 2.0);
   EXPECT_NEAR(result.positions[1], 0.010, kMicrostep / 2.0);
   expectAtRest();
