@@ -236,7 +236,7 @@ TEST(ReadingTrajectories, TakesVelocitiesOverATenthOfASecondOrALittleMore) {
   // At 1 per second by the plan, and a quarter of it lost.
   for (int i = 0; i < 100; ++i) {
     const double time = 5.0 + 0.03 * i;
-    const auto velocities = means.take(time, {{0.03 * i}, {0.0225 * i}});
+    const auto velocities = means.add(time, {{0.03 * i}, {0.0225 * i}});
     ASSERT_EQ(velocities.has_value(), i >= 4) << i;
     if (!velocities) continue;
     EXPECT_NEAR(velocities->planned.at(0), 1.0, 1e-9);

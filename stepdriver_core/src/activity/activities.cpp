@@ -24,7 +24,7 @@ Activity* Activities::find(const axis::AxisModel& axis, bool begun) const {
   return found != all_.end() ? found->get() : nullptr;
 }
 
-void Activities::begin(std::unique_ptr<Activity> activity, const Why& why) {
+void Activities::begin(std::unique_ptr<Activity> activity, const EarlyEnd& why) {
   bool at_speed = activity->handover() == Activity::Handover::kAtSpeed;
   for (axis::AxisModel* axis : activity->axes()) {
     const Activity* now = owner(*axis);
@@ -72,25 +72,25 @@ void Activities::takeOver(std::unique_ptr<Activity> activity) {
     if (goals == companions.end()) continue;
     all_.push_back(std::make_unique<ComeToRest>(
         context_, std::move(goals->second),
-        Why{axis::MoveEnd::kStopped,
-            left_by + ", which it moved together with, was given another goal"}));
+        EarlyEnd{axis::MoveEnd::kStopped,
+                 left_by + ", which it moved together with, was given another goal"}));
     all_.back()->begin({});
   }
 }
 
-void Activities::end(const axis::AxisModel& axis, const Why& why, const Ack& call) {
+void Activities::end(const axis::AxisModel& axis, const EarlyEnd& why, const SharedCall& call) {
   schedule_.drop(axis, why);
   if (Activity* next = heir(axis)) next->end(why);
   if (Activity* now = owner(axis)) now->end(why, call);
 }
 
-void Activities::endAll(const Why& why, const Ack& call) {
+void Activities::endAll(const EarlyEnd& why, const SharedCall& call) {
   for (const auto& axis : context_.axes) end(*axis, why, call);
 }
 
-void Activities::look() {
+void Activities::poll() {
   // Activities that begin during the loop are included.
-  for (std::size_t i = 0; i < all_.size(); ++i) all_[i]->look();
+  for (std::size_t i = 0; i < all_.size(); ++i) all_[i]->poll();
   while (sweep()) {
   }
   lookAtSchedule();
@@ -129,7 +129,7 @@ std::vector<axis::Move> Activities::beginLater(LaterMotion motion) {
 }
 
 void Activities::lookAtSchedule() {
-  schedule_.look();
+  schedule_.poll();
   for (axis::AxisModel* axis : schedule_.toWake()) {
     if (isFree(*axis)) begin(std::make_unique<WakeUp>(context_, *axis, nullptr), {});
   }
@@ -172,7 +172,7 @@ bool Activities::sweep() {
     Activity& next = *all_[i];
     if (next.hasBegun() || !mayBegin(next)) continue;
     next.begin({});
-    next.look();
+    next.poll();
     return true;
   }
   return std::any_of(all_.begin(), all_.end(),

@@ -36,11 +36,11 @@ class Activities {
   ///
   /// @param why the reason given to activities that it ends instead of taking over.
   /// @throw Refused if it can't take over; then nothing has changed.
-  void begin(std::unique_ptr<Activity> activity, const Why& why);
+  void begin(std::unique_ptr<Activity> activity, const EarlyEnd& why);
 
   /// Ends the owner and the heir of an axis.
-  void end(const axis::AxisModel& axis, const Why& why, const Ack& call = {});
-  void endAll(const Why& why, const Ack& call = {});
+  void end(const axis::AxisModel& axis, const EarlyEnd& why, const SharedCall& call = {});
+  void endAll(const EarlyEnd& why, const SharedCall& call = {});
 
   /// A motion that begins later. @throw Refused if an axis can't be taken over then; then nothing
   /// has changed.
@@ -50,7 +50,7 @@ class Activities {
   const Schedule& schedule() const { return schedule_; }
 
   /// Each owner handles what has happened; finished activities leave their axes, and heirs begin.
-  void look();
+  void poll();
 
   void forEach(const std::function<void(Activity&)>& action) const;
   pulse::Nanoseconds due() const;

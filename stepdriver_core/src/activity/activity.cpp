@@ -7,15 +7,15 @@ void Activity::begin(std::vector<Predecessor> predecessors) {
   onBegin(std::move(predecessors));
 }
 
-void Activity::look() {
+void Activity::poll() {
   if (begun_ && !finished_) onLook();
 }
 
-void Activity::extend(const Extension& /*extension*/, const Ack& call) {
+void Activity::extend(const Extension& /*extension*/, const SharedCall& call) {
   call->fail({Failure::Kind::kRefused, axes_.front()->name() + ": it follows no path"});
 }
 
-void Activity::end(const Why& why, const Ack& call) {
+void Activity::end(const EarlyEnd& why, const SharedCall& call) {
   if (finished_) return;
   if (begun_) return onEnd(why, call);
   if (!endsBeforeItBegins()) return;

@@ -12,7 +12,7 @@
 
 namespace stepdriver::activity {
 
-class Manoeuvre;
+class MotionExecution;
 
 /// Something that takes time. It owns its axes from its acceptance until it has finished: nothing
 /// else orders a motion of them or writes their pins.
@@ -52,11 +52,11 @@ class Activity {
   void begin(std::vector<Predecessor> predecessors);
   /// Something may have happened: there is news from the engine, a pin was written, an input has
   /// changed, or time has passed.
-  void look();
+  void poll();
   /// Ends it early: it comes to rest, tells its waiting callers why, and finishes. It completes a
   /// sequence of pins that it has begun.
   /// @param call is answered when the axes decelerate.
-  void end(const Why& why, const Ack& call = {});
+  void end(const EarlyEnd& why, const SharedCall& call = {});
 
   /// Whether it is a motion that another one can take over now.
   virtual bool canHandOver() const { return false; }
@@ -78,21 +78,21 @@ class Activity {
   /// Whether motions that begin later on its axes, see Schedule, are kept when it begins.
   virtual bool leavesLaterMotions() const { return isInBackground(); }
 
-  virtual void hold(const Ack& /*call*/) {}
+  virtual void hold(const SharedCall& /*call*/) {}
   /// @throw Refused if it is held, and can't be resumed now.
   virtual void refuseUnlessResumable() const {}
   /// @pre refuseUnlessResumable() has just returned.
-  virtual void resume(const Ack& /*call*/) {}
+  virtual void resume(const SharedCall& /*call*/) {}
   /// The speed override or the limits have changed.
-  virtual void speedChanged(const Ack& /*call*/) {}
-  /// Continues the path of its motion, see Manoeuvre::extend().
-  virtual void extend(const Extension& extension, const Ack& call);
+  virtual void speedChanged(const SharedCall& /*call*/) {}
+  /// Continues the path of its motion, see MotionExecution::extend().
+  virtual void extend(const Extension& extension, const SharedCall& call);
   /// The caller of these homings no longer waits.
   virtual void cancelHomings(const std::vector<std::uint64_t>& /*ids*/) {}
   /// @return false if it does not disable its axis; otherwise this call waits for that too.
-  virtual bool joinDisable(const Ack& /*call*/) { return false; }
+  virtual bool joinDisable(const SharedCall& /*call*/) { return false; }
 
-  /// Clock time by which look() must be called.
+  /// Clock time by which poll() must be called.
   virtual pulse::Nanoseconds due() const { return pulse::kNever; }
   /// Whether it uses the levels of inputs.
   virtual bool watchesInputs() const { return false; }
@@ -102,15 +102,15 @@ class Activity {
   virtual Work work() const { return Work::kMoves; }
   virtual axis::HomingPhase homingPhase() const { return axis::HomingPhase::kNone; }
   /// Its current or held motion; nullptr if there is none.
-  virtual const Manoeuvre* motion() const { return nullptr; }
+  virtual const MotionExecution* motion() const { return nullptr; }
   /// @}
 
  protected:
   virtual void onBegin(std::vector<Predecessor> predecessors) = 0;
   virtual void onLook() = 0;
-  virtual void onEnd(const Why& why, const Ack& call) = 0;
+  virtual void onEnd(const EarlyEnd& why, const SharedCall& call) = 0;
   /// It was ended before it began.
-  virtual void onAbandon(const Why& why) = 0;
+  virtual void onAbandon(const EarlyEnd& why) = 0;
   /// If false, it is carried out in any case.
   virtual bool endsBeforeItBegins() const { return true; }
 

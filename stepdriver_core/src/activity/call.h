@@ -79,21 +79,21 @@ class PendingCall {
 };
 
 /// Shared by everything that contributes to the answer; may be empty if nobody waits for it.
-using Ack = std::shared_ptr<PendingCall>;
+using SharedCall = std::shared_ptr<PendingCall>;
 
 /// A call in several parts, each of which may be refused by itself. It is answered with its
 /// Refusals when all parts are answered.
 class PartedCall : public AnswerSink {
  public:
-  PartedCall(Ack whole, std::size_t parts) : whole_(std::move(whole)), refusals_(parts) {}
+  PartedCall(SharedCall whole, std::size_t parts) : whole_(std::move(whole)), refusals_(parts) {}
   ~PartedCall() override { whole_->succeed(std::move(refusals_)); }
   PartedCall(const PartedCall&) = delete;
   PartedCall& operator=(const PartedCall&) = delete;
 
   /// @return for each part its call.
-  static std::vector<Ack> divide(Ack whole, std::size_t parts) {
+  static std::vector<SharedCall> divide(SharedCall whole, std::size_t parts) {
     const auto parted = std::make_shared<PartedCall>(std::move(whole), parts);
-    std::vector<Ack> calls;
+    std::vector<SharedCall> calls;
     for (std::size_t i = 0; i < parts; ++i) {
       const auto part = std::make_shared<Part>(parted, i);
       calls.emplace_back(part, &part->call);
@@ -114,7 +114,7 @@ class PartedCall : public AnswerSink {
     PendingCall call;  // answers `of` when it ends
   };
 
-  Ack whole_;
+  SharedCall whole_;
   Refusals refusals_;
 };
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "activity.h"
-#include "manoeuvre.h"
+#include "motion_execution.h"
 
 namespace stepdriver::activity {
 
@@ -14,29 +14,29 @@ class ComeToRest : public Activity {
  public:
   /// @param left the goals of the axis, at least one: the last, and those that it was to replace
   ///   when the engine had not yet accepted it.
-  ComeToRest(Context& context, std::vector<Predecessor> left, Why why)
+  ComeToRest(Context& context, std::vector<Predecessor> left, EarlyEnd why)
       : Activity(context, {left.back().axis}, Handover::kAtSpeed),
-        manoeuvre_(context, {{left.back().axis, goalOf(left.back().goal)}}),
+        execution_(context, {{left.back().axis, goalOf(left.back().goal)}}),
         replaced_(left.begin(), left.end() - 1),
         why_(std::move(why)) {}
 
   bool canHandOver() const override { return true; }
-  const Manoeuvre* motion() const override { return &manoeuvre_; }
+  const MotionExecution* motion() const override { return &execution_; }
   std::vector<Predecessor> handOver(const std::string& /*by*/) override {
     finish();
-    return manoeuvre_.handOver();
+    return execution_.handOver();
   }
 
  protected:
   void onBegin(std::vector<Predecessor> /*predecessors*/) override {
-    manoeuvre_.beginStop(std::move(replaced_), why_);
+    execution_.beginStop(std::move(replaced_), why_);
     onLook();
   }
   void onLook() override {
-    if (manoeuvre_.look()) finish();
+    if (execution_.poll()) finish();
   }
-  void onEnd(const Why& why, const Ack& call) override { manoeuvre_.stop(why, call); }
-  void onAbandon(const Why& /*why*/) override {}
+  void onEnd(const EarlyEnd& why, const SharedCall& call) override { execution_.stop(why, call); }
+  void onAbandon(const EarlyEnd& /*why*/) override {}
 
  private:
   // The axis leaves its path.
@@ -45,9 +45,9 @@ class ComeToRest : public Activity {
     return goal;
   }
 
-  Manoeuvre manoeuvre_;
+  MotionExecution execution_;
   std::vector<Predecessor> replaced_;
-  const Why why_;
+  const EarlyEnd why_;
 };
 
 }  // namespace stepdriver::activity

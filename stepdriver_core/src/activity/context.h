@@ -102,7 +102,7 @@ class Context : public AnswerSink {
 };
 
 /// Why something ends early.
-struct Why {
+struct EarlyEnd {
   axis::MoveEnd end = axis::MoveEnd::kStopped;
   std::string text;
 };

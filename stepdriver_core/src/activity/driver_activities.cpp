@@ -254,7 +254,7 @@ Steps ChangeMicrosteps::plan() {
     goal.outcome = std::make_shared<axis::Outcome<axis::MoveResult>>();
     add(steps, std::make_unique<FollowStep>(
                    context(), std::vector<Order>{{&axis, goal}}, JoinPath(),
-                   [] { return std::vector<Predecessor>(); }, [] { return Ack(); }));
+                   [] { return std::vector<Predecessor>(); }, [] { return SharedCall(); }));
     add(steps, std::make_unique<RunStep>([&axis, goal] {
           const auto result = goal.outcome->get();
           if (!result || result->end != axis::MoveEnd::kReached) {

@@ -14,12 +14,12 @@ namespace stepdriver::activity {
 /// A sequence of pins, which is always completed.
 class PinScript : public Script {
  public:
-  PinScript(Context& context, axis::AxisModel& axis, Ack call)
+  PinScript(Context& context, axis::AxisModel& axis, SharedCall call)
       : Script(context, {&axis}, Handover::kAfterRest, std::move(call)) {}
   Work work() const override { return Work::kWritesPins; }
 
  protected:
-  void onEnd(const Why& /*why*/, const Ack& /*call*/) override {}
+  void onEnd(const EarlyEnd& /*why*/, const SharedCall& /*call*/) override {}
   bool endsBeforeItBegins() const override { return false; }
 };
 
@@ -53,7 +53,7 @@ class Disable : public PinScript {
  public:
   using PinScript::PinScript;
   Work work() const override { return Work::kDisables; }
-  bool joinDisable(const Ack& call) override {
+  bool joinDisable(const SharedCall& call) override {
     joined_.push_back(call);
     return true;
   }
@@ -62,13 +62,13 @@ class Disable : public PinScript {
   Steps plan() override;
 
  private:
-  std::vector<Ack> joined_;
+  std::vector<SharedCall> joined_;
 };
 
 /// Puts the chip to sleep, or wakes it.
 class Sleep : public PinScript {
  public:
-  Sleep(Context& context, axis::AxisModel& axis, bool asleep, Ack call)
+  Sleep(Context& context, axis::AxisModel& axis, bool asleep, SharedCall call)
       : PinScript(context, axis, std::move(call)), asleep_(asleep) {}
 
  protected:
@@ -100,7 +100,7 @@ class GoIdle : public PinScript {
 /// Engages the brake. Without a call it is in the background: the axis is at fault.
 class EngageBrake : public PinScript {
  public:
-  EngageBrake(Context& context, axis::AxisModel& axis, Ack call)
+  EngageBrake(Context& context, axis::AxisModel& axis, SharedCall call)
       : PinScript(context, axis, std::move(call)), is_in_background_(this->call() == nullptr) {}
   bool isInBackground() const override { return is_in_background_; }
 
@@ -134,7 +134,7 @@ class Recover : public PinScript {
 /// there is none here.
 class ChangeMicrosteps : public Script {
  public:
-  ChangeMicrosteps(Context& context, axis::AxisModel& axis, int wanted, Ack call)
+  ChangeMicrosteps(Context& context, axis::AxisModel& axis, int wanted, SharedCall call)
       : Script(context, {&axis}, Handover::kAfterRest, std::move(call)), wanted_(wanted) {}
   Work work() const override { return Work::kChangesMicrosteps; }
 
@@ -150,7 +150,7 @@ class ChangeMicrosteps : public Script {
 class RestorePosition : public PinScript {
  public:
   RestorePosition(Context& context, axis::AxisModel& axis, const axis::AxisMemory& kept,
-                  std::string doubt, Ack call)
+                  std::string doubt, SharedCall call)
       : PinScript(context, axis, std::move(call)), kept_(kept), doubt_(std::move(doubt)) {}
 
  protected:

@@ -36,7 +36,7 @@ Activity::Handover handoverOf(const std::vector<Order>& orders) {
 
 }  // namespace
 
-FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call,
+FollowGoal::FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, SharedCall call,
                        std::shared_ptr<const CommonStart> start, std::int64_t begins_ns)
     : Script(context, axesOf(orders), handoverOf(orders), std::move(call)),
       orders_(std::move(orders)),
@@ -56,7 +56,7 @@ void FollowGoal::prepare() {
 }
 
 // Nobody may want it anymore when the hold ends.
-void FollowGoal::hold(const Ack& call) {
+void FollowGoal::hold(const SharedCall& call) {
   if (motion() == nullptr && isStreamed()) return end(kEndedByHold, call);
   Script::hold(call);
 }
@@ -75,7 +75,7 @@ Steps FollowGoal::plan() {
 // ---- a line ----
 
 FollowLine::FollowLine(Context& context, std::vector<Order> orders, double velocity,
-                       double duration, Ack call)
+                       double duration, SharedCall call)
     : Script(context, axesOf(orders), Handover::kAfterRest, std::move(call)),
       orders_(std::move(orders)),
       velocity_(velocity),
@@ -136,7 +136,7 @@ Steps FollowLine::takeUp(const Order& order) {
   goal.outcome = std::make_shared<axis::Outcome<axis::MoveResult>>();
   const auto nobody = [] { return std::vector<Predecessor>(); };
   add(steps, std::make_unique<FollowStep>(context(), std::vector<Order>{{&axis, goal}}, JoinPath(),
-                                          nobody, [] { return Ack(); }));
+                                          nobody, [] { return SharedCall(); }));
   add(steps, std::make_unique<RunStep>([this, &axis, goal] {
         check();
         const auto result = goal.outcome->get();

@@ -16,12 +16,12 @@ namespace stepdriver::activity {
 /// come to rest first, and it is woken up.
 class FollowGoal : public Script {
  public:
-  /// @param join empty for a single axis. @param start, begins_ns see Manoeuvre.
-  FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, Ack call,
+  /// @param join empty for a single axis. @param start, begins_ns see MotionExecution.
+  FollowGoal(Context& context, std::vector<Order> orders, JoinPath join, SharedCall call,
              std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0);
 
   void prepare() override;
-  void hold(const Ack& call) override;
+  void hold(const SharedCall& call) override;
   bool isStreamed() const override { return orders_.front().goal.isStreamed(); }
   bool followsSetpoints() const override { return orders_.front().goal.isSetpointOfPosition(); }
   bool leavesLaterMotions() const override { return begins_ns_ > 0 || isStreamed(); }
@@ -46,7 +46,7 @@ class FollowLine : public Script {
   /// @param targets [microsteps] of the joints.
   /// @param velocity, duration see machine::LineRequest.
   FollowLine(Context& context, std::vector<Order> orders, double velocity, double duration,
-             Ack call);
+             SharedCall call);
 
  protected:
   Steps plan() override;

@@ -116,7 +116,7 @@ struct Predecessor {
   axis::AxisModel* axis = nullptr;
   Goal goal;
   std::string left_by;       ///< why it isn't reached if its axis comes to rest before it, in words
-  Ack call;                  ///< waits for its beginning, if the engine had not yet accepted it
+  SharedCall call;           ///< waits for its beginning, if the engine had not yet accepted it
   std::uint64_t serial = 0;  ///< the order that would have begun it
   /// The last order for it that the engine has accepted, and those that it has not yet handled.
   std::vector<Followed> orders;

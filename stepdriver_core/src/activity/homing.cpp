@@ -111,12 +111,12 @@ void Homing::onBegin(std::vector<Predecessor> /*predecessors*/) {
   }
 }
 
-void Homing::onAbandon(const Why& why) {
+void Homing::onAbandon(const EarlyEnd& why) {
   failure_ = fmt::format("{} isn't homed: {}", axis_.name(), why.text);
   conclude(failure_ + "; it stands at ", true);
 }
 
-void Homing::onEnd(const Why& why, const Ack& call) {
+void Homing::onEnd(const EarlyEnd& why, const SharedCall& call) {
   fail(why.text, HomingEnd::kFailed, call);
   onLook();
 }
@@ -124,7 +124,7 @@ void Homing::onEnd(const Why& why, const Ack& call) {
 void Homing::cancelHomings(const std::vector<std::uint64_t>& ids) {
   if (std::find(ids.begin(), ids.end(), id_) == ids.end()) return;
   fail("it was cancelled", HomingEnd::kCancelled);
-  look();
+  poll();
 }
 
 std::vector<Predecessor> Homing::handOver(const std::string& by) {
@@ -135,7 +135,7 @@ std::vector<Predecessor> Homing::handOver(const std::string& by) {
   return left;
 }
 
-void Homing::hold(const Ack& call) {
+void Homing::hold(const SharedCall& call) {
   if (!isHeld()) held_since_ = context().now;
   if (stroke_) stroke_->hold(call);
 }
@@ -144,14 +144,14 @@ void Homing::refuseUnlessResumable() const {
   if (stroke_) stroke_->refuseUnlessResumable();
 }
 
-void Homing::resume(const Ack& call) {
+void Homing::resume(const SharedCall& call) {
   if (!isHeld()) return;
   if (stroke_) stroke_->resume(call);
   deadline_ += context().now - *held_since_;
   held_since_.reset();
 }
 
-void Homing::speedChanged(const Ack& call) {
+void Homing::speedChanged(const SharedCall& call) {
   if (stroke_) stroke_->replan(call);
 }
 
@@ -176,12 +176,12 @@ void Homing::onLook() {
 
 void Homing::step() {
   while (!waking_.empty()) {
-    if (!waking_.front()->look()) return;
+    if (!waking_.front()->poll()) return;
     waking_.erase(waking_.begin());
     if (phase_ == HomingPhase::kStopping) waking_.clear();
     if (!waking_.empty()) waking_.front()->begin();
   }
-  const bool ended = stroke_ == nullptr || stroke_->look();
+  const bool ended = stroke_ == nullptr || stroke_->poll();
   if (phase_ == HomingPhase::kStopping) {
     if (ended) conclude(failure_ + "; it stands at ", true);
     return;
@@ -276,7 +276,7 @@ void Homing::goOn() {
 void Homing::stroke(Goal goal) {
   goal.measures = true;
   axis_.refuseUnlessReady();
-  stroke_ = std::make_unique<Manoeuvre>(context(), std::vector<Order>{{&axis_, goal}});
+  stroke_ = std::make_unique<MotionExecution>(context(), std::vector<Order>{{&axis_, goal}});
   stroke_->prepare();
   stroke_->begin({}, nullptr);
 }
@@ -416,7 +416,7 @@ std::string Homing::timeOver() const {
   return fmt::format("{} didn't {} {}", switchThatIs(leaving), leaving ? "open" : "close", within);
 }
 
-void Homing::fail(const std::string& why, HomingEnd end, const Ack& call) {
+void Homing::fail(const std::string& why, HomingEnd end, const SharedCall& call) {
   if (phase_ != HomingPhase::kStopping) {
     phase_ = HomingPhase::kStopping;
     failure_ = fmt::format("{} isn't homed: {}", axis_.name(), why);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "activity.h"
-#include "manoeuvre.h"
+#include "motion_execution.h"
 #include "profile/shaped_profile.h"
 #include "script.h"
 #include "stepdriver_core/axis/axis_state.h"
@@ -32,22 +32,22 @@ class Homing : public Activity {
 
   bool canHandOver() const override { return stroke_ != nullptr; }
   std::vector<Predecessor> handOver(const std::string& by) override;
-  void hold(const Ack& call) override;
+  void hold(const SharedCall& call) override;
   void refuseUnlessResumable() const override;
-  void resume(const Ack& call) override;
-  void speedChanged(const Ack& call) override;
+  void resume(const SharedCall& call) override;
+  void speedChanged(const SharedCall& call) override;
   void cancelHomings(const std::vector<std::uint64_t>& ids) override;
   pulse::Nanoseconds due() const override;
   bool watchesInputs() const override { return !isHeld(); }
   axis::HomingPhase homingPhase() const override { return phase_; }
-  const Manoeuvre* motion() const override { return stroke_.get(); }
+  const MotionExecution* motion() const override { return stroke_.get(); }
   bool isHeld() const { return held_since_.has_value(); }
 
  protected:
   void onBegin(std::vector<Predecessor> predecessors) override;
   void onLook() override;
-  void onEnd(const Why& why, const Ack& call) override;
-  void onAbandon(const Why& why) override;
+  void onEnd(const EarlyEnd& why, const SharedCall& call) override;
+  void onAbandon(const EarlyEnd& why) override;
 
  private:
   void step();
@@ -65,7 +65,7 @@ class Homing : public Activity {
   void align();
   void pullOff();
   void fail(const std::string& why, axis::HomingEnd end = axis::HomingEnd::kFailed,
-            const Ack& call = {});
+            const SharedCall& call = {});
   void succeed();
   void conclude(const std::string& message, bool stands);
 
@@ -94,7 +94,7 @@ class Homing : public Activity {
   std::optional<pulse::Nanoseconds> held_since_;
 
   Steps waking_;
-  std::unique_ptr<Manoeuvre> stroke_;  // under way
+  std::unique_ptr<MotionExecution> stroke_;  // under way
   std::int64_t bound_ = 0;  // the joint's count at which the strokes of this phase must end
   bool slowing_ = false;    // the switch has opened
   pulse::Nanoseconds phase_began_ = 0;

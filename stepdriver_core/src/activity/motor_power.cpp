@@ -24,7 +24,7 @@ void MotorPower::switchOn() {
   failure_.clear();
 }
 
-void MotorPower::switchOff(pulse::Nanoseconds at, const Ack& call) {
+void MotorPower::switchOff(pulse::Nanoseconds at, const SharedCall& call) {
   if (!isWired()) return;
   wanted_ = false;
   off_at_ = off_at_ ? std::min(*off_at_, at) : at;
@@ -56,7 +56,7 @@ bool MotorPower::watchesInputs() const {
   return hasFeedback() && (state_ == State::kLeaving || state_ == State::kComing);
 }
 
-bool MotorPower::look(Context& context, bool may_go) {
+bool MotorPower::poll(Context& context, bool may_go) {
   if (!isWired()) return false;
   looked_at_ = context.now;
   const State before = state_;
@@ -152,7 +152,8 @@ bool MotorPower::endWrite(Context& context) {
   const bool switched_off = state_ == State::kSwitchingOff;
   state_ = switched_off ? State::kLeaving : State::kComing;
   since_ = context.now;
-  const std::vector<Ack> calls = switched_off ? std::exchange(off_calls_, {}) : std::vector<Ack>();
+  const std::vector<SharedCall> calls =
+      switched_off ? std::exchange(off_calls_, {}) : std::vector<SharedCall>();
   if (error == 0) return true;
   // Its feedback says nothing about a line that wasn't written.
   if (switched_off) state_ = State::kOff;
@@ -160,7 +161,7 @@ bool MotorPower::endWrite(Context& context) {
       "the motor power line {} can't be written: {}; check the cable and the supply of "
       "its chip",
       context.lines.output(lines_.output), gpio::errorText(error));
-  for (const Ack& call : calls) call->fail({Failure::Kind::kGpio, why});
+  for (const SharedCall& call : calls) call->fail({Failure::Kind::kGpio, why});
   // If it was to be switched on, it may have been.
   return fail(context, why);
 }

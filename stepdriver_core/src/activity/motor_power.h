@@ -41,21 +41,21 @@ class MotorPower {
   /// Switches it on, or keeps it on if it was to be switched off. Its line is switched off first,
   /// in case that failed before.
   void switchOn();
-  /// Switches it off at this clock time, or as soon after it as look() allows.
+  /// Switches it off at this clock time, or as soon after it as poll() allows.
   ///
   /// @param call is answered when the line is written.
-  void switchOff(pulse::Nanoseconds at, const Ack& call = {});
+  void switchOff(pulse::Nanoseconds at, const SharedCall& call = {});
   /// Switches it off after an emergency stop.
   void stopped(const Context& context);
 
   /// Something may have happened.
   ///
   /// @param may_go every brake that can hold its load does, and no motor moves.
-  /// @return whether it has got on: others that depend on it must look too.
-  bool look(Context& context, bool may_go);
+  /// @return whether it has got on: others that depend on it must be polled too.
+  bool poll(Context& context, bool may_go);
   /// What has gone wrong since the last call; empty: nothing.
   std::string takeFailure();
-  /// Clock time by which look() must be called.
+  /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const;
   /// Whether it waits for the level of the feedback.
   bool watchesInputs() const;
@@ -93,7 +93,7 @@ class MotorPower {
   State state_ = State::kThere;
   bool wanted_ = true;
   std::optional<pulse::Nanoseconds> off_at_;
-  std::vector<Ack> off_calls_;
+  std::vector<SharedCall> off_calls_;
   std::uint64_t job_ = 0;
   pulse::Nanoseconds since_ = 0;  // beginning of the wait of kLeaving or kComing
   pulse::Nanoseconds looked_at_ = 0;

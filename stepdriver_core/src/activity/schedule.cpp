@@ -15,11 +15,12 @@ namespace {
 // may be late. It is short, because a stop that comes meanwhile begins with that motion.
 constexpr pulse::Nanoseconds kAhead = 5'000'000;
 
-const Why kReplacedByLater{axis::MoveEnd::kReplaced,
-                           "another trajectory was to begin before it or at the same time"};
+const EarlyEnd kReplacedByLater{axis::MoveEnd::kReplaced,
+                                "another trajectory was to begin before it or at the same time"};
 
 // The axis that made it end, and those that were to move with it.
-void tellDropped(const std::vector<Order>& orders, const axis::AxisModel* because, const Why& why) {
+void reportDropped(const std::vector<Order>& orders, const axis::AxisModel* because,
+                   const EarlyEnd& why) {
   for (const Order& order : orders) {
     axis::MoveResult result;
     result.end = order.axis == because ? why.end : axis::MoveEnd::kCompanion;
@@ -35,7 +36,7 @@ class Beginning : public AnswerSink {
   explicit Beginning(std::vector<Order> orders) : orders_(std::move(orders)), call(*this, 0) {}
   void answer(CallId /*call*/, Reply reply) override {
     if (!reply.failure) return;
-    tellDropped(orders_, orders_.front().axis, {axis::MoveEnd::kStopped, reply.failure->text});
+    reportDropped(orders_, orders_.front().axis, {axis::MoveEnd::kStopped, reply.failure->text});
   }
 
  private:
@@ -134,32 +135,32 @@ bool Schedule::has(const axis::AxisModel& axis) const {
 }
 
 template <typename Which>
-bool Schedule::dropIf(const Which& which, const axis::AxisModel& axis, const Why& why) {
+bool Schedule::dropIf(const Which& which, const axis::AxisModel& axis, const EarlyEnd& why) {
   bool any = false;
   for (auto entry = entries_.begin(); entry != entries_.end();) {
     const auto& orders = entry->motion.orders;
     const bool drops = std::any_of(orders.begin(), orders.end(), [&](const Order& order) {
       return order.axis == &axis && which(*entry);
     });
-    if (drops) tellDropped(orders, &axis, why);
+    if (drops) reportDropped(orders, &axis, why);
     any = any || drops;
     entry = drops ? entries_.erase(entry) : entry + 1;
   }
   return any;
 }
 
-void Schedule::drop(const axis::AxisModel& axis, const Why& why) {
+void Schedule::drop(const axis::AxisModel& axis, const EarlyEnd& why) {
   dropIf([](const Entry& /*any*/) { return true; }, axis, why);
 }
 
-void Schedule::dropAll(const Why& why) {
+void Schedule::dropAll(const EarlyEnd& why) {
   for (const Entry& entry : entries_) {
-    tellDropped(entry.motion.orders, entry.motion.orders.front().axis, why);
+    reportDropped(entry.motion.orders, entry.motion.orders.front().axis, why);
   }
   entries_.clear();
 }
 
-bool Schedule::dropMove(const axis::AxisModel& axis, std::uint64_t move, const Why& why) {
+bool Schedule::dropMove(const axis::AxisModel& axis, std::uint64_t move, const EarlyEnd& why) {
   const auto has_it = [&](const Entry& entry) {
     const auto& orders = entry.motion.orders;
     return std::any_of(orders.begin(), orders.end(), [&](const Order& order) {
@@ -207,10 +208,10 @@ std::optional<Schedule::Drop> Schedule::whyNot(Entry& entry) const {
   return std::nullopt;
 }
 
-void Schedule::look() {
+void Schedule::poll() {
   for (std::size_t i = 0; i < entries_.size();) {
     if (const std::optional<Drop> drop = whyNot(entries_[i])) {
-      tellDropped(entries_[i].motion.orders, drop->axis, drop->why);
+      reportDropped(entries_[i].motion.orders, drop->axis, drop->why);
       entries_.erase(entries_.begin() + static_cast<std::ptrdiff_t>(i));
     } else {
       ++i;

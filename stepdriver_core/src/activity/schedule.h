@@ -46,19 +46,19 @@ class Schedule {
   std::vector<axis::Move> add(LaterMotion motion);
   bool has(const axis::AxisModel& axis) const;
   /// Drops all motions of an axis; their callers are told.
-  void drop(const axis::AxisModel& axis, const Why& why);
-  void dropAll(const Why& why);
+  void drop(const axis::AxisModel& axis, const EarlyEnd& why);
+  void dropAll(const EarlyEnd& why);
   /// Drops one motion. @return whether there was one with this move of the axis.
-  bool dropMove(const axis::AxisModel& axis, std::uint64_t move, const Why& why);
+  bool dropMove(const axis::AxisModel& axis, std::uint64_t move, const EarlyEnd& why);
 
   /// Drops what can't begin anymore.
-  void look();
+  void poll();
   /// Axes that must be woken up before their motion begins.
   std::vector<axis::AxisModel*> toWake() const;
   /// A motion that must begin now, and the call that tells its callers if it doesn't.
   struct Due {
     std::unique_ptr<FollowGoal> activity;
-    Ack call;
+    SharedCall call;
   };
   std::optional<Due> takeDue();
   /// Clock time by which takeDue() must be called.
@@ -86,7 +86,7 @@ class Schedule {
   };
   struct Drop {
     const axis::AxisModel* axis;
-    Why why;
+    EarlyEnd why;
   };
 
   const Entry* before(const Entry& entry, const axis::AxisModel& axis) const;
@@ -95,7 +95,7 @@ class Schedule {
   std::optional<Drop> whyNot(Entry& entry) const;
   pulse::Nanoseconds lead(const Entry& entry) const;
   template <typename Which>
-  bool dropIf(const Which& which, const axis::AxisModel& axis, const Why& why);
+  bool dropIf(const Which& which, const axis::AxisModel& axis, const EarlyEnd& why);
 
   Context& context_;
   std::vector<Entry> entries_;  // in the order of their beginnings

@@ -29,12 +29,12 @@ void Script::run() {
         if (ended_) {
           return fail(notDone(ended_->text));
         }
-        if (context().mode.held && steps_.front()->manoeuvre() != nullptr) return;
+        if (context().mode.held && steps_.front()->execution() != nullptr) return;
         current_ = std::move(steps_.front());
         steps_.pop_front();
         current_->begin();
       }
-      if (!current_->look()) return;
+      if (!current_->poll()) return;
       current_.reset();
     }
   } catch (const Error& error) {
@@ -45,13 +45,13 @@ void Script::run() {
 void Script::fail(const Failure& failure) {
   if (call_) call_->fail(failure);
   call_.reset();
-  for (Predecessor& left : takePredecessors()) Manoeuvre::conclude(context(), left);
+  for (Predecessor& left : takePredecessors()) MotionExecution::conclude(context(), left);
   steps_.clear();
   current_.reset();
   finish();
 }
 
-void Script::onEnd(const Why& why, const Ack& call) {
+void Script::onEnd(const EarlyEnd& why, const SharedCall& call) {
   if (!ended_) ended_ = why;
   if (current_) current_->end(why, call);
   run();
@@ -61,7 +61,7 @@ Failure Script::notDone(const std::string& why) const {
   return {Failure::Kind::kRefused, axes().front()->name() + ": " + why};
 }
 
-void Script::onAbandon(const Why& why) {
+void Script::onAbandon(const EarlyEnd& why) {
   if (call_) call_->fail(notDone(why.text));
   call_.reset();
 }
@@ -70,34 +70,37 @@ void Script::onAbandon(const Why& why) {
 
 bool Script::canHandOver() const { return motion() != nullptr; }
 
-const Manoeuvre* Script::motion() const { return current_ ? current_->manoeuvre() : nullptr; }
+const MotionExecution* Script::motion() const { return current_ ? current_->execution() : nullptr; }
 
 std::vector<Predecessor> Script::handOver(const std::string& by) {
-  std::vector<Predecessor> left = current_->manoeuvre()->handOver();
+  std::vector<Predecessor> left = current_->execution()->handOver();
   fail(notDone(by));
   return left;
 }
 
-void Script::hold(const Ack& call) {
-  if (Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr) manoeuvre->hold(call);
+void Script::hold(const SharedCall& call) {
+  if (MotionExecution* execution = current_ ? current_->execution() : nullptr)
+    execution->hold(call);
 }
 
 void Script::refuseUnlessResumable() const {
   if (motion() != nullptr) motion()->refuseUnlessResumable();
 }
 
-void Script::resume(const Ack& call) {
-  if (Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr) manoeuvre->resume(call);
+void Script::resume(const SharedCall& call) {
+  if (MotionExecution* execution = current_ ? current_->execution() : nullptr)
+    execution->resume(call);
 }
 
-void Script::speedChanged(const Ack& call) {
-  if (Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr) manoeuvre->replan(call);
+void Script::speedChanged(const SharedCall& call) {
+  if (MotionExecution* execution = current_ ? current_->execution() : nullptr)
+    execution->replan(call);
 }
 
-void Script::extend(const Extension& extension, const Ack& call) {
-  Manoeuvre* manoeuvre = current_ ? current_->manoeuvre() : nullptr;
-  if (manoeuvre == nullptr) return Activity::extend(extension, call);
-  manoeuvre->extend(extension, call);
+void Script::extend(const Extension& extension, const SharedCall& call) {
+  MotionExecution* execution = current_ ? current_->execution() : nullptr;
+  if (execution == nullptr) return Activity::extend(extension, call);
+  execution->extend(extension, call);
   run();
 }
 

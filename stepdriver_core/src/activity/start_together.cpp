@@ -22,25 +22,25 @@ Activity::Handover handoverOfStarts(const std::vector<StartTogether::Start>& sta
 /// Passes a failure on to all calls.
 class Passing : public AnswerSink {
  public:
-  explicit Passing(std::vector<Ack> calls) : calls_(std::move(calls)) {}
+  explicit Passing(std::vector<SharedCall> calls) : calls_(std::move(calls)) {}
   void answer(CallId /*call*/, Reply reply) override {
-    for (const Ack& call : calls_) {
+    for (const SharedCall& call : calls_) {
       if (reply.failure) call->fail(*reply.failure);
     }
     calls_.clear();
   }
 
  private:
-  std::vector<Ack> calls_;
+  std::vector<SharedCall> calls_;
 };
 
-Ack callOfAll(const std::vector<StartTogether::Start>& starts) {
+SharedCall callOfAll(const std::vector<StartTogether::Start>& starts) {
   struct All {
-    explicit All(std::vector<Ack> calls) : passing(std::move(calls)), call(passing, 0) {}
+    explicit All(std::vector<SharedCall> calls) : passing(std::move(calls)), call(passing, 0) {}
     Passing passing;
     PendingCall call;  // ends first
   };
-  std::vector<Ack> calls;
+  std::vector<SharedCall> calls;
   calls.reserve(starts.size());
   for (const StartTogether::Start& start : starts) calls.push_back(start.call);
   const auto all = std::make_shared<All>(std::move(calls));

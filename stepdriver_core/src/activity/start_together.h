@@ -16,7 +16,7 @@ class StartTogether : public Script {
   /// A goal, and the call that waits for its beginning.
   struct Start {
     Order order;
-    Ack call;
+    SharedCall call;
   };
 
   /// @param starts streamed goals.
@@ -24,7 +24,7 @@ class StartTogether : public Script {
 
   void prepare() override;
   bool leavesLaterMotions() const override { return true; }
-  void hold(const Ack& call) override { end(kEndedByHold, call); }
+  void hold(const SharedCall& call) override { end(kEndedByHold, call); }
   std::vector<Part> takeParts() override;
   bool isStreamed() const override { return true; }
   bool followsSetpoints() const override {

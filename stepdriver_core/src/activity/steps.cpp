@@ -33,7 +33,7 @@ void PinsStep::begin() {
   phase_ = Phase::kReserving;
 }
 
-bool PinsStep::look() {
+bool PinsStep::poll() {
   const pulse::ChannelState& state = axis_.motor.state();
   if (phase_ == Phase::kAwaitingRest) {
     begin();
@@ -155,7 +155,7 @@ void PowerStep::begin() {
   context_.motor_power.switchOn();
 }
 
-bool PowerStep::look() {
+bool PowerStep::poll() {
   const MotorPower& power = context_.motor_power;
   if (power.isWanted()) return power.isThere();
   refuseIfStopped(context_, axis_);
@@ -177,8 +177,8 @@ void EngageBrakeStep::begin() {
   writing_->begin();
 }
 
-bool EngageBrakeStep::look() {
-  if (writing_ && !writing_->look()) return false;
+bool EngageBrakeStep::poll() {
+  if (writing_ && !writing_->poll()) return false;
   writing_.reset();
   return context_.now >= axis_.motor.brake().settles();
 }
@@ -187,8 +187,8 @@ pulse::Nanoseconds EngageBrakeStep::due() const {
   return writing_ ? writing_->due() : axis_.motor.brake().settles();
 }
 
-bool ReleaseBrakeStep::look() {
-  if (writing_ && !writing_->look()) return false;
+bool ReleaseBrakeStep::poll() {
+  if (writing_ && !writing_->poll()) return false;
   writing_.reset();
   if (!axis_.motorHolds()) return true;
   const motor::Brake& brake = axis_.motor.brake();
@@ -225,9 +225,9 @@ Steps braked(Context& context, axis::AxisModel& axis, Steps steps) {
 
 void FollowStep::begin() {
   if (moves_.empty()) prepare();
-  Ack call = call_();
+  SharedCall call = call_();
   if (call) call->succeed(moves_);
-  manoeuvre_.begin(predecessors_(), std::move(call));
+  execution_.begin(predecessors_(), std::move(call));
 }
 
 }  // namespace stepdriver::activity

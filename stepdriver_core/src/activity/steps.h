@@ -16,7 +16,7 @@ namespace stepdriver::activity {
 class RunStep : public Step {
  public:
   explicit RunStep(std::function<void()> action) : action_(std::move(action)) {}
-  bool look() override {
+  bool poll() override {
     action_();
     return true;
   }
@@ -33,7 +33,7 @@ class WaitStep : public Step {
            std::function<bool()> earlier = {})
       : context_(context), until_(std::move(until)), earlier_(std::move(earlier)) {}
   void begin() override { due_ = until_(); }
-  bool look() override { return context_.now >= due_ || (earlier_ && earlier_()); }
+  bool poll() override { return context_.now >= due_ || (earlier_ && earlier_()); }
   pulse::Nanoseconds due() const override { return due_; }
 
  private:
@@ -61,7 +61,7 @@ class PinsStep : public Step {
       : context_(context), axis_(axis), build_(std::move(writes)) {}
 
   void begin() override;
-  bool look() override;
+  bool poll() override;
   pulse::Nanoseconds due() const override {
     return phase_ == Phase::kWaiting ? due_ : pulse::kNever;
   }
@@ -102,7 +102,7 @@ class EngageBrakeStep : public BrakeStep {
  public:
   using BrakeStep::BrakeStep;
   void begin() override;
-  bool look() override;
+  bool poll() override;
   pulse::Nanoseconds due() const override;
 };
 
@@ -111,7 +111,7 @@ class EngageBrakeStep : public BrakeStep {
 class ReleaseBrakeStep : public BrakeStep {
  public:
   using BrakeStep::BrakeStep;
-  bool look() override;
+  bool poll() override;
   pulse::Nanoseconds due() const override;
 };
 
@@ -122,7 +122,7 @@ class PowerStep : public Step {
   /// @throw Refused if there was an emergency stop, or if the machine was closed.
   void begin() override;
   /// @throw GpioError if it can't be switched on. @throw Refused as above, meanwhile.
-  bool look() override;
+  bool poll() override;
 
  private:
   Context& context_;
@@ -132,27 +132,29 @@ class PowerStep : public Step {
 /// Follows a motion to its end.
 class FollowStep : public Step {
  public:
-  /// @param predecessors, call are taken when it begins. @param start, begins_ns see Manoeuvre.
+  /// @param predecessors, call are taken when it begins. @param start, begins_ns see
+  /// MotionExecution.
   FollowStep(Context& context, std::vector<Order> orders, JoinPath join,
-             std::function<std::vector<Predecessor>()> predecessors, std::function<Ack()> call,
-             std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0)
-      : manoeuvre_(context, std::move(orders), std::move(join), std::move(start), begins_ns),
+             std::function<std::vector<Predecessor>()> predecessors,
+             std::function<SharedCall()> call, std::shared_ptr<const CommonStart> start = {},
+             std::int64_t begins_ns = 0)
+      : execution_(context, std::move(orders), std::move(join), std::move(start), begins_ns),
         predecessors_(std::move(predecessors)),
         call_(std::move(call)) {}
 
   /// Plans it in advance. @throw Refused
-  void prepare() { moves_ = manoeuvre_.prepare(); }
+  void prepare() { moves_ = execution_.prepare(); }
 
   void begin() override;
-  bool look() override { return manoeuvre_.look(); }
-  void end(const Why& why, const Ack& call) override { manoeuvre_.stop(why, call); }
-  Manoeuvre* manoeuvre() override { return &manoeuvre_; }
+  bool poll() override { return execution_.poll(); }
+  void end(const EarlyEnd& why, const SharedCall& call) override { execution_.stop(why, call); }
+  MotionExecution* execution() override { return &execution_; }
 
  private:
-  Manoeuvre manoeuvre_;
+  MotionExecution execution_;
   std::vector<axis::Move> moves_;
   std::function<std::vector<Predecessor>()> predecessors_;
-  std::function<Ack()> call_;
+  std::function<SharedCall()> call_;
 };
 
 /// @throw Refused if there was an emergency stop, or if the machine was closed.

@@ -5,14 +5,14 @@
 
 namespace stepdriver::axis {
 
-bool InputLevels::take(int input, int level) {
+bool InputLevels::update(int input, int level) {
   int& known = levels_.at(static_cast<std::size_t>(input));
   if (known == level) return false;
   known = level;
   return true;
 }
 
-void InputLevels::take(const gpio::EdgeEvent& edge) {
+void InputLevels::add(const gpio::EdgeEvent& edge) {
   edges_.push_back(edge);
   if (edges_.size() > kRemembered) edges_.pop_front();
 }

@@ -18,8 +18,8 @@ class InputLevels {
   int level(int input) const { return levels_.at(static_cast<std::size_t>(input)); }
 
   /// @return whether the level has changed.
-  bool take(int input, int level);
-  void take(const gpio::EdgeEvent& edge);
+  bool update(int input, int level);
+  void add(const gpio::EdgeEvent& edge);
 
   /// The edges of an input after this time, in the order of their reports.
   std::vector<gpio::EdgeEvent> since(int input, std::int64_t time_ns) const;

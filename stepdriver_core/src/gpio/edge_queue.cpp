@@ -5,7 +5,7 @@
 
 namespace stepdriver::gpio {
 
-int EdgeQueue::take(std::int64_t timeout_ns, EdgeEvent* events, std::size_t capacity) {
+int EdgeQueue::pop(std::int64_t timeout_ns, EdgeEvent* events, std::size_t capacity) {
   std::unique_lock<std::mutex> lock(mutex_);
   const auto come = [this] { return interrupted_ || size_ > 0; };
   if (timeout_ns < 0) {

@@ -32,7 +32,7 @@ class EdgeQueue {
   }
 
   /// @return as Lines::waitForEdges().
-  int take(std::int64_t timeout_ns, EdgeEvent* events, std::size_t capacity);
+  int pop(std::int64_t timeout_ns, EdgeEvent* events, std::size_t capacity);
 
  private:
   std::mutex mutex_;

@@ -92,7 +92,7 @@ class SimulatedBackend::HeldLines : public Lines {
 
   int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
                    std::size_t capacity) noexcept override {
-    return capacity == 0 ? -EINVAL : edges_.take(timeout_ns, events, capacity);
+    return capacity == 0 ? -EINVAL : edges_.pop(timeout_ns, events, capacity);
   }
 
   void interrupt() noexcept override { edges_.interrupt(); }

@@ -23,13 +23,13 @@ namespace stepdriver::machine {
 namespace {
 
 using activity::Activity;
+using activity::EarlyEnd;
 using activity::Goal;
 using activity::Order;
-using activity::Why;
 
-const Why kStopped{axis::MoveEnd::kStopped, "it was stopped"};
+const EarlyEnd kStopped{axis::MoveEnd::kStopped, "it was stopped"};
 constexpr const char* kMovedMeanwhile = "it moved while its path was planned";
-const Why kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
+const EarlyEnd kTakenOver{axis::MoveEnd::kReplaced, "another command took over"};
 
 constexpr const char* kChipRemedy =
     "let it cool down, check the motor's wiring and the current that is set, then call recover";
@@ -131,7 +131,7 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   context_.stops_asked = input.stops_asked;
   context_.beginTurn(out);
   std::visit([this](const auto& what) { on(what); }, input.what);
-  activities_.look();
+  activities_.poll();
   supervise();
   while (supervisePower()) {
   }
@@ -155,11 +155,11 @@ pulse::Nanoseconds Controller::due() const {
 // ---- the engine ----
 
 void Controller::on(const EngineNews& news) {
-  takeStops(news);
-  for (std::size_t i = 0; i < news.channels.size(); ++i) take(axis(i), news.channels[i]);
+  handleStops(news);
+  for (std::size_t i = 0; i < news.channels.size(); ++i) update(axis(i), news.channels[i]);
 }
 
-void Controller::takeStops(const EngineNews& news) {
+void Controller::handleStops(const EngineNews& news) {
   const bool by_input = news.input_stops != input_stops_seen_;
   const auto latch = [&] {
     for (const auto& axis : context_.axes) {
@@ -179,9 +179,9 @@ void Controller::takeStops(const EngineNews& news) {
   latch();
 }
 
-void Controller::take(axis::AxisModel& axis, const pulse::ChannelState& state) {
+void Controller::update(axis::AxisModel& axis, const pulse::ChannelState& state) {
   const pulse::ChannelState before = axis.motor.state();
-  axis.motor.take(state);
+  axis.motor.update(state);
   const bool was_faulty = static_cast<bool>(axis.fault);
   if (state.accepted != before.accepted) axis.stopped_by.clear();
   if (state.line_errors != before.line_errors) {
@@ -277,13 +277,13 @@ void Controller::supervise() {
     superviseIdle(*axis);
   }
   disables_all_ = false;
-  activities_.look();
+  activities_.poll();
 }
 
 // @return whether it has got on: the activities have looked at it.
 bool Controller::supervisePower() {
   activity::MotorPower& power = context_.motor_power;
-  if (!power.look(context_, motorsMayLosePower())) return false;
+  if (!power.poll(context_, motorsMayLosePower())) return false;
   if (const std::string failure = power.takeFailure(); !failure.empty()) {
     context_.out->stops = true;
     for (const auto& axis : context_.axes) {
@@ -291,7 +291,7 @@ bool Controller::supervisePower() {
       axis->noteStop();
     }
   }
-  activities_.look();
+  activities_.poll();
   supervise();
   return true;
 }
@@ -327,7 +327,7 @@ void Controller::superviseIdle(axis::AxisModel& axis) {
 // ---- requests ----
 
 void Controller::on(const Requested& requested) {
-  const Ack call = std::make_shared<activity::PendingCall>(context_, requested.call);
+  const SharedCall call = std::make_shared<activity::PendingCall>(context_, requested.call);
   try {
     std::visit([this, &call](const auto& wanted) { serve(wanted, call); }, requested.request);
   } catch (const Error& error) {
@@ -389,7 +389,7 @@ Goal Controller::goalWithOutcome(Goal goal) {
 
 double Controller::relativeOrigin(const axis::AxisModel& axis) const {
   const Activity* owner = activities_.owner(axis);
-  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const activity::MotionExecution* motion = owner != nullptr ? owner->motion() : nullptr;
   const motor::Motion* latest = axis.motor.motions().latest();
   if (motion == nullptr || latest == nullptr) {
     return axis.restCount() + axis.position.remainder() * axis.stepsPerUnit();
@@ -433,7 +433,7 @@ Goal Controller::goalOf(const MoveTo& wanted) {
   return goal;
 }
 
-void Controller::serve(const MoveTo& wanted, const Ack& call) {
+void Controller::serve(const MoveTo& wanted, const SharedCall& call) {
   axis::AxisModel& moved = axis(wanted.axis);
   const Goal goal = goalWithOutcome(goalOf(wanted));
   activities_.begin(std::make_unique<activity::FollowGoal>(
@@ -441,7 +441,7 @@ void Controller::serve(const MoveTo& wanted, const Ack& call) {
                     kTakenOver);
 }
 
-void Controller::serve(const MoveRounds& wanted, const Ack& call) {
+void Controller::serve(const MoveRounds& wanted, const SharedCall& call) {
   const axis::AxisModel& moved = axis(wanted.axis);
   if (moved.config.kinematics) {
     moved.refuse("it shares its motors, none of which turns for it alone: move it by a distance");
@@ -458,7 +458,7 @@ void Controller::serve(const MoveRounds& wanted, const Ack& call) {
   serve(MoveTo{wanted.axis, way, true, wanted.velocity}, call);
 }
 
-void Controller::serve(const PlanMove& wanted, const Ack& call) {
+void Controller::serve(const PlanMove& wanted, const SharedCall& call) {
   axis::AxisModel& moved = axis(wanted.move.axis);
   const Goal goal = goalOf(wanted.move);
   axis::MovePlan shown;
@@ -489,7 +489,7 @@ void Controller::serve(const PlanMove& wanted, const Ack& call) {
 
 const Goal* Controller::streamedGoal(const axis::AxisModel& axis) const {
   const Activity* owner = activities_.owner(axis);
-  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const activity::MotionExecution* motion = owner != nullptr ? owner->motion() : nullptr;
   const Goal* current = motion != nullptr && axis.moving() ? motion->goalOf(axis) : nullptr;
   return current != nullptr && current->isStreamed() ? current : nullptr;
 }
@@ -509,7 +509,7 @@ void Controller::limitVelocity(Goal& goal, const axis::AxisModel& axis, const ch
   axis.refuseIntoEndstop(sign);
 }
 
-Controller::MayBegin Controller::goalOf(const Jog& wanted, const Ack& call) {
+Controller::MayBegin Controller::goalOf(const Jog& wanted, const SharedCall& call) {
   axis::AxisModel& moved = axis(wanted.axis);
   moved.refuseUnlessFinite("velocity", wanted.velocity, "/s");
   const double velocity = velocityOrRest(moved, wanted.velocity);
@@ -559,7 +559,7 @@ Controller::MayBegin Controller::positionGoal(const Setpoint& wanted, double tim
   goal.target = motion::restingCount(setpoint.position);
   goal.remainder = setpoint.position - static_cast<double>(*goal.target);
   const axis::SetpointStream::Course course =
-      moved.setpoints.take(setpoint.position, now, nanoseconds(timeout), moved.stops);
+      moved.setpoints.add(setpoint.position, now, nanoseconds(timeout), moved.stops);
   setpoint.velocity = course.velocity;
   setpoint.period = static_cast<double>(course.period_ns) * 1e-9;
   setpoint.reach_ns = course.came_ns + course.period_ns;
@@ -590,9 +590,9 @@ Controller::MayBegin Controller::velocityGoal(const Setpoint& wanted, double tim
 }
 
 template <typename Message, typename GoalOf>
-void Controller::beginStreamed(const std::vector<Message>& messages, const Ack& call,
+void Controller::beginStreamed(const std::vector<Message>& messages, const SharedCall& call,
                                const GoalOf& goal_of) {
-  const std::vector<Ack> calls = activity::PartedCall::divide(call, messages.size());
+  const std::vector<SharedCall> calls = activity::PartedCall::divide(call, messages.size());
   std::vector<activity::StartTogether::Start> starts;
   for (std::size_t i = 0; i < messages.size(); ++i) {
     try {
@@ -620,21 +620,21 @@ void Controller::beginTogether(std::vector<activity::StartTogether::Start> start
       any_waits ? std::stable_partition(starts.begin(), starts.end(), moves) : starts.end();
   const auto begin = [this](std::vector<Start> group) {
     if (group.empty()) return;
-    std::vector<Ack> calls;
+    std::vector<SharedCall> calls;
     calls.reserve(group.size());
     for (const Start& start : group) calls.push_back(start.call);
     try {
       activities_.begin(std::make_unique<activity::StartTogether>(context_, std::move(group)),
                         kTakenOver);
     } catch (const Error& error) {
-      for (const Ack& call : calls) call->fail(activity::failureOf(error));
+      for (const SharedCall& call : calls) call->fail(activity::failureOf(error));
     }
   };
   begin({starts.begin(), first_waiting});
   begin({first_waiting, starts.end()});
 }
 
-void Controller::serve(const Jog& wanted, const Ack& call) {
+void Controller::serve(const Jog& wanted, const SharedCall& call) {
   const MayBegin goal = goalOf(wanted, call);
   if (!goal) return;
   activities_.begin(
@@ -643,13 +643,13 @@ void Controller::serve(const Jog& wanted, const Ack& call) {
       kTakenOver);
 }
 
-void Controller::serve(const JogTogether& wanted, const Ack& call) {
+void Controller::serve(const JogTogether& wanted, const SharedCall& call) {
   beginStreamed(wanted.jogs, call,
-                [this](const Jog& jog, const Ack& part) { return goalOf(jog, part); });
+                [this](const Jog& jog, const SharedCall& part) { return goalOf(jog, part); });
 }
 
-void Controller::serve(const FollowSetpoints& wanted, const Ack& call) {
-  beginStreamed(wanted.setpoints, call, [&](const Setpoint& setpoint, const Ack& /*part*/) {
+void Controller::serve(const FollowSetpoints& wanted, const SharedCall& call) {
+  beginStreamed(wanted.setpoints, call, [&](const Setpoint& setpoint, const SharedCall& /*part*/) {
     axis::AxisModel& moved = axis(setpoint.axis);
     const bool is_position = wanted.mode == SetpointMode::kPosition;
     moved.refuseUnlessFinite("setpoint", setpoint.value, is_position ? "" : "/s");
@@ -665,7 +665,7 @@ void Controller::serve(const FollowSetpoints& wanted, const Ack& call) {
   });
 }
 
-void Controller::serve(const MoveLine& wanted, const Ack& call) {
+void Controller::serve(const MoveLine& wanted, const SharedCall& call) {
   const axis::AxisModel& first = axis(wanted.axes.front());
   refuseBadNumber(first, "velocity", wanted.velocity);
   refuseBadNumber(first, "duration", wanted.duration);
@@ -690,7 +690,7 @@ void Controller::serve(const MoveLine& wanted, const Ack& call) {
                     {axis::MoveEnd::kStopped, "a line was to begin"});
 }
 
-void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
+void Controller::serve(const FollowTrajectory& wanted, const SharedCall& call) {
   std::vector<axis::AxisModel*> axes;
   for (std::size_t i = 0; i < wanted.axes.size(); ++i) {
     axis::AxisModel& moved = axis(wanted.axes[i]);
@@ -748,11 +748,11 @@ void Controller::serve(const FollowTrajectory& wanted, const Ack& call) {
 
 const Goal* Controller::goalOf(const axis::AxisModel& axis) const {
   const Activity* owner = activities_.owner(axis);
-  const activity::Manoeuvre* motion = owner != nullptr ? owner->motion() : nullptr;
+  const activity::MotionExecution* motion = owner != nullptr ? owner->motion() : nullptr;
   return motion != nullptr ? motion->goalOf(axis) : nullptr;
 }
 
-void Controller::serve(const ExtendPath& wanted, const Ack& call) {
+void Controller::serve(const ExtendPath& wanted, const SharedCall& call) {
   axis::AxisModel& extended = axis(wanted.axis);
   Activity* owner = activities_.owner(extended);
   const Goal* goal = goalOf(extended);
@@ -765,12 +765,12 @@ void Controller::serve(const ExtendPath& wanted, const Ack& call) {
 
 // ---- stops ----
 
-void Controller::serve(const StopAxis& wanted, const Ack& call) {
+void Controller::serve(const StopAxis& wanted, const SharedCall& call) {
   axis(wanted.axis).noteStop();
   activities_.end(axis(wanted.axis), kStopped, call);
 }
 
-void Controller::serve(const StopMove& wanted, const Ack& call) {
+void Controller::serve(const StopMove& wanted, const SharedCall& call) {
   axis::AxisModel& stopped = axis(wanted.axis);
   if (activities_.schedule().dropMove(stopped, wanted.move, kStopped)) return;
   const Goal* goal = goalOf(stopped);
@@ -779,13 +779,13 @@ void Controller::serve(const StopMove& wanted, const Ack& call) {
   activities_.end(stopped, kStopped, call);
 }
 
-void Controller::serve(const StopAll& /*wanted*/, const Ack& call) {
+void Controller::serve(const StopAll& /*wanted*/, const SharedCall& call) {
   context_.mode.held = false;
   for (const auto& axis : context_.axes) axis->noteStop();
   activities_.endAll(kStopped, call);
 }
 
-void Controller::serve(const Hold& /*wanted*/, const Ack& call) {
+void Controller::serve(const Hold& /*wanted*/, const SharedCall& call) {
   if (!context_.mode.closed.empty()) throw Refused(context_.mode.closed);
   if (context_.mode.held) return;
   context_.mode.held = true;
@@ -796,7 +796,7 @@ void Controller::serve(const Hold& /*wanted*/, const Ack& call) {
   });
 }
 
-void Controller::serve(const Resume& /*wanted*/, const Ack& call) {
+void Controller::serve(const Resume& /*wanted*/, const SharedCall& call) {
   if (!context_.mode.held) return;
   // All or none: what is refused for one axis leaves the machine on hold.
   activities_.forEach([](const Activity& activity) {
@@ -809,12 +809,12 @@ void Controller::serve(const Resume& /*wanted*/, const Ack& call) {
   });
 }
 
-void Controller::serve(const SetSpeedOverride& wanted, const Ack& call) {
+void Controller::serve(const SetSpeedOverride& wanted, const SharedCall& call) {
   context_.mode.speed_override = wanted.factor;
   activities_.forEach([&](Activity& activity) { activity.speedChanged(call); });
 }
 
-void Controller::serve(const SetLimits& wanted, const Ack& call) {
+void Controller::serve(const SetLimits& wanted, const SharedCall& call) {
   axis::AxisModel& changed = axis(wanted.axis);
   changed.refuseUnlessOpen();
   changed.changeLimits(changed.checkedLimits(wanted.limits));
@@ -832,7 +832,7 @@ void Controller::refuseWhileEmergencyStopInput() const {
   if ((level != 0) == emergency_stop_->active) throw Refused(input + " is active; release it");
 }
 
-void Controller::serve(const Recover& /*wanted*/, const Ack& call) {
+void Controller::serve(const Recover& /*wanted*/, const SharedCall& call) {
   refuseWhileEmergencyStopInput();
   if (context_.stops_asked != context_.stops_handled) {
     throw Refused("an emergency stop has come meanwhile");
@@ -849,7 +849,7 @@ void Controller::serve(const Recover& /*wanted*/, const Ack& call) {
 
 // ---- homing ----
 
-void Controller::serve(const Home& wanted, const Ack& call) {
+void Controller::serve(const Home& wanted, const SharedCall& call) {
   for (const AxisId id : wanted.axes) {
     activity::Homing::refuseUnlessReady(axis(id));
     refuseUnlessReadyToMove(axis(id));
@@ -875,13 +875,13 @@ void Controller::serve(const Home& wanted, const Ack& call) {
   call->succeed(std::move(accepted));
 }
 
-void Controller::serve(const CancelHoming& wanted, const Ack& /*call*/) {
+void Controller::serve(const CancelHoming& wanted, const SharedCall& /*call*/) {
   activities_.forEach([&](Activity& activity) { activity.cancelHomings(wanted.ids); });
 }
 
 // ---- the driver chip ----
 
-void Controller::serve(const Enable& wanted, const Ack& call) {
+void Controller::serve(const Enable& wanted, const SharedCall& call) {
   std::vector<axis::AxisModel*> all;
   for (const AxisId id : wanted.axes) {
     for (axis::AxisModel* axis : withSharers(id)) {
@@ -926,7 +926,7 @@ bool Controller::mustEnable(const axis::AxisModel& axis) const {
   return true;
 }
 
-void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call) {
+void Controller::disable(axis::AxisModel& axis, const EarlyEnd& why, const SharedCall& call) {
   ++axis.stops;
   for (Activity* at : {activities_.owner(axis), activities_.heir(axis)}) {
     if (at != nullptr && at->joinDisable(call)) return;
@@ -934,7 +934,7 @@ void Controller::disable(axis::AxisModel& axis, const Why& why, const Ack& call)
   activities_.begin(std::make_unique<activity::Disable>(context_, axis, call), why);
 }
 
-void Controller::serve(const Sleep& wanted, const Ack& call) {
+void Controller::serve(const Sleep& wanted, const SharedCall& call) {
   const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
   for (const axis::AxisModel* changed : all) {
     refuseUnlessFree(*changed, wanted.asleep ? "it is put to sleep" : "it is woken");
@@ -950,7 +950,7 @@ void Controller::serve(const Sleep& wanted, const Ack& call) {
   }
 }
 
-void Controller::serve(const Reset& wanted, const Ack& call) {
+void Controller::serve(const Reset& wanted, const SharedCall& call) {
   const std::vector<axis::AxisModel*> all = withSharers(wanted.axis);
   for (const axis::AxisModel* changed : all) {
     refuseUnlessFree(*changed, "it is reset");
@@ -963,7 +963,7 @@ void Controller::serve(const Reset& wanted, const Ack& call) {
   }
 }
 
-void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
+void Controller::serve(const SetMicrosteps& wanted, const SharedCall& call) {
   axis::AxisModel& changed = axis(wanted.axis);
   changed.refuseMicrosteps(wanted.microsteps);
   refuseUnlessFree(changed, "its microsteps are changed");
@@ -988,7 +988,7 @@ void Controller::serve(const SetMicrosteps& wanted, const Ack& call) {
       kTakenOver);
 }
 
-void Controller::serve(const SetPosition& wanted, const Ack& /*call*/) {
+void Controller::serve(const SetPosition& wanted, const SharedCall& /*call*/) {
   axis::AxisModel& changed = axis(wanted.axis);
   refuseUnlessFree(changed, "its position is set");
   changed.refuseUnlessFinite("position", wanted.position);
@@ -998,13 +998,13 @@ void Controller::serve(const SetPosition& wanted, const Ack& /*call*/) {
 
 // ---- beginning and end ----
 
-void Controller::serve(const BringUp& /*wanted*/, const Ack& call) {
+void Controller::serve(const BringUp& /*wanted*/, const SharedCall& call) {
   for (const auto& axis : context_.axes) {
     activities_.begin(std::make_unique<activity::BringUp>(context_, *axis, call), kTakenOver);
   }
 }
 
-void Controller::serve(const RestorePosition& wanted, const Ack& call) {
+void Controller::serve(const RestorePosition& wanted, const SharedCall& call) {
   axis::AxisModel& restored = axis(wanted.axis);
   const axis::AxisMemory& kept = wanted.memory;
   const std::string why = restored.whyImpossible(kept, wanted.source);
@@ -1018,23 +1018,23 @@ void Controller::serve(const RestorePosition& wanted, const Ack& call) {
       kTakenOver);
 }
 
-void Controller::serve(const NotePosition& wanted, const Ack& /*call*/) {
+void Controller::serve(const NotePosition& wanted, const SharedCall& /*call*/) {
   axis(wanted.axis).position.setNote(wanted.why);
 }
 
-void Controller::serve(const Close& wanted, const Ack& call) {
+void Controller::serve(const Close& wanted, const SharedCall& call) {
   context_.mode.closed = wanted.reason;
   context_.mode.held = false;
   for (const auto& axis : context_.axes) ++axis->stops;
   activities_.endAll({axis::MoveEnd::kStopped, wanted.reason}, call);
 }
 
-void Controller::serve(const AwaitRest& /*wanted*/, const Ack& call) {
+void Controller::serve(const AwaitRest& /*wanted*/, const SharedCall& call) {
   awaiting_rest_.push_back(call);
 }
 
-void Controller::serve(const PowerDown& /*wanted*/, const Ack& call) {
-  const Why why{axis::MoveEnd::kStopped, context_.mode.closed};
+void Controller::serve(const PowerDown& /*wanted*/, const SharedCall& call) {
+  const EarlyEnd why{axis::MoveEnd::kStopped, context_.mode.closed};
   for (const auto& axis : context_.axes) {
     if (axis->motor.pins().hasEnable() && axis->config.disable_on_shutdown) {
       disable(*axis, why, call);

@@ -47,43 +47,43 @@ class Controller {
   void on(const Requested& requested);
   void on(const EngineNews& news);
   void on(const EngineHangs& hang);
-  void on(const InputRead& read) { context_.levels.take(read.input, read.level); }
-  void on(const InputEdge& edge) { context_.levels.take(edge.edge); }
+  void on(const InputRead& read) { context_.levels.update(read.input, read.level); }
+  void on(const InputEdge& edge) { context_.levels.add(edge.edge); }
   void on(const activity::PinDone& done) { context_.pin_done = done; }
   void on(const TimerDue& /*due*/) {}
 
   // Requests. Each throws Refused or GpioError, or accepts the call.
-  using Ack = activity::Ack;
-  void serve(const MoveTo& wanted, const Ack& call);
-  void serve(const MoveRounds& wanted, const Ack& call);
-  void serve(const PlanMove& wanted, const Ack& call);
-  void serve(const Jog& wanted, const Ack& call);
-  void serve(const JogTogether& wanted, const Ack& call);
-  void serve(const FollowSetpoints& wanted, const Ack& call);
-  void serve(const MoveLine& wanted, const Ack& call);
-  void serve(const FollowTrajectory& wanted, const Ack& call);
-  void serve(const ExtendPath& wanted, const Ack& call);
-  void serve(const StopAxis& wanted, const Ack& call);
-  void serve(const StopMove& wanted, const Ack& call);
-  void serve(const StopAll& wanted, const Ack& call);
-  void serve(const Hold& wanted, const Ack& call);
-  void serve(const Resume& wanted, const Ack& call);
-  void serve(const SetSpeedOverride& wanted, const Ack& call);
-  void serve(const SetLimits& wanted, const Ack& call);
-  void serve(const Home& wanted, const Ack& call);
-  void serve(const CancelHoming& wanted, const Ack& call);
-  void serve(const Enable& wanted, const Ack& call);
-  void serve(const Sleep& wanted, const Ack& call);
-  void serve(const Reset& wanted, const Ack& call);
-  void serve(const SetMicrosteps& wanted, const Ack& call);
-  void serve(const SetPosition& wanted, const Ack& call);
-  void serve(const Recover& wanted, const Ack& call);
-  void serve(const BringUp& wanted, const Ack& call);
-  void serve(const RestorePosition& wanted, const Ack& call);
-  void serve(const NotePosition& wanted, const Ack& call);
-  void serve(const Close& wanted, const Ack& call);
-  void serve(const AwaitRest& wanted, const Ack& call);
-  void serve(const PowerDown& wanted, const Ack& call);
+  using SharedCall = activity::SharedCall;
+  void serve(const MoveTo& wanted, const SharedCall& call);
+  void serve(const MoveRounds& wanted, const SharedCall& call);
+  void serve(const PlanMove& wanted, const SharedCall& call);
+  void serve(const Jog& wanted, const SharedCall& call);
+  void serve(const JogTogether& wanted, const SharedCall& call);
+  void serve(const FollowSetpoints& wanted, const SharedCall& call);
+  void serve(const MoveLine& wanted, const SharedCall& call);
+  void serve(const FollowTrajectory& wanted, const SharedCall& call);
+  void serve(const ExtendPath& wanted, const SharedCall& call);
+  void serve(const StopAxis& wanted, const SharedCall& call);
+  void serve(const StopMove& wanted, const SharedCall& call);
+  void serve(const StopAll& wanted, const SharedCall& call);
+  void serve(const Hold& wanted, const SharedCall& call);
+  void serve(const Resume& wanted, const SharedCall& call);
+  void serve(const SetSpeedOverride& wanted, const SharedCall& call);
+  void serve(const SetLimits& wanted, const SharedCall& call);
+  void serve(const Home& wanted, const SharedCall& call);
+  void serve(const CancelHoming& wanted, const SharedCall& call);
+  void serve(const Enable& wanted, const SharedCall& call);
+  void serve(const Sleep& wanted, const SharedCall& call);
+  void serve(const Reset& wanted, const SharedCall& call);
+  void serve(const SetMicrosteps& wanted, const SharedCall& call);
+  void serve(const SetPosition& wanted, const SharedCall& call);
+  void serve(const Recover& wanted, const SharedCall& call);
+  void serve(const BringUp& wanted, const SharedCall& call);
+  void serve(const RestorePosition& wanted, const SharedCall& call);
+  void serve(const NotePosition& wanted, const SharedCall& call);
+  void serve(const Close& wanted, const SharedCall& call);
+  void serve(const AwaitRest& wanted, const SharedCall& call);
+  void serve(const PowerDown& wanted, const SharedCall& call);
 
   axis::AxisModel& axis(AxisId id) { return *context_.axes.at(id); }
   /// The axis, and all that share its motors.
@@ -91,7 +91,7 @@ class Controller {
   activity::Goal goalOf(const MoveTo& wanted);
   using MayBegin = std::optional<activity::Goal>;
   /// @return empty if nothing new must begin. @throw Refused
-  MayBegin goalOf(const Jog& wanted, const Ack& call);
+  MayBegin goalOf(const Jog& wanted, const SharedCall& call);
   MayBegin positionGoal(const Setpoint& wanted, double timeout);
   MayBegin velocityGoal(const Setpoint& wanted, double timeout);
   /// Of the axis's present or held motion.
@@ -101,7 +101,8 @@ class Controller {
   /// Sets the soft limit ahead as the end of a velocity. @throw Refused if it can't begin.
   void limitVelocity(activity::Goal& goal, const axis::AxisModel& axis, const char* moves) const;
   template <typename Message, typename GoalOf>
-  void beginStreamed(const std::vector<Message>& messages, const Ack& call, const GoalOf& goal_of);
+  void beginStreamed(const std::vector<Message>& messages, const SharedCall& call,
+                     const GoalOf& goal_of);
   void beginTogether(std::vector<activity::StartTogether::Start> starts);
   void setTarget(activity::Goal& goal, axis::AxisModel& axis, double position, bool relative);
   /// [microsteps] The position of the joint from which a relative move counts.
@@ -115,11 +116,11 @@ class Controller {
   void refuseWhileEmergencyStopInput() const;
   /// Whether an enable has something to do. @throw Refused
   bool mustEnable(const axis::AxisModel& axis) const;
-  void disable(axis::AxisModel& axis, const activity::Why& why, const Ack& call);
+  void disable(axis::AxisModel& axis, const activity::EarlyEnd& why, const SharedCall& call);
 
   // The engine.
-  void take(axis::AxisModel& axis, const pulse::ChannelState& state);
-  void takeStops(const EngineNews& news);
+  void update(axis::AxisModel& axis, const pulse::ChannelState& state);
+  void handleStops(const EngineNews& news);
   void supervise();
   bool supervisePower();
   bool motorsMayLosePower() const;
@@ -134,7 +135,7 @@ class Controller {
   bool disables_all_ = false;  // an emergency stop has come, and all motors must be disabled
   std::uint64_t input_stops_seen_ = 0;
   std::uint64_t homings_ = 0;
-  std::vector<Ack> awaiting_rest_;
+  std::vector<SharedCall> awaiting_rest_;
   activity::Outputs last_;  // receives the answers to unserved calls at the end
 };
 

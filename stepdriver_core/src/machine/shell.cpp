@@ -360,7 +360,7 @@ void Shell::settle() {
 
 // Whether there may be anything to do in a turn.
 bool Shell::isAwaited() {
-  return wake_.take() || core_.hasNews() || clock_.now() >= core_.due() || core_.hasInput();
+  return wake_.consume() || core_.hasNews() || clock_.now() >= core_.due() || core_.hasInput();
 }
 
 // @return whether the controller was told anything.

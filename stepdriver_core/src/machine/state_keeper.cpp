@@ -65,7 +65,7 @@ void StateKeeper::noteMotion() noexcept {
   wake_.notify_all();
 }
 
-bool StateKeeper::take(const Memories& memories) {
+bool StateKeeper::merge(const Memories& memories) {
   bool changed = !saved_;
   for (const auto& [name, memory] : memories) {
     axis::AxisMemory& known = state_.axes[name];
@@ -79,7 +79,7 @@ bool StateKeeper::keep() {
   if (!read_) return false;
   const Memories memories = read_();
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (ended_ || !take(memories)) return false;
+  if (ended_ || !merge(memories)) return false;
   save();
   return true;
 }
@@ -87,7 +87,7 @@ bool StateKeeper::keep() {
 void StateKeeper::close(const Memories& last) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (ended_) return;
-  take(last);
+  merge(last);
   ended_ = true;
   state_.clean = true;
   save();

@@ -55,7 +55,7 @@ class StateKeeper {
 
  private:
   void run();
-  bool take(const Memories& memories);
+  bool merge(const Memories& memories);
   void save();
 
   StateFile file_;

@@ -4,7 +4,7 @@
 
 namespace stepdriver::motor {
 
-void Motions::take(const pulse::ChannelState& state) {
+void Motions::update(const pulse::ChannelState& state) {
   following_ = state.following;
   taken_ = state.taken;
   const auto refused = [&state](const Motion& motion) {

@@ -41,7 +41,7 @@ class Motions {
 
   /// Drops the motions that the engine has refused, and those older than the profile that it
   /// follows or that ended last.
-  void take(const pulse::ChannelState& state);
+  void update(const pulse::ChannelState& state);
 
   /// The engine follows a profile, or has not yet answered an order.
   bool moving() const { return following_ != 0 || inFlight(); }

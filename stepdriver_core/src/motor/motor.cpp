@@ -28,9 +28,9 @@ Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int chan
   }
 }
 
-void Motor::take(const pulse::ChannelState& state) {
+void Motor::update(const pulse::ChannelState& state) {
   state_ = state;
-  motions_.take(state);
+  motions_.update(state);
 }
 
 motion::PlannedMotion Motor::shaped(motion::Profile plan) const {

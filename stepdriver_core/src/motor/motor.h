@@ -34,7 +34,7 @@ class Motor {
 
   /// The engine's last report on the channel.
   const pulse::ChannelState& state() const { return state_; }
-  void take(const pulse::ChannelState& state);
+  void update(const pulse::ChannelState& state);
 
   bool moving() const { return motions_.moving(); }
   const Motions& motions() const { return motions_; }

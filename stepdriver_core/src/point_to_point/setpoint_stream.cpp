@@ -32,8 +32,8 @@ void smooth(SetpointStream::Course& course, std::int64_t expected, std::int64_t 
 
 }  // namespace
 
-SetpointStream::Course SetpointStream::take(double position, std::int64_t now,
-                                            std::int64_t timeout_ns, std::uint64_t stops) {
+SetpointStream::Course SetpointStream::add(double position, std::int64_t now,
+                                           std::int64_t timeout_ns, std::uint64_t stops) {
   const bool continues = last_ && last_->stops == stops && now >= last_->arrived_ns &&
                          now - last_->arrived_ns < timeout_ns;
   Course course;

@@ -19,7 +19,7 @@ class SetpointStream {
   /// @param position [microsteps] @param now motion time
   /// @param timeout_ns A setpoint that comes later than this after the last one begins a stream.
   /// @param stops AxisModel::stops: a stop ends a stream too.
-  Course take(double position, std::int64_t now, std::int64_t timeout_ns, std::uint64_t stops);
+  Course add(double position, std::int64_t now, std::int64_t timeout_ns, std::uint64_t stops);
   /// Another command has taken the axis: the next setpoint begins a stream.
   void end() { last_.reset(); }
 

@@ -12,7 +12,7 @@ namespace stepdriver::pulse {
 namespace {
 
 // How often a thread that waits for a paced clock looks at the time.
-constexpr Nanoseconds kLook = VirtualClock::kStall / 10;
+constexpr Nanoseconds kCheckPeriod = VirtualClock::kStall / 10;
 
 // The calling thread, as a system for HybridWait.
 struct WakeableThread {
@@ -78,8 +78,8 @@ void VirtualClock::waitUntil(Nanoseconds time) {
   waiting_ = true;
   while (!woken_ && now_ < time) {
     if (holds_ > 0 && speed_ > 0.0 && time != kNever) {
-      changed_.wait_for(lock, std::chrono::nanoseconds(kLook));
-      look();
+      changed_.wait_for(lock, std::chrono::nanoseconds(kCheckPeriod));
+      checkForStall();
     } else if (holds_ > 0 || (time == kNever && speed_ == 0.0)) {
       changed_.wait(lock);
     } else if (speed_ == 0.0) {
@@ -89,31 +89,31 @@ void VirtualClock::waitUntil(Nanoseconds time) {
       if (now_ >= time) break;
       const auto wall_ns = static_cast<double>(time - now_) / speed_;
       // A wait for a wake is split as well: the sum with now() must not overflow.
-      const double longest = time == kNever ? 3.6e12 : static_cast<double>(kLook);
+      const double longest = time == kNever ? 3.6e12 : static_cast<double>(kCheckPeriod);
       changed_.wait_for(lock, std::chrono::nanoseconds(std::llround(std::min(longest, wall_ns))));
-      look();
+      checkForStall();
     }
   }
   if (woken_) now_ = current();
   if (speed_ > 0.0) {
-    look();
-    takeStall();
+    checkForStall();
+    countStall();
   }
   woken_ = false;
   waiting_ = false;
 }
 
-// A hold excuses no stall: a thread that waits for an event looks at the time so often that it
-// misses to look only if it doesn't run.
-void VirtualClock::look() {
+// A hold excuses no stall: a thread that waits for an event checks the time so often that
+// it misses a check only if it doesn't run.
+void VirtualClock::checkForStall() {
   const Nanoseconds now = steadyNow();
-  const Nanoseconds unseen = now - std::max(looked_, held_since_);
+  const Nanoseconds unseen = now - std::max(checked_, held_since_);
   if (holds_ > 0 && awaited_ != kNever && unseen > kStall) held_since_ += unseen;
-  looked_ = now;
+  checked_ = now;
 }
 
 // A thread that is only slow falls behind by little from wait to wait, and nothing is late.
-void VirtualClock::takeStall() {
+void VirtualClock::countStall() {
   const Nanoseconds lag = paced() - now_;
   if (woken_) {
     lag_ = std::min(lag_, lag);
@@ -139,7 +139,7 @@ void VirtualClock::hold() {
 
 void VirtualClock::release() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  look();
+  checkForStall();
   // On real lines nothing stands still for it.
   if (--holds_ == 0) lag_ += atPace(steadyNow() - held_since_);
   changed_.notify_all();

@@ -34,7 +34,7 @@ void wakeSleeper(std::atomic<std::uint32_t>& word) noexcept {
 }
 
 void WakeFlag::wait(Nanoseconds until) noexcept {
-  while (!take() && (until == kNever || steadyNow() < until)) sleepOnWord(until, word_, 0);
+  while (!consume() && (until == kNever || steadyNow() < until)) sleepOnWord(until, word_, 0);
 }
 
 }  // namespace stepdriver::pulse

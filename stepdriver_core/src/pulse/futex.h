@@ -24,7 +24,7 @@ class WakeFlag {
   }
 
   /// Lowers it. @return whether it was raised.
-  bool take() noexcept { return word_.exchange(0, std::memory_order_acq_rel) != 0; }
+  bool consume() noexcept { return word_.exchange(0, std::memory_order_acq_rel) != 0; }
 
   /// Returns when it is raised, or at this time of CLOCK_MONOTONIC, and lowers it. For one thread.
   void wait(Nanoseconds until) noexcept;

@@ -169,12 +169,12 @@ Nanoseconds PulseEngine::serve() {
   if (dues_.earliest() <= now) writeOthers(now);
   if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
   serveStops();
-  tell();
+  report();
   const Nanoseconds due = std::min(dues_.earliest(), stops_.due([this] { return allSlow(); }));
   return heartbeat_ ? std::min(due, heartbeat_->due()) : due;
 }
 
-void PulseEngine::tell() {
+void PulseEngine::report() {
   if (!news_) return;
   news_ = false;
   if (listener_ != nullptr) listener_->onNews();

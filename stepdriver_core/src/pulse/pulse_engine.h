@@ -160,7 +160,7 @@ class PulseEngine {
   bool mayFollow(const Follow& order, Nanoseconds now) const;
 
   // News.
-  void tell();
+  void report();
 
   // Inputs and emergency stops.
   void serveStops();

@@ -109,13 +109,13 @@ DriverClient::DriverClient(ros::NodeHandle node, Session& session,
   const auto hints = ros::TransportHints().tcpNoDelay();
   states_ = node.subscribe<AxisStates>(
       driver_ + "/axis_states", kQueued,
-      [this](const AxisStates::ConstPtr& message) { take(*message); }, {}, hints);
+      [this](const AxisStates::ConstPtr& message) { onMessage(*message); }, {}, hints);
   endstops_ = node.subscribe<Endstops>(
-      driver_ + "/endstops", kQueued, [this](const Endstops::ConstPtr& message) { take(*message); },
-      {}, hints);
+      driver_ + "/endstops", kQueued,
+      [this](const Endstops::ConstPtr& message) { onMessage(*message); }, {}, hints);
   log_ = node.subscribe<rosgraph_msgs::Log>(
       "/rosout", 10 * kQueued,
-      [this](const rosgraph_msgs::Log::ConstPtr& message) { take(*message); });
+      [this](const rosgraph_msgs::Log::ConstPtr& message) { onMessage(*message); });
 }
 
 void DriverClient::carryOut(const Orders& orders) {
@@ -198,7 +198,7 @@ TableUnits DriverClient::tableUnitsOf(const std::string& axis) const {
   return {config::configUnitsPerUnit(config->kind), configUnitOf(config->kind)};
 }
 
-void DriverClient::take(const AxisStates& states) {
+void DriverClient::onMessage(const AxisStates& states) {
   std::vector<AxisView> axes;
   for (std::size_t i = 0; i < states.name.size(); ++i) {
     AxisView& axis = axes.emplace_back();
@@ -221,14 +221,14 @@ void DriverClient::take(const AxisStates& states) {
   session_.update(std::move(axes), steadyNow());
 }
 
-void DriverClient::take(const Endstops& endstops) {
+void DriverClient::onMessage(const Endstops& endstops) {
   for (std::size_t i = 0; i < endstops.name.size(); ++i) {
     session_.driver().updateEndstops(endstops.name[i], endstops.min[i] != 0, endstops.max[i] != 0);
   }
 }
 
 // Jogs have no answer: only the driver's log says why one was refused.
-void DriverClient::take(const rosgraph_msgs::Log& log) {
+void DriverClient::onMessage(const rosgraph_msgs::Log& log) {
   if (log.name != driver_ || log.level < rosgraph_msgs::Log::WARN) return;
   session_.logged(log.msg);
 }

@@ -44,9 +44,9 @@ class DriverClient {
     client::BackgroundCall background;
   };
 
-  void take(const AxisStates& states);
-  void take(const Endstops& endstops);
-  void take(const rosgraph_msgs::Log& log);
+  void onMessage(const AxisStates& states);
+  void onMessage(const Endstops& endstops);
+  void onMessage(const rosgraph_msgs::Log& log);
   void configure(const DriverParameters& parameters);
   void noticeTheDriver();
   void takeParameters();

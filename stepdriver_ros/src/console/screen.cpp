@@ -70,14 +70,14 @@ class Body {
 
   int left() const { return room_; }
   /// @return the rows for which there is room.
-  std::vector<Row> take(std::vector<Row> rows) {
+  std::vector<Row> fit(std::vector<Row> rows) {
     if (static_cast<int>(rows.size()) > room_) rows.resize(room_);
     room_ -= static_cast<int>(rows.size());
     return rows;
   }
-  std::vector<Row> takeWhole(std::vector<Row> rows, int but_leave = 0) {
+  std::vector<Row> fitWhole(std::vector<Row> rows, int but_leave = 0) {
     if (static_cast<int>(rows.size()) + but_leave > room_) return {};
-    return take(std::move(rows));
+    return fit(std::move(rows));
   }
 
  private:
@@ -87,14 +87,14 @@ class Body {
 /// The axes that fit, around the chosen one, and the number of those that don't.
 std::vector<Row> axisRows(const AxisTable& table, Body& body) {
   const int count = static_cast<int>(table.rows.size());
-  if (count <= body.left() || body.left() < 1) return body.take(table.rows);
+  if (count <= body.left() || body.left() < 1) return body.fit(table.rows);
   const int fit = std::max(body.left() - 1, 1);
   const int first = std::clamp(table.chosen - fit / 2, 0, count - fit);
   std::vector<Row> rows(table.rows.begin() + first, table.rows.begin() + first + fit);
   rows.push_back(
       {fmt::format("axes {} to {} of {}; up, down: the others", first + 1, first + fit, count),
        false});
-  return body.take(rows);
+  return body.fit(rows);
 }
 
 std::vector<Row> faultRows(const Session& session, int columns) {
@@ -206,14 +206,14 @@ std::vector<Row> helpRows(const Session& session, int columns) {
 std::vector<Row> takeHelp(const Session& session, int columns, Body& body) {
   constexpr int kLines = 2;  // those of '-' above the messages and above the help
   std::vector<Row> rows = helpRows(session, columns);
-  if (!session.showsHelp()) return body.takeWhole(std::move(rows), kFewestMessages + kLines);
+  if (!session.showsHelp()) return body.fitWhole(std::move(rows), kFewestMessages + kLines);
   const int room = body.left() - kLines - 1;
   if (room < 1) return {};
   if (static_cast<int>(rows.size()) > room) {
     rows.resize(room);
     rows.back() = Row{std::string("...more keys in a larger window").substr(0, columns), false};
   }
-  return body.take(std::move(rows));
+  return body.fit(std::move(rows));
 }
 
 std::vector<Row> messageRows(const Session& session, int columns, int room) {
@@ -251,21 +251,21 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
     return screen;
   }
   Body body(rows - static_cast<int>(screen.size()) - 1);  // except the row of keys
-  append(screen, body.take({titleRow(session, columns, now)}));
+  append(screen, body.fit({titleRow(session, columns, now)}));
   const AxisTable table = axisTable(session, columns, now);
   const std::vector<Row> axes = axisRows(table, body);
-  const std::vector<Row> prompt = body.take(promptRows(session, columns));
-  const std::vector<Row> faults = body.take(faultRows(session, columns));
-  const std::vector<Row> hidden = body.take(hiddenRows(table, columns));
-  const std::vector<Row> titles = body.take({table.titles});
-  const std::vector<Row> pending = body.take(pendingRows(session, columns, now));
-  const std::vector<Row> settings = body.takeWhole(settingRows(session, columns), 1);
+  const std::vector<Row> prompt = body.fit(promptRows(session, columns));
+  const std::vector<Row> faults = body.fit(faultRows(session, columns));
+  const std::vector<Row> hidden = body.fit(hiddenRows(table, columns));
+  const std::vector<Row> titles = body.fit({table.titles});
+  const std::vector<Row> pending = body.fit(pendingRows(session, columns, now));
+  const std::vector<Row> settings = body.fitWhole(settingRows(session, columns), 1);
   std::vector<Row> help = takeHelp(session, columns, body);
   if (!help.empty()) {
     help.insert(help.begin(), Row{std::string(columns, '-'), false});
-    body.take({Row{}});
+    body.fit({Row{}});
   }
-  std::vector<Row> messages = body.takeWhole({{std::string(columns, '-'), false}}, 1);
+  std::vector<Row> messages = body.fitWhole({{std::string(columns, '-'), false}}, 1);
   append(messages, messageRows(session, columns, body.left()));
 
   append(screen, titles);

@@ -34,7 +34,7 @@ Joystick::Joystick(ros::NodeHandle node, const std::string& driver, JoystickConf
   }
   publisher_ = node.advertise<Jog>(driver + "/jog", kQueued);
   subscriber_ = ros_node::subscribeToNew<sensor_msgs::Joy>(
-      node, "joy", kQueued, latched_, [this](const auto& message) { take(*message); },
+      node, "joy", kQueued, latched_, [this](const auto& message) { onMessage(*message); },
       ros::TransportHints().tcpNoDelay());
   timer_ = node.createSteadyTimer(ros::WallDuration(1.0 / config_.rate),
                                   [this](const ros::SteadyTimerEvent& /*event*/) {
@@ -48,7 +48,7 @@ void Joystick::rest() {
   send();
 }
 
-void Joystick::take(const sensor_msgs::Joy& message) {
+void Joystick::onMessage(const sensor_msgs::Joy& message) {
   heard_ = ros::SteadyTime::now();
   const std::string mistake = mistakeIn(message);
   if (!mistake.empty()) {

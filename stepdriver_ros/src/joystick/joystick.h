@@ -46,7 +46,7 @@ class Joystick {
     std::unique_ptr<client::BackgroundCall> enable;  ///< if the axis is disabled in the dead band
   };
 
-  void take(const sensor_msgs::Joy& message);
+  void onMessage(const sensor_msgs::Joy& message);
   /// @return the mistake in a message; empty: no mistake.
   std::string mistakeIn(const sensor_msgs::Joy& message) const;
   bool deadmanHeld(const sensor_msgs::Joy& message) const;

@@ -58,10 +58,10 @@ FlightRecorderService::FlightRecorderService(machine::Machine& machine,
   // A fault during the pause is written at its end, and must still be in the memory.
   options.fault_pause =
       std::chrono::milliseconds(std::llround(std::clamp(800.0 * seconds, 1'000.0, 10'000.0)));
-  dumper_.emplace(machine, options, [this](const recorder::Dump& dump) { tell(dump); });
+  dumper_.emplace(machine, options, [this](const recorder::Dump& dump) { report(dump); });
 }
 
-void FlightRecorderService::tell(const recorder::Dump& dump) {
+void FlightRecorderService::report(const recorder::Dump& dump) {
   if (dump.error.empty()) {
     ROS_INFO_NAMED("recorder", "Recording (%s): %s and %s", dump.reason.c_str(), dump.trace.c_str(),
                    dump.events.c_str());

@@ -34,7 +34,7 @@ class FlightRecorderService {
   recorder::Dump last() const { return dumper_ ? dumper_->last() : recorder::Dump{}; }
 
  private:
-  void tell(const recorder::Dump& dump);
+  void report(const recorder::Dump& dump);
 
   bool failed_ = false;                     // the last recording; of the dumper's thread
   std::optional<recorder::Dumper> dumper_;  // empty: nothing is recorded

@@ -132,10 +132,10 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
                     "%s; the next start may not know the positions, or not trust them",
                     error.c_str());
   }
-  move_actions.tellEnded();
-  line_action.tellEnded();
-  path_action.tellEnded();
-  trajectory_action.tellEnded();
+  move_actions.reportEnded();
+  line_action.reportEnded();
+  path_action.reportEnded();
+  trajectory_action.reportEnded();
   if (!machine.whyHung().empty()) {
     // All that reads or releases lines would wait for the chip.
     ROS_FATAL_NAMED("node",
@@ -273,7 +273,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   publisher.start();
   master_watch.start();
   const ServiceManager service_manager(machine);
-  ServiceManager::tellReady();
+  ServiceManager::notifyReady();
   ROS_INFO_NAMED("node", "Ready: %zu %s on %s (%s)", machine.axes().size(),
                  machine.axes().size() == 1 ? "axis" : "axes", description.c_str(),
                  machine.figures().realtime.c_str());
@@ -288,7 +288,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
     }
   }
   ROS_INFO_NAMED("node", "Ending on %s", who.c_str());
-  ServiceManager::tellEnding();
+  ServiceManager::notifyEnding();
   master_watch.stop();
   const int exit_code = shutDown(machine, queues, move_actions, line_action, path_action,
                                  trajectory_action, publisher, end);

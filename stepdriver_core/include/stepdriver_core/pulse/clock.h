@@ -115,8 +115,8 @@ class VirtualClock : public Clock {
   Nanoseconds current() const;
   Nanoseconds paced() const;
   Nanoseconds atPace(Nanoseconds real) const;
-  void look();
-  void takeStall();
+  void checkForStall();
+  void countStall();
 
   const double speed_;
   const Nanoseconds started_;
@@ -132,7 +132,7 @@ class VirtualClock : public Clock {
   int holds_ = 0;
   // [ns] of CLOCK_MONOTONIC:
   Nanoseconds held_since_ = 0;  // later by the stalls in it
-  Nanoseconds looked_ = 0;      // when a waiting thread last looked at the time
+  Nanoseconds checked_ = 0;     // when a waiting thread last checked the time
 };
 
 }  // namespace stepdriver::pulse

@@ -23,11 +23,11 @@ class Requester {
   Requester(const std::vector<OutputRequest>& outputs, const std::vector<InputRequest>& inputs)
       : outputs_(outputs), inputs_(inputs), open_(gpiod::openChips()) {}
 
-  std::unique_ptr<Lines> take() {
+  std::unique_ptr<Lines> requestAll() {
     checkBias();
     addresses_ = findLines(open_.table, outputs_, inputs_);
-    takeInputs();
-    takeOutputs();
+    requestInputs();
+    requestOutputs();
     keepNames();
     parts_.chips = std::move(open_.chips);
     return std::make_unique<HeldLines>(std::move(parts_));
@@ -59,7 +59,7 @@ class Requester {
     }
   }
 
-  void takeInputs() {
+  void requestInputs() {
     parts_.inputs.resize(inputs_.size());
     for (const auto& entry : byChip("inputs", outputs_.size(), inputs_.size())) {
       const std::size_t chip = entry.first;
@@ -80,7 +80,7 @@ class Requester {
     }
   }
 
-  void takeOutputs() {
+  void requestOutputs() {
     parts_.outputs.resize(outputs_.size());
     for (const auto& entry : byChip("outputs", 0, outputs_.size())) {
       const std::size_t chip = entry.first;
@@ -114,15 +114,15 @@ class Requester {
 
   /// Requests lines of one chip. If that fails, it requests them one by one to find the one that
   /// failed, because the kernel doesn't report it.
-  template <typename Line, typename Take, typename Refusal>
-  void request(std::size_t chip, const char* kind, const std::vector<Line>& lines, const Take& take,
-               const Refusal& refusal) {
+  template <typename Line, typename RequestSome, typename Refusal>
+  void request(std::size_t chip, const char* kind, const std::vector<Line>& lines,
+               const RequestSome& request_some, const Refusal& refusal) {
     try {
-      take(lines);
+      request_some(lines);
     } catch (const std::system_error& error) {
       for (std::size_t k = 0; k < lines.size(); ++k) {
         try {
-          take(std::vector<Line>{lines[k]});
+          request_some(std::vector<Line>{lines[k]});
         } catch (const std::system_error& culprit) {
           throw GpioError(refusal(k, culprit.code().value()));
         }
@@ -183,7 +183,7 @@ class LibgpiodBackend : public Backend {
  public:
   std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
                                  const std::vector<InputRequest>& inputs) override {
-    return Requester(outputs, inputs).take();
+    return Requester(outputs, inputs).requestAll();
   }
 };
 

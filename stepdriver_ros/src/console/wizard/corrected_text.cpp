@@ -102,7 +102,8 @@ std::string byHand(const Difference& difference) {
 }
 
 /// Takes an edit if the text then means exactly what is wanted.
-bool take(std::string& text, const std::optional<std::string>& edited, const ConfigValue& wanted) {
+bool replaceIfMeant(std::string& text, const std::optional<std::string>& edited,
+                    const ConfigValue& wanted) {
   if (!edited) return false;
   const auto meaning = meaningOf(*edited);
   if (!meaning || !same(*meaning, wanted)) return false;
@@ -120,13 +121,13 @@ bool change(std::string& text, ConfigValue& meaning, const std::vector<Findings>
     only_swap.switches_swapped = true;
     meaning = corrected(std::move(meaning), only_swap);
     const KeyPath endstops = {"axes", one.axis, "endstops"};
-    if (!take(text, withKeysSwapped(text, endstops, "min", "max"), meaning)) return false;
+    if (!replaceIfMeant(text, withKeysSwapped(text, endstops, "min", "max"), meaning)) return false;
   }
   for (const Difference& difference : differencesOf(meaning, wanted)) {
     set(meaning, difference);
     // A key that is there may come from a merged map (<<): a key of the map itself overrides it.
-    if (!take(text, withScalar(text, difference.path, difference.wanted), meaning) &&
-        !take(text, withNewKey(text, difference.path, difference.wanted), meaning)) {
+    if (!replaceIfMeant(text, withScalar(text, difference.path, difference.wanted), meaning) &&
+        !replaceIfMeant(text, withNewKey(text, difference.path, difference.wanted), meaning)) {
       return false;
     }
   }

@@ -48,7 +48,7 @@ class MotionAction {
 
   /// Reports ended goals to their clients; after the machine has been shut down, these are all
   /// goals.
-  void tellEnded() {
+  void reportEnded() {
     const std::lock_guard<std::mutex> lock(mutex_);
     concludeEnded();
   }
@@ -64,7 +64,7 @@ class MotionAction {
       : name_(node.resolveName(name)),
         begun_(std::move(begun)),
         server_(
-            node, name, topics, [this](const GoalHandle& handle) { take(handle); },
+            node, name, topics, [this](const GoalHandle& handle) { onGoal(handle); },
             [this](const GoalHandle& handle) { cancel(handle); }) {}
 
   /// Call it when the action is fully constructed.
@@ -96,7 +96,7 @@ class MotionAction {
 
   // Goals come one after another. One may wait for a chip to wake up or for axes to come to rest,
   // or take long to plan: cancels and the other goals don't wait for that.
-  void take(GoalHandle handle) {
+  void onGoal(GoalHandle handle) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (isCancelled(handle)) {

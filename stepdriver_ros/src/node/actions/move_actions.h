@@ -31,8 +31,8 @@ class MoveActions {
 
   /// Reports ended goals to their clients; after the machine has been shut down, these are all
   /// goals.
-  void tellEnded() {
-    for (AxisMoveAction& action : actions_) action.tellEnded();
+  void reportEnded() {
+    for (AxisMoveAction& action : actions_) action.reportEnded();
   }
 
  private:

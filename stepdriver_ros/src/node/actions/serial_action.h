@@ -30,7 +30,7 @@ class SerialAction {
   SerialAction(const ros::NodeHandle& node, const std::string& name, ActionTopics& topics, Run run)
       : run_(std::move(run)),
         server_(
-            node, name, topics, [this](const GoalHandle& goal) { take(goal); },
+            node, name, topics, [this](const GoalHandle& goal) { onGoal(goal); },
             [this](const GoalHandle& goal) { cancel(goal); }) {
     server_.start();
   }
@@ -40,7 +40,7 @@ class SerialAction {
  private:
   static constexpr const char* kNewerGoal = "a newer goal has come";
 
-  void take(const GoalHandle& goal) {
+  void onGoal(const GoalHandle& goal) {
     GoalHandle newer = goal;
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const auto& other : {current_, next_}) {

@@ -180,7 +180,7 @@ void TrajectoryAction::keepToPath(Following& following, const Places& places) {
   if (!following.violated.empty() || !following.preempted_by.empty()) return;
   following.violated = violation("path_tolerance", following.joints, following.tolerances.path,
                                  places.planned, places.actual);
-  const auto means = following.velocities.take(ros::SteadyTime::now().toSec(), places);
+  const auto means = following.velocities.add(ros::SteadyTime::now().toSec(), places);
   if (following.violated.empty() && means) {
     following.violated =
         velocityViolation("path_tolerance", following.joints, following.tolerances.path_velocity,

@@ -58,7 +58,7 @@ TrajectoryTolerances readTolerances(const action_msgs::FollowJointTrajectoryGoal
   return limits;
 }
 
-std::optional<JointPlaces> MeanVelocities::take(double now, const JointPlaces& places) {
+std::optional<JointPlaces> MeanVelocities::add(double now, const JointPlaces& places) {
   constexpr double kWindow = 0.1;  // s
   past_.emplace_back(now, places);
   while (past_.size() > 1 && now - past_[1].first >= kWindow) past_.pop_front();

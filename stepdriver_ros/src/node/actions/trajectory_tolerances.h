@@ -43,7 +43,7 @@ class MeanVelocities {
  public:
   /// @param now [s] on any clock.
   /// @return empty until a tenth of a second has passed since the first call.
-  std::optional<JointPlaces> take(double now, const JointPlaces& places);
+  std::optional<JointPlaces> add(double now, const JointPlaces& places);
 
  private:
   std::deque<std::pair<double, JointPlaces>> past_;  // the first one is old enough, or the oldest

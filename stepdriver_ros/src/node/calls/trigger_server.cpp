@@ -73,7 +73,7 @@ std::string uriOf(const Descriptor& listening) {
 }
 
 /// Tells the master of a service, or that it has ended.
-void tellMaster(const char* method, const std::string& service, const std::string& uri,
+void callMaster(const char* method, const std::string& service, const std::string& uri,
                 const std::optional<std::string>& node_uri) {
   XmlRpc::XmlRpcValue request;
   XmlRpc::XmlRpcValue response;
@@ -121,7 +121,7 @@ TriggerServer::TriggerServer(std::string name)
 
 void TriggerServer::advertise(const std::string& name, TriggerHandler handler) {
   services_.insert_or_assign(name, std::move(handler));
-  tellMaster("registerService", name, uri_, ros::XMLRPCManager::instance()->getServerURI());
+  callMaster("registerService", name, uri_, ros::XMLRPCManager::instance()->getServerURI());
 }
 
 void TriggerServer::start() {
@@ -135,7 +135,7 @@ void TriggerServer::start() {
 }
 
 void TriggerServer::finish(std::chrono::milliseconds bound) {
-  for (const auto& [name, handler] : services_) tellMaster("unregisterService", name, uri_, {});
+  for (const auto& [name, handler] : services_) callMaster("unregisterService", name, uri_, {});
   if (thread_.joinable()) {
     finish_by_ = Clock::now() + bound;
     eventfd_write(wake_.number(), 1);

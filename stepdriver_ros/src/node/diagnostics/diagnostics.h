@@ -34,11 +34,11 @@ class Diagnostics {
  private:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-  static void tellAxis(const axis::Axis& axis, Status& status);
-  void tellEngine(Status& status);
-  void tellMaster(Status& status) const;
-  void tellStateFile(Status& status) const;
-  void tellRecorder(Status& status) const;
+  static void reportAxis(const axis::Axis& axis, Status& status);
+  void reportEngine(Status& status);
+  void reportMaster(Status& status) const;
+  void reportStateFile(Status& status) const;
+  void reportRecorder(Status& status) const;
 
   const machine::Machine& machine_;
   const MasterWatch& master_;

@@ -31,8 +31,8 @@ namespace {
 /// @param what "a line"
 /// @tparam Response of MoveLine or FollowPath
 template <typename Response>
-void tell(machine::Machine& machine, const machine::CoordinatedMove& move, bool wait,
-          const char* what, Response& response) {
+void answer(machine::Machine& machine, const machine::CoordinatedMove& move, bool wait,
+            const char* what, Response& response) {
   for (const auto& [name, own] : move.members) response.target.push_back(own.target);
   if (wait) {
     machine::CoordinatedResult result = machine.wait(move);
@@ -148,8 +148,8 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
   const boost::function<bool(MoveLine::Request&, MoveLine::Response&)> line =
       [&machine](MoveLine::Request& request, MoveLine::Response& response) {
         return respond(response, [&] {
-          tell(machine, machine.moveLine(lineRequest(request)), request.wait != 0, "a line",
-               response);
+          answer(machine, machine.moveLine(lineRequest(request)), request.wait != 0, "a line",
+                 response);
         });
       };
   const boost::function<bool(FollowPath::Request&, FollowPath::Response&)> path =
@@ -161,7 +161,7 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
           }
           const machine::CoordinatedMove move = machine.followPath(pathRequest(request));
           response.path = move.id();
-          tell(machine, move, request.wait != 0, "a path", response);
+          answer(machine, move, request.wait != 0, "a path", response);
         });
       };
   const boost::function<bool(PlanPath::Request&, PlanPath::Response&)> plan =

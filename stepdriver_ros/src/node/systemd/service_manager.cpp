@@ -30,9 +30,9 @@ ServiceManager::~ServiceManager() {
   thread_.join();
 }
 
-void ServiceManager::tellReady() { sd_notify(0, "READY=1"); }
+void ServiceManager::notifyReady() { sd_notify(0, "READY=1"); }
 
-void ServiceManager::tellEnding() { sd_notify(0, "STOPPING=1"); }
+void ServiceManager::notifyEnding() { sd_notify(0, "STOPPING=1"); }
 
 void ServiceManager::run(std::chrono::microseconds period) {
   pthread_setname_np(pthread_self(), "watchdog");

@@ -22,8 +22,8 @@ class ServiceManager {
   ServiceManager(const ServiceManager&) = delete;
   ServiceManager& operator=(const ServiceManager&) = delete;
 
-  static void tellReady();
-  static void tellEnding();
+  static void notifyReady();
+  static void notifyEnding();
 
  private:
   void run(std::chrono::microseconds period);

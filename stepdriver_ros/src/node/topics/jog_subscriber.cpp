@@ -29,11 +29,11 @@ JogSubscriber::JogSubscriber(ros::NodeHandle node, machine::Machine& machine, Ca
             [this] { return endWhatIsOver(); }) {
   node.setCallbackQueue(&queues.control());
   subscriber_ = subscribeToNew<Bounded<Jog>>(
-      node, "jog", kQueuedJogs, latched, [this](const auto& message) { take(message); },
+      node, "jog", kQueuedJogs, latched, [this](const auto& message) { onMessage(message); },
       ros::TransportHints().tcpNoDelay());
 }
 
-void JogSubscriber::take(const boost::shared_ptr<const Bounded<Jog>>& message) {
+void JogSubscriber::onMessage(const boost::shared_ptr<const Bounded<Jog>>& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
     const std::vector<std::size_t> axes = axesOf(*message);

@@ -34,7 +34,7 @@ class JogSubscriber {
   JogSubscriber& operator=(const JogSubscriber&) = delete;
 
  private:
-  void take(const boost::shared_ptr<const Bounded<Jog>>& message);
+  void onMessage(const boost::shared_ptr<const Bounded<Jog>>& message);
   /// @return the indices of the axes that the message names. @throw Refused
   std::vector<std::size_t> axesOf(const Jog& message) const;
   void jog(const std::vector<std::size_t>& axes, const std::vector<double>& velocities);

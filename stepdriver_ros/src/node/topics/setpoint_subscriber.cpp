@@ -31,7 +31,7 @@ SetpointSubscriber::SetpointSubscriber(ros::NodeHandle node, machine::Machine& m
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     subscribers_.push_back(subscribeToNew<std_msgs::Float64>(
         node, machine.axes()[i]->config().name + "/setpoint", kQueuedSetpoints, latched,
-        [this, i](const auto& message) { take(i, {message->data}); }, no_delay));
+        [this, i](const auto& message) { follow(i, {message->data}); }, no_delay));
   }
   subscribers_.push_back(subscribeToNew<Bounded<std_msgs::Float64MultiArray>>(
       node, "setpoint", kQueuedSetpoints, latched,
@@ -46,7 +46,7 @@ void SetpointSubscriber::takeAll(
         "{} axes, in their order, and no offset",
         message->data.size(), message->layout.data_offset, axes_.size()));
   }
-  take(0, message->data);
+  follow(0, message->data);
 }
 
 void SetpointSubscriber::add(std::size_t axis, double value,
@@ -73,7 +73,7 @@ void SetpointSubscriber::warn(const std::string& why) {
   if (warnings_.isDue()) ROS_WARN_NAMED("setpoint", "setpoint: %s", why.c_str());
 }
 
-void SetpointSubscriber::take(std::size_t first, const std::vector<double>& values) {
+void SetpointSubscriber::follow(std::size_t first, const std::vector<double>& values) {
   std::vector<machine::StreamMessage> messages;
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -42,7 +42,7 @@ class SetpointSubscriber {
 
   void takeAll(const boost::shared_ptr<const Bounded<std_msgs::Float64MultiArray>>& message);
   /// @param first the axis of the first value.
-  void take(std::size_t first, const std::vector<double>& values);
+  void follow(std::size_t first, const std::vector<double>& values);
   /// Adds the message for an axis, unless its number isn't finite.
   void add(std::size_t axis, double value, std::vector<machine::StreamMessage>& messages);
   void warn(const std::string& why);

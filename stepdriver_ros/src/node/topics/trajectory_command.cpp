@@ -19,11 +19,11 @@ TrajectoryCommand::TrajectoryCommand(ros::NodeHandle node, machine::Machine& mac
     : machine_(machine), axes_(axisOfJoint(machine)), allow_slower_(allow_slower) {
   node.setCallbackQueue(&queues.trajectories());
   subscriber_ = subscribeToNew<Message>(
-      node, "command", kQueuedTrajectories, latched, [this](const auto& message) { take(message); },
-      ros::TransportHints().tcpNoDelay());
+      node, "command", kQueuedTrajectories, latched,
+      [this](const auto& message) { onMessage(message); }, ros::TransportHints().tcpNoDelay());
 }
 
-void TrajectoryCommand::take(const boost::shared_ptr<const Message>& message) {
+void TrajectoryCommand::onMessage(const boost::shared_ptr<const Message>& message) {
   try {
     if (message->points.empty()) {
       stop(message->joint_names);

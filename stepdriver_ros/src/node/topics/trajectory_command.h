@@ -28,7 +28,7 @@ class TrajectoryCommand {
  private:
   using Message = Bounded<trajectory_msgs::JointTrajectory>;
 
-  void take(const boost::shared_ptr<const Message>& message);
+  void onMessage(const boost::shared_ptr<const Message>& message);
   void stop(const std::vector<std::string>& joints);
 
   machine::Machine& machine_;

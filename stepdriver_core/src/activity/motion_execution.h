@@ -19,13 +19,13 @@ namespace stepdriver::activity {
 /// The engine may refuse an order because it came too late, or because the motion that it continues
 /// has ended. The order is then planned again from the current motion of the axes, as long as it
 /// makes sense.
-class Manoeuvre {
+class MotionExecution {
  public:
   /// @param join of orders that are kTogether; empty for one order alone.
   /// @param start of one order alone that begins at the same time as others; may be empty.
   /// @param begins_ns motion time before which it doesn't begin.
-  Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join = {},
-            std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0);
+  MotionExecution(Context& context, std::vector<Order> orders, JoinPath join = {},
+                  std::shared_ptr<const CommonStart> start = {}, std::int64_t begins_ns = 0);
 
   /// Plans the first order; nothing is ordered yet.
   ///
@@ -34,30 +34,30 @@ class Manoeuvre {
   /// Orders what was prepared.
   /// @param predecessors the goals of the axes until now.
   /// @param call is answered when the engine has accepted the order.
-  void begin(std::vector<Predecessor> predecessors, Ack call);
-  /// Comes to rest from the motion of another manoeuvre. @param predecessors as above.
-  void beginStop(std::vector<Predecessor> predecessors, const Why& why);
+  void begin(std::vector<Predecessor> predecessors, SharedCall call);
+  /// Comes to rest from the motion of another execution. @param predecessors as above.
+  void beginStop(std::vector<Predecessor> predecessors, const EarlyEnd& why);
 
-  /// There is news from the engine, or time has passed. @return whether the manoeuvre has ended.
-  bool look();
-  /// How the first axis's goal ended, once look() has said that the manoeuvre has.
+  /// There is news from the engine, or time has passed. @return whether the execution has ended.
+  bool poll();
+  /// How the first axis's goal ended, once poll() has said that the execution has.
   const axis::MoveResult& result() const { return result_; }
   /// Why it did not begin; empty if it did.
   const std::optional<Failure>& failure() const { return failure_; }
 
   /// Slows down to rest, along the path of axes that move together.
   /// @param call is answered when the axes decelerate.
-  void stop(const Why& why, const Ack& call = {});
+  void stop(const EarlyEnd& why, const SharedCall& call = {});
   /// The same, and keeps the goals.
-  void hold(const Ack& call);
+  void hold(const SharedCall& call);
   bool isHeld() const { return held_; }
   /// @throw Refused if it is held, and can't be resumed now.
   void refuseUnlessResumable() const;
   /// @pre refuseUnlessResumable() has just returned.
   /// @param call is answered when the engine has accepted the motion.
-  void resume(const Ack& call);
+  void resume(const SharedCall& call);
   /// The override or the limits have changed.
-  void replan(const Ack& call);
+  void replan(const SharedCall& call);
 
   /// Continues the path that the axes follow. If it comes too late, they come to rest at the end of
   /// that path, and continue from there.
@@ -65,13 +65,13 @@ class Manoeuvre {
   /// @param call is answered when the engine has accepted the motion. It fails as outdated if the
   ///   axes follow another path by now, or may have left the part that both paths share when the
   ///   new one takes over.
-  void extend(Extension extension, const Ack& call);
+  void extend(Extension extension, const SharedCall& call);
   /// The path that the axes follow; nullptr if they don't, or not yet.
   std::shared_ptr<const axis::SharedPath> sharedPath() const { return course_.path; }
   /// The motion along it that was ordered last.
   std::shared_ptr<const motion::Profile> motionAlong() const { return path_; }
 
-  /// Leaves the axes to another manoeuvre, which takes over during the motion.
+  /// Leaves the axes to another execution, which takes over during the motion.
   std::vector<Predecessor> handOver();
 
   /// The goal of an axis; nullptr if the axis has no part in it.
@@ -108,7 +108,7 @@ class Manoeuvre {
     Mode mode = Mode::kRun;
     Plans plans;
     Course course;
-    Ack extension;                                        // that it begins
+    SharedCall extension;                                 // that it begins
     std::shared_ptr<std::vector<pulse::Follow>> follows;  // the motions in its command
   };
 
@@ -116,16 +116,16 @@ class Manoeuvre {
   bool beginsTogether() const { return start_ && !started_ && mode_ == Mode::kRun; }
   Plans plan(pulse::Nanoseconds lead);
   std::shared_ptr<const motion::Profile> planPath(std::int64_t at);
-  void order(Plans plans, const Ack& extension = {});
+  void order(Plans plans, const SharedCall& extension = {});
   void follow(Course course);
   void tryExtension();
   bool mayExtend(const Extension& extension) const;
   Failure noContinuation() const;
-  void orderExtension(const Extension& extension, const Ack& call);
+  void orderExtension(const Extension& extension, const SharedCall& call);
   /// It stands at a place of its path from which it will continue.
   bool isParked() const { return held_ || awaits_; }
   bool endsInWait() const;
-  void change(Mode mode, const Ack& call);
+  void change(Mode mode, const SharedCall& call);
   bool anyMoves() const;
   /// Its last motions have come to their planned ends.
   bool isDone() const;
@@ -151,15 +151,16 @@ class Manoeuvre {
   const JoinPath join_;
   const std::shared_ptr<const CommonStart> start_;
   const std::int64_t begins_ns_;
-  Course course_;                                       // that was joined last
-  Course accepted_course_;                              // the one that the engine follows
-  std::optional<std::pair<Extension, Ack>> extension_;  // waits until the engine has handled all
+  Course course_;           // that was joined last
+  Course accepted_course_;  // the one that the engine follows
+  std::optional<std::pair<Extension, SharedCall>>
+      extension_;  // waits until the engine has handled all
   std::uint64_t group_ = 0;
   std::vector<Predecessor> predecessors_;
   std::optional<Plans> prepared_;
 
   Mode mode_ = Mode::kRun;
-  Why why_;                          // why it stops
+  EarlyEnd why_;                     // why it stops
   Mode accepted_mode_ = Mode::kRun;  // how the engine follows it
   std::vector<OpenOrder> open_;
   // the last order begins at rest: it is the first one, or that of a resume
@@ -173,13 +174,13 @@ class Manoeuvre {
   pulse::Nanoseconds lead_;
   std::shared_ptr<const motion::Profile> path_;           // as last ordered
   std::shared_ptr<const motion::Profile> accepted_path_;  // as the engine follows it
-  Ack call_;                                              // waits for the beginning
-  std::vector<Ack> calls_;                                // wait for the open orders
+  SharedCall call_;                                       // waits for the beginning
+  std::vector<SharedCall> calls_;                         // wait for the open orders
 };
 
 /// For a goal that isStreamed().
-inline const Why kEndedByHold{axis::MoveEnd::kStopped,
-                              "it was held, which ends jogs and setpoints"};
+inline const EarlyEnd kEndedByHold{axis::MoveEnd::kStopped,
+                                   "it was held, which ends jogs and setpoints"};
 
 /// "x stands at 0.01 m, not at 0.02 m: it was stopped"
 std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::string& why);

@@ -1,4 +1,4 @@
-#include "manoeuvre.h"
+#include "motion_execution.h"
 
 #include <fmt/format.h>
 
@@ -35,7 +35,7 @@ bool isAt(const axis::AxisModel& axis, const Goal& goal) {
 /// How the goal of an axis at rest ended, also in words.
 /// @param slowed_down its last motion was to end before it. @param left_by why
 std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const Goal& goal,
-                                            bool slowed_down, const Why& left_by) {
+                                            bool slowed_down, const EarlyEnd& left_by) {
   switch (axis.motor.state().end) {
     case pulse::EndReason::kDone:
       if (!slowed_down && isAt(axis, goal)) return {axis::MoveEnd::kReached, ""};
@@ -74,7 +74,7 @@ axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis,
   return result;
 }
 
-void tell(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
+void reportEnd(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) {
   // It may have come to rest alone, after another axis had left the path.
   const bool along_path = goal.kind == Goal::Kind::kTogether || goal.path_limits.acceleration > 0.0;
   if (along_path) {
@@ -89,7 +89,7 @@ void conclude(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result) 
   const bool reached = result.end == axis::MoveEnd::kReached;
   axis.position.reached(reached ? (goal.remainder - goal.between(axis)) / axis.stepsPerUnit()
                                 : 0.0);
-  tell(axis, goal, std::move(result));
+  reportEnd(axis, goal, std::move(result));
 }
 
 // Motors that square stop at their own endstops.
@@ -125,8 +125,8 @@ std::string standsAt(const axis::AxisModel& axis, const Goal& goal, const std::s
   return fmt::format("{} stands at {}{}: {}", axis.name(), place, not_at, why);
 }
 
-Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join,
-                     std::shared_ptr<const CommonStart> start, std::int64_t begins_ns)
+MotionExecution::MotionExecution(Context& context, std::vector<Order> orders, JoinPath join,
+                                 std::shared_ptr<const CommonStart> start, std::int64_t begins_ns)
     : context_(context),
       orders_(std::move(orders)),
       join_(std::move(join)),
@@ -142,7 +142,7 @@ Manoeuvre::Manoeuvre(Context& context, std::vector<Order> orders, JoinPath join,
 
 // ---- plans ----
 
-std::shared_ptr<const motion::Profile> Manoeuvre::planPath(std::int64_t at) {
+std::shared_ptr<const motion::Profile> MotionExecution::planPath(std::int64_t at) {
   const double factor = context_.mode.speed_override;
   const auto shared = [](motion::Profile profile) {
     return std::make_shared<const motion::Profile>(std::move(profile));
@@ -157,7 +157,7 @@ std::shared_ptr<const motion::Profile> Manoeuvre::planPath(std::int64_t at) {
   return shared(slowsDown() ? along.planStop(at, from) : along.plan(at, from, factor));
 }
 
-void Manoeuvre::follow(Course course) {
+void MotionExecution::follow(Course course) {
   course_ = std::move(course);
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     Goal& goal = orders_[i].goal;
@@ -167,7 +167,7 @@ void Manoeuvre::follow(Course course) {
   }
 }
 
-Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
+MotionExecution::Plans MotionExecution::plan(pulse::Nanoseconds lead) {
   Plans plans;
   // Axes that never joined a path come to rest one by one.
   const bool alone = !join_ || (slowsDown() && path_ == nullptr);
@@ -211,7 +211,7 @@ Manoeuvre::Plans Manoeuvre::plan(pulse::Nanoseconds lead) {
   return plans;
 }
 
-std::vector<axis::Move> Manoeuvre::prepare() {
+std::vector<axis::Move> MotionExecution::prepare() {
   prepared_ = plan(lead_);
   std::vector<axis::Move> moves;
   for (std::size_t i = 0; i < orders_.size(); ++i) {
@@ -228,7 +228,7 @@ std::vector<axis::Move> Manoeuvre::prepare() {
 
 // ---- orders to the engine ----
 
-void Manoeuvre::order(Plans plans, const Ack& extension) {
+void MotionExecution::order(Plans plans, const SharedCall& extension) {
   OpenOrder open;
   open.mode = mode_;
   open.course = course_;
@@ -280,25 +280,25 @@ void Manoeuvre::order(Plans plans, const Ack& extension) {
   open_.push_back(std::move(open));
 }
 
-void Manoeuvre::begin(std::vector<Predecessor> predecessors, Ack call) {
+void MotionExecution::begin(std::vector<Predecessor> predecessors, SharedCall call) {
   predecessors_ = std::move(predecessors);
   call_ = std::move(call);
   order(*std::exchange(prepared_, std::nullopt));
 }
 
-void Manoeuvre::beginStop(std::vector<Predecessor> predecessors, const Why& why) {
+void MotionExecution::beginStop(std::vector<Predecessor> predecessors, const EarlyEnd& why) {
   predecessors_ = std::move(predecessors);
   started_ = true;
   stop(why);
-  look();
+  poll();
 }
 
-bool Manoeuvre::anyMoves() const {
+bool MotionExecution::anyMoves() const {
   return std::any_of(orders_.begin(), orders_.end(),
                      [](const Order& order) { return order.axis->moving(); });
 }
 
-void Manoeuvre::change(Mode mode, const Ack& call) {
+void MotionExecution::change(Mode mode, const SharedCall& call) {
   mode_ = mode;
   if (call) calls_.push_back(call);
   if (!anyMoves() && (!held_ || awaits_)) return calls_.clear();
@@ -311,7 +311,7 @@ void Manoeuvre::change(Mode mode, const Ack& call) {
   }
 }
 
-void Manoeuvre::stop(const Why& why, const Ack& call) {
+void MotionExecution::stop(const EarlyEnd& why, const SharedCall& call) {
   if (over_) return;
   if (mode_ == Mode::kStop) {
     if (call && !open_.empty()) calls_.push_back(call);
@@ -323,7 +323,7 @@ void Manoeuvre::stop(const Why& why, const Ack& call) {
 }
 
 // Gives up the goals that it kept at rest.
-void Manoeuvre::drop() {
+void MotionExecution::drop() {
   for (const Order& order : orders_) {
     activity::conclude(*order.axis, order.goal, droppedResult(order, &order == &orders_.front()));
   }
@@ -331,14 +331,14 @@ void Manoeuvre::drop() {
   finish();
 }
 
-void Manoeuvre::hold(const Ack& call) {
+void MotionExecution::hold(const SharedCall& call) {
   if (over_ || mode_ != Mode::kRun) return;
   if (orders_.front().goal.isStreamed()) return stop(kEndedByHold, call);
   if (awaits_ && !anyMoves()) held_ = true;
   change(Mode::kHold, call);
 }
 
-void Manoeuvre::refuseUnlessResumable() const {
+void MotionExecution::refuseUnlessResumable() const {
   if (over_ || mode_ != Mode::kHold || anyMoves()) return;
   for (const Order& order : orders_) {
     order.axis->refuseUnlessReady();
@@ -346,7 +346,7 @@ void Manoeuvre::refuseUnlessResumable() const {
   }
 }
 
-void Manoeuvre::resume(const Ack& call) {
+void MotionExecution::resume(const SharedCall& call) {
   if (over_ || mode_ != Mode::kHold) return;
   // A path that awaits its continuation orders nothing now.
   from_rest_ = !anyMoves() && !awaits_;
@@ -354,7 +354,7 @@ void Manoeuvre::resume(const Ack& call) {
   held_ = false;
 }
 
-void Manoeuvre::replan(const Ack& call) {
+void MotionExecution::replan(const SharedCall& call) {
   if (over_ || mode_ != Mode::kRun || !anyMoves()) return;
   change(Mode::kRun, call);
 }
@@ -369,7 +369,7 @@ Failure outdated(const axis::AxisModel& axis) {
 
 }  // namespace
 
-void Manoeuvre::extend(Extension extension, const Ack& call) {
+void MotionExecution::extend(Extension extension, const SharedCall& call) {
   const axis::AxisModel& axis = *orders_.front().axis;
   if (over_ || mode_ == Mode::kStop) return call->fail(noContinuation());
   if (extension_ || course_.path != extension.of) return call->fail(outdated(axis));
@@ -377,8 +377,8 @@ void Manoeuvre::extend(Extension extension, const Ack& call) {
   if (open_.empty()) tryExtension();
 }
 
-// Why its path can't be continued.
-Failure Manoeuvre::noContinuation() const {
+// EarlyEnd its path can't be continued.
+Failure MotionExecution::noContinuation() const {
   const axis::AxisModel& axis = *orders_.front().axis;
   return {
       Failure::Kind::kRefused,
@@ -387,7 +387,7 @@ Failure Manoeuvre::noContinuation() const {
                              : why_.text)};
 }
 
-bool Manoeuvre::mayExtend(const Extension& extension) const {
+bool MotionExecution::mayExtend(const Extension& extension) const {
   const auto precedes = [](motion::DoubleDouble earlier, motion::DoubleDouble later) {
     constexpr double kRounding = 1e-9;
     return (later - earlier).hi > -kRounding;
@@ -400,7 +400,7 @@ bool Manoeuvre::mayExtend(const Extension& extension) const {
 }
 
 // The engine has handled all orders.
-void Manoeuvre::tryExtension() {
+void MotionExecution::tryExtension() {
   const auto [extension, call] = *std::exchange(extension_, std::nullopt);
   if (!mayExtend(extension)) return call->fail(outdated(*orders_.front().axis));
   if (extension.moves_on && mode_ == Mode::kRun) return orderExtension(extension, call);
@@ -414,7 +414,7 @@ void Manoeuvre::tryExtension() {
   }
 }
 
-void Manoeuvre::orderExtension(const Extension& extension, const Ack& call) {
+void MotionExecution::orderExtension(const Extension& extension, const SharedCall& call) {
   const bool from_rest = !anyMoves();
   const auto revert = [this, call = call](Failure failure) {
     follow(accepted_course_);
@@ -441,14 +441,14 @@ void Manoeuvre::orderExtension(const Extension& extension, const Ack& call) {
 
 // ---- news from the engine ----
 
-bool Manoeuvre::isDone() const {
+bool MotionExecution::isDone() const {
   return std::all_of(orders_.begin(), orders_.end(), [](const Order& order) {
     return order.axis->motor.state().end == pulse::EndReason::kDone;
   });
 }
 
 // Also while the engine has not handled what was ordered with it.
-bool Manoeuvre::isOpen() const {
+bool MotionExecution::isOpen() const {
   if (open_.empty()) return false;
   const std::vector<pulse::Follow>& follows = *open_.back().follows;
   return std::any_of(follows.begin(), follows.end(), [this](const pulse::Follow& follow) {
@@ -457,7 +457,7 @@ bool Manoeuvre::isOpen() const {
   });
 }
 
-bool Manoeuvre::look() {
+bool MotionExecution::poll() {
   if (over_) return true;
   if (isOpen()) return false;
   if (!open_.empty()) {
@@ -482,7 +482,7 @@ bool Manoeuvre::look() {
 }
 
 // The engine accepts an order for all of its axes or for no axis.
-bool Manoeuvre::wasAccepted(const OpenOrder& order) const {
+bool MotionExecution::wasAccepted(const OpenOrder& order) const {
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const std::uint64_t serial = order.serials[i];
     if (serial != 0) return serial <= orders_[i].axis->motor.state().accepted;
@@ -490,7 +490,7 @@ bool Manoeuvre::wasAccepted(const OpenOrder& order) const {
   return false;
 }
 
-void Manoeuvre::accept(const OpenOrder& order) {
+void MotionExecution::accept(const OpenOrder& order) {
   lead_ = kLead;
   if (!started_) {
     for (Order& own : orders_) own.goal.slipped_ns = context_.slipped;
@@ -504,14 +504,14 @@ void Manoeuvre::accept(const OpenOrder& order) {
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     for (std::size_t i = 0; i < orders_.size(); ++i) {
       if (orders_[i].axis != before.axis || !order.plans.planned[i].motion) continue;
-      tell(*before.axis, before.goal,
-           replacedResult(before, orders_[i], *order.plans.planned[i].motion->plan()));
+      reportEnd(*before.axis, before.goal,
+                replacedResult(before, orders_[i], *order.plans.planned[i].motion->plan()));
     }
   }
   call_.reset();
 }
 
-void Manoeuvre::refused() {
+void MotionExecution::refused() {
   path_ = accepted_path_;
   if (accepted_course_.path && course_.path != accepted_course_.path) follow(accepted_course_);
   for (auto before = predecessors_.begin(); before != predecessors_.end();) {
@@ -544,7 +544,7 @@ void Manoeuvre::refused() {
   tryAgain();
 }
 
-void Manoeuvre::tryAgain() {
+void MotionExecution::tryAgain() {
   if (lead_ > kLongestLead) {
     return fail(
         {Failure::Kind::kRefused,
@@ -572,11 +572,11 @@ void Manoeuvre::tryAgain() {
 }
 
 // It can't continue as planned. Axes that still move come to rest.
-void Manoeuvre::fail(Failure failure) {
+void MotionExecution::fail(Failure failure) {
   const bool is_resume = started_ && from_rest_;
   if (call_) call_->fail(failure);
   call_.reset();
-  for (const Ack& call : std::exchange(calls_, {})) {
+  for (const SharedCall& call : std::exchange(calls_, {})) {
     if (anyMoves() || is_resume) call->fail(failure);
   }
   why_ = {axis::MoveEnd::kStopped, failure.text};
@@ -594,7 +594,7 @@ void Manoeuvre::fail(Failure failure) {
   }
 }
 
-void Manoeuvre::rested() {
+void MotionExecution::rested() {
   if (!started_) {
     // An emergency stop or a fault has come before it began.
     if (why_.text.empty()) return;
@@ -616,12 +616,12 @@ void Manoeuvre::rested() {
 }
 
 // A stop that came too late to change anything ends it nevertheless.
-bool Manoeuvre::endsInWait() const {
+bool MotionExecution::endsInWait() const {
   return course_.path && course_.path->waitsAtEnd() && accepted_mode_ == Mode::kRun &&
          mode_ != Mode::kStop && isDone();
 }
 
-void Manoeuvre::concludeGoals() {
+void MotionExecution::concludeGoals() {
   for (const Order& order : orders_) {
     const axis::MoveResult result = resultOf(order);
     if (&order == &orders_.front()) result_ = result;
@@ -629,13 +629,13 @@ void Manoeuvre::concludeGoals() {
   }
 }
 
-void Manoeuvre::concludePredecessors() {
+void MotionExecution::concludePredecessors() {
   for (const Predecessor& before : std::exchange(predecessors_, {})) {
     conclude(context_, before);
   }
 }
 
-void Manoeuvre::finish() {
+void MotionExecution::finish() {
   concludePredecessors();
   over_ = true;
   held_ = false;
@@ -646,7 +646,7 @@ void Manoeuvre::finish() {
   calls_.clear();
 }
 
-std::vector<Predecessor> Manoeuvre::handOver() {
+std::vector<Predecessor> MotionExecution::handOver() {
   std::vector<Predecessor> left = std::exchange(predecessors_, {});
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Order& order = orders_[i];
@@ -677,7 +677,7 @@ std::vector<Predecessor> Manoeuvre::handOver() {
   return left;
 }
 
-const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
+const Goal* MotionExecution::goalOf(const axis::AxisModel& axis) const {
   for (const Order& order : orders_) {
     if (order.axis == &axis) return &order.goal;
   }
@@ -686,7 +686,7 @@ const Goal* Manoeuvre::goalOf(const axis::AxisModel& axis) const {
 
 // ---- how it ended, in words ----
 
-void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
+void MotionExecution::conclude(const Context& context, const Predecessor& ended) {
   // Neither it nor its successor has begun.
   if (ended.call) ended.call->fail(neverBegun(ended));
   const auto last = std::find_if(ended.orders.rbegin(), ended.orders.rend(),
@@ -699,7 +699,7 @@ void Manoeuvre::conclude(const Context& context, const Predecessor& ended) {
                      resultWith(context, *ended.axis, ended.goal, end, why));
 }
 
-axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
+axis::MoveResult MotionExecution::resultOf(const Order& order) const {
   const bool by_fault =
       why_.end == axis::MoveEnd::kFault || why_.end == axis::MoveEnd::kEmergencyStop;
   auto [end, why] = endOf(*order.axis, order.goal, accepted_mode_ != Mode::kRun,
@@ -708,7 +708,7 @@ axis::MoveResult Manoeuvre::resultOf(const Order& order) const {
   return resultWith(context_, *order.axis, order.goal, end, why);
 }
 
-std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
+std::string MotionExecution::endedWith(const axis::AxisModel& axis) const {
   for (const Order& other : orders_) {
     const pulse::EndReason end = other.axis->motor.state().end;
     if (other.axis != &axis && end != pulse::EndReason::kDone &&
@@ -721,7 +721,7 @@ std::string Manoeuvre::endedWith(const axis::AxisModel& axis) const {
 }
 
 // For a goal that was held at rest.
-axis::MoveResult Manoeuvre::droppedResult(const Order& order, bool by_it) const {
+axis::MoveResult MotionExecution::droppedResult(const Order& order, bool by_it) const {
   if (by_it || orders_.size() == 1) {
     return resultWith(context_, *order.axis, order.goal, why_.end, why_.text);
   }
@@ -730,8 +730,8 @@ axis::MoveResult Manoeuvre::droppedResult(const Order& order, bool by_it) const 
       fmt::format("it was held together with {}: {}", orders_.front().axis->name(), why_.text));
 }
 
-axis::MoveResult Manoeuvre::replacedResult(const Predecessor& before, const Order& by,
-                                           const motion::Profile& profile) const {
+axis::MoveResult MotionExecution::replacedResult(const Predecessor& before, const Order& by,
+                                                 const motion::Profile& profile) const {
   const axis::AxisModel& axis = *before.axis;
   axis::MoveResult result;
   result.end = axis::MoveEnd::kReplaced;
