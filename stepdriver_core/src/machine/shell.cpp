@@ -202,6 +202,8 @@ std::string Shell::whyHung() const {
 }
 
 void Shell::advance(pulse::Nanoseconds time) {
+  // The clock serves one waiting thread; with two, its time could stand still for good.
+  if (threaded_) throw Refused("advance() is only for a machine without threads");
   engine_.inputsChanged();  // nothing watches them
   feedInputs();
   const pulse::Nanoseconds end = clock_.now() + time;

@@ -71,7 +71,7 @@ TEST(Alarm, EndsTheStepsAtOnceOrByARamp) {
 TEST(Alarm, BeforeTheFirstStepOfAMotionLeavesNothingToRamp) {
   config::AxisConfig config = alarmAxis(FaultEnd::kReset);
   config.fault->ramps = true;
-  Bench bench({config}, true, kSpeed);
+  Bench bench({config});
   bench.rig.setFaults("x", brokenAfter(0));
   bench.machine->advance(0.2);
   // The fault may be known only when the first step is due.

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "support/homing_bench.h"
+#include "support/refusal.h"
 
 // A machine with threads on a clock that waits for nobody: each wait ends at once.
 
@@ -61,6 +62,12 @@ TEST(VirtualTime, ShowsAtOnceWhatAMotionThatEndedHasLeft) {
   std::thread other([&] { move_and_home(bench.axis("y")); });
   move_and_home(bench.axis("x"));
   other.join();
+}
+
+// The caller and the pulse thread would wait on one clock, and its time could stand still for good.
+TEST(VirtualTime, IsNotAdvancedByACallerIfThereAreThreads) {
+  Bench bench({homingAxis("x")}, true, 1.0);
+  EXPECT_REFUSED(bench.machine->advance(0.001), "only for a machine without threads");
 }
 
 }  // namespace

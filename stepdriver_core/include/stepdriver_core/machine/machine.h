@@ -334,7 +334,9 @@ class Machine {
   /// As measured at the start; empty if that wasn't requested, or if the clock is virtual.
   const std::optional<pulse::Capability>& capability() const;
 
-  /// Serves the pulses for a time of the clock. Only for a machine without threads.
+  /// Serves the pulses for a time of the clock.
+  ///
+  /// @throw Refused if the machine has threads, which serve the pulses.
   void advance(double seconds);
 
  private:
