@@ -3,6 +3,8 @@
 import math
 import time
 
+from stepdriver.msg import Endstops
+
 from .driver import LATENESS, Axis
 from .units import in_page_units
 
@@ -52,7 +54,7 @@ class Machine:
     def _state(self, message, endstops, i, name):
         axis = self.axes[name]
         number = endstops.name.index(name) if endstops is not None and name in endstops.name else None
-        switches = {end: None if number is None or not there else getattr(endstops, end)[number]
+        switches = {end: None if number is None or not there else self._switch(getattr(endstops, end)[number])
                     for end, there in axis.switches.items()}
         return {
             "name": name, "enabled": message.enabled[i], "moving": message.moving[i], "held": message.held[i],
@@ -61,6 +63,10 @@ class Machine:
             "remedy": in_page_units(message.remedy[i]), "note": in_page_units(message.position_note[i]),
             "target": message.target[i] * axis.factor, "stoppedBy": in_page_units(message.stopped_by[i]),
             "min": switches["min"], "max": switches["max"]}
+
+    @staticmethod
+    def _switch(active):
+        return {"active": active, "text": Endstops.PRESSED if active else Endstops.OPEN}
 
     def override(self):
         message = self.driver.states.message

@@ -1,6 +1,7 @@
 #include "axis_table.h"
 
 #include <fmt/format.h>
+#include <stepdriver/Endstops.h>
 
 #include <algorithm>
 
@@ -24,7 +25,7 @@ struct Column {
 std::string switchText(bool there, bool known, bool active) {
   if (!there) return "-";
   if (!known) return "?";
-  return active ? "PRESSED" : "open";
+  return active ? Endstops::PRESSED : Endstops::OPEN;
 }
 
 std::string fitted(const std::string& text, std::size_t width, bool right_aligned) {

@@ -95,8 +95,8 @@ class AxisCard {
     setText(this.fields.stopped, state.stoppedBy);
     for (const end of ["min", "max"]) {
       const there = this.settings.switches[end];
-      setText(this.fields[end], !there ? "none" : state[end] === null ? "not known" : state[end] ? "PRESSED" : "open");
-      this.fields[end].className = there && state[end] ? "warn" : "";
+      setText(this.fields[end], !there ? "none" : (state[end]?.text ?? "not known"));
+      this.fields[end].className = state[end]?.active ? "warn" : "";
     }
   }
 
