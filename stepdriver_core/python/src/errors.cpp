@@ -50,7 +50,7 @@ void translate(std::exception_ptr pointer) {  // NOLINT(performance-unnecessary-
   } catch (const py::error_already_set&) {
     throw;
   } catch (
-      const std::runtime_error& error) {  // also of the system, such as a thread that can't start
+      const std::runtime_error& error) {  // or of the system, such as a thread that can't start
     raise("Error", error.what());
   }
 }

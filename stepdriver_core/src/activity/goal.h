@@ -55,7 +55,7 @@ struct Goal {
   motion::MotionLimits path_limits;  ///< [microsteps] of a kTogether: its path keeps them
   /// At the target the axis waits for a path that continues its own: it isn't the end.
   bool waits_at_target = false;
-  std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< where its result appears
+  std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< receives its result
   std::int64_t began_ns = 0;                                 ///< motion time at which it began
   pulse::Nanoseconds slipped_ns = 0;  ///< how far the timeline had slid by then
 

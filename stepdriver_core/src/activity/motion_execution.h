@@ -108,7 +108,7 @@ class MotionExecution {
     Mode mode = Mode::kRun;
     Plans plans;
     Course course;
-    SharedCall extension;                                 // that it begins
+    SharedCall extension;  // the call is answered when the extension begins
     std::shared_ptr<std::vector<pulse::Follow>> follows;  // the motions in its command
   };
 
@@ -151,7 +151,7 @@ class MotionExecution {
   const JoinPath join_;
   const std::shared_ptr<const CommonStart> start_;
   const std::int64_t begins_ns_;
-  Course course_;           // that was joined last
+  Course course_;           // the course that was joined last
   Course accepted_course_;  // the one that the engine follows
   std::optional<std::pair<Extension, SharedCall>>
       extension_;  // waits until the engine has handled all
@@ -167,7 +167,7 @@ class MotionExecution {
   bool from_rest_ = true;
   bool started_ = false;  // the engine has accepted an order
   bool held_ = false;
-  bool awaits_ = false;  // at rest at the end of a path that waits there for its continuation
+  bool awaits_ = false;  // rests at the end of a path that waits there for its continuation
   bool over_ = false;
   axis::MoveResult result_;
   std::optional<Failure> failure_;

@@ -66,7 +66,7 @@ class MotorPower {
     kLeaving,       ///< off; waits until the feedback says so
     kSwitchingOn,   ///< its line is being written
     kComing,        ///< waits for its time and the feedback
-    kThere,         ///< also if nothing switches it
+    kThere,         ///< the power is there, or nothing switches it
     kSwitchingOff,  ///< its line is being written
   };
   struct Feedback {

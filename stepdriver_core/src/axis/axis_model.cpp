@@ -246,7 +246,7 @@ void AxisModel::refuseMicrosteps(int wanted) const {
                     "motors may be at different microsteps, which another mode doesn't have",
                     config.motors(), motor.microsteps()));
   }
-  const driver::DriverChip& chip = config.driver;  // that of the only motor
+  const driver::DriverChip& chip = config.driver;  // the chip of the only motor
   const std::vector<int> known = driver::selectableMicrosteps(chip);
   if (chip.modes.empty()) {
     refuse(
@@ -337,7 +337,7 @@ double AxisModel::restWith(const std::function<double(const AxisModel&)>& end_of
   double rest = 0.0;
   for (std::size_t i = 0; i < sharing_.size(); ++i) {
     const AxisModel& driven = *sharing_[i];
-    double end = 0.0;  // of the motor with the pins of that axis
+    double end = 0.0;  // the end of the motor with the pins of that axis
     for (std::size_t k = 0; k < sharing_.size(); ++k) {
       end += config.kinematics->matrix[i][k] * end_of(*sharing_[k]) * driven.config.steps_per_unit /
              sharing_[k]->config.steps_per_unit;

@@ -52,7 +52,7 @@ struct ChannelState {
   std::uint8_t chip_at_fault = 0;  ///< the motor whose chip has reported the last of chip_faults
   std::uint8_t unsettled = 0;      ///< the motor that kNotInPosition is about
   Nanoseconds waited = 0;          ///< for the in-position output, before kNotInPosition
-  Nanoseconds end_lateness = 0;    ///< of the pulse that was not sent, for kTooLate
+  Nanoseconds end_lateness = 0;    ///< how late the pulse was that was not sent, for kTooLate
   std::uint64_t epoch = 0;         ///< how many times the scale of `count` has changed
   std::uint64_t chip_faults = 0;   ///< how many times the fault line became active
   std::uint64_t line_errors = 0;   ///< failed writes and reads

@@ -12,7 +12,7 @@ namespace stepdriver::config {
 namespace {
 
 constexpr double kLargest = 1e9;    // decimals mean nothing above this
-constexpr double kRounding = 1e-6;  // of a microstep, in sums
+constexpr double kRounding = 1e-6;  // [microsteps] the rounding of sums
 
 std::string roundedTo(int decimals, double number) {
   std::string text = fmt::format("{:.{}f}", number, decimals);

@@ -10,7 +10,7 @@ namespace stepdriver::config {
 /// A revolution of the motor, and the gear behind it. A member is empty if its value is wrong.
 struct Rounds {
   std::optional<int> microsteps;
-  std::optional<int> full_steps;  ///< also empty if it isn't given
+  std::optional<int> full_steps;  ///< empty if it isn't given, too
   /// Motor revolutions per revolution of the gear's output: 1 by default.
   std::optional<double> gear;
   double steps = 0.0;  ///< [microsteps per revolution]; 0: not known

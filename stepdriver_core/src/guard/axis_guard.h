@@ -13,7 +13,7 @@ namespace stepdriver::pulse {
 /// Why a motion must end.
 struct Objection {
   EndReason reason = EndReason::kDone;
-  LineFailure failure;  ///< of kLineError
+  LineFailure failure;  ///< for kLineError
 };
 
 /// Whether the steps of an axis may go out, and whether its motion may end: by its switches, the

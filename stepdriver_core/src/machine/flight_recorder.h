@@ -29,7 +29,7 @@ class FlightRecorder {
  public:
   struct Options {
     double seconds = 10.0;           ///< above 0
-    std::size_t bytes = 16'000'000;  ///< of the edges, at most
+    std::size_t bytes = 16'000'000;  ///< the most memory for edges
   };
 
   /// @param names of the lines, for events. @param now nothing is recorded before.
@@ -88,7 +88,7 @@ class FlightRecorder {
   pulse::Nanoseconds slipped_ = 0;
   std::map<std::uint64_t, int> jobs_;  // output of each write that a line writer makes
 
-  std::mutex mutex_;  // of the two below
+  std::mutex mutex_;  // guards the two below
   std::function<void()> on_fault_;
   bool faulty_before_ = false;
 };

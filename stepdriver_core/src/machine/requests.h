@@ -88,7 +88,7 @@ struct FollowTrajectory {
 /// Continues the path that axes follow.
 struct ExtendPath {
   AxisId axis = 0;         ///< one of them
-  std::uint64_t move = 0;  ///< of that axis
+  std::uint64_t move = 0;  ///< the number of that axis's move
   activity::Extension extension;
 };
 struct StopAxis {

@@ -128,27 +128,27 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   gpio::LineWriters writers_;
 
   ShellCore core_;
-  pulse::WakeFlag wake_;  // of the controller's thread
+  pulse::WakeFlag wake_;  // the controller's thread waits for it
   std::atomic<bool> ending_{false};
   std::atomic<activity::CallId> calls_{0};
 
   std::mutex rounds_mutex_;
   std::condition_variable round_ended_;
-  std::uint64_t rounds_ = 0;  // of the controller's thread
+  std::uint64_t rounds_ = 0;  // counts the rounds of the controller's thread
 
   // To clients.
   mutable std::mutex answers_mutex_;
   std::condition_variable answered_;
   std::unordered_map<activity::CallId, Call> answers_;
-  std::uint64_t changes_ = 0;      // that a waiting client may want to look at
-  std::uint64_t turns_ended_ = 0;  // of the controller
+  std::uint64_t changes_ = 0;      // counts what a waiting client may want to look at
+  std::uint64_t turns_ended_ = 0;  // counts the controller's turns
   std::string why_hung_;
   std::shared_ptr<const MachineSnapshot> snapshot_;
 
   std::atomic<bool> news_hold_{false};  // the clock is held for news that hasn't been handled yet
 
   // Of the thread that runs the controller.
-  std::uint64_t passes_seen_ = 0;   // of the pulse thread
+  std::uint64_t passes_seen_ = 0;   // the pulse thread's count when it was last seen
   std::int64_t looks_in_vain_ = 0;  // since it has begun or ended a pass
   std::int64_t next_look_ns_ = 0;
   pulse::Nanoseconds engine_due_ = 0;

@@ -113,12 +113,12 @@ class ShellCore {
   FlightRecorder* const recorder_;
 
   std::atomic<bool> news_{true};
-  std::atomic<std::uint64_t> readings_{0};  // that have begun
+  std::atomic<std::uint64_t> readings_{0};  // how many have begun
   std::atomic<std::uint64_t> turns_begun_{0};
 
-  mutable std::mutex mutex_;  // of the next four
+  mutable std::mutex mutex_;  // guards the next four
   std::deque<Item> requests_;
-  Seen seen_;  // of the inputs
+  Seen seen_;  // what was seen of the inputs
   ToldLevels told_levels_;
   bool closed_ = false;
 

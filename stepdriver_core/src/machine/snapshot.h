@@ -42,10 +42,10 @@ struct AxisSnapshot {
   std::optional<double> held_target;  ///< [unit]
   /// The path that it follows with other axes.
   struct Path {
-    std::uint64_t move = 0;  ///< of this axis
+    std::uint64_t move = 0;  ///< the number of this axis's move
     std::shared_ptr<const axis::SharedPath> shared;
     std::shared_ptr<const motion::Profile> along;  ///< the motion along it that was ordered last
-    bool slows_down = false;                       ///< that motion
+    bool slows_down = false;                       ///< that motion slows down
   };
   std::optional<Path> path;
   std::shared_ptr<const axis::EndedPath> ended_path;  ///< the last one; nullptr if there is none

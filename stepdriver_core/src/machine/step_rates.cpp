@@ -31,7 +31,7 @@ struct Load {
   double wake_ups;  // in a step: its end is one if the thread may sleep until then
   double spinning;  // spinning before both edges, if nothing shortens it
   double alone;     // the shortest interval that doesn't spin too much, with no other axis moving
-  double interval;  // of the steps at top speed
+  double interval;  // the interval of the steps at top speed
 
   /// [steps] How much lateness of so many nanoseconds is absorbed.
   double absorbedIn(double ns) const {
@@ -158,7 +158,7 @@ std::vector<config::AxisConfig> atMotorSpeeds(const std::vector<config::AxisConf
   return motors;
 }
 
-constexpr double kRounding = 1e-9;  // of a rate, in its calculation
+constexpr double kRounding = 1e-9;  // the relative rounding of a rate
 
 std::string rateText(double rate, double steps_per_round, double (*rounded)(double)) {
   std::string text = fmt::format("{:.0f} steps/s", rate);

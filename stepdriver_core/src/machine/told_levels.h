@@ -11,7 +11,7 @@ namespace stepdriver::machine {
 /// The levels of all inputs, as one thread read them.
 struct InputReading {
   std::uint64_t number = 0;  ///< a reading with a higher number began later
-  std::vector<int> levels;   ///< of each input: 0 or 1, or -errno
+  std::vector<int> levels;   ///< each input's level: 0 or 1, or -errno
 };
 
 /// What the controller was told of the inputs, which several threads read. Not safe from several

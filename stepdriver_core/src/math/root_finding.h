@@ -113,7 +113,7 @@ struct Value {
 /// A root, roughly, by Newton's method within the bracket.
 struct RoughRoot {
   double t = 0.0;
-  double slope = 0.0;  ///< of f, near there
+  double slope = 0.0;  ///< the slope of f near there
 };
 
 /// @param f double to Value.

@@ -104,7 +104,7 @@ class Motor {
   struct EnableShare {
     int line = -1;
     std::shared_ptr<EnableLine> shared;
-    std::size_t number = 0;  // of this axis there
+    std::size_t number = 0;  // the number of this axis there
     std::uint64_t releases_seen = 0;
   };
 

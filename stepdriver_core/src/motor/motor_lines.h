@@ -17,7 +17,7 @@ struct ChipLines {
   int step = -1;
   int dir = -1;
   int enable = -1;
-  std::shared_ptr<EnableLine> enable_line;  ///< of `enable`, shared with other motors or not
+  std::shared_ptr<EnableLine> enable_line;  ///< the line of `enable`, which other motors may share
   std::array<int, 3> mode = {-1, -1, -1};
   int sleep = -1;
   int reset = -1;

@@ -24,7 +24,7 @@ class Translator {
   struct Change {
     int microsteps = 1;
     std::int64_t home_count = 0;
-    std::int64_t count = 0;  ///< of the motor, in the new mode
+    std::int64_t count = 0;  ///< the motor's count, in the new mode
     bool home_stays = true;  ///< false: the counting restarts from Home
   };
   /// @pre the count is a position of both modes.

@@ -11,9 +11,9 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoise = 4e-15;  // of a search in doubles, relative
+constexpr double kNoise = 4e-15;  // the relative noise of a search in doubles
 constexpr double kSure = 1e-8;    // relative; below this the sign of a rough value means nothing
-constexpr double kLimitRounding = 1e-12;  // of an acceleration that is a limit, relative
+constexpr double kLimitRounding = 1e-12;  // the relative rounding of an acceleration limit
 
 DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
   Reach<DoubleDouble> stop(v, a);
@@ -63,7 +63,7 @@ struct Switch {
 
 std::optional<Switch> switchWithJerk(const Path& path, DoubleDouble length, double missing_before,
                                      double sign, const MotionLimits& limits) {
-  DoubleDouble left = length;  // of the distance, at the beginning of a phase
+  DoubleDouble left = length;  // the distance that is left at the beginning of a phase
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Phase& phase = path[i];
     // How much of the distance is missing if the motion leaves the phase at a time and stops as

@@ -103,7 +103,7 @@ std::int64_t MotionBuilder::nextRest(const MotionLimits& limits) const {
 void MotionBuilder::add(const Approach& part, DoubleDouble end) {
   const Path& path = part.path;
   pieces_.reserve(pieces_.size() + path.size());
-  DoubleDouble left;  // of the second part
+  DoubleDouble left;  // what is left of the second part
   for (std::size_t i = part.first_part; i < path.size(); ++i) left = left + path[i].way;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const bool first = i < part.first_part;

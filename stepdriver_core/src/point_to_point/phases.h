@@ -55,7 +55,7 @@ class Path {
   std::size_t size_ = 0;
   DoubleDouble v_;
   DoubleDouble a_;
-  DoubleDouble end_v_;  // of the last phase, from its polynomial
+  DoubleDouble end_v_;  // the velocity at the end of the last phase, from its polynomial
   DoubleDouble end_a_;
 };
 

@@ -12,7 +12,7 @@ class SetpointStream {
   /// What is known when a setpoint has come.
   struct Course {
     std::int64_t came_ns = 0;    ///< motion time at which it came, smoothed
-    std::int64_t period_ns = 0;  ///< of the stream; 0: it is the first setpoint
+    std::int64_t period_ns = 0;  ///< the stream's period; 0: it is the first setpoint
     double velocity = 0.0;       ///< [microsteps/s] of the position
   };
 

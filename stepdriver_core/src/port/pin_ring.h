@@ -29,7 +29,7 @@ class PinRing {
   struct Copy {
     std::vector<Edge> edges;
     bool overwritten = false;  ///< there were older edges
-    std::vector<bool> levels;  ///< of all outputs, those without an edge: before it and after it
+    std::vector<bool> levels;  ///< all outputs; one without an edge keeps its level
   };
 
   /// @param levels of all outputs at the beginning.

@@ -181,7 +181,7 @@ DoubleDouble Profile::pieceStart(std::size_t index) const {
 
 std::size_t Profile::pieceAt(DoubleDouble time) const {
   const Section* section = nullptr;
-  std::size_t end = piece_count_;  // of the section's pieces
+  std::size_t end = piece_count_;  // the end of the section's pieces
   for (const Section& next : sections_) {
     if (section != nullptr && time < next.start) {
       end = next.first;

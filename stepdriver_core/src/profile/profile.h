@@ -139,7 +139,7 @@ class Profile {
   double peak_speed_ = 0.0;
   std::size_t piece_count_ = 0;
   std::vector<Piece> pieces_;
-  std::vector<DoubleDouble> starts_;  // of pieces_
+  std::vector<DoubleDouble> starts_;  // the starts of pieces_
   std::vector<Section> sections_;     // empty: all pieces are in pieces_
 };
 

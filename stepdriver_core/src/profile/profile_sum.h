@@ -53,8 +53,8 @@ class ProfileSum {
   DoubleDouble addPiece(Part& part, DoubleDouble from);
 
   std::array<Part, kMostTerms * InputShaper::kMostImpulses> parts_{};
-  std::size_t size_ = 0;   // of them
-  std::size_t terms_ = 0;  // that were added
+  std::size_t size_ = 0;   // how many there are
+  std::size_t terms_ = 0;  // how many were added
   std::int64_t start_ns_ = 0;
   DoubleDouble piece_start_;
   DoubleDouble piece_end_;

@@ -59,7 +59,7 @@ class StepFinder {
     // The first two are for all except the longest stretches.
     enum class Curve { kShortLine, kShortParabola, kLine, kParabola, kCubic };
     Curve curve = Curve::kLine;
-    int direction = 0;       // of the motion
+    int direction = 0;       // the direction of the motion
     double time_sign = 1.0;  // +1: the anchor is the beginning, -1: it is the end
     Split anchor_ns;         // motion time
     std::int64_t anchor_count = 0;
@@ -82,7 +82,7 @@ class StepFinder {
     DoubleDouble exact_a;
     // s from the anchor: the times of the last steps, the latest first.
     std::array<double, 4> last = {};
-    int known = 0;  // of these
+    int known = 0;  // how many of these are known
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
   };
@@ -102,7 +102,7 @@ class StepFinder {
 
   const Profile* profile_ = nullptr;
   ProfileSum* sum_ = nullptr;  // instead of a profile
-  std::int64_t start_ns_ = 0;  // of either
+  std::int64_t start_ns_ = 0;  // the start of either
   std::size_t piece_ = 0;
   double done_ = 0.0;  // s of the piece that earlier stretches have covered
   Stretch stretch_;

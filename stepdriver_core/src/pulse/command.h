@@ -61,18 +61,18 @@ struct Command {
   };
 
   Kind kind = Kind::kFollow;
-  const Follow* follows = nullptr;  ///< of kFollow; live until the channels have handled the order
+  const Follow* follows = nullptr;  ///< for kFollow; valid until the channels have handled it
   std::size_t follow_count = 0;
-  int channel = 0;  ///< of kReserve and kRelease, like all below
+  int channel = 0;  ///< for kReserve and kRelease, like all below
   std::uint64_t serial = 0;
-  Nanoseconds ready = 0;  ///< of kRelease: clock time before which no step goes out
+  Nanoseconds ready = 0;  ///< for kRelease: clock time before which no step goes out
   /// The position of the motor in the microsteps of a new mode.
   struct Scale {
     std::int64_t count = 0;
-    double taken_up = 0.0;  ///< of the backlash, see ChannelState
+    double taken_up = 0.0;  ///< the part of the backlash that is taken up, see ChannelState
     double backlash = 0.0;
   };
-  std::optional<Scale> scale;  ///< of kRelease
+  std::optional<Scale> scale;  ///< for kRelease
 };
 
 }  // namespace stepdriver::pulse

@@ -34,7 +34,7 @@ class Heartbeat {
  private:
   const HeartbeatLine line_;
   Nanoseconds due_;
-  bool level_ = true;  // of the next edge
+  bool level_ = true;  // the level after the next edge
   bool failing_ = false;
 };
 

@@ -15,7 +15,7 @@ Spread spreadOf(std::vector<Nanoseconds> samples);
 
 constexpr int kMeasuredWakeUps = 300;  // a millisecond each
 constexpr int kMeasuredSleeps = 100;   // a millisecond each
-constexpr int kMeasuredCalls = 200;    // of each line; fewer if they take more than 20 ms
+constexpr int kMeasuredCalls = 200;    // calls of each line; fewer if they take more than 20 ms
 
 /// Measures the same as measureWakeUps(), and the costs of the calls. Nothing moves: STEP lines are
 /// written with their current level, and no other line is written.

@@ -28,7 +28,7 @@ struct EngineState {
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;         ///< how often the timeline slid; edges of one instant count once
   Nanoseconds slipped = 0;         ///< total of the slips: motion time is clock time minus this
-  Nanoseconds worst_lateness = 0;  ///< of an active STEP edge against its planned time
+  Nanoseconds worst_lateness = 0;  ///< the latest active STEP edge against its planned time
 };
 
 struct EngineChannel;
@@ -221,7 +221,7 @@ class PulseEngine {
   EmergencyStops stops_;
   NewsListener* listener_ = nullptr;
   std::optional<Heartbeat> heartbeat_;
-  bool news_ = false;  // of this pass
+  bool news_ = false;  // there is news in this pass
   std::atomic<bool> inputs_changed_{false};
   EngineState state_;
   LatenessRecord lateness_;

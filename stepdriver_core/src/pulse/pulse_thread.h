@@ -60,7 +60,7 @@ class PulseThread {
   std::atomic<Nanoseconds> alarm_{kNever};
   std::atomic<bool> stopping_{false};
   std::atomic<std::uint64_t> passes_{0};
-  std::atomic<pid_t> id_{0};              // of the thread
+  std::atomic<pid_t> id_{0};              // the thread's id
   std::atomic<int> scheduler_error_{-1};  // errno of the request; -1: not requested
   std::atomic<int> lock_error_{-1};
   std::atomic<int> cpu_error_{-1};

@@ -95,7 +95,7 @@ class ChipModel {
   const int declared_microsteps_;
   const bool decodes_;  // a microstep pin is wired
   std::array<PinState, kPinCount> pins_;
-  Pin last_step_ = Pin::kStep;  // of the last active edge
+  Pin last_step_ = Pin::kStep;  // the pin of the last active edge
   std::int64_t step_active_ns_ = kForEver;
   std::int64_t step_inactive_ns_ = kForEver;
   std::int64_t mode_changed_ns_ = kForEver;

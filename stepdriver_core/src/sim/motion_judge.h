@@ -85,7 +85,7 @@ class MotionJudge {
   struct Mean {
     double velocity = 0.0;  // [steps/s]
     double seconds = 0.0;
-    double error = 0.0;  // of the velocity
+    double error = 0.0;  // the error of the velocity
   };
   static constexpr std::size_t kScales = 40;
 

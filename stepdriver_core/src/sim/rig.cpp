@@ -20,7 +20,7 @@ namespace {
 
 struct PinOnLine {
   RigAxis* axis;           ///< nullptr: the relay of the motor power
-  std::optional<Pin> pin;  ///< of the chip; empty: the brake
+  std::optional<Pin> pin;  ///< the chip's pin; empty: the brake
   int trace_pin;
 };
 
@@ -34,7 +34,7 @@ struct Line {
   std::vector<PinOnLine> pins;
   std::vector<SwitchModel*> contacts;
   std::vector<RigAxis*> axes;  // whose contacts these are
-  bool other_level = false;    // of an input that no axis has
+  bool other_level = false;    // the other level of an input that no axis has
   std::optional<WriteFault> write_fault;
   gpio::EdgeListener listener;
   bool told_level = false;  // the last level that the listener was told
@@ -220,7 +220,7 @@ class Rig::Impl {
     feed.addSwitch({axis.spec().name, variable}, contact);
   }
 
-  std::unordered_map<std::string, std::size_t> indexes_;  // of the lines, by their names
+  std::unordered_map<std::string, std::size_t> indexes_;  // the lines' indices, by their names
 };
 
 Rig::Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace,

@@ -105,7 +105,7 @@ class RigAxis {
   // The place at which the rotor comes to rest, in microsteps of the finest mode from its position
   // when the rig was made.
   double rotor_ = 0.0;
-  std::optional<RotorModel> swing_;  // of the rotor around that place
+  std::optional<RotorModel> swing_;  // the rotor's motion around that place
   std::int64_t stepped_ = 0;         // microsteps by which pulses have moved the rotor
   std::int64_t slipped_ = 0;         // microsteps that the rotor made and the carriage didn't
   std::int64_t motor_steps_ = 0;     // since the faults were set

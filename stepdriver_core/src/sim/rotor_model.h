@@ -50,7 +50,7 @@ class RotorModel {
   std::int64_t slips() const { return slips_; }
 
  private:
-  static constexpr double kLongestStep = 0.25;  // of 1/w
+  static constexpr double kLongestStep = 0.25;  // in units of 1/w
 
   /// In units of 1/w.
   double elapsed(std::int64_t time_ns) const {
@@ -63,9 +63,9 @@ class RotorModel {
 
   const double frequency_;  // [rad/s]
   const double damping_;
-  const double friction_;  // of the holding torque
+  const double friction_;  // in parts of the holding torque
   double lag_ = 0.0;       // [electrical rad]
-  double speed_ = 0.0;     // of the rotor, in units of w
+  double speed_ = 0.0;     // the rotor's speed, in units of w
   double largest_lag_ = 0.0;
   std::int64_t slips_ = 0;
   std::int64_t time_ns_ = kForEver;

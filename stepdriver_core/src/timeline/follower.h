@@ -152,7 +152,7 @@ class Follower {
   Successors successors_;
 
  private:
-  motion::ProfileSum parts_;  // of a profile that is shaped
+  motion::ProfileSum parts_;  // the parts of a profile that is shaped
 
   friend class MotorSum;
 };

@@ -100,7 +100,7 @@ class MotorSum {
   std::vector<std::unique_ptr<MotorOfSum>> motors_;
   std::vector<motion::ProfileSum> sums_;  // by motor
   Nanoseconds since_ = 0;  // motion time at which a profile was last begun, replaced or ended
-  Nanoseconds replaced_at_ = kNever;  // of the first successor
+  Nanoseconds replaced_at_ = kNever;  // when the first successor begins
 
   friend class AxisOfSum;
   friend class MotorOfSum;

@@ -103,7 +103,7 @@ class Drive {
   double reported_at_ = kNever;
   double speed_override_ = 1.0;
   double angle_ = 0.0;
-  std::optional<double> target_;  // that the steering has been given
+  std::optional<double> target_;  // the last target of the steering
   std::string steering_refused_;
 
   State state_ = State::kStopped;

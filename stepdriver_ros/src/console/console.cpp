@@ -72,7 +72,7 @@ void runConsole(const ros::NodeHandle& node, const std::string& driver, const Op
   const auto end = [&] {
     client.carryOut(session.rest());
     std::this_thread::sleep_for(kLastWords);
-    ros::shutdown();  // also ends unanswered calls
+    ros::shutdown();  // this ends unanswered calls too
   };
   try {
     runScreen(session, client, end_requests);

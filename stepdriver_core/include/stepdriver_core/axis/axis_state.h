@@ -162,7 +162,7 @@ struct MovePiece {
 
 /// A part of a motion that an input shaper makes later.
 struct MotionPart {
-  double part = 1.0;   ///< of the whole
+  double part = 1.0;   ///< the share of the whole
   double delay = 0.0;  ///< [s]
 };
 

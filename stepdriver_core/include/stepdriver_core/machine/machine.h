@@ -86,7 +86,7 @@ struct MachineOptions {
 
 /// What the pulse engine has done since the start.
 struct EngineFigures {
-  std::uint64_t edges = 0;  ///< of all STEP lines, both ends of each pulse
+  std::uint64_t edges = 0;  ///< edges of all STEP lines, both ends of each pulse
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;      ///< times that the timeline was slid because a pulse was late
   double slipped = 0.0;         ///< [s] by how much altogether

@@ -39,7 +39,7 @@ struct Recording {
   pulse::Nanoseconds end = 0;
   bool shortened = false;  ///< it begins later than it should, because the memory was full
   std::vector<Pin> pins;
-  std::vector<bool> levels;  ///< of the outputs at the beginning
+  std::vector<bool> levels;  ///< levels of the outputs at the beginning
   std::vector<Edge> edges;
   std::vector<Event> events;
   bool events_lost = false;  ///< there were more events than fit

@@ -17,7 +17,7 @@ struct StepRate {
   double alone = 0.0;  ///< [steps/s] that can be sustained if no other axis moves
   double held = 0.0;  ///< [steps/s] that can be sustained while all others move at their top speeds
   std::string limited;           ///< what limits `held`, in words
-  double steps_per_round = 0.0;  ///< of the motor; 0: not known
+  double steps_per_round = 0.0;  ///< the motor's steps; 0: not known
 
   /// Whether the computer can sustain the rate that the axis needs.
   bool holds() const { return asked <= held; }

@@ -26,13 +26,13 @@ struct Spread {
   Nanoseconds p90 = 0;
   Nanoseconds p99 = 0;
   Nanoseconds max = 0;
-  std::size_t count = 0;  ///< of the samples
+  std::size_t count = 0;  ///< the number of samples
 };
 
 /// The lateness of pulses: half of them were late by at most p50, and so on. The percentiles are
 /// rounded up, by at most a sixteenth.
 struct LatenessFigures {
-  std::uint64_t count = 0;  ///< of the pulses
+  std::uint64_t count = 0;  ///< the number of pulses
   Nanoseconds p50 = 0;      ///< the median
   Nanoseconds p99 = 0;
   Nanoseconds p999 = 0;
@@ -41,17 +41,17 @@ struct LatenessFigures {
 
 /// The costs of the calls for one channel.
 struct CallCosts {
-  Spread write;  ///< of its STEP line
-  Spread read;   ///< of the slower of its endstops; all 0 if it has no endstop
+  Spread write;  ///< a write of its STEP line
+  Spread read;   ///< a read of the slower of its endstops; all 0 if it has no endstop
 };
 
 /// What the kernel granted to a process and a thread that requested real-time permissions.
 struct RealtimeRights {
   int scheduler_error = -1;  ///< errno of the request for SCHED_FIFO; 0: granted; -1: not requested
-  int memory_error = -1;     ///< of the request to lock the memory
-  int latency_error = -1;    ///< of the request to keep the processors awake, see kCpuLatencyDevice
-  int cpu_error = -1;        ///< of the request to run on one processor
-  int cpu = -1;              ///< that processor
+  int memory_error = -1;     ///< the answer to the request to lock the memory
+  int latency_error = -1;    ///< the same for keeping the processors awake, see kCpuLatencyDevice
+  int cpu_error = -1;        ///< the same for running on one processor
+  int cpu = -1;              ///< the number of that processor
 
   /// Without these, pulses may be late by any time. The processors' idle states don't count: their
   /// cost is measured with the wake-ups, and some computers have none.
@@ -68,8 +68,9 @@ struct RealtimeRights {
 struct Capability {
   /// [full steps] as configured, see machine::MachineOptions: what a lateness means for a motion.
   double late_steps = 0.25;
-  Spread lateness;        ///< of wake-ups, waiting as the pulse thread does
-  Spread sleep_lateness;  ///< of wake-ups from waits that don't spin (see Clock::sleepUntil())
+  Spread lateness;        ///< how late wake-ups are, waiting as the pulse thread does
+  Spread sleep_lateness;  ///< how late wake-ups from waits that don't spin are (see
+                          ///< Clock::sleepUntil())
   Nanoseconds guard = 0;  ///< Clock::guard()
   std::vector<CallCosts> channels;
   RealtimeRights rights;

@@ -78,7 +78,7 @@ class Simulation {
   std::map<std::string, sim::RigFaults> faults_;
   std::mutex mutex_;
   std::map<std::string, sim::RigFaults> pressed_;  // the faults, and the pressed switches
-  std::atomic<std::uint64_t> stalls_{0};           // of the clock that the rig has been told
+  std::atomic<std::uint64_t> stalls_{0};  // how many stalls of the clock the rig has been told
   pulse::VirtualClock clock_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;

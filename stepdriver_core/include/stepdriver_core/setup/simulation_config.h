@@ -19,7 +19,7 @@ struct SimulatedWiring {
   std::optional<double> steps_per_unit;  ///< [microsteps/mm|deg] at the configured microsteps
   std::optional<std::string> min_pin;    ///< the line of the switch at the min end
   std::optional<std::string> max_pin;
-  std::optional<bool> min_active_level;  ///< of that line, while the switch is pressed
+  std::optional<bool> min_active_level;  ///< that line's level while the switch is pressed
   std::optional<bool> max_active_level;
 };
 

@@ -52,7 +52,7 @@ class MemoryTrace : public PinTrace {
   void edge(int pin, bool level, std::int64_t time_ns) override;
 
   const std::vector<TracePin>& pins() const { return pins_; }
-  const std::vector<bool>& levels() const { return levels_; }  ///< at begin()
+  const std::vector<bool>& levels() const { return levels_; }  ///< the levels at begin()
   const std::vector<Edge>& edges() const { return edges_; }
 
   /// @return index of the pin. @throw Error if there is no such pin.

@@ -49,7 +49,7 @@ struct MotorPowerSpec {
   std::string line;
   bool active_level = true;      ///< level of the line that switches the power on
   std::int64_t on_ns = 0;        ///< from that level until the power is there
-  std::string feedback_line;     ///< of a contact that closes with the power; empty: not wired
+  std::string feedback_line;     ///< the line of the power's contact; empty: not wired
   bool feedback_active = false;  ///< its level while the power is there
 };
 

@@ -13,8 +13,8 @@ namespace stepdriver::axis {
 struct TrajectoryPoint {
   double time = 0.0;  ///< [s] after the start
   std::vector<double> positions;
-  std::vector<double> velocities;     ///< or empty
-  std::vector<double> accelerations;  ///< or empty
+  std::vector<double> velocities;     ///< may be empty
+  std::vector<double> accelerations;  ///< may be empty
 };
 
 /// Relative. A curve between points that keep to a limit may go beyond it by so much.
@@ -26,7 +26,7 @@ namespace stepdriver::machine {
 
 /// A straight line of several axes. A unit is m on a linear axis, rad on a rotary one.
 struct LineRequest {
-  std::vector<std::string> names;  ///< of the axes, each once
+  std::vector<std::string> names;  ///< the axes' names, each once
   std::vector<double> positions;   ///< [unit] one for each name
   bool relative = false;           ///< positions are relative, see Machine::moveLine()
   /// Highest speed along the path; 0: as fast as the limits of all axes allow, and it must not be
@@ -41,7 +41,7 @@ struct LineRequest {
 
 /// A trajectory of several axes, as Machine::followTrajectory() takes it.
 struct TrajectoryRequest {
-  std::vector<std::string> names;  ///< of the axes, each once; need not be all
+  std::vector<std::string> names;  ///< the axes' names, each once; need not be all
   std::vector<axis::TrajectoryPoint> points;
   /// If a limit of velocity, acceleration or jerk doesn't allow the times of the points, all times
   /// are multiplied by the smallest factor that the limits allow; velocities are divided by it,
@@ -80,7 +80,7 @@ struct PathSegment {
   bool clockwise = false;
   /// @}
 
-  std::vector<double> control1;  ///< of a Bezier, the control point next to its begin
+  std::vector<double> control1;  ///< the control point next to the begin of a Bezier
   std::vector<double> control2;  ///< the one next to its end
 
   double velocity = 0.0;  ///< as PathRequest::velocity; 0: that one
@@ -91,14 +91,14 @@ struct PathSegment {
 /// @name See PathSegment::Shape::kArcAround
 /// @{
 constexpr double kArcMismatch = 5e-6;         ///< [unit]
-constexpr double kArcMismatchShare = 1e-3;    ///< of the radius
+constexpr double kArcMismatchShare = 1e-3;    ///< in parts of the radius
 constexpr double kLargestArcMismatch = 5e-4;  ///< [unit]
 /// @}
 
 /// Segments that several axes follow without stopping, as Machine::followPath() takes them. A unit
 /// is m on a linear axis, rad on a rotary one.
 struct PathRequest {
-  std::vector<std::string> names;  ///< of the axes, each once; need not be all
+  std::vector<std::string> names;  ///< the axes' names, each once; need not be all
   /// 1 to kMostPathSegments. A line or a Bezier all of whose points are within a thousandth of a
   /// microstep of its begin makes no step and is left out, as doubled points are.
   std::vector<PathSegment> segments;
@@ -128,7 +128,7 @@ struct PathAppend {
 
 /// What lies ahead of axes on a path to which segments can be appended.
 struct PathAhead {
-  std::size_t segments = 0;     ///< that they have not passed
+  std::size_t segments = 0;     ///< segments that they have not passed
   std::size_t room = 0;         ///< for so many more
   double time = 0.0;            ///< [s] that they take at the speed override of 1
   double passed = 0.0;          ///< [s] that the path took until now, at that override

@@ -18,14 +18,14 @@ namespace stepdriver::gpio::gpiod {
 struct OutputGroup {
   std::unique_ptr<Outputs> request;
   LineBits levels = 0;    // their last levels
-  PriorityMutex mutex{};  // of both
+  PriorityMutex mutex{};  // guards both
 };
 
 /// The inputs on one chip.
 struct InputGroup {
   std::unique_ptr<Inputs> request;
   std::vector<int> inputs;  // maps indices in this group to indices in the whole request
-  PriorityMutex mutex{};    // of the request
+  PriorityMutex mutex{};    // guards the request
 };
 
 /// The place of a line of the whole request.

@@ -13,7 +13,7 @@ namespace stepdriver::ros_node {
 /// The facts about the pulse engine for diagnostics.
 struct EngineReading {
   machine::EngineFigures figures;
-  std::uint64_t slips_before = 0;  ///< at the previous reading
+  std::uint64_t slips_before = 0;  ///< the slips at the previous reading
   double max_lateness = 0.0;       ///< [s] MachineOptions::max_lateness
   /// The measured step rates, with the needs of the axes; empty: not measured.
   std::vector<machine::StepRate> rates;
