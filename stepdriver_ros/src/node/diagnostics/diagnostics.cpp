@@ -48,15 +48,15 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
       updater_(node, private_node) {
   updater_.setHardwareID(hardware_id);
   for (const auto& axis : machine.axes()) {
-    updater_.add(axis->config().name, [&axis](Status& status) { reportAxis(*axis, status); });
+    updater_.add(axis->config().name, [&axis](Status& status) { fillAxisStatus(*axis, status); });
   }
-  updater_.add(kEngineName, [this](Status& status) { reportEngine(status); });
-  updater_.add(kMasterName, [this](Status& status) { reportMaster(status); });
+  updater_.add(kEngineName, [this](Status& status) { fillEngineStatus(status); });
+  updater_.add(kMasterName, [this](Status& status) { fillMasterStatus(status); });
   if (!state_file_.empty()) {
-    updater_.add(kStateFileName, [this](Status& status) { reportStateFile(status); });
+    updater_.add(kStateFileName, [this](Status& status) { fillStateFileStatus(status); });
   }
   if (config.recorder.seconds > 0.0) {
-    updater_.add(kRecorderName, [this](Status& status) { reportRecorder(status); });
+    updater_.add(kRecorderName, [this](Status& status) { fillRecorderStatus(status); });
   }
   node.setCallbackQueue(&queues.control());
   timer_ = node.createSteadyTimer(
@@ -64,7 +64,7 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
       false);
 }
 
-void Diagnostics::reportAxis(const axis::Axis& axis, Status& status) {
+void Diagnostics::fillAxisStatus(const axis::Axis& axis, Status& status) {
   AxisReading reading;
   reading.state = axis.state();
   reading.limits = axis.limits();
@@ -76,7 +76,7 @@ void Diagnostics::reportAxis(const axis::Axis& axis, Status& status) {
   reportAxis(axis.config(), reading, status);
 }
 
-void Diagnostics::reportEngine(Status& status) {
+void Diagnostics::fillEngineStatus(Status& status) {
   EngineReading reading;
   reading.figures = machine_.figures();
   reading.slips_before = slips_before_;
@@ -86,7 +86,7 @@ void Diagnostics::reportEngine(Status& status) {
   reportEngine(reading, status);
 }
 
-void Diagnostics::reportMaster(Status& status) const {
+void Diagnostics::fillMasterStatus(Status& status) const {
   const MasterWatch::Reading reading = master_.reading();
   if (reading.silent > 0.0) {
     status.summary(Status::ERROR, "doesn't answer: no new client can find this node");
@@ -98,7 +98,7 @@ void Diagnostics::reportMaster(Status& status) const {
   status.add("times registered again", reading.restarts);
 }
 
-void Diagnostics::reportStateFile(Status& status) const {
+void Diagnostics::fillStateFileStatus(Status& status) const {
   const std::string error = machine_.stateFileError();
   if (error.empty()) {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "written");
@@ -108,7 +108,7 @@ void Diagnostics::reportStateFile(Status& status) const {
   status.add("file", state_file_);
 }
 
-void Diagnostics::reportRecorder(Status& status) const {
+void Diagnostics::fillRecorderStatus(Status& status) const {
   const std::string error = recorder_.error();
   if (error.empty()) {
     status.summary(Status::OK, "records");

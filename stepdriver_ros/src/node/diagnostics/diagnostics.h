@@ -34,11 +34,11 @@ class Diagnostics {
  private:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-  static void reportAxis(const axis::Axis& axis, Status& status);
-  void reportEngine(Status& status);
-  void reportMaster(Status& status) const;
-  void reportStateFile(Status& status) const;
-  void reportRecorder(Status& status) const;
+  static void fillAxisStatus(const axis::Axis& axis, Status& status);
+  void fillEngineStatus(Status& status);
+  void fillMasterStatus(Status& status) const;
+  void fillStateFileStatus(Status& status) const;
+  void fillRecorderStatus(Status& status) const;
 
   const machine::Machine& machine_;
   const MasterWatch& master_;
