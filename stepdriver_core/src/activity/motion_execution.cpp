@@ -32,6 +32,25 @@ bool isAt(const axis::AxisModel& axis, const Goal& goal) {
   return goal.target == (goal.of_motor ? axis.motor.state().count : axis.jointCount());
 }
 
+/// Why the last motion of an axis was ended by a fault or an emergency stop. That is latched by the
+/// axis or by one that shares its motors; a recover may have cleared it meanwhile.
+std::string faultThatEnded(const axis::AxisModel& axis) {
+  const std::string fault = axis.faultText();
+  if (!fault.empty()) return fault;
+  switch (axis.motor.state().end) {
+    case pulse::EndReason::kChipFault:
+      return "a driver chip reported a fault";
+    case pulse::EndReason::kNotInPosition:
+      return "it wasn't in position in time";
+    case pulse::EndReason::kTooLate:
+      return "a pulse was too late";
+    case pulse::EndReason::kLineError:
+      return "a line failed";
+    default:
+      return axis::Fault::kEmergencyStop;
+  }
+}
+
 /// How the goal of an axis at rest ended, also in words.
 /// @param slowed_down its last motion was to end before it. @param left_by why
 std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const Goal& goal,
@@ -46,12 +65,12 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
     case pulse::EndReason::kEndstopMax:
       return {axis::MoveEnd::kEndstopMax, "the max endstop was met"};
     case pulse::EndReason::kEmergencyStop:
-      return {axis::MoveEnd::kEmergencyStop, axis.fault.what()};
+      return {axis::MoveEnd::kEmergencyStop, faultThatEnded(axis)};
     case pulse::EndReason::kChipFault:
     case pulse::EndReason::kNotInPosition:
     case pulse::EndReason::kTooLate:
     case pulse::EndReason::kLineError:
-      return {axis::MoveEnd::kFault, axis.fault.what()};
+      return {axis::MoveEnd::kFault, faultThatEnded(axis)};
     case pulse::EndReason::kSkewed:
       return {axis::MoveEnd::kStopped, "its motors got too far apart"};
     case pulse::EndReason::kCompanion:
@@ -193,7 +212,7 @@ MotionExecution::Plans MotionExecution::plan(pulse::Nanoseconds lead) {
     }
     if (!slowsDown()) {
       const Order& order = orders_.front();
-      GoalPlan own = planGoal(*order.axis, order.goal, plans.at);
+      GoalPlan own = planGoal(*order.axis, order.goal, context_.motionNow(), plans.at);
       plans.planned.push_back({order.axis->motor.shaped(std::move(own.plan.profile)),
                                own.plan.overshoot, own.limits, own.slows_ns});
       return plans;

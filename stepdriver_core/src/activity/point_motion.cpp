@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "point_to_point/acceleration_ramp_down.h"
 #include "point_to_point/move_between.h"
 #include "profile/position_range.h"
+#include "profile/profile_parts.h"
 #include "profile/resting_count.h"
 #include "setpoint_motion.h"
 
@@ -29,10 +31,20 @@ std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
   return from.velocity > 0.0 ? up : down;
 }
 
-std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal) {
-  std::optional<std::int64_t> stand_at = goal.target;
-  if (stand_at && goal.velocity > 0.0) *stand_at += axis.backlash();
-  return stand_at;
+std::int64_t limitTarget(const axis::AxisModel& axis, std::int64_t limit, bool up,
+                         const motion::MotionState& from, const motion::MotionLimits& within) {
+  if (!up || axis.backlash() == 0) return limit;
+  // If it can't stop before the limit, it comes back to it, and opens the backlash.
+  const double rest = motion::planStop(0, from, within).endPosition().value();
+  const bool passes = axis.jointAt(rest) - static_cast<double>(limit) > motion::kNoStep;
+  return passes ? limit : limit + axis.backlash();
+}
+
+std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal,
+                                    const motion::MotionState& from,
+                                    const motion::MotionLimits& within) {
+  if (!goal.target) return std::nullopt;
+  return limitTarget(axis, *goal.target, goal.velocity > 0.0, from, within);
 }
 
 namespace {
@@ -43,7 +55,7 @@ motion::Plan planToCount(const axis::AxisModel& axis, const Goal& goal,
   if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
   if (goal.kind == Goal::Kind::kJog) {
     return motion::planVelocity(at, from, std::copysign(within.max_speed, goal.velocity), within,
-                                standAt(axis, goal));
+                                standAt(axis, goal, from, within));
   }
   return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
 }
@@ -56,34 +68,77 @@ motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
   });
 }
 
-// With the overshoot of the joint: if it passes its target and returns, the motor goes back to a
-// place before the one at which the joint first met its target, and may not seem to pass its own.
-motion::Plan ofJoint(const axis::AxisModel& axis, const Goal& goal, const motion::MotionState& from,
+double secondsOf(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+// The way on which the motions under way lead the motor until another one takes over.
+struct WayUntil {
+  double from = 0.0;  // [microsteps] its place now
+  motion::Extent extent;
+};
+
+WayUntil wayUntil(const axis::AxisModel& axis, std::int64_t now, std::int64_t at) {
+  const auto count = static_cast<double>(axis.motor.state().count) + axis.motor.state().between;
+  WayUntil way{count, {count, count}};
+  const auto& motions = axis.motor.motions().all();
+  bool any = false;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const motion::ShapedProfile made = motions[i].planned.made();
+    const motion::Profile& profile = made.profile();
+    const std::int64_t until =
+        i + 1 < motions.size() ? motions[i + 1].planned.plan()->startNs() : at;
+    if (made.startNs() <= now && now < until) way.from = made.stateAt(now).position.value();
+    // Each part of a shaped motion follows its plan later; their sum stays within the plan.
+    const std::int64_t late = made.shaper() != nullptr ? made.shaper()->durationNs() : 0;
+    const std::int64_t begin = std::max(now - late, profile.startNs());
+    const std::int64_t end = std::min(until, profile.endNs());
+    if (begin >= end) continue;
+    const motion::Extent ahead = motion::extentOf(motion::part(
+        profile, secondsOf(begin - profile.startNs()), secondsOf(end - profile.startNs())));
+    if (!std::exchange(any, true)) way.extent = ahead;
+    way.extent.lowest = std::min(way.extent.lowest, ahead.lowest);
+    way.extent.highest = std::max(way.extent.highest, ahead.highest);
+  }
+  return way;
+}
+
+// With the overshoot of the joint as its caller sees it, from the place where it is now: until the
+// plan begins, it may already have passed the target. If a joint with a backlash passes its target
+// and returns, the motor goes back to a place before the one at which the joint first met its
+// target, and may not seem to pass its own.
+motion::Plan ofJoint(const axis::AxisModel& axis, const Goal& goal, std::int64_t now,
                      motion::Plan plan) {
-  if (goal.kind != Goal::Kind::kMove || goal.of_motor || axis.backlash() == 0) return plan;
-  const double joint = axis.jointAt(from.position.value());
-  const motion::Extent motor = motion::extentOf(plan.profile);
+  if (goal.kind != Goal::Kind::kMove || goal.of_motor || !axis.moving()) return plan;
+  const WayUntil before = wayUntil(axis, now, plan.profile.startNs());
+  const double joint = axis.jointAt(before.from);
+  const motion::Extent after = motion::extentOf(plan.profile);
+  const auto backlash = static_cast<double>(axis.backlash());
   const motion::Extent reached{
-      std::min(joint, motor.lowest),
-      std::max(joint, motor.highest - static_cast<double>(axis.backlash()))};
-  plan.overshoot = motion::overshootOf(reached, joint, static_cast<double>(*goal.target));
+      std::min({joint, before.extent.lowest, after.lowest}),
+      std::max({joint, before.extent.highest - backlash, after.highest - backlash})};
+  plan.overshoot = motion::overshootOf(reached, joint, goal.end(axis));
   return plan;
+}
+
+// How far a motion goes beyond a soft limit [microsteps].
+double beyondLimits(const axis::AxisModel& axis, const Goal& goal, const motion::Plan& plan) {
+  if (goal.of_motor) return 0.0;  // no soft limit applies
+  double beyond = 0.0;
+  const motion::Extent extent = motion::extentOf(plan.profile);
+  if (const auto& lowest = axis.config.min_position) {
+    beyond = std::max(beyond, axis.countOf(*lowest) - extent.lowest);
+  }
+  if (const auto& highest = axis.config.max_position) {
+    const double most = axis.countOf(*highest) + static_cast<double>(axis.backlash());
+    beyond = std::max(beyond, extent.highest - most);
+  }
+  return beyond;
 }
 
 // How far a motion goes beyond its target or a soft limit [microsteps].
 double excessOf(const axis::AxisModel& axis, const Goal& goal, const motion::Plan& plan) {
   // To follow a stream of setpoints, an axis may have to pass the last one.
-  double excess = goal.kind == Goal::Kind::kSetpoint ? 0.0 : plan.overshoot;
-  if (goal.of_motor) return excess;  // no soft limit applies
-  const motion::Extent extent = motion::extentOf(plan.profile);
-  if (const auto& lowest = axis.config.min_position) {
-    excess = std::max(excess, axis.countOf(*lowest) - extent.lowest);
-  }
-  if (const auto& highest = axis.config.max_position) {
-    const double most = axis.countOf(*highest) + static_cast<double>(axis.backlash());
-    excess = std::max(excess, extent.highest - most);
-  }
-  return excess;
+  const double overshoot = goal.kind == Goal::Kind::kSetpoint ? 0.0 : plan.overshoot;
+  return std::max(overshoot, beyondLimits(axis, goal, plan));
 }
 
 // The limits of the motion under way, at a motion time of it.
@@ -101,7 +156,8 @@ bool areTheSame(const motion::MotionLimits& one, const motion::MotionLimits& oth
 
 }  // namespace
 
-GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at) {
+GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t now,
+                  std::int64_t at) {
   const motion::MotionState from = axis.motor.stateAt(at);
   const bool slows_down = goal.runs() && goal.velocity == 0.0;
   const double velocity =
@@ -117,19 +173,30 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at
     if (axis.moving()) return {{planStop(axis, at)}, before, at};
     axis.refuse("no other setpoint came before the timeout");
   }
-  if (areTheSame(before, within)) {
-    return {ofJoint(axis, goal, from, planFrom(axis, goal, from, at, within)), within, slows_ns};
-  }
-  const motion::LevelOff level_off(at, from, within, before.jerk);
-  GoalPlan changed{ofJoint(axis, goal, from,
-                           level_off.followedBy(
-                               planFrom(axis, goal, level_off.end(), level_off.endNs(), within))),
-                   level_off.isNeeded() ? before : within, slows_ns};
-  const double excess = excessOf(axis, goal, changed.plan);
-  if (excess <= motion::kNoStep) return changed;
-  GoalPlan kept{ofJoint(axis, goal, from, planFrom(axis, goal, from, at, before)), before,
-                slows_ns};
-  return excessOf(axis, goal, kept.plan) < excess ? kept : changed;
+  const auto plan_within = [&](const motion::MotionLimits& limits) -> GoalPlan {
+    return {ofJoint(axis, goal, now, planFrom(axis, goal, from, at, limits)), limits, slows_ns};
+  };
+  const auto best_within = [&]() -> GoalPlan {
+    if (areTheSame(before, within)) return plan_within(within);
+    const motion::LevelOff level_off(at, from, within, before.jerk);
+    GoalPlan changed{ofJoint(axis, goal, now,
+                             level_off.followedBy(
+                                 planFrom(axis, goal, level_off.end(), level_off.endNs(), within))),
+                     level_off.isNeeded() ? before : within, slows_ns};
+    const double excess = excessOf(axis, goal, changed.plan);
+    if (excess <= motion::kNoStep) return changed;
+    GoalPlan kept = plan_within(before);
+    return excessOf(axis, goal, kept.plan) < excess ? kept : changed;
+  };
+  GoalPlan best = best_within();
+  // The motion under way may have relied on a stop, as at the timeout of setpoints, which is harder
+  // than its limits.
+  const double beyond = beyondLimits(axis, goal, best.plan);
+  if (beyond <= motion::kNoStep || under_way == nullptr) return best;
+  motion::MotionLimits stopping = axis.stopLimits();
+  stopping.max_speed = within.max_speed;
+  GoalPlan hardest = plan_within(stopping);
+  return beyondLimits(axis, goal, hardest.plan) < beyond ? hardest : best;
 }
 
 motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
@@ -141,7 +208,13 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   const double way = (end - from.position).value();
   const bool ends_ahead = way * from.velocity > 0.0 || std::abs(way) < 0.5;
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
-  return motion::planStop(at, from, stopping, motion::restingCount(end.value()));
+  const std::int64_t count = motion::restingCount(end.value());
+  const double between = axis.sharers().empty() ? 0.0 : end.value() - static_cast<double>(count);
+  return axis::planBetween(between, from,
+                           [&](const motion::MotionState& seen) {
+                             return motion::Plan{motion::planStop(at, seen, stopping, count)};
+                           })
+      .profile;
 }
 
 std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,

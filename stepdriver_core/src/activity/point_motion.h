@@ -24,20 +24,31 @@ struct GoalPlan {
 /// The plan for a goal of one axis, from the state of the axis at a motion time.
 ///
 /// If the limits have changed since the motion under way was planned, the new ones apply, unless
-/// the axis would pass its target or a soft limit farther with them: then it keeps the old ones.
+/// the axis would pass its target or a soft limit farther with them: then it keeps the old ones. If
+/// it would still pass a soft limit, it has those of stops.
 ///
 /// @throw motion::TooLong if the motion takes too long; Refused if the timeout of a setpoint is
 /// over
 ///   before the axis moves.
-GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t at);
+/// @param now motion time at which its overshoot begins to count: until the plan begins, the axis
+///   continues its motion.
+GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t now, std::int64_t at);
 
 /// The count at which the motor has to stop for a goal of the joint: a backlash is taken up or open
 /// there. @param within the limits of the motion from this state.
 std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
                          const motion::MotionState& from, const motion::MotionLimits& within);
 
-/// The count at which the motor has to stop a goal that runs(); empty without a limit.
-std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal);
+/// The count at which the motor has to stop for the joint to rest on a soft limit, at the upper or
+/// at the lower end, from a state within limits.
+std::int64_t limitTarget(const axis::AxisModel& axis, std::int64_t limit, bool up,
+                         const motion::MotionState& from, const motion::MotionLimits& within);
+
+/// The count at which the motor has to stop a goal that runs(), from a state within limits; empty
+/// without a limit.
+std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal,
+                                    const motion::MotionState& from,
+                                    const motion::MotionLimits& within);
 
 /// The fastest stop within the limits of stops. @pre the axis moves.
 motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at);

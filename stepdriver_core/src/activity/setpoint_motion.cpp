@@ -88,7 +88,7 @@ motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
   append(pieces, motion::planMove(0, last, rest, within).profile);
   motion::Profile profile = profileOf(at, from, std::move(pieces));
   if (isWithinSoftLimits(axis, profile, goal.between(axis))) return profile;
-  return motion::planMove(at, from, target, within).profile;
+  return motion::planMove(at, from, motorTarget(axis, goal, from, within), within).profile;
 }
 
 motion::Profile velocityProfile(const axis::AxisModel& axis, const Goal& goal,
@@ -96,12 +96,15 @@ motion::Profile velocityProfile(const axis::AxisModel& axis, const Goal& goal,
                                 const motion::MotionLimits& within) {
   if (goal.velocity != 0.0) {
     const double velocity = std::copysign(within.max_speed, goal.velocity);
-    return motion::planVelocity(at, from, velocity, within, standAt(axis, goal)).profile;
+    return motion::planVelocity(at, from, velocity, within, standAt(axis, goal, from, within))
+        .profile;
   }
   const bool up = from.velocity > 0.0;
   const auto& limit = up ? axis.config.max_position : axis.config.min_position;
   std::optional<std::int64_t> not_beyond;
-  if (limit) not_beyond = motion::restingCount(axis.countOf(*limit)) + (up ? axis.backlash() : 0);
+  if (limit) {
+    not_beyond = limitTarget(axis, motion::restingCount(axis.countOf(*limit)), up, from, within);
+  }
   return motion::planStop(at, from, within, not_beyond);
 }
 

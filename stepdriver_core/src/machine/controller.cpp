@@ -464,8 +464,9 @@ void Controller::serve(const PlanMove& wanted, const SharedCall& call) {
   axis::MovePlan shown;
   const motion::PlannedMotion planned = [&] {
     try {
-      motion::Plan plan =
-          activity::planGoal(moved, goal, activity::earliestStart(context_, moved, 0)).plan;
+      motion::Plan plan = activity::planGoal(moved, goal, context_.motionNow(),
+                                             activity::earliestStart(context_, moved, 0))
+                              .plan;
       motion::PlannedMotion motion = moved.motor.shaped(std::move(plan.profile));
       shown.move = activity::moveOf(moved, goal, motion.made(), plan.overshoot);
       return motion;
@@ -497,7 +498,12 @@ const Goal* Controller::streamedGoal(const axis::AxisModel& axis) const {
 void Controller::limitVelocity(Goal& goal, const axis::AxisModel& axis, const char* moves) const {
   const bool up = goal.velocity > 0.0;
   const auto& limit = up ? axis.config.max_position : axis.config.min_position;
-  if (limit) goal.target = motion::restingCount(axis.countOf(*limit));
+  if (limit) {
+    const double count = axis.countOf(*limit);
+    goal.target = motion::restingCount(count);
+    // An axis that shares motors has no counts of its own to rest on.
+    if (!axis.sharers().empty()) goal.remainder = count - static_cast<double>(*goal.target);
+  }
   if (axis.moving()) return;
   const std::int64_t sign = up ? 1 : -1;
   if (goal.target && (*goal.target - axis.jointCount()) * sign <= 0) {

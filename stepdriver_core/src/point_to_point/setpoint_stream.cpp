@@ -6,6 +6,9 @@ namespace stepdriver::axis {
 namespace {
 
 constexpr std::int64_t kShortestPeriod = 1'000'000;
+// The period of the slowest stream, 20 Hz, and half of it for a message that comes late. What comes
+// at longer intervals are single positions: a velocity between them would lead beyond the last one.
+constexpr std::int64_t kLongestInterval = 75'000'000;
 // A time may be smoothed into the future by this, and then delays the motion.
 constexpr std::int64_t kMostDelay = 1'000'000;
 // How much of a deviation from the expected time is believed.
@@ -35,7 +38,7 @@ void smooth(SetpointStream::Course& course, std::int64_t expected, std::int64_t 
 SetpointStream::Course SetpointStream::add(double position, std::int64_t now,
                                            std::int64_t timeout_ns, std::uint64_t stops) {
   const bool continues = last_ && last_->stops == stops && now >= last_->arrived_ns &&
-                         now - last_->arrived_ns < timeout_ns;
+                         now - last_->arrived_ns < std::min(timeout_ns, kLongestInterval);
   Course course;
   course.came_ns = now;
   if (continues) {

@@ -333,6 +333,7 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
   const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
   Part part;
   part.ends = {waypoints.front(), waypoints.back()};
+  part.target = axis.countOf(source.points.back().positions[member]);
   part.begins_at_start = waypoints.size() > 1 && waypoints.front().time_ns == 0;
   part.bounds = {axis.mostAcceleration() * kMore, axis.limits.jerk * kMore};
   try {

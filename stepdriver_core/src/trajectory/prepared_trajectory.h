@@ -45,7 +45,7 @@ class PreparedTrajectory {
 
   const std::vector<PathAxis>& axes() const { return axes_; }
   /// [microsteps] The position at which each axis will come to rest.
-  double target(std::size_t member) const { return parts_[member].ends.back().position; }
+  double target(std::size_t member) const { return parts_[member].target; }
 
   /// The path from the current positions of the axes. If there is a backlash, it is taken up until
   /// the result matches what was prepared, mostly at the first reversal.
@@ -65,6 +65,7 @@ class PreparedTrajectory {
   // Everything that is known about one axis in advance. A motor tail points into the spline tail.
   struct Part {
     std::vector<motion::Waypoint> ends;  // the first waypoint, and the last
+    double target = 0.0;                 // [microsteps] the last position as it was commanded
     bool begins_at_start = false;        // the first of several points is at time 0
     std::unique_ptr<const motion::SplineTail> spline;
     std::unique_ptr<const motion::MotorTail> motor;  // only with a backlash

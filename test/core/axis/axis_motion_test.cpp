@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -128,6 +129,35 @@ TEST_F(AxisMotion, TurnsAndSaysSoWhereItCannotStopBeforeTheTarget) {
   EXPECT_EQ(bench->report().pulses_forward, 1001);
   EXPECT_EQ(bench->report().pulses_backward, 101);
   expectCleanAt(900);
+}
+
+// Until a plan begins, the axis continues its motion for a millisecond, here by 20 microsteps.
+TEST(AxisOvershoot, IsAnnouncedIfATargetIsPassedBeforeThePlanBegins) {
+  for (const double sign : {1.0, -1.0}) {
+    for (const double backlash : {0.0, 0.0003}) {
+      for (const int ahead : {-200, -2, 2, 10, 18, 22, 200, 1200}) {
+        constexpr double kScale = 1e5;
+        config::AxisConfig config = test::linearAxis("x", kScale, 0.2, 2.0);
+        config.backlash = backlash;
+        Bench fast({config});
+        axis::Axis& x = fast.axis();
+        x.moveTo(sign * 0.09);
+        fast.machine->advance(0.2);
+        const double target = x.state().position + sign * ahead / kScale;
+        const axis::Move move = x.moveTo(target);
+        double farthest = x.state().position;
+        while (x.state().moving) {
+          fast.machine->advance(1e-4);
+          farthest = sign > 0.0 ? std::max(farthest, x.state().position)
+                                : std::min(farthest, x.state().position);
+        }
+        const double passed = ahead > 0 ? std::max(0.0, sign * (farthest - target)) : 0.0;
+        EXPECT_NEAR(move.overshoot, passed, 1.5 / kScale)
+            << sign << ", " << ahead << " microsteps ahead, backlash " << backlash;
+        EXPECT_NEAR(x.state().position, target, 0.5 / kScale);
+      }
+    }
+  }
 }
 
 TEST_F(AxisMotion, StopsShortOfANearerTargetWhereItCan) {

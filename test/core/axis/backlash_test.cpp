@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,8 @@
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
 #include "support/refusal.h"
 
@@ -312,6 +315,56 @@ TEST(BacklashInAllModes, LeavesThePositionValidAndWithinHalfAMicrostepOfTheMode)
     EXPECT_EQ(violationsOf(bench.report()), "");
   }
   EXPECT_GT(worst, 0.1) << "a test that rounds nothing shows nothing";
+}
+
+// Whatever takes over, the joint rests within its soft limits: with the backlash taken up at the
+// upper one, or opened if the axis had to come back to it.
+TEST(BacklashAtSoftLimits, IsNoWayBeyondThem) {
+  std::mt19937 random(33);
+  const auto any = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  for (int round = 0; round < 60; ++round) {
+    config::AxisConfig config = linearAxis("x");
+    config.backlash = kBacklash / config.steps_per_unit;
+    config.min_position = -0.004;
+    config.max_position = 0.004;
+    config.jerk = round % 2 == 0 ? 0.0 : 100.0;
+    if (round % 3 == 0) config.stop_deceleration = 3.0;
+    Bench bench({config});
+    axis::Axis& x = bench.axis();
+    std::string story;
+    for (int i = 0; i < 40; ++i) {
+      const int kind = static_cast<int>(any(0.0, 6.0));
+      const double value = any(-1.0, 1.0);
+      story += fmt::format("{} {}, ", kind, value);
+      try {
+        if (kind == 0) x.moveTo(0.004 * value);
+        if (kind == 1) x.jog(0.1 * value);
+        if (kind == 2 || kind == 3) {
+          const auto mode =
+              kind == 2 ? machine::SetpointMode::kVelocity : machine::SetpointMode::kPosition;
+          static_cast<void>(bench.machine->followSetpoints(
+              mode, 0.2, {{"x", (kind == 2 ? 0.1 : 0.006) * value, {}}}));
+        }
+        if (kind == 4) x.stop();
+        if (kind == 5) {
+          const double part = std::pow(10.0, -1.0 + value);
+          x.setLimits({0.0, part, part, config.jerk * part});
+        }
+      } catch (const Refused&) {
+      }
+      bench.machine->advance(any(0.0, 0.05));
+      if (i % 8 == 7) {
+        bench.machine->advance(1.0);
+        x.stop();
+        while (x.state().moving) bench.machine->advance(0.01);
+        x.setLimits({});
+      }
+      if (x.state().moving) continue;
+      EXPECT_LE(std::abs(x.state().position), 0.004 + 1e-9) << story;
+    }
+  }
 }
 
 }  // namespace

@@ -155,6 +155,27 @@ TEST(CoreXyDrivers, ThatReportAFaultStopBothAxesByARamp) {
   expectNoViolations(bench);
 }
 
+// The chip is that of the axis at rest, whose motor turns for the other one too.
+TEST(CoreXyDrivers, ThatReportAFaultSayWhyTheOtherAxisWasStopped) {
+  for (const char* moved : {"x", "y"}) {
+    std::vector<config::AxisConfig> axes{test::linearAxis("x", "drv8825"),
+                                         test::linearAxis("y", "drv8825")};
+    test::share(axes, {{1.0, 1.0}, {1.0, -1.0}});
+    for (config::AxisConfig& axis : axes) axis.fault = config::FaultPin{axis.name + ".fault"};
+    // As above, in real time.
+    Bench bench(axes, true, 1.0);
+    for (const auto& axis : bench.machine->axes()) axis->setPosition(0.0);
+    sim::RigFaults faults;
+    faults.chip_fault_after = 500;
+    const std::string other = moved == std::string("x") ? "y" : "x";
+    bench.rig.setFaults(other, faults);
+    const axis::MoveResult result = bench.move(0.09, moved);
+    EXPECT_EQ(result.end, MoveEnd::kFault) << result.message;
+    EXPECT_NE(result.message.find("reports a fault on nFAULT"), std::string::npos)
+        << result.message;
+  }
+}
+
 // ---- over a restart ----
 
 class CoreXyStateFile : public testing::Test {

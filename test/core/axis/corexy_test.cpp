@@ -390,5 +390,33 @@ TEST(SkewedAxes, ReachTheirTargetsToHalfAMicrostepOfEachMotorByEveryKindOfMotion
   for (const std::string& name : names) EXPECT_EQ(violationsOf(bench.report(name)), "");
 }
 
+// The places of an axis that shares motors aren't its own counts, at a soft limit either.
+TEST(SkewedAxes, JogToTheirSoftLimitsToHalfAMicrostepOfEachMotor) {
+  for (int i = 0; i < 40; ++i) {
+    const double limit = 0.003 + i * 1.7e-6;
+    std::vector<config::AxisConfig> axes{test::linearAxis("x", 40'000.0, 0.1, 1.0),
+                                         test::linearAxis("y", 40'000.0, 0.1, 1.0)};
+    for (config::AxisConfig& axis : axes) {
+      axis.min_position = -limit;
+      axis.max_position = limit;
+    }
+    test::share(axes, {{1.0, 0.5}, {0.25, -1.0}});
+    Bench bench(axes);
+    for (const auto& axis : bench.machine->axes()) axis->setPosition(0.0);
+    for (std::size_t k = 0; k < 2; ++k) {
+      double reach = 5e-10;
+      for (const double part : axes[0].kinematics->inverse[k]) {
+        reach += 0.5 * std::abs(part) / 40'000.0;
+      }
+      axis::Axis& moved = bench.axis(axes[k].name);
+      for (const double sign : {1.0, -1.0}) {
+        moved.jog(sign * 0.1);
+        while (moved.state().moving) bench.machine->advance(1e-3);
+        EXPECT_NEAR(moved.state().position, sign * limit, reach) << axes[k].name;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "geometry/path.h"
+#include "sim/motion_judge.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "support/constants.h"
@@ -186,6 +187,12 @@ constexpr double kNear = 1.0 + 0.71 + 0.2;
 constexpr double kMostOver = 1.05;
 constexpr double kRounding = 2e-9;  // [s] the times of two steps are rounded by this
 
+// Also of what happens in the shortest time between two knots.
+sim::MotionJudge judgeOf(const axis::PathAxis& axis) {
+  return sim::MotionJudge(
+      {axis.limits.max_speed, std::max(axis.limits.acceleration, axis.limits.deceleration)});
+}
+
 void expectGoodSteps(const Drawn& drawn, const PlannedPath& path) {
   const Hull hull(drawn);
   struct Step {
@@ -198,12 +205,15 @@ void expectGoodSteps(const Drawn& drawn, const PlannedPath& path) {
     for (const auto& [time, direction] : path.steps(k)) all.push_back({time, k, direction});
   }
   std::sort(all.begin(), all.end(), [](const Step& a, const Step& b) { return a.time < b.time; });
+  std::array<sim::MotionJudge, 2> judges{judgeOf(drawn.axes[0]), judgeOf(drawn.axes[1])};
   Point place{};
   std::array<Step, 2> last{Step{0, 0, 0}, Step{0, 1, 0}};
   for (const Step& step : all) {
     place[step.axis] += step.direction;
     ASSERT_LE(hull.distance(place), drawn.request.tolerance + kNear)
         << "at " << place[0] << ' ' << place[1] << " after " << step.time << " ns";
+    judges.at(step.axis).step(step.direction, step.time, 0);
+    ASSERT_EQ(judges.at(step.axis).firstViolation(), "") << "axis " << step.axis;
     const Step before = std::exchange(last[step.axis], step);
     if (before.direction != step.direction) continue;
     const double interval = static_cast<double>(step.time - before.time) * 1e-9;

@@ -215,6 +215,56 @@ TEST_F(Setpoints, WithoutAnotherMessageTheAxisRestsOnTheLastPosition) {
   expectClean();
 }
 
+// They come within the timeout, but more slowly than any stream: nothing says that the next one
+// lies farther in their direction.
+TEST_F(Setpoints, PositionsThatComeMoreSlowlyThanAStreamAreNeverPassed) {
+  for (const double jerk : {0.0, 200.0}) {
+    for (const double interval : {0.08, 0.1, 0.125, 0.2, 0.5, 2.0}) {
+      build({configOf("x", jerk)});
+      double highest = 0.0;
+      for (int i = 1; i <= 8; ++i) {
+        const double position = 0.001 * i;
+        const auto refused =
+            bench->machine->followSetpoints(SetpointMode::kPosition, 5.0, {{"x", position, {}}});
+        EXPECT_EQ(refused.front(), "");
+        // No other one comes after the last one.
+        const double until = i < 8 ? interval : 3.0 * interval;
+        for (double waited = 0.0; waited < until; waited += 0.0005) {
+          advance(0.0005);
+          highest = std::max(highest, place());
+          EXPECT_LE(highest, position + 0.5 / kScale) << interval << " s, jerk " << jerk;
+        }
+      }
+      expectClean();
+    }
+  }
+}
+
+// A stream of 20 Hz that becomes slower is no stream any more from its first long interval on.
+TEST_F(Setpoints, AStreamThatBecomesTooSlowEndsWithItsLongInterval) {
+  double sent = 0.0;
+  const auto set_position = [&] {
+    sent += 0.001;
+    const auto refused =
+        bench->machine->followSetpoints(SetpointMode::kPosition, 5.0, {{"x", sent, {}}});
+    EXPECT_EQ(refused.front(), "");
+  };
+  for (int i = 0; i < 10; ++i) {
+    set_position();
+    advance(0.05);
+  }
+  advance(0.05);
+  for (int i = 0; i < 5; ++i) {
+    set_position();
+    for (int k = 0; k < 200; ++k) {
+      advance(0.0005);
+      // When the first one comes, it has already passed the last one of the stream.
+      EXPECT_TRUE(i == 0 || place() <= sent + 0.5 / kScale) << place() << " m, beyond " << sent;
+    }
+  }
+  expectClean();
+}
+
 TEST_F(Setpoints, SilenceBringsTheAxisToRestWithinTheTimeoutAndItsDeceleration) {
   expectTaken(SetpointMode::kPosition, 0.09);
   advance(kTimeout + 0.001);

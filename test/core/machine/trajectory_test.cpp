@@ -190,6 +190,32 @@ TEST_F(Trajectory, FollowsASampledTrapezoidAtTheLimits) {
   }
 }
 
+// A relative move counts from the position that was commanded, between two microsteps.
+TEST_F(Trajectory, LeavesTheRestOfAMicrostepToTheNextRelativeMove) {
+  const std::vector<TrajectoryRequest> requests = {
+      {{"x"}, {{1.0, {0.5}, {}, {}}, {2.0, {1.0004}, {}, {}}}},
+      {{"x"}, {{1.0, {0.5}, {0.5}, {0.0}}, {2.0, {1.0004}, {0.0}, {0.0}}}},
+      {{"x"}, {{2.0, {1.0004}, {}, {}}}},
+  };
+  for (const double jerk : {0.0, 1000.0}) {
+    for (const TrajectoryRequest& request : requests) {
+      config::AxisConfig x = trajectoryAxis("x");
+      x.jerk = jerk;
+      build({x, trajectoryAxis("y")});
+      const CoordinatedMove move = follow(request);
+      EXPECT_NEAR(move.members.front().move.target, 1.0004, 1e-12);
+      EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+      EXPECT_EQ(bench->pulses("x"), 1000);
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_EQ(bench->axis("x").wait(bench->axis("x").moveTo(0.0004, true)).end,
+                  MoveEnd::kReached);
+      }
+      EXPECT_EQ(bench->pulses("x"), 1002) << "1000 + 4 x 0.4, jerk " << jerk;
+      expectClean();
+    }
+  }
+}
+
 TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
   const auto why = [&](const std::vector<axis::TrajectoryPoint>& points) {
     return refusal([&] { follow({{"x", "y"}, points}); });
