@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fuzz/fuzz_input.h"
+#include "search/drawn_machines.h"
 #include "search/participants.h"
 
 // The input is a schedule of test/core/search: acts of two clients and of the machine, some of them
@@ -79,19 +80,21 @@ Act request(const std::string& name, const machine::Request& wanted, const Meani
 }
 
 /// An act with numbers of the input, as machine::Machine hands them over: it refuses some itself.
-Act readAct(Input& input) {
-  constexpr std::size_t kKinds = 14;
+Act readAct(Input& input, const std::vector<config::AxisConfig>& configs) {
+  constexpr std::size_t kKinds = 15;
   const std::size_t kind = input.any(kKinds);
   const std::size_t axis = input.any(search::kAxes);
+  const config::AxisConfig& config = configs.at(axis);
   switch (kind) {
     case 0: {
-      const machine::MoveTo move{axis, input.number(0.02), input.any(2) == 1, input.number(0.1)};
+      const machine::MoveTo move{axis, input.number(0.02), input.any(2) == 1,
+                                 input.number(config.max_speed)};
       return request(fmt::format("move {} {} {} at {}", axis, move.relative ? "by" : "to",
                                  move.position, move.velocity),
                      move, moving({axis}));
     }
     case 1: {
-      const machine::MoveRounds move{axis, input.number(3.0), input.number(0.1)};
+      const machine::MoveRounds move{axis, input.number(3.0), input.number(config.max_speed)};
       return request(fmt::format("move {} by {} rounds at {}", axis, move.rounds, move.velocity),
                      move, moving({axis}));
     }
@@ -100,7 +103,7 @@ Act readAct(Input& input) {
       const machine::MoveLine line{{axis, other},
                                    {input.number(0.02), input.number(0.02)},
                                    input.any(2) == 1,
-                                   input.any(4) == 0 ? input.number(0.1) : 0.0,
+                                   input.any(4) == 0 ? input.number(config.max_speed) : 0.0,
                                    input.any(4) == 0 ? input.number(3.0) : 0.0};
       const std::string name = fmt::format("line of {} and {} {} {} and {} at {} or in {} s", axis,
                                            other, line.relative ? "by" : "to", line.positions[0],
@@ -108,14 +111,14 @@ Act readAct(Input& input) {
       return request(name, line, moving({axis, other}));
     }
     case 3: {
-      const double velocity = input.number(0.1);
+      const double velocity = input.number(config.max_speed);
       return request(fmt::format("jog {} at {}", axis, velocity), machine::Jog{axis, velocity, {}},
                      moving({axis}));
     }
     case 8: {
       const std::size_t other = (axis + 1) % search::kAxes;
       const bool positions = input.any(2) == 1;
-      const double most = positions ? 0.02 : 0.1;
+      const double most = positions ? 0.02 : config.max_speed;
       machine::FollowSetpoints wanted{
           positions ? machine::SetpointMode::kPosition : machine::SetpointMode::kVelocity,
           input.between(0.01, 0.3),
@@ -130,18 +133,19 @@ Act readAct(Input& input) {
     }
     case 9: {
       const std::size_t other = (axis + 1) % search::kAxes;
-      const machine::JogTogether jogs{
-          {{axis, input.number(0.1), {}}, {other, input.number(0.1), {}}}};
+      const machine::JogTogether jogs{{{axis, input.number(config.max_speed), {}},
+                                       {other, input.number(configs.at(other).max_speed), {}}}};
       const std::string name = fmt::format("jog {} and {} at {} and {}", axis, other,
                                            jogs.jogs[0].velocity, jogs.jogs[1].velocity);
       return request(name, jogs, moving({axis, other}));
     }
     case 4: {
       axis::AxisLimits limits;
-      limits.max_speed = input.inDecades(0.11);
-      limits.acceleration = input.inDecades(2.1);
-      limits.deceleration = input.inDecades(2.1);
-      if (input.any(2) == 1) limits.jerk = input.inDecades(60.0);
+      limits.max_speed = input.inDecades(1.1 * config.max_speed);
+      limits.acceleration = input.inDecades(1.1 * config.acceleration);
+      limits.deceleration = input.inDecades(1.1 * config.deceleration);
+      if (input.any(2) == 1)
+        limits.jerk = input.inDecades(config.jerk > 0.0 ? 1.1 * config.jerk : 60.0);
       const std::string name = fmt::format("limits of {}: {} {} {} {}", axis, limits.max_speed,
                                            limits.acceleration, limits.deceleration, limits.jerk);
       return request(name, machine::SetLimits{axis, limits}, {});
@@ -186,6 +190,10 @@ Act readAct(Input& input) {
           fmt::format("append to the path of {}, {}{}", axis, size, is_last ? ", the last" : ""),
           [=](Participants& all, int client) { all.appendToPath(client, axis, size, is_last); }};
     }
+    case 13: {
+      const double first = std::max(1e-6, input.inDecades(1e-3));
+      return search::slowPath(first, std::max(1e-6, input.inDecades(1e-3)));
+    }
     default: {
       const int microsteps = static_cast<int>(input.any(34)) - 1;
       return request(fmt::format("{} microsteps of {}", microsteps, axis),
@@ -196,8 +204,16 @@ Act readAct(Input& input) {
 
 search::Schedule readSchedule(Input input) {
   search::Schedule schedule;
-  schedule.variant = static_cast<int>(input.any(search::kVariants));
+  const std::uint8_t kind = input.byte();
+  schedule.variant = static_cast<int>(kind % search::kVariants);
   schedule.may_last = true;
+  const bool is_drawn = kind >= 128;
+  if (is_drawn) {
+    schedule.machine =
+        search::drawMachine(schedule.variant, [&input] { return input.byte() / 255.0; });
+  }
+  const std::vector<config::AxisConfig> configs =
+      is_drawn ? schedule.machine : search::configsOf(schedule.variant);
   while (!input.isOver() && schedule.items.size() < kMostItems) {
     const std::uint8_t what = input.byte();
     if (what >= 240 && schedule.deviations.size() < kMostDeviations) {
@@ -214,7 +230,7 @@ search::Schedule readSchedule(Input input) {
     if (what < 2 * search::acts().size()) {
       item.act = what / 2;
     } else {
-      item.own = std::make_shared<const Act>(readAct(input));
+      item.own = std::make_shared<const Act>(readAct(input, configs));
     }
     schedule.items.push_back(item);
   }
@@ -226,6 +242,8 @@ std::string storyOf(const search::Schedule& schedule, const std::vector<std::str
   std::string story;
   for (const std::string& complaint : complaints) story += complaint + "\n";
   story += fmt::format("variant {}\n", schedule.variant);
+  for (const config::AxisConfig& axis : schedule.machine)
+    story += "  " + search::describe(axis) + "\n";
   for (const search::Item& item : schedule.items) {
     story += fmt::format("  client {}, after {} steps: {}\n", item.client == 0 ? "A" : "B",
                          item.after, search::actOf(item).name);

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <cerrno>
 #include <stdexcept>
 
@@ -103,16 +105,6 @@ std::deque<Turn> holdsAndFeeds(std::size_t steps) {
           {pause(3), request("hold", machine::Hold{}, quiet(Meaning::Quiet::kHeld, every))},
           {pause(9), request("resume", machine::Resume{}, resumes)},
           {pause(27), append("tell the end of the path", 0.0, true)}};
-}
-
-/// The client watches it.
-std::deque<Turn> followsSlowly() {
-  return {{0,
-           {"begin a slow path of x and y",
-            [](Participants& all, int client) {
-              all.postSlowPath(client, {kX, kY});
-            }}},
-          {20'000 * kMillisecond, {"watch", [](Participants& /*all*/, int /*client*/) {}}}};
 }
 
 /// An act of several acts, which differ with the steps before.
@@ -249,7 +241,7 @@ std::vector<Act> makeActs() {
       {"a pin is slow", [](Participants& all, int) { all.hangNextPin(20'000'000); }},
       {"shut down", [](Participants& all, int client) { all.shutDown(client); }},
       inTurn("path of x and y that is held, resumed and ended", holdsAndFeeds),
-      inTurn("slow path of x and y", [](std::size_t /*steps*/) { return followsSlowly(); }),
+      slowPath(40e-6, 3e-6),
   };
 }
 
@@ -258,6 +250,17 @@ std::vector<Act> makeActs() {
 const std::vector<Act>& acts() {
   static const std::vector<Act> all = makeActs();
   return all;
+}
+
+Act slowPath(double first, double second) {
+  const Act begin{"begin a slow path of x and y", [=](Participants& all, int client) {
+                    all.postSlowPath(client, {kX, kY}, first, second);
+                  }};
+  const Act watch{"watch", [](Participants& /*all*/, int /*client*/) {}};
+  return {fmt::format("slow path of x and y at {} and {} m/s", first, second),
+          [=](Participants& all, int client) {
+            all.postInTurn(client, {{0, begin}, {20'000 * kMillisecond, watch}});
+          }};
 }
 
 const Act& actOf(const Item& item) { return item.own ? *item.own : acts().at(item.act); }

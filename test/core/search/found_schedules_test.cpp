@@ -215,7 +215,7 @@ TEST(FoundSchedules, AnAxisThatIsShapedTwiceMakesNoBursts) {
 // the first.
 TEST(FoundSchedules, ASlowPathStaysWhereItIsSentTo) {
   for (int variant = 0; variant < 5; ++variant) {
-    expectGood({variant, {does(0, 0, "slow path of x and y")}, {}});
+    expectGood({variant, {does(0, 0, "slow path of x and y at 4e-05 and 3e-06 m/s")}, {}});
   }
 }
 

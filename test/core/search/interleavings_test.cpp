@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "search/drawn_machines.h"
 #include "search/participants.h"
 
 namespace stepdriver::search {
@@ -22,6 +25,7 @@ constexpr std::size_t kShards = 16;
 
 std::string textOf(const Schedule& schedule) {
   std::string text = "variant " + std::to_string(schedule.variant) + "\n";
+  for (const config::AxisConfig& axis : schedule.machine) text += "  " + describe(axis) + "\n";
   for (const Item& item : schedule.items) {
     text += "  client " + std::string(item.client == 0 ? "A" : "B") + ", after " +
             std::to_string(item.after) + " steps: " + actOf(item).name + "\n";
@@ -99,13 +103,26 @@ Schedule pairOf(std::size_t number) {
   return schedule;
 }
 
+double anyPart(std::mt19937_64& random) {
+  return std::uniform_real_distribution<double>(0.0, 1.0)(random);
+}
+
+/// One of acts(), or a slow path at speeds from 1e-6 to 1e-3 m/s.
+Item anyItem(std::mt19937_64& random) {
+  constexpr std::size_t kSlowPaths = 30;  // one in so many
+  Item item{any(random, acts().size()), static_cast<int>(any(random, 2)),
+            kAfter[any(random, kAfter.size())]};
+  if (any(random, kSlowPaths) != 0) return item;
+  const auto speed = [&] { return 1e-6 * std::pow(1e3, anyPart(random)); };
+  const double first = speed();
+  item.own = std::make_shared<const Act>(slowPath(first, speed()));
+  return item;
+}
+
 Schedule tripleOf(std::mt19937_64& random) {
   Schedule schedule;
   schedule.variant = static_cast<int>(any(random, kVariants));
-  for (std::size_t i = 0; i < 3 + any(random, 2); ++i) {
-    schedule.items.push_back({any(random, acts().size()), static_cast<int>(any(random, 2)),
-                              kAfter[any(random, kAfter.size())]});
-  }
+  for (std::size_t i = 0; i < 3 + any(random, 2); ++i) schedule.items.push_back(anyItem(random));
   return schedule;
 }
 
@@ -141,7 +158,7 @@ Schedule crowdOf(std::mt19937_64& random) {
   return schedule;
 }
 
-/// About 335,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is the number of
+/// About 340,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is the number of
 /// schedules of each sampled kind, STEPDRIVER_FIRST_SEED the first seed, and STEPDRIVER_FAILURES
 /// the number of failures after which a test ends. A seed means the same schedule, whatever these
 /// values are.
@@ -212,6 +229,30 @@ TEST_P(Interleavings, KeepThePromisesForManyRequests) {
     if (any(random, 4) != 0) deviate(schedule, random);
     return expectGood(schedule, "many, seed " + std::to_string(seed));
   });
+}
+
+/// A fifth as many as of the other kinds. Low limits may make a motion longer than a run.
+TEST_P(Interleavings, KeepThePromisesOnDrawnMachines) {
+  forEachSeed([this](std::uint64_t seed) {
+    if (seed / kShards % 5 != 0) return true;
+    std::mt19937_64 random(seed);
+    Schedule schedule = tripleOf(random);
+    schedule.may_last = true;
+    schedule.machine = drawMachine(schedule.variant, [&] { return anyPart(random); });
+    return expectGood(schedule, "drawn, seed " + std::to_string(seed));
+  });
+}
+
+TEST(DrawnMachines, HaveNumbersThatTheReaderAccepts) {
+  std::mt19937_64 random(33);
+  std::size_t differ = 0;
+  constexpr std::size_t kMachines = 200;
+  for (std::size_t i = 0; i < kMachines; ++i) {
+    const int variant = static_cast<int>(i % kVariants);
+    const auto machine = drawMachine(variant, [&] { return anyPart(random); });
+    differ += machine[0].acceleration != configsOf(variant)[0].acceleration ? 1 : 0;
+  }
+  EXPECT_EQ(differ, kMachines) << "otherwise no machine was drawn that the reader accepts";
 }
 
 INSTANTIATE_TEST_SUITE_P(Shards, Interleavings, testing::Range<std::size_t>(0, kShards));

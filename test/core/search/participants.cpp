@@ -50,6 +50,8 @@ constexpr int kSharing = 3;
 /// In this one the motions of x and z are shaped, and those of y aren't.
 constexpr int kShaped = 4;
 
+}  // namespace
+
 std::vector<config::AxisConfig> configsOf(int variant) {
   std::vector<config::AxisConfig> configs;
   for (const char* name : {"x", "y", "z"}) {
@@ -107,6 +109,8 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   }
   return configs;
 }
+
+namespace {
 
 machine::EmergencyDisable emergencyDisableOf(int variant) {
   switch (variant) {
@@ -169,7 +173,8 @@ std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs)
   return names;
 }
 
-/// For each axis, the longest deceleration and 10 %, and the time of its shaper.
+/// For each axis, the longest deceleration and 10 %, the time of a move of one microstep, as it
+/// stops on a whole one, and that of its shaper.
 std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
                                                 const Schedule& schedule) {
   const bool late = isEngineLate(schedule);
@@ -179,7 +184,11 @@ std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisCo
     const double deceleration = config.stop_deceleration.value_or(config.deceleration);
     double time = config.max_speed / deceleration;
     if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
-    time = 1.1 * time + motor::shapingTimeOf(config);
+    const double scale = config.steps_per_unit;
+    double microstep =
+        std::sqrt(2.0 / scale * (1.0 / config.acceleration + 1.0 / config.deceleration));
+    if (config.jerk > 0.0) microstep += 4.0 * std::cbrt(0.5 / scale / config.jerk);
+    time = 1.1 * time + microstep + motor::shapingTimeOf(config);
     slowing[axis] = std::llround(time * 1e9) + (late ? kLongestLead : kLead);
   }
   return slowing;
@@ -201,7 +210,7 @@ const char* nameOf(Who who) {
 
 Participants::Participants(const Schedule& schedule)
     : schedule_(schedule),
-      configs_(configsOf(schedule.variant)),
+      configs_(schedule.machine.empty() ? configsOf(schedule.variant) : schedule.machine),
       oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
       rig_(rigOf(configs_, schedule), trace_, test::Bench::couplings(configs_),
@@ -226,7 +235,7 @@ Participants::Participants(const Schedule& schedule)
   engine_->listen(*news_);
   watched_ = readInputs();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    hulls_[axis].begin(0.0, kHullTolerance);
+    hulls_[axis].begin(0.0, kHullTolerance * roundingOf(axis));
     lowest_limits_[axis].deceleration = configs_[axis].deceleration;
     lowest_limits_[axis].jerk = configs_[axis].jerk;
   }
@@ -684,9 +693,21 @@ double Participants::placeOnRig(std::size_t axis) const {
   if (shared == nullptr) return static_cast<double>(trace_->place(axis));
   double place = 0.0;
   for (std::size_t motor = 0; motor < shared->axes.size(); ++motor) {
-    place += shared->inverse[axis][motor] * static_cast<double>(trace_->place(motor));
+    place += shared->inverse[axis][motor] * static_cast<double>(trace_->place(motor)) /
+             configs_[motor].steps_per_unit;
   }
-  return place;
+  return place * configs_[axis].steps_per_unit;
+}
+
+// [microsteps] By how much a microstep of each motor moves it.
+double Participants::roundingOf(std::size_t axis) const {
+  const auto& shared = configs_[axis].kinematics;
+  if (shared == nullptr) return 1.0;
+  double rounding = 0.0;
+  for (std::size_t motor = 0; motor < shared->axes.size(); ++motor) {
+    rounding += std::abs(shared->inverse[axis][motor]) / configs_[motor].steps_per_unit;
+  }
+  return std::max(1.0, rounding * configs_[axis].steps_per_unit);
 }
 
 double Participants::onRig(std::size_t axis, double position) {
@@ -748,7 +769,7 @@ void Participants::beginHulls(const Ask& asked) {
     const double backlash = configs_[axis].backlash * configs_[axis].steps_per_unit;
     const auto snapshot = controller_->snapshot();
     const double step = configs_[axis].steps_per_unit / snapshot->axes.at(axis).steps_per_unit;
-    const double tolerance = kHullTolerance * step + backlash;
+    const double tolerance = kHullTolerance * step * roundingOf(axis) + backlash;
     if (mayRest(axis, asked.id)) {
       checkHull(axis);
       hulls_[axis].begin(placeOnRig(axis), tolerance);
@@ -833,19 +854,21 @@ void Participants::checkMoves(const Ask& asked, const std::vector<axis::Move>& m
       oracle_.complain(who + " succeeds, but the engine has not begun it");
     }
     const double scale = controller_->snapshot()->axes[axis].steps_per_unit;
-    if (asked.meaning.moves && std::abs(moves[i].rest - moves[i].target) > 0.501 / scale) {
+    const double most = 0.501 * roundingOf(axis) / scale;
+    if (asked.meaning.moves && std::abs(moves[i].rest - moves[i].target) > most) {
       oracle_.complain(who + " comes to rest at " + std::to_string(moves[i].rest) +
                        " m, not at the microstep nearest to " + std::to_string(moves[i].target));
     }
     if (!asked.relative && i < asked.ways.size() &&
-        std::abs(moves[i].rest - asked.ways[i]) > 0.501 / scale) {
+        std::abs(moves[i].rest - asked.ways[i]) > most) {
       oracle_.complain(who + " comes to rest at " + std::to_string(moves[i].rest) +
                        " m, but was sent to " + std::to_string(asked.ways[i]));
     }
     if (!asked.relative || !asked.targets[i]) continue;
     // A relative goal counts from the target of the last move, which is at most half a step from
     // the actual position.
-    const double half_step = 0.51 * configs_[axis].microsteps / configs_[axis].steps_per_unit;
+    const double half_step =
+        0.51 * configs_[axis].microsteps * roundingOf(axis) / configs_[axis].steps_per_unit;
     if (std::abs(moves[i].target - *asked.targets[i]) > half_step) {
       oracle_.complain(who + " goes to " + std::to_string(moves[i].target) + " m, not to " +
                        std::to_string(*asked.targets[i]) + " m");
@@ -1062,12 +1085,16 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
   followPath(client, axes, size, request);
 }
 
-void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes) {
-  constexpr double kSize = 0.0001;  // m
-  machine::PathRequest request{{}, {lineTo({kSize, 0.0}), lineTo({2.0 * kSize, 0.0})}, true};
-  request.segments[0].velocity = 40e-6;
-  request.segments[1].velocity = 3e-6;
-  followPath(client, axes, 2.0 * kSize, request);
+void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes, double first,
+                                double second) {
+  constexpr double kLongest = 30.0;     // s
+  constexpr double kMostSize = 0.0005;  // m
+  const double begin = std::min(kMostSize, kLongest * first);
+  const double end = begin + std::min(kMostSize, kLongest * second);
+  machine::PathRequest request{{}, {lineTo({begin, 0.0}), lineTo({end, 0.0})}, true};
+  request.segments[0].velocity = first;
+  request.segments[1].velocity = second;
+  followPath(client, axes, end, request);
 }
 
 void Participants::followPath(int client, const std::vector<std::size_t>& axes, double size,
@@ -1442,7 +1469,10 @@ void Participants::checkOutcomes() {
   // Another axis may have made only one of the two steps that together leave this one in place, and
   // may come to rest elsewhere than it was to when this one was promised its place.
   const bool shares = schedule_.variant == kSharing;
-  const double reached = shares ? 0.51 / 20'000.0 : 1e-9;
+  double reached = 1e-9;
+  for (std::size_t axis = 0; shares && axis < kAxes; ++axis) {
+    reached = std::max(reached, 0.51 * roundingOf(axis) / configs_[axis].steps_per_unit);
+  }
   const auto misses = [&](const axis::Move& move, double position) {
     const bool near_target = shares && std::abs(position - move.target) <= reached;
     return std::abs(position - move.rest) > reached && !near_target;

@@ -64,6 +64,8 @@ struct Item {
 
 /// Machines that a schedule can be played on.
 constexpr std::size_t kVariants = 5;
+/// The axes of one of them, as it is configured by default.
+std::vector<config::AxisConfig> configsOf(int variant);
 
 /// Everything that determines the course of a run.
 struct Schedule {
@@ -71,6 +73,8 @@ struct Schedule {
   std::vector<Item> items;
   std::vector<Deviation> deviations;
   bool may_last = false;  ///< its motions may take longer than a run; a stop ends them
+  /// Other axes than configsOf(), with the same lines; empty: those.
+  std::vector<config::AxisConfig> machine{};
 };
 
 class Participants;
@@ -88,6 +92,8 @@ struct Turn {
 };
 const std::vector<Act>& acts();
 const Act& actOf(const Item& item);
+/// A path of x and y of two lines at these speeds [m/s], which the client watches.
+Act slowPath(double first, double second);
 /// @return its index. @throw std::out_of_range
 std::size_t actNamed(const std::string& name);
 
@@ -130,8 +136,8 @@ class Participants : private machine::ShellCore::Host {
   void postLaterTrajectory(int client, std::vector<std::size_t> axes, double size);
   /// A path of several axes at rest that can be fed until appendToPath() ends it.
   void postPath(int client, const std::vector<std::size_t>& axes, double size);
-  /// Two short lines, the second one at a twentieth of the first one's speed.
-  void postSlowPath(int client, const std::vector<std::size_t>& axes);
+  /// Two short lines at these speeds [m/s], each of which takes at most half a minute.
+  void postSlowPath(int client, const std::vector<std::size_t>& axes, double first, double second);
   /// Appends to the path that an axis follows, if it is one; a last segment ends it.
   /// @param size of the segment; 0: none, only that this is the end.
   void appendToPath(int client, std::size_t axis, double size, bool is_last);
@@ -258,6 +264,7 @@ class Participants : private machine::ShellCore::Host {
   /// @name Where the pulses may lead, on the rig [configured microsteps]
   /// @{
   double placeOnRig(std::size_t axis) const;
+  double roundingOf(std::size_t axis) const;
   double onRig(std::size_t axis, double position);
   bool mayRest(std::size_t axis, std::uint64_t call);
   double stoppingWay(std::size_t axis) const;
