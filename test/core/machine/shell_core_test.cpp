@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "machine/wiring.h"
@@ -54,6 +55,16 @@ class ByHand : public ShellCore::Host, public pulse::NewsListener {
     return answers_.at(call);
   }
   const activity::Reply& answer(activity::CallId call) const { return answers_.at(call); }
+  /// The engine says that the motion has ended, and nothing about a fault.
+  void endMotion(pulse::EndReason end) {
+    EngineNews news{0, 0, 0, {engine_.channel(0)}};
+    pulse::ChannelState& state = news.channels.front();
+    state.ended = state.following;
+    state.following = 0;
+    state.end = end;
+    activity::Outputs out;
+    controller_.handle({clock_.now(), 0, 0, news}, out);
+  }
 
   void turnEnded(const MachineSnapshot& /*before*/,
                  const std::shared_ptr<const MachineSnapshot>& /*now*/,
@@ -106,6 +117,23 @@ TEST(ShellCore, NamesTheCallsThatAreOpenWhenItCloses) {
   EXPECT_EQ(machine.core().close(), std::vector<activity::CallId>{move});
   EXPECT_FALSE(machine.core().takeRequest());
   EXPECT_EQ(machine.core().post(100, StopAll{}), "the machine was shut down");
+}
+
+// A recover may clear the fault first, and it may be the fault of an axis that shares the motors.
+TEST(ShellCore, SaysWhyAMotionHasEndedIfItsAxisHasNoFaultAnyMore) {
+  for (const auto end :
+       {pulse::EndReason::kEmergencyStop, pulse::EndReason::kChipFault, pulse::EndReason::kTooLate,
+        pulse::EndReason::kLineError, pulse::EndReason::kNotInPosition, pulse::EndReason::kSkewed,
+        pulse::EndReason::kCompanion, pulse::EndReason::kEndstopMin, pulse::EndReason::kDone}) {
+    ByHand machine;
+    const activity::Reply reply = machine.answerOf(MoveTo{0, 0.01, false, 0.0});
+    const axis::Move move = std::get<std::vector<axis::Move>>(reply.value).front();
+    machine.endMotion(end);
+    const auto result = move.outcome->get();
+    ASSERT_TRUE(result) << static_cast<int>(end);
+    EXPECT_NE(result->end, axis::MoveEnd::kReached);
+    EXPECT_NE(result->message.back(), ' ') << result->message;
+  }
 }
 
 TEST(ShellCore, RefusesARequestIfTooManyWait) {
