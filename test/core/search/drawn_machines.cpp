@@ -20,9 +20,10 @@ namespace stepdriver::search {
 namespace {
 
 constexpr double kCoarsest = 20e3;  // microsteps/m
-constexpr double kFinest = 2e6;
+constexpr double kFinest = 400e3;
 constexpr double kSlowest = 1e-3;       // m/s: 8 mm take 8 s
 constexpr double kLongestRamp = 5.0;    // s
+constexpr double kMostSteps = 10e3;     // of a motor, at full speed in the time of a ramp
 constexpr double kLowestPart = 0.0101;  // of a motor in the way of an axis: the reader has 0.01
 
 /// In decades, or one of the bounds.
@@ -36,17 +37,19 @@ double within(double low, double high, const Draw& draw) {
 double signOf(const Draw& draw) { return draw() < 0.5 ? -1.0 : 1.0; }
 
 /// @param fastest [unit/s]
-void drawMotion(config::AxisConfig& axis, double fastest, const Draw& draw) {
+/// @param rate [steps/unit] the most of a motor
+void drawMotion(config::AxisConfig& axis, double fastest, double rate, const Draw& draw) {
   const double highest = config::kHighestAcceleration / axis.steps_per_unit;
   axis.max_speed = within(kSlowest, fastest, draw);
-  const double lowest = axis.max_speed / kLongestRamp;
+  const double longest = std::min(kLongestRamp, kMostSteps / (axis.max_speed * rate));
+  const double lowest = axis.max_speed / longest;
   axis.acceleration = within(lowest, highest, draw);
   axis.deceleration = within(lowest, highest, draw);
   if (draw() < 0.3) axis.stop_deceleration = within(axis.deceleration, highest, draw);
   const double most =
       std::max(axis.acceleration, axis.stop_deceleration.value_or(axis.deceleration));
   const double highest_jerk = config::kHighestJerk / axis.steps_per_unit;
-  const double lowest_jerk = most / kLongestRamp;
+  const double lowest_jerk = most / longest;
   axis.jerk =
       draw() < 0.5 || lowest_jerk > highest_jerk ? 0.0 : within(lowest_jerk, highest_jerk, draw);
 }
@@ -75,19 +78,16 @@ config::Matrix drawMatrix(const Draw& draw) {
   return matrix;
 }
 
-/// [unit/s] Both axes at once turn no motor faster than its chip allows.
-double fastestOf(const std::vector<config::AxisConfig>& axes, const config::AxisConfig& axis) {
-  double fastest = 1e9 / static_cast<double>(axis.shortestStepNs()) / axis.steps_per_unit;
-  if (!axis.kinematics) return fastest;
+/// [steps/unit] The most that a motor makes for it.
+double rateOf(const std::vector<config::AxisConfig>& axes, const config::AxisConfig& axis) {
+  if (!axis.kinematics) return axis.steps_per_unit;
   const std::size_t own = axis.kinematics->numberOf(axis.name);
+  double rate = 0.0;
   for (std::size_t motor = 0; motor < axis.kinematics->axes.size(); ++motor) {
-    const double steps = std::abs(axis.kinematics->matrix[motor][own]) * axes[motor].steps_per_unit;
-    const double rate = 1e9 / static_cast<double>(axes[motor].shortestStepNs());
-    if (steps > 0.0) {
-      fastest = std::min(fastest, rate / steps / static_cast<double>(axis.kinematics->axes.size()));
-    }
+    rate =
+        std::max(rate, std::abs(axis.kinematics->matrix[motor][own]) * axes[motor].steps_per_unit);
   }
-  return fastest;
+  return rate;
 }
 
 // The fault outputs of the search's machines are on chips that have none, for the sake of the
@@ -122,9 +122,12 @@ std::vector<config::AxisConfig> drawOnce(int variant, const Draw& draw) {
     for (std::size_t i = 0; i < sharing.size(); ++i) axes[i].kinematics = sharing[i].kinematics;
   }
   for (config::AxisConfig& axis : axes) {
-    const double fastest = fastestOf(axes, axis);
-    if (!(fastest >= kSlowest)) return {};
-    drawMotion(axis, fastest, draw);
+    // All axes at once turn no motor faster than its chip allows.
+    const double together =
+        axis.kinematics ? static_cast<double>(axis.kinematics->axes.size()) : 1.0;
+    const double rate = rateOf(axes, axis);
+    drawMotion(axis, 1e9 / static_cast<double>(axis.shortestStepNs()) / rate / together, rate,
+               draw);
     if (!axis.input_shaper.empty()) {
       axis.input_shaper = drawShapers(draw);
     } else {
