@@ -1,58 +1,57 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include "channel/channel_config.h"
+#include "port/step_port.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
 
 /// The pulses of one channel: the levels of its lines of STEP and DIR, when their last edges
-/// happened, and when the next ones may. All times are clock times at the ends of writes. For the
-/// pulse thread.
+/// happened, and when the next ones may; its lane tells the engine of them. All times are clock
+/// times at the ends of writes. For the pulse thread.
 class PulseTrain {
  public:
-  /// @param config outlives this.
-  explicit PulseTrain(const ChannelConfig& config);
+  /// @param config, lane outlive this.
+  PulseTrain(const ChannelConfig& config, StepPort::Lane& lane);
 
   std::size_t motors() const { return motors_; }
-  /// The pulse is out; never so if both edges are steps.
-  bool high() const { return high_; }
+  const StepPort::Lane& lane() const { return lane_; }
   /// The steps backward have lines of their own.
   bool stepsOnDir() const { return config_.dir_steps; }
-  /// Of the last DIR edge, or of the lines that make the steps: +1 or -1.
-  int direction() const { return direction_; }
-  Nanoseconds rose() const { return rose_; }
-  /// Active edges.
-  std::uint64_t pulses() const { return pulses_; }
   /// A motor takes part in the last edge.
   bool hasPulsed(std::size_t motor) const { return (pulsed_ & motorBit(motor)) != 0; }
-  bool allPulsed() const { return pulsed_ == all_motors_; }
+  /// Those that don't.
+  MotorSet still() const { return all_motors_ & static_cast<MotorSet>(~pulsed_); }
 
   /// @name When the chip allows the next edge
   /// @{
-  Nanoseconds fallDue() const { return rose_ + config_.step_high; }
-  Nanoseconds turnDue() const { return pulses_ != 0 ? rose_ + config_.dir_hold : 0; }
-  Nanoseconds riseDue() const;
-  /// The earliest time of the next rise after one that just happened.
-  Nanoseconds closestRise() const {
-    return config_.both_edges ? rose_ : rose_ + config_.step_high + config_.step_low;
-  }
+  Nanoseconds fallDue() const { return lane_.last + config_.step_high; }
+  Nanoseconds turnDue() const { return lane_.stepped ? lane_.last + config_.dir_hold : 0; }
   /// @}
 
   /// @name Edges
   /// @{
   /// A pulse begins on all motors but those.
   void beginPulse(MotorSet still) { pulsed_ = all_motors_ & static_cast<MotorSet>(~still); }
-  /// The line of a motor and its level after the next edge. It is put there member by member: the
-  /// processor would wait for a copy of a complete pair.
-  void putEdge(std::size_t motor, gpio::LineWrite& write) const {
-    const Signal& step = stepOf(motor, direction_);
-    write.output = step.line;
-    write.level = step.active != (high_ || (toggled_ & motorBit(motor)) != 0);
+  /// The lines of the motors that take part, and their levels after the next edge. They are put
+  /// there member by member: the processor would wait for a copy of a complete pair.
+  /// @return the end of them.
+  gpio::LineWrite* putEdges(gpio::LineWrite* write) const {
+    const Signal* step = lane_.direction > 0 ? forward_.data() : backward_.data();
+    const MotorSet ends = lane_.busy ? all_motors_ : toggled_;
+    for (MotorSet motor = 1; motor <= pulsed_; motor = static_cast<MotorSet>(motor << 1U), ++step) {
+      if ((pulsed_ & motor) == 0) continue;
+      write->output = step->line;
+      write->level = step->active != ((ends & motor) != 0);
+      ++write;
+    }
+    return write;
   }
   /// Of a motor's DIR line.
   gpio::LineWrite turnOf(std::size_t motor, bool forward) const {
@@ -61,16 +60,18 @@ class PulseTrain {
   }
   /// The pulse has ended.
   void fall(Nanoseconds now) {
-    high_ = false;
+    lane_.busy = false;
     fell_ = now;
+    lane_.takes = takes();
   }
   /// A step has gone out.
   void rise(Nanoseconds now);
   /// An edge could not be written, and may have happened.
   void failed(Nanoseconds now);
   void turned(int direction, Nanoseconds now) {
-    direction_ = direction;
+    lane_.direction = direction;
     turned_ = now;
+    lane_.takes = takes();
   }
   /// @}
 
@@ -78,28 +79,28 @@ class PulseTrain {
   const MotorSignals& signalsOf(std::size_t motor) const {
     return motor == 0 ? config_ : config_.twins[motor - 1];
   }
-  // A motor's line of pulses in a direction.
-  const Signal& stepOf(std::size_t motor, int forward) const {
-    const MotorSignals& signals = signalsOf(motor);
-    return config_.dir_steps && forward < 0 ? signals.dir : signals.step;
+  Nanoseconds takes() const;
+  void stepAt(Nanoseconds now) {
+    lane_.last = now;
+    lane_.closest = config_.both_edges ? now : now + config_.step_high + config_.step_low;
   }
 
   const ChannelConfig& config_;
+  StepPort::Lane& lane_;
   const std::size_t motors_;
   const MotorSet all_motors_;
+  // By motor: its lines of pulses in the two directions.
+  std::array<Signal, kMostMotors> forward_;
+  std::array<Signal, kMostMotors> backward_;
   MotorSet pulsed_;
   MotorSet toggled_ = 0;  // both edges are steps, and these motors' lines are at their active level
-  bool high_ = false;
-  int direction_ = -1;
-  std::uint64_t pulses_ = 0;
-  Nanoseconds rose_ = 0;
   Nanoseconds fell_ = 0;
   Nanoseconds turned_ = 0;
 };
 
-inline Nanoseconds PulseTrain::riseDue() const {
+inline Nanoseconds PulseTrain::takes() const {
   const Nanoseconds turned = turned_ + config_.dir_setup;
-  if (pulses_ == 0) return turned;
+  if (!lane_.stepped) return turned;
   // Both edges being steps, the last one was the beginning of the active time, or its end.
   Nanoseconds gap = toggled_ != 0 ? config_.step_high : config_.step_low;
   if (motors_ > 1 && toggled_ != 0) gap = std::max(gap, config_.step_low);
@@ -107,14 +108,15 @@ inline Nanoseconds PulseTrain::riseDue() const {
 }
 
 inline void PulseTrain::rise(Nanoseconds now) {
+  lane_.stepped = true;
+  stepAt(now);
   if (config_.both_edges) {
     toggled_ ^= pulsed_;
     fell_ = now;
+    lane_.takes = takes();
   } else {
-    high_ = true;
+    lane_.busy = true;
   }
-  rose_ = now;
-  ++pulses_;
 }
 
 }  // namespace stepdriver::pulse

@@ -6,7 +6,7 @@
 
 namespace stepdriver::pulse {
 
-void Kin::stepped(EngineChannel& channel) { channel.publishStep(); }
+void Kin::stepped(EngineChannel& channel, const PlayedStep& step) { channel.publishStep(step); }
 
 bool Kin::follows() const {
   return std::any_of(axes.begin(), axes.end(),
@@ -24,14 +24,14 @@ bool Kin::isReserved() const {
                      [](const EngineChannel* axis) { return axis->guard.reserved(); });
 }
 
-bool Kin::isHigh() const {
+bool Kin::isBusy() const {
   return std::any_of(all.begin(), all.end(),
-                     [](const EngineChannel* channel) { return channel->train.high(); });
+                     [](const EngineChannel* channel) { return channel->lane.busy; });
 }
 
 // The n-th motor has the chip of the n-th axis, and its channel comes after those of all axes.
-void SumKin::stepped(EngineChannel& channel) {
-  channel.publishStep();
+void SumKin::stepped(EngineChannel& channel, const PlayedStep& step) {
+  channel.publishStep(step);
   sum.stepped();
   for (std::size_t i = 0; i < axes.size(); ++i) {
     ChannelState& state = axes[i]->state;
@@ -97,15 +97,14 @@ void EngineChannel::takeUp(double of_backlash) {
   state.slack = motion::restingCount(state.taken_up);
 }
 
-void EngineChannel::publishStep() {
-  const int direction = train.direction();
-  state.count += direction;
-  if (config.backlash > 0.0) takeUp(state.taken_up + direction);
+void EngineChannel::publishStep(const PlayedStep& step) {
+  state.count += step.direction;
+  if (config.backlash > 0.0) takeUp(state.taken_up + step.direction);
   ++state.pulses;
-  state.rose = train.rose();
-  if (train.allPulsed()) return published.storeFirst<kStepBytes>(state);
-  for (std::size_t i = 0; i < train.motors(); ++i) {
-    if (!train.hasPulsed(i)) state.lags[i] -= direction;
+  state.rose = step.time;
+  if (step.still == 0) return published.storeFirst<kStepBytes>(state);
+  for (std::size_t i = 0; i < guard.motors(); ++i) {
+    if ((step.still & motorBit(i)) != 0) state.lags[i] -= step.direction;
   }
   publish();
 }

@@ -7,7 +7,7 @@
 #include "channel/channel_config.h"
 #include "channel/channel_state.h"
 #include "guard/axis_guard.h"
-#include "port/pulse_train.h"
+#include "port/step_port.h"
 #include "pulse/command.h"
 #include "pulse/snapshot.h"
 #include "timeline/follower.h"
@@ -16,6 +16,13 @@
 namespace stepdriver::pulse {
 
 struct EngineChannel;
+
+/// A step that has gone out.
+struct PlayedStep {
+  int direction = 0;
+  MotorSet still = 0;    ///< motors that didn't take part
+  Nanoseconds time = 0;  ///< by which it had happened
+};
 
 /// Channels that depend on each other: that of an axis with motors of its own, alone, or those of
 /// axes that share motors, and of these motors.
@@ -27,14 +34,14 @@ class Kin {
   Kin& operator=(const Kin&) = delete;
 
   /// A step of a channel has gone out: tells the places of the axes.
-  virtual void stepped(EngineChannel& channel);
+  virtual void stepped(EngineChannel& channel, const PlayedStep& step);
   /// All axes have ended early: tells their places.
   virtual void halted() {}
 
   bool follows() const;     ///< an axis follows a profile
   bool isRunning() const;   ///< such a motion has made a step
   bool isReserved() const;  ///< the pins of a chip are being written
-  bool isHigh() const;      ///< a pulse is out
+  bool isBusy() const;      ///< a pulse is out
 
   std::vector<EngineChannel*> axes;  ///< what objects to a step, or ends, is theirs
   std::vector<EngineChannel*> all;   ///< a step of one may be what another one waits for
@@ -43,33 +50,30 @@ class Kin {
 };
 
 /// The pulse thread's state of one channel: what comes next on it (timeline), whether that may go
-/// out (guard), its edges (port), and what others may know.
+/// out (guard), what the port has made of it, and what others may know.
 struct EngineChannel {
   EngineChannel(std::size_t number, const ChannelConfig& channel_config, Follower& follower,
-                WatchedLines& lines)
+                WatchedLines& lines, const StepPort::Lane& port_lane)
       : index(number),
         config(channel_config),
         motion(&follower),
         guard(config, state, lines),
-        train(config) {}
+        lane(port_lane) {}
   EngineChannel(const EngineChannel&) = delete;
   EngineChannel& operator=(const EngineChannel&) = delete;
 
-  /// What to do when the channel is due.
-  enum class Action { kNothing, kFall, kTurn, kRise, kFinish };
-
-  Action action() const {
-    if (train.high()) return Action::kFall;
-    if (const auto& next = motion->next()) {
-      return next->direction == train.direction() ? Action::kRise : Action::kTurn;
-    }
-    return motion->follows() ? Action::kFinish : Action::kNothing;
+  /// The port accepts its next step.
+  bool canStep() const {
+    const auto& next = motion->next();
+    return next && lane.accepts(next->direction);
   }
+  /// Nothing is left to be done before the end of its profile.
+  bool canFinish() const { return !lane.busy && !motion->next() && motion->follows(); }
 
   /// How much longer than planned it is since the last step, if the motor can't stop or start at
   /// once between them; otherwise 0.
   Nanoseconds overdue(Nanoseconds now) const {
-    return motion->nextIsFast() ? now - train.rose() - motion->interval() : 0;
+    return motion->nextIsFast() ? now - lane.last - motion->interval() : 0;
   }
 
   void publish() { published.store(state); }
@@ -78,7 +82,7 @@ struct EngineChannel {
   /// Another profile is followed.
   void adopted();
   /// A step has gone out. @pre The axis has motors of its own.
-  void publishStep();
+  void publishStep(const PlayedStep& step);
   void endMotion(EndReason reason, bool abrupt, Nanoseconds motion_now);
 
   const std::size_t index;
@@ -86,7 +90,7 @@ struct EngineChannel {
   ChannelState state;
   Follower* motion;
   AxisGuard guard;
-  PulseTrain train;
+  const StepPort::Lane& lane;
   Kin* kin = nullptr;
   EngineChannel* next_of_kin = this;  // a ring through all of them
 
@@ -106,7 +110,7 @@ class SumKin final : public Kin {
  public:
   explicit SumKin(const SharedAxes& shared) : sum(shared.matrix, shared.inverse) {}
 
-  void stepped(EngineChannel& channel) override;
+  void stepped(EngineChannel& channel, const PlayedStep& step) override;
   void halted() override;
 
   MotorSum sum;

@@ -4,10 +4,9 @@
 #include <utility>
 
 #include "engine_channel.h"
+#include "port/gpio_port.h"
 
 namespace stepdriver::pulse {
-
-using Action = EngineChannel::Action;
 
 namespace {
 
@@ -27,12 +26,6 @@ bool isOfAllAxes(EndReason reason) {
 std::size_t sharedMotors(const std::vector<SharedAxes>& shared) {
   std::size_t motors = 0;
   for (const SharedAxes& axes : shared) motors += axes.channels.size();
-  return motors;
-}
-
-std::size_t allMotors(const std::vector<ChannelConfig>& channels) {
-  std::size_t motors = channels.size();
-  for (const ChannelConfig& channel : channels) motors += channel.twins.size();
   return motors;
 }
 
@@ -75,6 +68,16 @@ std::vector<ChannelConfig> withSharedChips(std::vector<ChannelConfig> channels,
   return channels;
 }
 
+// The channels of a port: those of the axes, then those of the motors that axes share.
+std::vector<ChannelConfig> lanesOf(std::vector<ChannelConfig> channels,
+                                   const std::vector<SharedAxes>& shared) {
+  const std::vector<ChannelConfig> given = channels;
+  for (const SharedAxes& axes : shared) {
+    for (const std::size_t axis : axes.channels) channels.push_back(motorOf(given.at(axis)));
+  }
+  return channels;
+}
+
 }  // namespace
 
 inline void PulseEngine::changed(Channel& channel) {
@@ -93,7 +96,8 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
                          const std::vector<SharedAxes>& shared)
     : lines_(lines),
       clock_(clock),
-      port_(lines_, clock, allMotors(channels) + sharedMotors(shared)),
+      own_port_(std::make_unique<GpioPort>(lines_, clock, lanesOf(channels, shared))),
+      port_(*own_port_),
       max_lateness_(max_lateness),
       emergency_input_(emergency_stop),
       axes_(channels.size()),
@@ -113,6 +117,7 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
     kin->guarded = std::any_of(kin->axes.begin(), kin->axes.end(),
                                [](const Channel* axis) { return !axis->guard.isIdle(); });
   }
+  port_.listen(*this);
   due_.reserve(channels_.size());
   changed_.reserve(channels_.size());
   readEmergencyStop();
@@ -120,7 +125,8 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
 
 void PulseEngine::add(std::size_t index, const ChannelConfig& config, Follower& follower,
                       Kin& kin) {
-  channels_.at(index) = std::make_unique<Channel>(index, config, follower, lines_);
+  channels_.at(index) =
+      std::make_unique<Channel>(index, config, follower, lines_, port_.lane(index));
   Channel& channel = *channels_[index];
   channel.kin = &kin;
   if (!kin.all.empty()) {
@@ -153,6 +159,21 @@ ChannelState PulseEngine::channel(int index) const {
   return channels_.at(static_cast<std::size_t>(index))->published.load();
 }
 
+inline void PulseEngine::scheduleChanged() {
+  for (Channel* channel : changed_) {
+    channel->changed = false;
+    schedule(*channel);
+  }
+  changed_.clear();
+  if (outdated_) scheduleAll();
+}
+
+inline void PulseEngine::servePort(Nanoseconds now) {
+  const std::uint64_t pulses = state_.pulses;
+  port_.serve(now);
+  if (state_.pulses != pulses) figures_.store(state_);
+}
+
 Nanoseconds PulseEngine::serve() {
   slid_ = false;
   if (mail_.front() != nullptr) takeMail(clock_.now());
@@ -162,15 +183,15 @@ Nanoseconds PulseEngine::serve() {
       inputs_changed_.exchange(false, std::memory_order_acquire)) {
     readInputs(now);
   }
-  collectDue(now);
-  if (meetLateness(now)) collectDue(now);
-  writeSteps(now);
+  if (dues_.earliest() <= now) putSteps(now);
+  if (port_.due() <= now) servePort(now);
   scheduleChanged();
-  if (dues_.earliest() <= now) writeOthers(now);
+  if (std::min(dues_.earliest(), port_.due()) <= now) finishDue(now);
   if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
   serveStops();
   report();
-  const Nanoseconds due = std::min(dues_.earliest(), stops_.due([this] { return allSlow(); }));
+  const Nanoseconds steps_due = std::min(dues_.earliest(), port_.due());
+  const Nanoseconds due = std::min(steps_due, stops_.due([this] { return allSlow(); }));
   return heartbeat_ ? std::min(due, heartbeat_->due()) : due;
 }
 
@@ -178,6 +199,11 @@ void PulseEngine::report() {
   if (!news_) return;
   news_ = false;
   if (listener_ != nullptr) listener_->onNews();
+}
+
+void PulseEngine::recordTo(PinRing& ring) {
+  ring_ = &ring;
+  port_.recordTo(ring);
 }
 
 // ---- orders ----
@@ -263,7 +289,7 @@ void PulseEngine::serveStops() {
   const std::uint64_t asked = stopsAsked();
   if (asked == stopsServed()) return;
   for (const auto& channel : channels_) {
-    if (channel->train.high() || channel->motion->follows()) return;
+    if (channel->lane.busy || channel->motion->follows()) return;
   }
   stops_.serve(asked);
   news_ = true;
@@ -346,9 +372,9 @@ bool PulseEngine::askGuards(Channel& channel, Nanoseconds now) {
   return true;
 }
 
-// ---- edges ----
+// ---- steps ----
 
-void PulseEngine::collectDue(Nanoseconds now) {
+inline void PulseEngine::collectDue(Nanoseconds now) {
   due_.clear();
   dues_.collect(now, due_);
 }
@@ -356,11 +382,11 @@ void PulseEngine::collectDue(Nanoseconds now) {
 // A delay in a pulse, or in a write, puts off the next step: then that one isn't late, but has come
 // too long after the last one. Returns whether the timeline slid, so that other channels are due
 // now.
-bool PulseEngine::meetLateness(Nanoseconds now) {
+[[gnu::always_inline]] inline bool PulseEngine::meetLateness(Nanoseconds now) {
   Nanoseconds excess = 0;
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
-    if (channel.action() != Action::kRise) continue;
+    if (!channel.canStep()) continue;
     const Nanoseconds late = now - dues_[index];
     const Nanoseconds motion_now = now - state_.slipped;
     const Nanoseconds lag = motion_now - channel.motion->next()->time_ns;
@@ -380,85 +406,65 @@ bool PulseEngine::meetLateness(Nanoseconds now) {
   return true;
 }
 
-void PulseEngine::writeSteps(Nanoseconds now) {
-  port_.begin();
-  for (const std::size_t index : due_) {
-    Channel& channel = *channels_[index];
-    const Action action = channel.action();
-    if (action == Action::kRise && mayStep(channel, now)) {
-      channel.train.beginPulse(channel.state.still);
-    } else if (action != Action::kFall) {
-      continue;
-    }
-    port_.add(index, channel.train);
-  }
-  // Reading the switches took time, and a stop may have come meanwhile; and the end of one channel
-  // may have ended others.
-  if (emergencyStopped()) stopAll(now);
-  if (news_) {  // an end is news
-    port_.drop([this](std::size_t index) {
-      const Channel& channel = *channels_[index];
-      return !channel.train.high() && !channel.motion->next();
-    });
-  }
-  if (port_.size() == 0) return;
-  const std::uint64_t pulses = state_.pulses;
-  if (port_.play()) {
-    for (std::size_t i = 0; i < port_.size(); ++i) {
-      if (port_.isFirst(i)) written(*channels_[port_.channelOf(i)], port_.done());
-    }
-  } else {
-    playFailed(now);
-  }
-  if (state_.pulses != pulses) figures_.store(state_);
-}
-
-// The count is that of the first motor of a channel, even if another's line fails.
-void PulseEngine::playFailed(Nanoseconds now) {
-  for (const GpioPort::Played& edge : port_.played()) {
-    if (!edge.first) continue;
-    Channel& channel = *channels_[edge.channel];
-    edge.failure.error == 0 ? written(channel, edge.done) : channel.train.failed(edge.done);
-  }
-  for (const GpioPort::Played& edge : port_.played()) {
-    if (edge.failure.error != 0) fail(*channels_[edge.channel], edge.failure, now);
-  }
-}
-
-void PulseEngine::written(Channel& channel, Nanoseconds now) {
-  changed(channel);
-  if (channel.train.high()) return channel.train.fall(now);
-  channel.behind = channel.overdue(now);
-  channel.train.rise(now);
-  Follower& motion = *channel.motion;
-  // The write itself has taken time.
-  if (motion.mayBeLate()) slide(motion.excess(now - state_.slipped));
-  ++state_.pulses;
-  state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
-  lateness_.add(now, channel.late);
-  channel.late = 0;
-  motion.advance();
-  channel.kin->stepped(channel);
-}
-
-void PulseEngine::writeOthers(Nanoseconds now) {
+void PulseEngine::putSteps(Nanoseconds now) {
   collectDue(now);
+  if (meetLateness(now)) collectDue(now);
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
-    const Action action = channel.action();
-    if (action == Action::kTurn) {
-      const LineFailure failure = port_.turn(channel.train, channel.motion->next()->direction);
-      failure.error == 0 ? changed(channel) : fail(channel, failure, now);
-    } else if (action == Action::kFinish) {
-      finish(channel, now);
-    }
+    if (!channel.canStep() || !mayStep(channel, now)) continue;
+    const motion::Step& step = *channel.motion->next();
+    port_.put({index, step.direction, step.time_ns + state_.slipped, channel.state.still});
+  }
+  // Reading the switches took time, and a stop may have come meanwhile: it takes the steps back.
+  if (emergencyStopped()) stopAll(now);
+}
+
+void PulseEngine::finishDue(Nanoseconds now) {
+  collectDue(now);
+  if (port_.due() <= now) servePort(now);
+  for (const std::size_t index : due_) {
+    if (channels_[index]->canFinish()) finish(*channels_[index], now);
   }
   scheduleChanged();
 }
 
+// ---- what the port tells ----
+
+void PulseEngine::played(std::size_t index, int direction, MotorSet still, Nanoseconds time) {
+  Channel& channel = *channels_[index];
+  changed(channel);
+  channel.behind = channel.overdue(time);
+  Follower& motion = *channel.motion;
+  // The write itself has taken time.
+  if (motion.mayBeLate()) slide(motion.excess(time - state_.slipped));
+  ++state_.pulses;
+  state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
+  lateness_.add(time, channel.late);
+  channel.late = 0;
+  motion.advance();
+  channel.kin->stepped(channel, {direction, still, time});
+}
+
+void PulseEngine::ready(std::size_t channel) { changed(*channels_[channel]); }
+
+void PulseEngine::givenBack(std::size_t channel, std::size_t /*steps*/) {
+  changed(*channels_[channel]);
+}
+
+void PulseEngine::stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
+                          MotorSet still) {
+  channels_[channel]->state.still |= still;
+  object(*channels_[channel], {reason, failure}, clock_.now());
+}
+
+void PulseEngine::failed(std::size_t channel, const LineFailure& failure, Nanoseconds now) {
+  fail(*channels_[channel], failure, now);
+}
+
 void PulseEngine::writeHeartbeat(Nanoseconds now) {
   const gpio::LineWrite write = heartbeat_->next();
-  const int error = port_.write(write);
+  const int error = lines_.write(&write, 1);
+  if (error == 0 && ring_ != nullptr) ring_->add(write.output, write.level, clock_.now());
   if (!heartbeat_->done(error == 0, now)) return;
   // Whatever watches the line now takes the motors' power away.
   for (const auto& channel : channels_) fail(*channel, {error, write.output}, now);
@@ -468,7 +474,7 @@ void PulseEngine::writeHeartbeat(Nanoseconds now) {
 void PulseEngine::finish(Channel& channel, Nanoseconds now) {
   changed(channel);
   // Another channel may have changed what is left to be done before it.
-  if (finishDue(channel) > now) return;
+  if (endOf(channel) > now) return;
   if (channel.motion->hasSuccessor()) {
     channel.motion->takeOver();
     channel.adopted();
@@ -531,6 +537,7 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
   }
   channel.motion->halt();
   kin.halted();
+  for (const Channel* one : kin.all) port_.takeBack(one->index);
   kin.ends = false;
   news_ = true;
 }
@@ -543,15 +550,6 @@ void PulseEngine::endOne(Channel& channel, EndReason reason, bool abrupt, Nanose
 
 // ---- times ----
 
-void PulseEngine::scheduleChanged() {
-  for (Channel* channel : changed_) {
-    channel->changed = false;
-    schedule(*channel);
-  }
-  changed_.clear();
-  if (outdated_) scheduleAll();
-}
-
 void PulseEngine::scheduleAll() {
   // A slide moves everything scheduled before it; no second slide follows for the same reason.
   do {
@@ -560,65 +558,70 @@ void PulseEngine::scheduleAll() {
   } while (outdated_);
 }
 
+inline void PulseEngine::aim(Channel& channel, int direction) {
+  if (channel.lane.aim != direction) port_.aim(channel.index, direction);
+}
+
+// The earliest time at which the next step may follow the last one.
+inline Nanoseconds PulseEngine::closestStep(const Channel& channel) {
+  return channel.motion->catchesUp() ? channel.lane.closest
+                                     : channel.lane.last + channel.motion->closest();
+}
+
+// The next step can't go out before `earliest`.
+inline void PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) {
+  const Nanoseconds motion_then = earliest - state_.slipped;
+  if (motion_then > channel.motion->next()->time_ns) slideAt(channel, motion_then);
+}
+
+inline void PulseEngine::scheduleStep(Channel& channel) {
+  Nanoseconds earliest = std::max(channel.state.ready, channel.lane.takes);
+  if (channel.lane.stepped) earliest = std::max(earliest, closestStep(channel));
+  dues_.set(channel.index, std::max(channel.motion->next()->time_ns + state_.slipped, earliest));
+  slideFor(channel, earliest);
+}
+
 void PulseEngine::schedule(Channel& channel) {
   Follower& motion = *channel.motion;
-  while (!channel.train.high() && motion.isReplaced()) {
+  while (!channel.lane.busy && motion.isReplaced()) {
     if (!motion.takeOver()) {
+      aim(channel, 0);
       dues_.set(channel.index, kNever);
       return;
     }
     channel.adopted();
     channel.publish();
   }
-  Nanoseconds due = kNever;
-  switch (channel.action()) {
-    case Action::kRise:
-      return scheduleRise(channel);
-    case Action::kNothing:
-      break;
-    case Action::kFall:
-      due = channel.train.fallDue();
-      // The time that a slow write takes from the next interval belongs to the same slip as its
-      // lateness.
-      if (motion.next() && !motion.isReplaced()) slideFor(channel, closestRise(channel));
-      break;
-    case Action::kTurn:
-      due = channel.train.turnDue();
-      break;
-    case Action::kFinish:
-      due = finishDue(channel);
-      break;
+  const auto& next = motion.next();
+  if (channel.lane.busy) {
+    dues_.set(channel.index, kNever);
+    // The time that a slow write takes from the next interval belongs to the same slip as its
+    // lateness.
+    if (next && !motion.isReplaced()) slideFor(channel, closestStep(channel));
+  } else if (!next) {
+    aim(channel, 0);
+    dues_.set(channel.index, motion.follows() ? endOf(channel) : kNever);
+  } else if (channel.lane.accepts(next->direction)) {
+    aim(channel, 0);
+    scheduleStep(channel);
+  } else {
+    aim(channel, next->direction);
+    dues_.set(channel.index, kNever);
   }
-  dues_.set(channel.index, due);
 }
 
-Nanoseconds PulseEngine::finishDue(const Channel& channel) const {
+Nanoseconds PulseEngine::endOf(const Channel& channel) const {
   const auto end = channel.motion->endsAt();
   // The last pulses must be over, also those of shared motors.
-  if (!end || (!channel.motion->hasSuccessor() && channel.kin->isHigh())) return kNever;
+  if (!end || (!channel.motion->hasSuccessor() && channel.kin->isBusy())) return kNever;
   return std::max(*end + state_.slipped, channel.guard.lookAt());
 }
 
-// The earliest time at which the next step may follow the last one.
-Nanoseconds PulseEngine::closestRise(const Channel& channel) {
-  return channel.motion->catchesUp() ? channel.train.closestRise()
-                                     : channel.train.rose() + channel.motion->closest();
-}
-
-void PulseEngine::scheduleRise(Channel& channel) {
-  Nanoseconds earliest = std::max(channel.state.ready, channel.train.riseDue());
-  if (channel.train.pulses() != 0) earliest = std::max(earliest, closestRise(channel));
-  dues_.set(channel.index, std::max(channel.motion->next()->time_ns + state_.slipped, earliest));
-  slideFor(channel, earliest);
-}
-
-// The next step can't go out before `earliest`.
-void PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) {
-  const Nanoseconds motion_then = earliest - state_.slipped;
-  Nanoseconds lag = motion_then - channel.motion->next()->time_ns;
-  if (lag <= 0) return;
-  if (channel.motion->catchesUp()) lag -= channel.motion->angleAsTime(motion_then);
-  slide(lag);
+// The next step goes out at a motion time after its own.
+void PulseEngine::slideAt(const Channel& channel, Nanoseconds motion_then) {
+  const Follower& motion = *channel.motion;
+  const Nanoseconds angle = motion.catchesUp() ? motion.angleAsTime(motion_then) : 0;
+  slide(motion_then - motion.next()->time_ns - angle);
 }
 
 void PulseEngine::slide(Nanoseconds by) {

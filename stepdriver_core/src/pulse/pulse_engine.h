@@ -12,7 +12,7 @@
 #include "channel/watched_lines.h"
 #include "guard/emergency_stops.h"
 #include "port/due_tree.h"
-#include "port/gpio_port.h"
+#include "port/step_port.h"
 #include "pulse/command.h"
 #include "pulse/heartbeat.h"
 #include "pulse/lateness_record.h"
@@ -34,6 +34,7 @@ struct EngineState {
 struct EngineChannel;
 struct Objection;
 class Follower;
+class PinRing;
 class Kin;
 
 /// Is told when the engine has news for the controller: an order was accepted or refused, a motion
@@ -48,9 +49,8 @@ class NewsListener {
 };
 
 /// Turns profiles into edges on lines, for all axes. It asks three rooms: what comes next, and when
-/// (Follower)? May it go out (EmergencyStops, AxisGuard)? How does it go out (PulseTrain,
-/// GpioPort)? Itself it says when a channel is due, how lateness is met, and what ends
-/// together.
+/// (Follower)? May it go out (EmergencyStops, AxisGuard)? How does it go out (StepPort)? Itself it
+/// says when a step is put, how lateness is met, and what ends together.
 ///
 /// Only the pulse thread calls serve(). post() is for one thread at a time, all other functions are
 /// for any thread. Nothing in serve() allocates, locks, throws or waits; its only system calls are
@@ -70,7 +70,7 @@ class NewsListener {
 /// - The switch is read before each step towards an endstop; no step goes out while it reads
 ///   active.
 /// - Channels of a group start together and end together (Follow::group).
-class PulseEngine {
+class PulseEngine : private StepPort::Listener {
  public:
   /// @param lines, clock outlive the engine. STEP and DIR lines are at their inactive levels.
   /// @param emergency_stop an input that has the same effect as emergencyStop() if it becomes
@@ -79,7 +79,7 @@ class PulseEngine {
   PulseEngine(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels,
               Nanoseconds max_lateness, std::optional<Signal> emergency_stop = {},
               const std::vector<SharedAxes>& shared = {});
-  ~PulseEngine();
+  ~PulseEngine() override;
   PulseEngine(const PulseEngine&) = delete;
   PulseEngine& operator=(const PulseEngine&) = delete;
 
@@ -130,7 +130,7 @@ class PulseEngine {
 
   /// @param ring records each edge of STEP, DIR and heartbeat lines at the end of its write. It
   ///   outlives the engine; set before the first serve().
-  void recordTo(PinRing& ring) { port_.recordTo(ring); }
+  void recordTo(PinRing& ring);
 
   /// The state of a channel, consistent and from one instant.
   ChannelState channel(int index) const;
@@ -172,15 +172,22 @@ class PulseEngine {
   bool mayStep(Channel& channel, Nanoseconds now);
   bool askGuards(Channel& channel, Nanoseconds now);
 
-  // Edges.
+  // Steps.
   void collectDue(Nanoseconds now);
   bool meetLateness(Nanoseconds now);
-  void writeSteps(Nanoseconds now);
-  void playFailed(Nanoseconds now);
-  void written(Channel& channel, Nanoseconds now);
-  void writeOthers(Nanoseconds now);
+  void putSteps(Nanoseconds now);
+  void servePort(Nanoseconds now);
+  void finishDue(Nanoseconds now);
   void writeHeartbeat(Nanoseconds now);
   void finish(Channel& channel, Nanoseconds now);
+
+  // What the port tells.
+  void played(std::size_t channel, int direction, MotorSet still, Nanoseconds time) override;
+  void ready(std::size_t channel) override;
+  void givenBack(std::size_t channel, std::size_t steps) override;
+  void stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
+               MotorSet still) override;
+  void failed(std::size_t channel, const LineFailure& failure, Nanoseconds now) override;
 
   // Ends.
   void object(Channel& channel, const Objection& objection, Nanoseconds now);
@@ -194,15 +201,19 @@ class PulseEngine {
   void scheduleChanged();
   void scheduleAll();
   void schedule(Channel& channel);
-  void scheduleRise(Channel& channel);
-  Nanoseconds finishDue(const Channel& channel) const;
-  static Nanoseconds closestRise(const Channel& channel);
+  void scheduleStep(Channel& channel);
+  void aim(Channel& channel, int direction);
+  Nanoseconds endOf(const Channel& channel) const;
+  static Nanoseconds closestStep(const Channel& channel);
   void slideFor(const Channel& channel, Nanoseconds earliest);
+  void slideAt(const Channel& channel, Nanoseconds motion_then);
   void slide(Nanoseconds by);
 
   WatchedLines lines_;
   Clock& clock_;
-  GpioPort port_;
+  std::unique_ptr<StepPort> own_port_;
+  StepPort& port_;
+  PinRing* ring_ = nullptr;
   const Nanoseconds max_lateness_;
   const std::optional<Signal> emergency_input_;
   const std::size_t axes_;
