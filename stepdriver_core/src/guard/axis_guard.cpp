@@ -50,9 +50,19 @@ std::optional<Objection> AxisGuard::readFault(std::size_t number) {
   faulty_ ^= motorBit(number);
   if (!faulty) return std::nullopt;
   if (level < 0) return Objection{EndReason::kLineError, {-level, fault->line, true}};
+  countFault(number);
+  return Objection{EndReason::kChipFault, {}};
+}
+
+void AxisGuard::noteFault(std::size_t number) {
+  if ((faulty_ & motorBit(number)) != 0) return;
+  faulty_ |= motorBit(number);
+  countFault(number);
+}
+
+void AxisGuard::countFault(std::size_t number) {
   ++state_.chip_faults;
   state_.chip_at_fault = static_cast<std::uint8_t>(number);
-  return Objection{EndReason::kChipFault, {}};
 }
 
 std::optional<Objection> AxisGuard::mayStep(int direction) {

@@ -52,6 +52,8 @@ class AxisGuard {
   void check() { unchecked_ = false; }
   /// Reads the fault output of a motor's chip. Counts a new fault.
   std::optional<Objection> readFault(std::size_t motor);
+  /// Counts a fault that a port has seen, unless it is known.
+  void noteFault(std::size_t motor);
   /// @}
 
   /// @name Steps
@@ -80,6 +82,7 @@ class AxisGuard {
     return number == 0 ? config_ : config_.twins[number - 1];
   }
   std::optional<Objection> readSwitch(std::size_t motor, bool forward);
+  void countFault(std::size_t motor);
   bool wouldSkew(int direction) const;
   std::int64_t skewAfter(int direction) const;
 

@@ -25,14 +25,16 @@ bool Kin::isReserved() const {
 }
 
 bool Kin::isBusy() const {
-  return std::any_of(all.begin(), all.end(),
-                     [](const EngineChannel* channel) { return channel->lane.busy; });
+  return open != 0 || std::any_of(all.begin(), all.end(),
+                                  [](const EngineChannel* channel) { return channel->lane.busy; });
 }
 
 // The n-th motor has the chip of the n-th axis, and its channel comes after those of all axes.
 void SumKin::stepped(EngineChannel& channel, const PlayedStep& step) {
   channel.publishStep(step);
-  sum.stepped();
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (all[axes.size() + i] == &channel) sum.stepped(i, channel.state.count);
+  }
   for (std::size_t i = 0; i < axes.size(); ++i) {
     ChannelState& state = axes[i]->state;
     state.count = sum.axis(i).count();

@@ -41,12 +41,14 @@ class Kin {
   bool follows() const;     ///< an axis follows a profile
   bool isRunning() const;   ///< such a motion has made a step
   bool isReserved() const;  ///< the pins of a chip are being written
-  bool isBusy() const;      ///< a pulse is out
+  bool isBusy() const;      ///< a pulse is out, or a step is open
 
   std::vector<EngineChannel*> axes;  ///< what objects to a step, or ends, is theirs
   std::vector<EngineChannel*> all;   ///< a step of one may be what another one waits for
   bool guarded = false;              ///< an axis has an input that may object to a step
   bool ends = false;                 ///< they are being ended
+  std::size_t open = 0;              ///< steps that a port with a horizon has, and hasn't played
+  bool drains = false;               ///< they have ended early, and steps are still open
 };
 
 /// The pulse thread's state of one channel: what comes next on it (timeline), whether that may go
@@ -76,7 +78,8 @@ struct EngineChannel {
     return motion->nextIsFast() ? now - lane.last - motion->interval() : 0;
   }
 
-  void publish() { published.store(state); }
+  /// Until the last open step of a motion that has ended is over, only its steps are told.
+  void publish() { kin->drains ? published.storeFirst<kStepBytes>(state) : published.store(state); }
   void follow(const Follow& order);
   void release(const Command& command);
   /// Another profile is followed.
@@ -94,11 +97,12 @@ struct EngineChannel {
   Kin* kin = nullptr;
   EngineChannel* next_of_kin = this;  // a ring through all of them
 
-  std::uint64_t group = 0;  // the last order's; 0: no group
-  bool slows = false;       // the last order brings it to rest
-  bool changed = false;     // it must be scheduled
-  Nanoseconds late = 0;     // how late the next step is so far
-  Nanoseconds behind = 0;   // overdue() of the last step when its write had ended
+  std::uint64_t group = 0;      // the last order's; 0: no group
+  bool slows = false;           // the last order brings it to rest
+  bool changed = false;         // it must be scheduled
+  Nanoseconds fast_until = -1;  // time of the last step that was put at a speed that nextIsFast()
+  Nanoseconds late = 0;         // how late the next step is so far
+  Nanoseconds behind = 0;       // overdue() of the last step when its write had ended
   Snapshot<ChannelState> published;
 
  private:

@@ -68,16 +68,6 @@ std::vector<ChannelConfig> withSharedChips(std::vector<ChannelConfig> channels,
   return channels;
 }
 
-// The channels of a port: those of the axes, then those of the motors that axes share.
-std::vector<ChannelConfig> lanesOf(std::vector<ChannelConfig> channels,
-                                   const std::vector<SharedAxes>& shared) {
-  const std::vector<ChannelConfig> given = channels;
-  for (const SharedAxes& axes : shared) {
-    for (const std::size_t axis : axes.channels) channels.push_back(motorOf(given.at(axis)));
-  }
-  return channels;
-}
-
 }  // namespace
 
 inline void PulseEngine::changed(Channel& channel) {
@@ -94,10 +84,25 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
                          const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
                          std::optional<Signal> emergency_stop,
                          const std::vector<SharedAxes>& shared)
+    : PulseEngine(nullptr, lines, clock, channels, max_lateness, emergency_stop, shared) {}
+
+PulseEngine::PulseEngine(StepPort& port, gpio::Lines& lines, Clock& clock,
+                         const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
+                         std::optional<Signal> emergency_stop,
+                         const std::vector<SharedAxes>& shared)
+    : PulseEngine(&port, lines, clock, channels, max_lateness, emergency_stop, shared) {}
+
+PulseEngine::PulseEngine(StepPort* port, gpio::Lines& lines, Clock& clock,
+                         const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
+                         std::optional<Signal> emergency_stop,
+                         const std::vector<SharedAxes>& shared)
     : lines_(lines),
       clock_(clock),
-      own_port_(std::make_unique<GpioPort>(lines_, clock, lanesOf(channels, shared))),
-      port_(*own_port_),
+      own_port_(port != nullptr
+                    ? nullptr
+                    : std::make_unique<GpioPort>(lines_, clock, lanesOf(channels, shared))),
+      port_(port != nullptr ? *port : *own_port_),
+      horizon_(port_.horizon()),
       max_lateness_(max_lateness),
       emergency_input_(emergency_stop),
       axes_(channels.size()),
@@ -121,6 +126,15 @@ PulseEngine::PulseEngine(gpio::Lines& lines, Clock& clock,
   due_.reserve(channels_.size());
   changed_.reserve(channels_.size());
   readEmergencyStop();
+}
+
+std::vector<ChannelConfig> PulseEngine::lanesOf(std::vector<ChannelConfig> channels,
+                                                const std::vector<SharedAxes>& shared) {
+  const std::vector<ChannelConfig> given = channels;
+  for (const SharedAxes& axes : shared) {
+    for (const std::size_t axis : axes.channels) channels.push_back(motorOf(given.at(axis)));
+  }
+  return channels;
 }
 
 void PulseEngine::add(std::size_t index, const ChannelConfig& config, Follower& follower,
@@ -184,7 +198,7 @@ Nanoseconds PulseEngine::serve() {
     readInputs(now);
   }
   if (dues_.earliest() <= now) putSteps(now);
-  if (port_.due() <= now) servePort(now);
+  if (port_.due() <= now || horizon_ != 0) servePort(now);
   scheduleChanged();
   if (std::min(dues_.earliest(), port_.due()) <= now) finishDue(now);
   if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
@@ -230,7 +244,7 @@ void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
   if (command.kind == Command::Kind::kRelease) {
     channel.release(command);
     channel.state.accepted = command.serial;
-  } else if (!channel.kin->follows() && !channel.guard.reserved()) {
+  } else if (!channel.kin->follows() && !channel.kin->drains && !channel.guard.reserved()) {
     channel.guard.reserve();
     channel.state.accepted = command.serial;
   }
@@ -263,9 +277,10 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
 bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const Channel& channel = *channels_[static_cast<std::size_t>(order.channel)];
   const Nanoseconds start = order.profile.startNs();
-  const bool late = start < now - state_.slipped || start < channel.motion->madeUntil();
-  return !late && !channel.kin->isReserved() && order.continues == channel.motion->latest() &&
-         channel.motion->hasRoom(start) && order.faults == channel.state.faults() &&
+  const bool late = start < now - state_.slipped + horizon_ || start < channel.motion->madeUntil();
+  return !late && !channel.kin->isReserved() && !channel.kin->drains &&
+         order.continues == channel.motion->latest() && channel.motion->hasRoom(start) &&
+         order.faults == channel.state.faults() &&
          (emergencyStopped() ? order.slows && stops_.isRamping() : order.stops == stopsAsked());
 }
 
@@ -289,7 +304,7 @@ void PulseEngine::serveStops() {
   const std::uint64_t asked = stopsAsked();
   if (asked == stopsServed()) return;
   for (const auto& channel : channels_) {
-    if (channel->lane.busy || channel->motion->follows()) return;
+    if (channel->motion->follows() || channel->kin->isBusy()) return;
   }
   stops_.serve(asked);
   news_ = true;
@@ -362,7 +377,7 @@ bool PulseEngine::askGuards(Channel& channel, Nanoseconds now) {
       readFaults(*axis, now);
     }
     if (!channel.motion->next()) return false;
-    if (!axis->motion->follows()) continue;
+    if (!axis->motion->follows() || horizon_ != 0) continue;
     const int direction = axis->motion->directionAt(channel.motion->next()->time_ns);
     if (const auto objection = axis->guard.mayStep(direction)) {
       object(*axis, *objection, now);
@@ -387,7 +402,7 @@ inline void PulseEngine::collectDue(Nanoseconds now) {
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
     if (!channel.canStep()) continue;
-    const Nanoseconds late = now - dues_[index];
+    const Nanoseconds late = now - dues_[index] - horizon_;
     const Nanoseconds motion_now = now - state_.slipped;
     const Nanoseconds lag = motion_now - channel.motion->next()->time_ns;
     const Nanoseconds worst = std::max({late, channel.overdue(now), channel.behind});
@@ -412,8 +427,9 @@ void PulseEngine::putSteps(Nanoseconds now) {
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
     if (!channel.canStep() || !mayStep(channel, now)) continue;
-    const motion::Step& step = *channel.motion->next();
-    port_.put({index, step.direction, step.time_ns + state_.slipped, channel.state.still});
+    const Nanoseconds time = dues_[index] + horizon_;
+    port_.put({index, channel.motion->next()->direction, time, channel.state.still});
+    if (horizon_ != 0) sent(channel, time);
   }
   // Reading the switches took time, and a stop may have come meanwhile: it takes the steps back.
   if (emergencyStopped()) stopAll(now);
@@ -433,27 +449,45 @@ void PulseEngine::finishDue(Nanoseconds now) {
 void PulseEngine::played(std::size_t index, int direction, MotorSet still, Nanoseconds time) {
   Channel& channel = *channels_[index];
   changed(channel);
-  channel.behind = channel.overdue(time);
-  Follower& motion = *channel.motion;
-  // The write itself has taken time.
-  if (motion.mayBeLate()) slide(motion.excess(time - state_.slipped));
+  if (horizon_ == 0) {
+    channel.behind = channel.overdue(time);
+    Follower& motion = *channel.motion;
+    // The write itself has taken time.
+    if (motion.mayBeLate()) slide(motion.excess(time - state_.slipped));
+    motion.advance();
+  }
   ++state_.pulses;
   state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
   lateness_.add(time, channel.late);
   channel.late = 0;
-  motion.advance();
   channel.kin->stepped(channel, {direction, still, time});
+  if (horizon_ != 0) closed(channel, 1);
+}
+
+// The timeline goes on from here, whenever the port plays it.
+void PulseEngine::sent(Channel& channel, Nanoseconds time) {
+  if (channel.motion->nextIsFast()) channel.fast_until = time;
+  ++channel.kin->open;
+  channel.motion->advance();
+  changed(channel);
+}
+
+void PulseEngine::closed(Channel& channel, std::size_t steps) {
+  channel.kin->open -= steps;
+  if (channel.kin->open == 0 && channel.kin->drains) concludeEnd(*channel.kin);
 }
 
 void PulseEngine::ready(std::size_t channel) { changed(*channels_[channel]); }
 
-void PulseEngine::givenBack(std::size_t channel, std::size_t /*steps*/) {
+void PulseEngine::givenBack(std::size_t channel, std::size_t steps) {
   changed(*channels_[channel]);
+  closed(*channels_[channel], steps);
 }
 
 void PulseEngine::stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
                           MotorSet still) {
   channels_[channel]->state.still |= still;
+  if (reason == EndReason::kChipFault) channels_[channel]->guard.noteFault(0);
   object(*channels_[channel], {reason, failure}, clock_.now());
 }
 
@@ -519,7 +553,8 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
   Kin& kin = *channel.kin;
   if (kin.ends) return;
   kin.ends = true;
-  const bool abrupt = channel.motion->isFast(now - state_.slipped);
+  const bool abrupt = isFast(channel, now);
+  kin.drains = kin.open != 0;
   for (Channel* axis : kin.axes) {
     const bool moved = axis->motion->follows();
     if (!moved && axis != &channel) {
@@ -538,7 +573,32 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
   channel.motion->halt();
   kin.halted();
   for (const Channel* one : kin.all) port_.takeBack(one->index);
+  if (horizon_ != 0 && !kin.drains) concludeEnd(kin);
   kin.ends = false;
+  news_ = true;
+}
+
+bool PulseEngine::isFast(const Channel& channel, Nanoseconds now) const {
+  if (channel.motion->isFast(now - state_.slipped)) return true;
+  const auto& all = channel.kin->all;
+  return std::any_of(all.begin(), all.end(),
+                     [now](const Channel* one) { return now <= one->fast_until; });
+}
+
+// Every step that was handed over has been played or given back: the motors stand at their counts.
+void PulseEngine::concludeEnd(Kin& kin) {
+  kin.drains = false;
+  for (Channel* channel : kin.all) {
+    channel->motion->rescale(channel->state.count);
+    channel->fast_until = -1;
+  }
+  for (Channel* axis : kin.axes) axis->motion->halt();
+  kin.halted();
+  for (Channel* channel : kin.all) {
+    channel->state.rests_at = channel->motion->restsAt();
+    channel->publish();
+    changed(*channel);
+  }
   news_ = true;
 }
 
@@ -577,7 +637,8 @@ inline void PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) 
 inline void PulseEngine::scheduleStep(Channel& channel) {
   Nanoseconds earliest = std::max(channel.state.ready, channel.lane.takes);
   if (channel.lane.stepped) earliest = std::max(earliest, closestStep(channel));
-  dues_.set(channel.index, std::max(channel.motion->next()->time_ns + state_.slipped, earliest));
+  const Nanoseconds time = std::max(channel.motion->next()->time_ns + state_.slipped, earliest);
+  dues_.set(channel.index, time - horizon_);
   slideFor(channel, earliest);
 }
 

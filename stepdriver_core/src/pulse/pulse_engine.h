@@ -79,6 +79,15 @@ class PulseEngine : private StepPort::Listener {
   PulseEngine(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels,
               Nanoseconds max_lateness, std::optional<Signal> emergency_stop = {},
               const std::vector<SharedAxes>& shared = {});
+  /// The same with a port of another kind for the steps, made for lanesOf() the channels. It
+  /// outlives the engine, which reads the other lines itself.
+  PulseEngine(StepPort& port, gpio::Lines& lines, Clock& clock,
+              const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
+              std::optional<Signal> emergency_stop = {},
+              const std::vector<SharedAxes>& shared = {});
+  /// The channels of a port: those of the axes, then those of the motors that axes share.
+  static std::vector<ChannelConfig> lanesOf(std::vector<ChannelConfig> channels,
+                                            const std::vector<SharedAxes>& shared);
   ~PulseEngine() override;
   PulseEngine(const PulseEngine&) = delete;
   PulseEngine& operator=(const PulseEngine&) = delete;
@@ -149,6 +158,10 @@ class PulseEngine : private StepPort::Listener {
  private:
   using Channel = EngineChannel;
 
+  PulseEngine(StepPort* port, gpio::Lines& lines, Clock& clock,
+              const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
+              std::optional<Signal> emergency_stop, const std::vector<SharedAxes>& shared);
+
   void add(std::size_t index, const ChannelConfig& config, Follower& follower, Kin& kin);
   std::size_t addShared(const SharedAxes& shared, const std::vector<ChannelConfig>& configs,
                         std::size_t motor);
@@ -177,6 +190,8 @@ class PulseEngine : private StepPort::Listener {
   bool meetLateness(Nanoseconds now);
   void putSteps(Nanoseconds now);
   void servePort(Nanoseconds now);
+  void sent(Channel& channel, Nanoseconds time);
+  void closed(Channel& channel, std::size_t steps);
   void finishDue(Nanoseconds now);
   void writeHeartbeat(Nanoseconds now);
   void finish(Channel& channel, Nanoseconds now);
@@ -194,6 +209,8 @@ class PulseEngine : private StepPort::Listener {
   void fail(Channel& channel, const LineFailure& failure, Nanoseconds now);
   void end(Channel& channel, EndReason reason, Nanoseconds now);
   void endEarly(Channel& channel, EndReason reason, Nanoseconds now);
+  void concludeEnd(Kin& kin);
+  bool isFast(const Channel& channel, Nanoseconds now) const;
   void endOne(Channel& channel, EndReason reason, bool abrupt, Nanoseconds now);
 
   // Times.
@@ -213,6 +230,7 @@ class PulseEngine : private StepPort::Listener {
   Clock& clock_;
   std::unique_ptr<StepPort> own_port_;
   StepPort& port_;
+  const Nanoseconds horizon_;  // of the port
   PinRing* ring_ = nullptr;
   const Nanoseconds max_lateness_;
   const std::optional<Signal> emergency_input_;

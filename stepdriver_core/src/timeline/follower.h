@@ -43,11 +43,12 @@ class Follower {
   /// @name The next step
   /// @{
   const std::optional<motion::Step>& next() const { return next_; }
-  /// It has gone out.
+  /// It was handed over: to a port that writes now, it has gone out.
   void advance();
-  /// [microsteps] The steps that have gone out, forward minus backward.
+  /// [microsteps] The steps that were handed over, forward minus backward.
   std::int64_t count() const { return count_; }
-  /// The same place in the microsteps of another mode. @pre It follows nothing.
+  /// The same place in the microsteps of another mode, or where it has stopped before all steps
+  /// that were handed over had gone out. @pre It follows nothing.
   void rescale(std::int64_t count) { count_ = count; }
   /// The planned interval between the last step and the next one, or from the profile's start.
   /// @pre There is a next one.

@@ -185,12 +185,13 @@ void MotorSum::halt() {
 double MotorSum::placeOf(std::size_t axis) const {
   double place = 0.0;
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    place += inverse_[axis][i] * static_cast<double>(motors_[i]->count_);
+    place += inverse_[axis][i] * static_cast<double>(motors_[i]->made_);
   }
   return place;
 }
 
-void MotorSum::stepped() {
+void MotorSum::stepped(std::size_t motor, std::int64_t count) {
+  motors_[motor]->made_ = count;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     AxisOfSum& axis = *axes_[i];
     axis.place_ = placeOf(i);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -57,6 +58,7 @@ class MotorOfSum final : public Follower {
  private:
   MotorSum& sum_;
   const std::size_t number_;
+  std::int64_t made_ = 0;  // its steps that have gone out, of those that were handed over
 
   friend class MotorSum;
 };
@@ -76,8 +78,8 @@ class MotorSum {
   AxisOfSum& axis(std::size_t number) { return *axes_[number]; }
   MotorOfSum& motor(std::size_t number) { return *motors_[number]; }
 
-  /// A motor has made a step: the places of the axes follow.
-  void stepped();
+  /// A motor has made a step: the places of the axes follow. @param count of the motor
+  void stepped(std::size_t motor, std::int64_t count);
 
  private:
   bool moves() const;

@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "support/ahead_port.h"
+#include "support/pulse_engine_bench.h"
+
+/// The engine with a port that plays steps up to 50 ms ahead of time.
+namespace stepdriver::pulse {
+namespace {
+
+constexpr Nanoseconds kMillisecond = 1'000'000;
+constexpr Nanoseconds kHorizon = 50 * kMillisecond;
+constexpr Nanoseconds kStart = 100 * kMillisecond;
+
+class EngineWithHorizon : public PulseEngineTest {
+ protected:
+  void makeAhead(const std::vector<ChannelConfig>& channels, Nanoseconds late = 0,
+                 const std::vector<SharedAxes>& shared = {}) {
+    port = std::make_unique<test::AheadPort>(
+        lines, clock, PulseEngine::lanesOf(channels, shared),
+        test::AheadPort::Habits{kHorizon, [late](const StepPort::Step&) { return late; }});
+    engine = std::make_unique<PulseEngine>(*port, lines, clock, channels, 5 * kMillisecond,
+                                           std::nullopt, shared);
+  }
+
+  void run(Nanoseconds until) {
+    for (;;) {
+      Nanoseconds due = engine->serve();
+      if (port->playDue() <= clock.now()) {
+        port->play(clock.now());
+        continue;
+      }
+      due = std::min(due, port->playDue());
+      if (due > until) break;
+      while (clock.now() < due) clock.waitUntil(due);
+    }
+    while (clock.now() < until) clock.waitUntil(until);
+  }
+
+  std::int64_t rises(int line) { return static_cast<std::int64_t>(lines.rises(line).size()); }
+
+  std::unique_ptr<test::AheadPort> port;
+};
+
+TEST_F(EngineWithHorizon, FollowsAMotionAndEndsItWhenTheLastStepHasBeenPlayed) {
+  for (const Nanoseconds late : {Nanoseconds{0}, 3 * kMillisecond, -kMillisecond}) {
+    lines.edges.clear();
+    makeAhead({config(0)}, late);
+    follow(cruise(clock.now() + kStart, 0, 200, 10'000.0));
+    run(clock.now() + kStart + 5 * kMillisecond);
+    const ChannelState moving = engine->channel(0);
+    EXPECT_EQ(moving.count, rises(0)) << "late by " << late;
+    EXPECT_GT(moving.following, 0u);
+    run(clock.now() + 200 * kMillisecond);
+    const ChannelState state = engine->channel(0);
+    EXPECT_EQ(state.count, 200);
+    EXPECT_EQ(rises(0), 200);
+    EXPECT_EQ(state.following, 0u);
+    EXPECT_EQ(state.end, EndReason::kDone);
+    EXPECT_EQ(engine->state().slips, 0u);
+  }
+}
+
+TEST_F(EngineWithHorizon, RefusesAPlanThatBeginsBeforeItsHorizon) {
+  makeAhead({config(0)});
+  const std::uint64_t first = follow(cruise(clock.now() + kHorizon - 1, 0, 10, 1'000.0));
+  engine->serve();
+  EXPECT_LT(engine->channel(0).accepted, first);
+  const std::uint64_t second = follow(cruise(clock.now() + kHorizon, 0, 10, 1'000.0));
+  engine->serve();
+  EXPECT_EQ(engine->channel(0).accepted, second);
+}
+
+TEST_F(EngineWithHorizon, TakesOverWithoutTakingStepsBack) {
+  makeAhead({config(0)});
+  const std::uint64_t first = follow(cruise(kStart, 0, 1'000, 10'000.0));
+  run(kStart + 20 * kMillisecond);
+  // At 10,000 steps/s it is at 800 then.
+  const Nanoseconds turn = kStart + 80 * kMillisecond;
+  follow(cruise(turn, 800, 500, 10'000.0), 0, first);
+  run(kStart + 300 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).count, 500);
+  EXPECT_EQ(rises(0), 800 + 300);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+}
+
+TEST_F(EngineWithHorizon, ServesAnEmergencyStopWhenAllStepsAreOver) {
+  makeAhead({config(0), config(1)});
+  follow(cruise(kStart, 0, 1'000, 10'000.0), 0);
+  follow(cruise(kStart, 0, -1'000, 10'000.0), 1);
+  run(kStart + 10 * kMillisecond);
+  const std::uint64_t asked = engine->emergencyStop();
+  engine->serve();
+  EXPECT_LT(engine->stopsServed(), asked) << "the board hasn't given the steps back";
+  EXPECT_GT(engine->channel(0).following, 0u);
+  const std::int64_t played = rises(0);
+  run(clock.now());
+  EXPECT_EQ(engine->stopsServed(), asked);
+  run(kStart + 300 * kMillisecond);
+  EXPECT_EQ(rises(0), played);
+  const ChannelState state = engine->channel(0);
+  EXPECT_EQ(state.count, played);
+  EXPECT_EQ(state.end, EndReason::kEmergencyStop);
+  EXPECT_EQ(engine->channel(1).count, -rises(kLinesPerChannel));
+
+  // The next motion begins where the motor stands.
+  engine->clearEmergencyStop(asked);
+  follow(cruise(clock.now() + kStart, state.count, state.count + 20, 1'000.0));
+  run(clock.now() + 300 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).count, played + 20);
+  EXPECT_EQ(rises(0), played + 20);
+}
+
+TEST_F(EngineWithHorizon, KnowsThatAStopWasAbruptAlthoughThePlanHasAlreadySlowedDown) {
+  restart_interval = 500'000;
+  makeAhead({config(0)});
+  // It comes to rest within the horizon.
+  follow(motion::planFromRest(kStart, 0, 300, {100.0, 20'000.0, 1e6, 1e6}));
+  run(kStart + 5 * kMillisecond);
+  engine->emergencyStop();
+  run(clock.now());
+  EXPECT_TRUE(engine->channel(0).end_abrupt);
+}
+
+TEST_F(EngineWithHorizon, EndsAMotionThatThePortHasStoppedAtASwitch) {
+  ChannelConfig guarded = config(0);
+  guarded.endstop_max = Signal{7, true};
+  makeAhead({guarded, config(1)});
+  plan(cruise(kStart, 0, 1'000, 10'000.0), 0).group = 1;
+  plan(cruise(kStart, 0, 1'000, 10'000.0), 1).group = 1;
+  postFollows(2);
+  run(kStart + 10 * kMillisecond);
+  lines.inputs[7] = 1;
+  const std::int64_t played = rises(0);
+  run(kStart + 300 * kMillisecond);
+  EXPECT_EQ(rises(0), played);
+  EXPECT_EQ(engine->channel(0).count, played);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kEndstopMax);
+  EXPECT_EQ(engine->channel(1).end, EndReason::kCompanion);
+  EXPECT_EQ(engine->channel(1).count, rises(kLinesPerChannel));
+}
+
+TEST_F(EngineWithHorizon, SlidesTheTimelineOnlyIfItIsLaterThanItsHorizon) {
+  makeAhead({config(0)});
+  follow(cruise(kStart, 0, 3'000, 10'000.0));
+  run(kStart);
+  // For 30 ms nobody serves it, and the board plays what it has.
+  while (clock.now() < kStart + 30 * kMillisecond) {
+    clock.waitUntil(std::min(port->playDue(), kStart + 30 * kMillisecond));
+    port->play(clock.now());
+  }
+  run(kStart + 60 * kMillisecond);
+  EXPECT_EQ(engine->state().slips, 0u);
+  const Nanoseconds late = clock.now() + kHorizon + 2 * kMillisecond;
+  while (clock.now() < late) {
+    clock.waitUntil(std::min(port->playDue(), late));
+    port->play(clock.now());
+  }
+  run(kStart + 600 * kMillisecond);
+  EXPECT_GT(engine->state().slips, 0u);
+  EXPECT_EQ(engine->channel(0).count, 3'000);
+  EXPECT_EQ(rises(0), 3'000);
+}
+
+TEST_F(EngineWithHorizon, TellsThePlacesOfAxesThatShareMotorsByWhatWasPlayed) {
+  SharedAxes shared;
+  shared.channels = {0, 1};
+  shared.matrix = {{1.0, 1.0}, {1.0, -1.0}};
+  shared.inverse = {{0.5, 0.5}, {0.5, -0.5}};
+  makeAhead({config(0), config(1)}, 0, {shared});
+  follow(cruise(kStart, 0, 1'000, 10'000.0), 0);
+  run(kStart + 10 * kMillisecond);
+  EXPECT_NEAR(static_cast<double>(engine->channel(0).count), 100.0, 2.0);
+  engine->emergencyStop();
+  run(kStart + 300 * kMillisecond);
+  EXPECT_EQ(2 * engine->channel(0).count, rises(0) + rises(kLinesPerChannel));
+  EXPECT_NEAR(engine->channel(0).rests_at, static_cast<double>(rises(0)), 1.0);
+}
+
+}  // namespace
+}  // namespace stepdriver::pulse
