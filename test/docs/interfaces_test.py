@@ -3,10 +3,12 @@
 
 usage: test/docs/interfaces_test.py
 
-Compares names, types, fields and latching, in both directions. Exit code 0: they agree; 1: otherwise.
+Compares names, types, fields and latching, in both directions, and the services with what
+stepdriver_node --help names. Exit code 0: they agree; 1: otherwise.
 """
 
 import re
+import subprocess
 import sys
 
 import roslib.message
@@ -72,6 +74,17 @@ def services(running):
             fields = set(message.__slots__) - {"success", "message"}
             if fields != fields_in(text):
                 yield f"{name} {where} {sorted(fields)}, and on the page {sorted(fields_in(text))}"
+
+
+def helped(running):
+    text = subprocess.run(
+        ["rosrun", "stepdriver", "stepdriver_node", "--help"], check=True, capture_output=True, text=True
+    ).stdout
+    named = set(re.findall(r"~[\w/]+", text))
+    for name in sorted(running):
+        short = "~" + re.sub(r"(^|/)[xr]/", r"\1AXIS/", name[len(NODE) + 1:])
+        if short not in named:
+            yield f"stepdriver_node --help doesn't name {short}"
 
 
 def actions(topics):
@@ -156,6 +169,7 @@ def main():
     there = {name: types[name] for name in published | subscribed}
     wrong = actions(there)
     wrong += services(of_node(providers))
+    wrong += helped(of_node(providers))
     wrong += topics(there, published)
     for text in wrong:
         print(f"FAILED: {PAGE}: {text}", file=sys.stderr)

@@ -80,7 +80,7 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~enable  ~home
-              ~move_line  ~follow_path  ~plan_path  ~hold  ~resume  ~dump
+              ~move_line  ~follow_path  ~append_path  ~plan_path  ~hold  ~resume  ~dump
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  /diagnostics
