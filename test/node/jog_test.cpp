@@ -129,7 +129,7 @@ TEST_F(JogTest, MovesNothingByAMessageThatItCannotUnderstand) {
     messages[0].second = "each name must have one velocity";
     messages[1].first.name = {"y"};
     messages[1].first.velocity = {0.01};
-    messages[1].second = "there is no axis y; there are x";
+    messages[1].second = "there is no axis y (axes: x)";
     messages[2].first.name = {"x", "x"};
     messages[2].first.velocity = {0.01, 0.02};
     messages[2].second = "named twice";

@@ -111,12 +111,12 @@ TEST_F(LinesTest, MovesNothingWhereItIsRefused) {
       {[](auto& r) {
          r.name = {"x", "z"};
        },
-       "there is no axis z; there are x, y"},
+       "there is no axis z (axes: x, y)"},
       {[](auto& r) {
          r.name = {"x", "x"};
        },
        "the axis x is named twice"},
-      {[](auto& r) { r.name.clear(); }, "no axis is named; there are x, y"},
+      {[](auto& r) { r.name.clear(); }, "no axis is named (axes: x, y)"},
       {[](auto& r) { r.position = {0.01}; }, "there are 2 names, but 1 positions"},
       {[nan](auto& r) { r.position[1] = nan; },
        "y: the position is nan m, but must be a finite number"},

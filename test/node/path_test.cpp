@@ -183,7 +183,7 @@ TEST_F(PathTest, MovesNothingIfItIsRefused) {
       {[](auto& r) {
          r.name = {"x", "z"};
        },
-       "there is no axis z; there are x, y"},
+       "there is no axis z (axes: x, y)"},
       {[](auto& r) { r.segments.clear(); }, "the path has 0 segments, but must have 1 to 20000"},
       {[](auto& r) { r.segments.resize(20'001); },
        "the path has 20001 segments, but must have 1 to 20000"},

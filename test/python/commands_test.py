@@ -100,8 +100,10 @@ class AnAxis(support.MachineTest):
         self.assertEqual((endstops.min, endstops.max), (False, False))
         self.machine.rig.press_endstop("x", "min")
         self.assertIs(self.x.endstops.min, True)
-        y = self.opened(support.two_axes(), virtual_time=True)["y"]
-        self.assertEqual((y.endstops.min, y.endstops.max), (None, None))
+        two = self.opened(support.two_axes(), virtual_time=True)
+        self.assertEqual((two["y"].endstops.min, two["y"].endstops.max), (None, None))
+        with self.assertRaisesRegex(Refused, "^y has no switch at the max end$"):
+            two.rig.press_endstop("y", "max")
 
     def test_homes(self):
         self.assertFalse(self.x.state.homed)
@@ -154,7 +156,7 @@ class AMachine(support.MachineTest):
                          {"x": False, "y": False})
         with self.assertRaises(NoSuchAxis) as caught:
             self.machine["z"]
-        self.assertEqual(str(caught.exception), "there is no axis z; there are x, y")
+        self.assertEqual(str(caught.exception), "there is no axis z (axes: x, y)")
         self.assertIsInstance(caught.exception, KeyError)
 
     def test_enables_and_disables_all(self):

@@ -115,6 +115,7 @@ class Moves(support.MachineTest):
         self.machine.advance(0.2)
         self.machine.rig.press_endstop("x", "max")
         self.assertIs(move.wait(check=False).end, MoveEnd.ENDSTOP_MAX)
+        self.assertRegex(self.x.state.stopped_by, "^the max endstop was met at ")
         self.machine.rig.press_endstop("x", "max", False)
         move = self.x.move_to(0.0)
         self.machine.advance(0.2)

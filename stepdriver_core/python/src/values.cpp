@@ -54,7 +54,7 @@ py::dict valueOf(const axis::AxisState& state) {
       "planned"_a = state.planned, "velocity"_a = state.velocity, "slack"_a = state.slack,
       "skew"_a = state.skew, "target"_a = state.target, "time_left"_a = state.time_left,
       "fault"_a = state.fault, "remedy"_a = state.remedy, "stops"_a = state.stops,
-      "position_note"_a = state.position_note);
+      "stopped_by"_a = state.stopped_by, "position_note"_a = state.position_note);
 }
 
 py::dict valueOf(const axis::AxisLimits& limits) {

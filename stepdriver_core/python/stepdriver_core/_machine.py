@@ -111,7 +111,7 @@ class Machine:
         try:
             return self._axes[name]
         except KeyError:
-            raise NoSuchAxis(f"there is no axis {name}; there are {', '.join(self._axes)}") from None
+            raise NoSuchAxis(f"there is no axis {name} (axes: {', '.join(self._axes)})") from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._axes
@@ -369,7 +369,7 @@ class Rig:
     def press_endstop(self, axis: str, end: str, pressed: bool = True) -> None:
         """Presses the switch at an end of an axis as if by hand, or releases it.
 
-        end: ``min`` or ``max``.
+        end: ``min`` or ``max``. Raises Refused if the axis has no switch there.
         """
         if end not in ("min", "max"):
             raise ValueError(f"the end is {end!r}, but must be 'min' or 'max'")

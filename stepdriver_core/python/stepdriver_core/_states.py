@@ -119,6 +119,8 @@ class AxisState:
     """What ends the fault, in words."""
     stops: int
     """How many times something has stopped the axis, or ended that: see ``unless_stopped_since`` of jog()."""
+    stopped_by: str
+    """At which endstop its last motion ended, and where; empty: at none, it was a homing, or the next one has begun."""
     position_note: str
     """Why the position that was kept over a restart can't be trusted; empty: it can, or there is none."""
 

@@ -121,7 +121,7 @@ class Machine::Impl {
     for (MachineAxis* axis : own_axes_) {
       if (axis->config().name == name) return *axis;
     }
-    throw Refused(fmt::format("there is no axis {}; there are {}", name, allNames()));
+    throw Refused(fmt::format("there is no axis {} (axes: {})", name, allNames()));
   }
 
   std::string allNames() const {
@@ -429,7 +429,7 @@ class Machine::Impl {
   }
 
   std::vector<MachineAxis*> axesOf(const std::vector<std::string>& names) const {
-    if (names.empty()) throw Refused("no axis is named; there are " + allNames());
+    if (names.empty()) throw Refused("no axis is named (axes: " + allNames() + ")");
     std::vector<MachineAxis*> axes;
     for (const std::string& name : names) {
       axes.push_back(&axis(name));

@@ -278,6 +278,10 @@ void Simulation::pressEndstop(const std::string& axis, End end, bool pressed) {
   const auto pressed_axis = std::find_if(
       axes_.begin(), axes_.end(), [&](const AxisConfig& known) { return known.name == axis; });
   if (pressed_axis == axes_.end()) throw Error("the rig has no axis named " + axis);
+  const bool at_max = end == End::kMax;
+  if (!pressed_axis->hasEndstop(at_max)) {
+    throw Refused(fmt::format("{} has no switch at the {} end", axis, at_max ? "max" : "min"));
+  }
   for (std::size_t i = 0; i < pressed_axis->motors(); ++i) {
     const std::string rig_axis = pressed_axis->traceName(i);
     const sim::RigFaults& always = faults_.at(rig_axis);

@@ -66,7 +66,7 @@ class Simulation {
   /// @param axis of the configuration.
   /// @param end of the axis; the wiring determines which lines change: all motors of an axis press
   ///   theirs.
-  /// @throw Error if there is no such axis.
+  /// @throw Error if there is no such axis. @throw Refused if it has no switch there.
   void pressEndstop(const std::string& axis, End end, bool pressed);
 
  private:
