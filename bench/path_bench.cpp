@@ -68,6 +68,20 @@ PathRequest zigzag(std::size_t segments) {
   return request;
 }
 
+/// A wave with radii of 10 mm and more in chords of 0.1 mm.
+PathRequest chords(std::size_t segments) {
+  PathRequest request = emptyRequest(2);
+  std::vector<double> place(2, 0.0);
+  double direction = 0.0;
+  for (std::size_t i = 0; i < segments; ++i) {
+    direction += 0.01 * std::sin(2.0 * std::acos(-1.0) * static_cast<double>(i) / 700.0);
+    place[0] += 1e-4 * std::cos(direction);
+    place[1] += 1e-4 * std::sin(direction);
+    request.segments.push_back(lineTo(place));
+  }
+  return request;
+}
+
 /// Smooth waves, each half of one a Bezier.
 PathRequest waves(std::size_t segments) {
   PathRequest request = emptyRequest(2);
@@ -106,10 +120,12 @@ void plan(benchmark::State& state, PathRequest (*make)(std::size_t), double jerk
 }
 BENCHMARK_CAPTURE(plan, circles, circles)->Name("Path/circles_of_lines");
 BENCHMARK_CAPTURE(plan, zigzag, zigzag)->Name("Path/random_lines");
+BENCHMARK_CAPTURE(plan, chords, chords)->Name("Path/chords");
 BENCHMARK_CAPTURE(plan, waves, waves)->Name("Path/beziers");
 constexpr double kJerk = 20.0 * 80'000.0;  // microsteps/s^3
 BENCHMARK_CAPTURE(plan, smooth_circles, circles, kJerk)->Name("Path/circles_of_lines_with_jerk");
 BENCHMARK_CAPTURE(plan, smooth_zigzag, zigzag, kJerk)->Name("Path/random_lines_with_jerk");
+BENCHMARK_CAPTURE(plan, smooth_chords, chords, kJerk)->Name("Path/chords_with_jerk");
 BENCHMARK_CAPTURE(plan, smooth_waves, waves, kJerk)->Name("Path/beziers_with_jerk");
 
 }  // namespace

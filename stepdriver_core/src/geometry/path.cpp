@@ -143,7 +143,7 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
     round(i, segments[i], continuity);
   }
   open_.segment = size();
-  if (continuity == Continuity::kCurvature) widen(segments, continues);
+  widen(segments, continues);
 }
 
 Contour::Segment Contour::placed(const std::vector<double>& from,

@@ -94,7 +94,7 @@ enum class Continuity {
 /// 3/8 d |c|/4 or less, which is 3/64, and |c| is at most 2 max|p''|. Then |p'| is above 0.04 for
 /// turns of up to 170 degrees.
 ///
-/// Roundings of corners between lines may then also overlap, as curves of many short lines need: a
+/// Roundings of corners between lines may overlap, as curves of many short lines need: a
 /// corner that turns by 30 degrees or less has a d beyond its segments if
 /// - the sum of all roundings is within the tolerance at each corner; between two corners it is
 ///   convex, so it is largest at one of them,

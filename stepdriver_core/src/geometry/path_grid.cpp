@@ -121,6 +121,16 @@ Division ContourGrid::divideEach(const std::vector<bool>& which, std::size_t par
   return division;
 }
 
+std::size_t ContourGrid::firstFrom(const Contour::Place& place) const {
+  const auto ends_before = [](const Interval& interval, const Contour::Place& at) {
+    return interval.segment < at.segment ||
+           (interval.segment == at.segment && interval.to <= at.parameter);
+  };
+  return static_cast<std::size_t>(
+      std::lower_bound(intervals_.begin(), intervals_.end(), place, ends_before) -
+      intervals_.begin());
+}
+
 void ContourGrid::reserve(std::size_t intervals) {
   intervals_.reserve(intervals);
   derivatives_.reserve(4 * axes_ * intervals);

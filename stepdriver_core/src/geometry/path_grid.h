@@ -54,7 +54,7 @@ class ContourGrid {
   /// @name If this is even along each interval
   /// @{
   static constexpr Fineness kForSpeed{0.12, 5};
-  static constexpr Fineness kForAcceleration{0.28, 3};  ///< that of each axis
+  static constexpr Fineness kForAcceleration{0.28, 2};  ///< that of each axis
   /// @}
 
   /// @param begin the parameter of the first segment at which it begins.
@@ -81,6 +81,8 @@ class ContourGrid {
 
   std::size_t axes() const { return axes_; }
   std::size_t size() const { return intervals_.size(); }
+  /// The first interval that doesn't end before a place; size() if there is none.
+  std::size_t firstFrom(const Contour::Place& place) const;
   /// How many intervals it may have without needing more memory.
   std::size_t capacity() const { return intervals_.capacity(); }
   const Interval& operator[](std::size_t index) const { return intervals_[index]; }

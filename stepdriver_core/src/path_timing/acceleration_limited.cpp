@@ -587,8 +587,8 @@ Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, Contour
 }
 
 // The same motion, slower by a factor, at times of whole nanoseconds.
-std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
-                                    const ContourGrid& grid, double factor, double ago) {
+std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid, double factor,
+                                    double ago) {
   const double last = knots.time(knots.size() - 1) * factor;
   if (!(last < Profile::kLongest)) {
     throw TooLong("the motion along the path would take longer than 4e9 s");
@@ -603,7 +603,7 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const Contour& contour,
     knot.segment = grid[knots.interval(i)].segment;
     knot.parameter = knots.parameter(i);
     knot.speed = knots.speed(i) / factor;
-    knot.may_begin = knots.isOnContour(i) && knot.parameter >= contour.roundedUntil(knot.segment);
+    knot.may_begin = knots.isOnContour(i);
     knot.straight = i + 1 < knots.size() && knots.isStraight(i + 1);
     knot.positions.resize(grid.axes());
     knot.velocities.resize(grid.axes());
@@ -644,7 +644,7 @@ Outcome planKnots(const Contour& contour, const std::vector<ContourLimits>& limi
     Outcome outcome{std::max(excess.acceleration, excess.speed)};
     if (outcome.excess > 1.0 + kSmallExcess && plans < most_plans) continue;
     if (!from_speed) outcome.slowdown = std::max(std::sqrt(excess.acceleration), excess.speed);
-    outcome.settled = knots.timeAt(speed.settledUntil());
+    outcome.settled = knots.timeAt(speed.settledUntil(grid.firstFrom(contour.openFrom())));
     return outcome;
   }
 }
@@ -657,9 +657,13 @@ ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>
   Knots knots(grid, limits, contour.resolution());
   const Outcome outcome = planKnots(contour, limits, begin.speed, grid, knots);
   ContourPlan plan;
-  if (begin.speed > 0.0) plan.excess = outcome.excess;
+  if (begin.speed > 0.0) {
+    plan.excess = outcome.excess;
+    // From a speed that is much too high, it may come to rest anywhere, and never end.
+    if (plan.excess > kPoorCubic) return plan;
+  }
   plan.settled_ns = std::llround(outcome.settled * outcome.slowdown * 1e9);
-  plan.knots = slowedDown(knots, contour, grid, outcome.slowdown, begin.ago);
+  plan.knots = slowedDown(knots, grid, outcome.slowdown, begin.ago);
   return plan;
 }
 

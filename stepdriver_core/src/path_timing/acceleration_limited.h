@@ -95,6 +95,7 @@ struct ContourPlan {
 /// slowed down by that factor as a whole.
 ///
 /// @param limits one for each axis.
+/// @return no knots if it begins at a speed from which it needs 1 % more than a limit.
 /// @throw motion::TooLong if it takes Profile::kLongest or longer.
 ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
                         const ContourBegin& begin = {});

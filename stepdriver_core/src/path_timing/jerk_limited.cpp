@@ -76,7 +76,7 @@ class SmoothSection {
     double jerk = 0.0;
     double fastest = 0.0;
     double slowest = kUnlimited;
-    for (std::size_t i = firstOf(corner); i < grid_.size(); ++i) {
+    for (std::size_t i = grid_.firstFrom({corner, 0.0}); i < grid_.size(); ++i) {
       const ContourGrid::Interval& interval = grid_[i];
       if (interval.segment > corner + 1) break;
       const bool before = interval.segment == corner;
@@ -142,20 +142,6 @@ class SmoothSection {
       caps_.push_back({distance, distance + grid_[i].length, capOf(i, speed)});
       distance += grid_[i].length;
     }
-  }
-
-  std::size_t firstOf(std::size_t segment) const {
-    std::size_t low = 0;
-    std::size_t high = grid_.size();
-    while (low < high) {
-      const std::size_t middle = (low + high) / 2;
-      if (grid_[middle].segment < segment) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    return low;
   }
 
   bool moves(std::size_t axis) const {

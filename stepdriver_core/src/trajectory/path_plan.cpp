@@ -193,7 +193,7 @@ void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Cont
   for (const std::size_t stop : stops) segments[stop].blend = 0.0;
 }
 
-// @param segments will have the `blend` of the plan if more follows and there is a jerk limit.
+// @param segments will have the `blend` of the plan if more follows.
 motion::ContourPlan planAlong(std::vector<motion::ContourSegment>& segments,
                               const std::vector<double>& start, const std::vector<PathAxis>& axes,
                               bool more_follows) {
@@ -204,8 +204,8 @@ motion::ContourPlan planAlong(std::vector<motion::ContourSegment>& segments,
   requireRange(contour, axes, segments);
   const std::vector<motion::ContourLimits> limits =
       contourLimits(axes, more_follows ? QueuedPath::kShareOfLimits : 1.0);
-  if (!smooth) return motion::planContour(contour, limits);
-  motion::ContourPlan plan = motion::planSmoothContour(contour, limits);
+  motion::ContourPlan plan =
+      smooth ? motion::planSmoothContour(contour, limits) : motion::planContour(contour, limits);
   if (more_follows) setBlends(segments, contour, 0, plan.stops);
   return plan;
 }

@@ -299,15 +299,10 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
   const std::vector<PathAxis>& axes = window_->axes;
   const bool smooth = isSmooth(axes);
   const auto continuity = smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection;
-  const std::size_t first = smooth ? firstRoundedInto(start.segment) : start.segment;
+  const std::size_t first = firstRoundedInto(start.segment);
   const std::size_t before = start.segment - first;  // segments before that of the start
   const std::vector<double>& from = first == 0 ? window_->start : old[first - 1].end;
-  std::vector<ContourSegment> segments;
-  if (smooth) {
-    segments = aroundStart(start, first);
-  } else {
-    segments.assign(old.begin() + static_cast<std::ptrdiff_t>(first), old.end());
-  }
+  std::vector<ContourSegment> segments = aroundStart(start, first);
   const std::size_t corner = segments.size();  // the number of the segment after it
   segments.insert(segments.end(), added.begin(), added.end());
   const double resolution = resolutionOf(axes);
@@ -329,15 +324,12 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
       segments[corner - 1].kept = 1.0 - left;
     }
     const motion::Contour contour(from, segments, resolution, continuity, more_follows);
-    if (smooth) {
-      made.plan =
-          motion::planSmoothContour(contour.part(before, segments.size() - 1), limits, start.begin);
-    } else {
-      made.plan = motion::planContour(contour, limits, start.begin);
-    }
+    const motion::Contour rest = contour.part(before, segments.size() - 1);
+    made.plan = smooth ? motion::planSmoothContour(rest, limits, start.begin)
+                       : motion::planContour(rest, limits, start.begin);
     if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcess) {
       made.segments.assign(segments.begin() + static_cast<std::ptrdiff_t>(before), segments.end());
-      if (smooth) setBlends(made.segments, contour, before, made.plan.stops);
+      setBlends(made.segments, contour, before, made.plan.stops);
       return made;
     }
     if (corner == before) break;
@@ -466,7 +458,7 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
                        [](std::int64_t time, const auto& knot) { return time < knot.time_ns; }) -
       1;
   std::size_t dropped = std::min(first_kept->segment, start.segment);
-  if (isSmooth(window_->axes)) dropped = firstRoundedInto(dropped);
+  dropped = firstRoundedInto(dropped);
   window.start = dropped == 0 ? window_->start : window_->segments[dropped - 1].end;
   window.segments.assign(window_->segments.begin() + static_cast<std::ptrdiff_t>(dropped),
                          window_->segments.begin() + static_cast<std::ptrdiff_t>(start.segment));

@@ -384,9 +384,7 @@ void expectRounded(Continuity continuity) {
         contour.evaluateGiven(segment, u, given);
         const double after = path.segments[segment].tolerance;
         // Roundings that overlap reach beyond half of a line.
-        const double most = continuity == Continuity::kCurvature ? std::max(before, after)
-                            : u < 0.5                            ? before
-                                                                 : after;
+        const double most = std::max(before, after);
         ASSERT_LE(distance(point.position, given.position), most * (1.0 + 1e-9) + 1e-9)
             << "path " << i << " segment " << segment << " at " << u;
         ASSERT_GT(distance(point.first, std::vector<double>(contour.axes())), 0.0);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <random>
 #include <string>
@@ -248,17 +249,12 @@ TEST(ContourMotion, IsNearlyTimeOptimalWithFewKnots) {
   EXPECT_LE(durationOf(knots), 1.004 * FineGrid(contour, limits).shortestTime());
 }
 
-// A curve that is given as many chords. The speed rises and falls at each of their corners, for
-// which a corner has about 18 knots: if the axes pass a chord in less than half a millisecond, as
-// the last ones here, knots 20 us apart are too few for that.
+// A curve that is given as many chords is nearly as fast as the curve: their roundings overlap. The
+// axes pass the shortest ones here in 0.15 ms, and knots are at least 20 us apart.
 TEST(ContourMotion, IsNearlyTimeOptimalOnDenseChords) {
-  struct Case {
-    double length;  // [microsteps] the length of a chord
-    double most;    // at most this part of the time that the fine grid takes
-  };
   constexpr int kChords = 200;
-  for (const Case& each : {Case{30.0, 1.02}, Case{10.0, 1.03}, Case{3.0, 1.03}, Case{0.3, 1.09}}) {
-    const double radius = each.length * kChords / (2.0 * kPi);
+  for (const double length : {30.0, 10.0, 3.0, 0.3}) {
+    const double radius = length * kChords / (2.0 * kPi);
     std::vector<ContourSegment> segments;
     for (int i = 1; i <= kChords; ++i) {
       const double angle = 2.0 * kPi * i / kChords;
@@ -268,9 +264,33 @@ TEST(ContourMotion, IsNearlyTimeOptimalOnDenseChords) {
     const Contour contour({0.0, 0.0}, segments, 1.0);
     const std::vector<ContourLimits> limits(2, {100'000.0, 400'000.0, 400'000.0});
     EXPECT_LE(durationOf(motion::planContour(contour, limits).knots),
-              each.most * FineGrid(contour, limits).shortestTime())
-        << "chords of " << each.length << " microsteps";
+              1.001 * FineGrid(contour, limits).shortestTime())
+        << "chords of " << length << " microsteps";
   }
+}
+
+// 10,000 chords of 0.1 mm at up to 0.1 m/s, 1 m/s^2, with a tolerance of 0.05 mm.
+double secondsOfChords(const std::function<double(int)>& turnAt) {
+  constexpr double kLength = 8.0;  // microsteps
+  std::vector<ContourSegment> segments;
+  std::vector<double> place(2, 0.0);
+  double direction = 0.0;
+  for (int i = 0; i < 10'000; ++i) {
+    direction += turnAt(i);
+    place[0] += kLength * std::cos(direction);
+    place[1] += kLength * std::sin(direction);
+    segments.push_back(lineTo(place, 4.0));
+  }
+  const Contour contour({0.0, 0.0}, segments, 1.0);
+  return durationOf(motion::planContour(contour, {2, {8000.0, 80'000.0, 80'000.0}}).knots);
+}
+
+TEST(ContourMotion, UsesTheToleranceOnDenseChords) {
+  // A curve with a radius of 10 mm or more: at least 10 s less what the tolerance cuts off.
+  EXPECT_LE(secondsOfChords([](int i) { return 0.01 * std::sin(2.0 * kPi * i / 700.0); }), 9.6);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> turn(-0.1, 0.1);
+  EXPECT_LE(secondsOfChords([&](int) { return turn(random); }), 16.5);
 }
 
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
