@@ -173,8 +173,17 @@ std::vector<std::string> namesOf(const std::vector<config::AxisConfig>& configs)
   return names;
 }
 
-/// For each axis, the longest deceleration and 10 %, the time of a move of one microstep, as it
-/// stops on a whole one, and that of its shaper.
+/// [s] A drawn machine may stop in less time than its next whole step takes, in the coarsest mode
+/// and from the lowest speed: it speeds up to that step at most to its top speed.
+double timeOfFullStep(const config::AxisConfig& config) {
+  const double step = config.microsteps / config.steps_per_unit;
+  double time = step / config.max_speed +
+                std::sqrt(2.0 * step * (1.0 / config.acceleration + 1.0 / config.deceleration));
+  if (config.jerk > 0.0) time += 4.0 * std::cbrt(0.5 * step / config.jerk);
+  return time;
+}
+
+/// For each axis, the longest deceleration and 10 %, and the time of its shaper.
 std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
                                                 const Schedule& schedule) {
   const bool late = isEngineLate(schedule);
@@ -184,11 +193,8 @@ std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisCo
     const double deceleration = config.stop_deceleration.value_or(config.deceleration);
     double time = config.max_speed / deceleration;
     if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
-    const double scale = config.steps_per_unit;
-    double microstep =
-        std::sqrt(2.0 / scale * (1.0 / config.acceleration + 1.0 / config.deceleration));
-    if (config.jerk > 0.0) microstep += 4.0 * std::cbrt(0.5 / scale / config.jerk);
-    time = 1.1 * time + microstep + motor::shapingTimeOf(config);
+    time = 1.1 * time + motor::shapingTimeOf(config);
+    if (!schedule.machine.empty()) time += timeOfFullStep(config);
     slowing[axis] = std::llround(time * 1e9) + (late ? kLongestLead : kLead);
   }
   return slowing;
