@@ -7,7 +7,6 @@
 #include <cstring>
 #include <utility>
 
-#include "event_text.h"
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
@@ -116,6 +115,33 @@ void addEdges(const pulse::PinRing::Copy& ring, pulse::Nanoseconds begin, Record
   }
 }
 
+/// How a profile of the engine ended: "reached its end".
+const char* textOf(pulse::EndReason reason) {
+  switch (reason) {
+    case pulse::EndReason::kDone:
+      return "reached its end";
+    case pulse::EndReason::kEndstopMin:
+      return "met the min endstop";
+    case pulse::EndReason::kEndstopMax:
+      return "met the max endstop";
+    case pulse::EndReason::kEmergencyStop:
+      return "was ended by an emergency stop";
+    case pulse::EndReason::kChipFault:
+      return "was ended by a fault of the driver chip";
+    case pulse::EndReason::kTooLate:
+      return "was ended because a pulse was too late";
+    case pulse::EndReason::kLineError:
+      return "was ended by a line that failed";
+    case pulse::EndReason::kNotInPosition:
+      return "was not in position in time after its end";
+    case pulse::EndReason::kSkewed:
+      return "was ended because its motors got too far apart";
+    case pulse::EndReason::kCompanion:
+      return "was ended together with another axis";
+  }
+  return "ended";
+}
+
 }  // namespace
 
 FlightRecorder::FlightRecorder(const std::vector<config::AxisConfig>& axes, const Wiring& wiring,
@@ -153,7 +179,8 @@ void FlightRecorder::addInput(const Input& input) {
     slipped_ = input.slipped;
   }
   if (const auto* asked = std::get_if<Requested>(&input.what)) {
-    note(input.now, fmt::format("call {}: {}", asked->call, textOf(asked->request, axes_)));
+    note(input.now,
+         fmt::format("call {}: {}", asked->call, textOf(asked->request, AxisWords(axes_))));
   } else if (const auto* news = std::get_if<EngineNews>(&input.what)) {
     noteNews(input, *news);
   } else if (const auto* read = std::get_if<InputRead>(&input.what)) {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "activity/context.h"
+#include "input.h"
 #include "port/pin_ring.h"
 #include "port/record_ring.h"
-#include "requests.h"
 #include "snapshot.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/recording.h"

@@ -7,17 +7,6 @@ namespace {
 
 constexpr std::size_t kMostRequests = 256;
 
-/// Requests that may be refused because of the level of a switch.
-bool asksForLevels(const Request& request) {
-  return std::holds_alternative<MoveTo>(request) || std::holds_alternative<MoveRounds>(request) ||
-         std::holds_alternative<PlanMove>(request) || std::holds_alternative<Jog>(request) ||
-         std::holds_alternative<JogTogether>(request) ||
-         std::holds_alternative<FollowSetpoints>(request) ||
-         std::holds_alternative<MoveLine>(request) || std::holds_alternative<Resume>(request) ||
-         std::holds_alternative<Home>(request) || std::holds_alternative<SetMicrosteps>(request) ||
-         std::holds_alternative<Recover>(request);
-}
-
 }  // namespace
 
 ShellCore::ShellCore(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
@@ -42,7 +31,7 @@ ShellCore::ShellCore(Controller& controller, pulse::PulseEngine& engine, pulse::
 
 std::string ShellCore::post(activity::CallId call, Request request) {
   std::optional<InputReading> reading;
-  if (asksForLevels(request)) reading = readInputs();
+  if (readsInputs(request)) reading = readInputs();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (closed_) return "the machine was shut down";
   if (requests_.size() >= kMostRequests) return "too many requests are already waiting";

@@ -11,8 +11,8 @@
 
 #include "controller.h"
 #include "flight_recorder.h"
+#include "input.h"
 #include "pulse/pulse_engine.h"
-#include "requests.h"
 #include "snapshot.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"

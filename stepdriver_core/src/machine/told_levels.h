@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "requests.h"
+#include "input.h"
 
 namespace stepdriver::machine {
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "machine/requests.h"
+#include "machine/requests/request.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::search {

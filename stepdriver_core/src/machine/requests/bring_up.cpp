@@ -1,0 +1,18 @@
+#include "bring_up.h"
+
+#include <memory>
+
+#include "activity/driver_activities.h"
+
+namespace stepdriver::machine {
+
+std::string BringUp::text(const AxisWords& /*axes*/) const { return "bring up"; }
+
+void BringUp::serve(RequestContext& machine, const SharedCall& call) const {
+  for (const auto& axis : machine.context.axes) {
+    machine.activities.begin(std::make_unique<activity::BringUp>(machine.context, *axis, call),
+                             kTakenOver);
+  }
+}
+
+}  // namespace stepdriver::machine

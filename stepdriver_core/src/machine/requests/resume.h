@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "request_context.h"
+
+namespace stepdriver::machine {
+
+/// Machine::resume()
+struct Resume {
+  static constexpr bool kReadsInputs = true;
+  std::string text(const AxisWords& axes) const;
+  void serve(RequestContext& machine, const SharedCall& call) const;
+};
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "request_context.h"
+
+namespace stepdriver::machine {
+
+/// Axis::setPosition()
+struct SetPosition {
+  AxisId axis = 0;
+  double position = 0.0;
+
+  static constexpr bool kReadsInputs = false;
+  std::string text(const AxisWords& axes) const;
+  void serve(RequestContext& machine, const SharedCall& call) const;
+};
+
+}  // namespace stepdriver::machine

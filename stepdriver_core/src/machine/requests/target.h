@@ -1,0 +1,13 @@
+#pragma once
+
+#include "activity/goal.h"
+#include "request_context.h"
+
+namespace stepdriver::machine {
+
+/// The target of a goal, and the remainder. A relative one counts from where the joint comes to
+/// rest. @throw Refused
+void setTarget(activity::Goal& goal, const RequestContext& machine, const axis::AxisModel& axis,
+               double position, bool relative);
+
+}  // namespace stepdriver::machine
