@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <random>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -65,6 +67,7 @@ struct Gpio {
   static constexpr Nanoseconds kEarly = 0;
   Gpio(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels)
       : watched(lines), port(watched, clock, channels) {}
+  static std::string name() { return "Gpio"; }
   static Nanoseconds due() { return kNever; }
   static void play(Nanoseconds /*now*/) {}
 
@@ -78,6 +81,10 @@ struct Ahead {
   Ahead(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels)
       : port(lines, clock, channels,
              {50 * kMillisecond, [](const StepPort::Step& /*step*/) { return kLate; }}) {}
+  static std::string name() {
+    if (kLate == 0) return "Ahead";
+    return kLate > 0 ? "AheadAndLate" : "AheadAndEarly";
+  }
   Nanoseconds due() { return port.playDue(); }
   void play(Nanoseconds now) { port.play(now); }
 
@@ -171,7 +178,13 @@ class StepPortConformance : public testing::Test {
 };
 
 using Boards = testing::Types<Gpio, Ahead<0>, Ahead<300'000>, Ahead<-300'000>>;
-TYPED_TEST_SUITE(StepPortConformance, Boards);
+struct BoardNames {
+  template <typename Board>
+  static std::string GetName(int /*index*/) {
+    return Board::name();
+  }
+};
+TYPED_TEST_SUITE(StepPortConformance, Boards, BoardNames);
 
 TYPED_TEST(StepPortConformance, PlaysEachStepOnceInOrderAndNotBeforeItsTime) {
   this->make({TestFixture::config(0)});
