@@ -34,8 +34,13 @@ LevelOff::LevelOff(std::int64_t start_ns, const MotionState& from, const MotionL
   const double jerk = std::min(jerkToLevelOff(from, limits), most);
   if (jerk <= limits.jerk * (1.0 + kJerkRounding)) return;
   const double size = std::abs(from.acceleration);
-  const std::int64_t duration_ns =
-      std::max<std::int64_t>(1, static_cast<std::int64_t>(size / jerk * 1e9));
+  const auto duration_ns = static_cast<std::int64_t>(size / jerk * 1e9);
+  // A longer time would take the speed past its maximum: without a jerk limit, the acceleration may
+  // be as high as any.
+  if (duration_ns == 0) {
+    end_.acceleration = 0.0;
+    return;
+  }
   end_ns_ += duration_ns;
   Piece piece;
   piece.duration = DoubleDouble(static_cast<double>(duration_ns)) / 1e9;

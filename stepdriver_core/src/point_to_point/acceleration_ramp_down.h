@@ -11,7 +11,8 @@ namespace stepdriver::motion {
 
 /// The beginning of a motion within limits of which the jerk is lower than that of the motion
 /// before: from its acceleration, the lower jerk may take the speed past standstill, or beyond its
-/// maximum. Then the acceleration is first taken back to 0, with the jerk that this needs.
+/// maximum. Then the acceleration is first taken back to 0, with the jerk that this needs; at once
+/// if that would take less than a nanosecond.
 class LevelOff {
  public:
   /// @param most_jerk [microsteps/s^3] of the motion before; 0: it had no limit.

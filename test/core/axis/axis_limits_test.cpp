@@ -136,6 +136,23 @@ TEST_F(AxisLimitsTest, GoesFasterAgainWhereTheLimitIsRaised) {
   EXPECT_NEAR(velocity(), 1.0, 1e-9);
 }
 
+// The acceleration of 1e12 microsteps/s^2 must end at once: in a nanosecond it takes the speed to
+// twice its maximum.
+TEST(AxisLimits, AreKeptIfALowJerkReplacesAStopAtTheHighestAcceleration) {
+  for (const double after : {0.016, 0.017, 0.018}) {
+    config::AxisConfig config = linearAxis("x", 100'000.0, 0.003, 1e7);
+    config.deceleration = 50.0;
+    Bench bench({config});
+    axis::Axis& x = bench.axis();
+    x.setLimits({0.0, 0.0, 0.0, 5.0});
+    x.moveTo(0.012);
+    bench.machine->advance(after);
+    x.stop();
+    EXPECT_EQ(x.wait(x.moveTo(0.0005, true)).end, MoveEnd::kReached);
+    EXPECT_EQ(violationsOf(bench.report()), "");
+  }
+}
+
 // With the lower deceleration it would overshoot its target, and here the soft limit too.
 TEST_F(AxisLimitsTest, ComesToRestInTimeWhateverIsSetMeanwhile) {
   const axis::Move move = x().moveTo(50.0);
