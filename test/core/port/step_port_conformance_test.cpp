@@ -180,6 +180,7 @@ class StepPortConformance : public testing::Test {
 using Boards = testing::Types<Gpio, Ahead<0>, Ahead<300'000>, Ahead<-300'000>>;
 struct BoardNames {
   template <typename Board>
+  // NOLINTNEXTLINE(readability-identifier-naming): googletest's name
   static std::string GetName(int /*index*/) {
     return Board::name();
   }
