@@ -21,9 +21,12 @@ namespace {
 
 constexpr double kCoarsest = 20e3;  // microsteps/m
 constexpr double kFinest = 400e3;
-constexpr double kSlowest = 1e-3;       // m/s: 8 mm take 8 s
-constexpr double kLongestRamp = 5.0;    // s
-constexpr double kMostSteps = 10e3;     // of a motor, at full speed in the time of a ramp
+constexpr double kSlowest = 1e-3;     // m/s: 8 mm take 8 s
+constexpr double kLongestRamp = 5.0;  // s
+constexpr double kMostSteps = 10e3;   // of a motor, at full speed in the time of a ramp
+/// Of an axis if each motor makes one [microsteps]: a millimetre in the coarsest scale, as the rig
+/// has 25 mm.
+constexpr double kMostWay = 20.0;
 constexpr double kLowestPart = 0.0101;  // of a motor in the way of an axis: the reader has 0.01
 
 /// In decades, or one of the bounds.
@@ -117,7 +120,11 @@ std::vector<config::AxisConfig> drawOnce(int variant, const Draw& draw) {
   if (axes[0].kinematics) {
     std::vector<config::AxisConfig> sharing(axes.begin(), axes.begin() + 2);
     const config::Matrix matrix = drawMatrix(draw);
-    if (!config::inverseOf(matrix)) return {};
+    const auto inverse = config::inverseOf(matrix);
+    if (!inverse) return {};
+    for (const auto& row : *inverse) {
+      if (std::abs(row[0]) + std::abs(row[1]) > kMostWay) return {};
+    }
     test::share(sharing, matrix);
     for (std::size_t i = 0; i < sharing.size(); ++i) axes[i].kinematics = sharing[i].kinematics;
   }
@@ -167,7 +174,7 @@ std::string describe(const config::AxisConfig& axis) {
 }
 
 std::vector<config::AxisConfig> drawMachine(int variant, const Draw& draw) {
-  constexpr int kMostTries = 20;
+  constexpr int kMostTries = 200;
   for (int i = 0; i < kMostTries; ++i) {
     std::vector<config::AxisConfig> axes = drawOnce(variant, draw);
     if (!axes.empty()) return axes;
