@@ -94,6 +94,15 @@ class Dump {
         rig.faults.chip_fault_after, rig.faults.chip_fault_lasts_ns);
     for (const auto& [name, motor] : rig.motors) all(name, motor);
   }
+  void add(const config::OutputConfig& output) {
+    all(output.name, output.line, output.active_level, output.initial, output.at_stop,
+        output.at_fault, output.max_on_ns, output.min_on_ns, output.min_off_ns);
+  }
+  void add(const config::InputConfig& input) { all(input.name, input.line, input.debounce_ns); }
+  void add(const setup::SimulatedOutput& output) { add(output.fail_write_after); }
+  void add(const setup::SimulatedInput& input) {
+    all(input.pressed, input.bounces, input.bounce_ms);
+  }
   void add(const joystick::JogAxis& axis) {
     all(axis.name, axis.joystick_axis, static_cast<int>(axis.kind), axis.max_speed,
         axis.stick.max_speed, axis.stick.dead_band, axis.stick.exponent, axis.stick.inverted,
@@ -135,6 +144,10 @@ std::string dump(const ros_node::NodeConfig& config) {
   dump.all(config.simulation.speed, config.simulation.trace,
            config.simulation.trace_overwrites_any_file, config.simulation.emergency_stop);
   for (const auto& rig : config.simulation.axes) dump.add(rig.second);
+  for (const auto& output : config.outputs) dump.add(output);
+  for (const auto& input : config.inputs) dump.add(input);
+  for (const auto& output : config.simulation.outputs) dump.add(output.second);
+  for (const auto& input : config.simulation.inputs) dump.add(input.second);
   return dump.text();
 }
 

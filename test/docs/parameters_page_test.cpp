@@ -93,7 +93,9 @@ realtime: {}
 emergency_stop: {pin: Z, active_level: high}
 heartbeat: {pin: Y}
 motor_power: {pin: W, on_ms: 5.0, feedback: {pin: V, active_level: low}}
-simulation: {axes: {x: {}}}
+outputs: {x: {pin: U}}
+inputs: {x: {pin: T, active_level: low}}
+simulation: {axes: {x: {}}, outputs: {x: {}}, inputs: {x: {}}}
 axes:
   x:)" + kAxisMap;
   if (rotary) text = replaced(replaced(text, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
@@ -217,6 +219,9 @@ std::vector<Parameter> parametersOf(const Node& node) {
   if (std::string(node.name) == "gantry") return parametersUnder("Several motors", "axes/x/");
   if (std::string(node.name) == "corexy") return parametersUnder("Axes that share motors", "");
   std::vector<Parameter> all = parametersUnder("The node", "");
+  for (const Parameter& parameter : parametersUnder("Outputs and inputs with a name", "")) {
+    all.push_back(parameter);
+  }
   for (const auto& [heading, prefix] :
        {std::pair("An axis", "axes/x/"), std::pair("The simulated rig", "simulation/")}) {
     for (const Parameter& parameter : parametersUnder(heading, prefix)) {
@@ -262,7 +267,10 @@ std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>
       map += (map.empty() ? "" : "/") + key;
     }
   }
-  for (const char* names_of_axes : {"axes", "simulation/axes", "wheels"}) maps.erase(names_of_axes);
+  for (const char* names : {"axes", "simulation/axes", "wheels", "outputs", "inputs",
+                            "simulation/outputs", "simulation/inputs"}) {
+    maps.erase(names);
+  }
   return maps;
 }
 

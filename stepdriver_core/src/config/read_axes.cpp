@@ -25,14 +25,6 @@ namespace {
 
 bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
-bool isAxisName(const std::string& name) {
-  if (name.empty() || !isLetter(name.front())) return false;
-  for (const char c : name) {
-    if (!isLetter(c) && !(c >= '0' && c <= '9') && c != '_') return false;
-  }
-  return true;
-}
-
 /// All motors have the same mode: one that each driver has.
 std::optional<int> readMicrosteps(ConfigReader& axis, const std::vector<MotorChip>& chips) {
   std::optional<std::vector<int>> modes;
@@ -146,8 +138,16 @@ class AxesReader {
 
 }  // namespace
 
+bool isName(const std::string& name) {
+  if (name.empty() || !isLetter(name.front())) return false;
+  for (const char c : name) {
+    if (!isLetter(c) && !(c >= '0' && c <= '9') && c != '_') return false;
+  }
+  return true;
+}
+
 void checkAxisName(const std::string& name, ConfigReader& axis) {
-  if (isAxisName(name)) return;
+  if (isName(name)) return;
   axis.issue("", fmt::format("has the name \"{}\", but an axis's name must begin with a letter and "
                              "continue with letters, digits and _ only",
                              printable(name)));

@@ -19,6 +19,9 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
                                  std::vector<ConfigIssue>& issues, UsedLines& used,
                                  const OwnChips& own = {});
 
+/// Whether something of a machine can have this name, which becomes part of ROS names.
+bool isName(const std::string& name);
+
 /// @return the required name of a line; empty if there is an issue.
 std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedLines& used);
 

@@ -21,6 +21,7 @@ constexpr const char* kChipRemedy =
 constexpr const char* kPositionRemedy =
     "check what blocks the motor, and its encoder, then call recover, and home it or set its "
     "position";
+constexpr const char* kOutputRemedy = "then call recover, and switch it again";
 constexpr const char* kPowerRemedy =
     "check the relay, its supply and fuse, and the wiring of the feedback, then call recover";
 constexpr const char* kLateRemedy =
@@ -33,10 +34,12 @@ constexpr const char* kLateRemedy =
 Controller::Controller(const std::vector<config::AxisConfig>& axes,
                        const std::vector<motor::MotorLines>& lines, axis::LineNames names,
                        const std::optional<pulse::Signal>& emergency_stop,
-                       EmergencyDisable emergency_disable, activity::MotorPower motor_power)
+                       EmergencyDisable emergency_disable, activity::MotorPower motor_power,
+                       NamedLines named)
     : context_(names.inputs.size()),
       activities_(context_),
-      requests_(context_, activities_, emergency_stop),
+      requests_(context_, activities_, emergency_stop, std::move(named)),
+      io_(std::make_shared<const IoStates>(requests_.named.states())),
       emergency_disable_(emergency_disable) {
   context_.out = &last_;
   context_.lines = std::move(names);
@@ -69,8 +72,11 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   std::visit([this](const auto& what) { on(what); }, input.what);
   activities_.poll();
   supervise();
-  while (supervisePower()) {
+  while (supervisePower() || superviseOutputs()) {
   }
+  requests_.named.inputs.poll(context_);
+  showIo();
+  if (!requests_.named.outputs.areBeingWritten()) stops_concluded_ = context_.stops_handled;
   context_.pin_done.reset();
   for (const auto& axis : context_.axes) axis->rememberRest();
   if (!requests_.awaiting_rest.empty()) {
@@ -83,7 +89,8 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
 }
 
 pulse::Nanoseconds Controller::due() const {
-  pulse::Nanoseconds due = std::min(activities_.due(), context_.motor_power.due());
+  pulse::Nanoseconds due = std::min({activities_.due(), context_.motor_power.due(),
+                                     requests_.named.outputs.due(), requests_.named.inputs.due()});
   for (const auto& axis : context_.axes) due = std::min(due, idleDue(*axis));
   return due;
 }
@@ -246,6 +253,26 @@ bool Controller::motorsMayLosePower() const {
   });
 }
 
+// @return whether one has failed, which others must look at too.
+bool Controller::superviseOutputs() {
+  NamedOutputs& outputs = requests_.named.outputs;
+  if (outputs.empty()) return false;
+  const std::string failure = outputs.poll(context_, requests_.whySafe());
+  if (failure.empty()) return false;
+  for (const auto& axis : context_.axes) {
+    axis->fault.latchOfMachine(failure, kOutputRemedy);
+    axis->noteStop();
+  }
+  activities_.poll();
+  supervise();
+  return true;
+}
+
+void Controller::showIo() {
+  IoStates now = requests_.named.states();
+  if (now != *io_) io_ = std::make_shared<const IoStates>(std::move(now));
+}
+
 pulse::Nanoseconds Controller::idleDue(const axis::AxisModel& axis) const {
   const motor::Power& power = axis.motor.power();
   const bool stays = axis.config.idle_timeout <= 0.0 || power.isIdle() || !power.wantsEnabled() ||
@@ -332,6 +359,8 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
 std::shared_ptr<const MachineSnapshot> Controller::snapshot() const {
   auto snapshot = std::make_shared<MachineSnapshot>();
   snapshot->stops_handled = context_.stops_handled;
+  snapshot->stops_concluded = stops_concluded_;
+  snapshot->io = io_;
   for (const auto& axis : context_.axes) snapshot->axes.push_back(snapshotOf(*axis));
   return snapshot;
 }

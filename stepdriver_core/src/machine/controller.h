@@ -21,7 +21,7 @@ class Controller {
   Controller(const std::vector<config::AxisConfig>& axes,
              const std::vector<motor::MotorLines>& lines, axis::LineNames names,
              const std::optional<pulse::Signal>& emergency_stop, EmergencyDisable emergency_disable,
-             activity::MotorPower motor_power = {});
+             activity::MotorPower motor_power = {}, NamedLines named = {});
   ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
@@ -33,7 +33,8 @@ class Controller {
   pulse::Nanoseconds due() const;
   /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
   bool watchesInputs() const {
-    return activities_.watchInputs() || context_.motor_power.watchesInputs();
+    return activities_.watchInputs() || context_.motor_power.watchesInputs() ||
+           requests_.named.inputs.areWatched();
   }
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
@@ -57,6 +58,8 @@ class Controller {
   void supervise();
   bool supervisePower();
   bool motorsMayLosePower() const;
+  bool superviseOutputs();
+  void showIo();
   void superviseIdle(axis::AxisModel& axis);
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
   AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;
@@ -65,6 +68,8 @@ class Controller {
   activity::Context context_;
   activity::Activities activities_;
   RequestContext requests_;
+  std::shared_ptr<const IoStates> io_;  // what readers see of the lines with a name
+  std::uint64_t stops_concluded_ = 0;   // as MachineSnapshot's
   const EmergencyDisable emergency_disable_;
   bool disables_all_ = false;  // an emergency stop has come, and all motors must be disabled
   std::uint64_t input_stops_seen_ = 0;

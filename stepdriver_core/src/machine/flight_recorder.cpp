@@ -77,7 +77,8 @@ void addPins(const config::AxisConfig& axis, std::size_t motor, const motor::Mot
 }
 
 std::vector<Recording::Pin> pinsOf(const std::vector<config::AxisConfig>& axes,
-                                   const Wiring& wiring) {
+                                   const Wiring& wiring,
+                                   const std::vector<config::OutputConfig>& outputs) {
   std::vector<Recording::Pin> pins;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     const config::AxisConfig& axis = axes[i];
@@ -93,6 +94,9 @@ std::vector<Recording::Pin> pinsOf(const std::vector<config::AxisConfig>& axes,
     pins.push_back({"machine", "motor_power", wiring.motor_power->output, true});
   }
   if (wiring.heartbeat) pins.push_back({"machine", "heartbeat", wiring.heartbeat->output, true});
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    pins.push_back({"outputs", outputs[i].name, wiring.named_outputs[i], outputs[i].active_level});
+  }
   return pins;
 }
 
@@ -151,7 +155,7 @@ FlightRecorder::FlightRecorder(const std::vector<config::AxisConfig>& axes, cons
       names_(std::move(names)),
       started_(now),
       length_(nanoseconds(options.seconds)),
-      pins_(pinsOf(axes, wiring)),
+      pins_(pinsOf(axes, wiring, options.outputs)),
       pulse_ring_(levelsOf(wiring), edgesToKeep(axes, wiring, options)),
       other_ring_(levelsOf(wiring), kOtherEdges),
       events_(kEvents) {

@@ -15,6 +15,7 @@
 #include "port/record_ring.h"
 #include "snapshot.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/machine/recording.h"
 #include "wiring.h"
 
@@ -30,6 +31,7 @@ class FlightRecorder {
   struct Options {
     double seconds = 10.0;           ///< above 0
     std::size_t bytes = 16'000'000;  ///< the most memory for edges
+    std::vector<config::OutputConfig> outputs{};
   };
 
   /// @param names of the lines, for events. @param now nothing is recorded before.

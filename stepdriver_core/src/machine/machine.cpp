@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -70,9 +71,9 @@ class Machine::Impl {
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness),
                                                    wiring.emergency_stop, wiring.shared);
-    controller_ =
-        std::make_unique<Controller>(configs, wiring.motor_lines, names_, wiring.emergency_stop,
-                                     options.emergency_disable, wiring.motorPower(options));
+    controller_ = std::make_unique<Controller>(
+        configs, wiring.motor_lines, names_, wiring.emergency_stop, options.emergency_disable,
+        wiring.motorPower(options), wiring.namedLines(options));
     if (options.emergency_disable == EmergencyDisable::kRamp) {
       engine_->rampStops(longestRamp(configs));
     }
@@ -80,7 +81,7 @@ class Machine::Impl {
     if (options.record_seconds > 0.0) {
       recorder_ = std::make_unique<FlightRecorder>(
           configs, wiring, names_, clock.now(),
-          FlightRecorder::Options{options.record_seconds, options.record_bytes});
+          FlightRecorder::Options{options.record_seconds, options.record_bytes, options.outputs});
       engine_->recordTo(recorder_->pulseRing());
     }
     Shell::Options shell_options;
@@ -89,6 +90,10 @@ class Machine::Impl {
     shell_options.realtime = options.realtime;
     shell_options.on_motion = [this] {
       if (keeper_) keeper_->noteMotion();
+    };
+    shell_options.on_io = [this](const IoStates& states) {
+      const std::lock_guard<std::mutex> lock(io_mutex_);
+      if (on_io_) on_io_(states);
     };
     shell_options.recorder = recorder_.get();
     shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring.inputs.size(),
@@ -527,6 +532,8 @@ class Machine::Impl {
   pulse::Clock& clock_;
   // Destroyed in this order: axes, shell, controller, engine, recorder, lines.
   Disposer disposer_;
+  std::mutex io_mutex_;  // of the next
+  std::function<void(const IoStates&)> on_io_;
   std::shared_ptr<gpio::Lines> lines_;
   axis::LineNames names_;
   std::optional<pulse::Capability> capability_;
@@ -658,7 +665,8 @@ void Machine::stop(const CoordinatedMove& move) {
 void Machine::emergencyStop() {
   const std::uint64_t asked = impl_->engine_->emergencyStop();
   impl_->shell_->wakeUp();
-  impl_->shell_->wait([this, asked] { return impl_->shell_->snapshot()->stops_handled >= asked; });
+  impl_->shell_->wait(
+      [this, asked] { return impl_->shell_->snapshot()->stops_concluded >= asked; });
 }
 
 bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped(); }
@@ -679,6 +687,17 @@ void Machine::enable(bool on) {
     throw Refused("no axis has pins/enable: the motors are energized as long as their drivers are");
   }
   ask(*impl_->shell_, std::move(wanted));
+}
+
+void Machine::setOutput(const std::string& name, bool on) {
+  ask(*impl_->shell_, SetOutput{name, on});
+}
+
+IoStates Machine::ioStates() const { return *impl_->shell_->snapshot()->io; }
+
+void Machine::onIoChange(std::function<void(const IoStates&)> told) {
+  const std::lock_guard<std::mutex> lock(impl_->io_mutex_);
+  impl_->on_io_ = std::move(told);
 }
 
 void Machine::shutdown() { impl_->shutdown(); }

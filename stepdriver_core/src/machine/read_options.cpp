@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "config/check_axes.h"
 #include "config/read_axes.h"
+#include "config/read_io.h"
 #include "config/write_axes.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/printable.h"
 
 namespace stepdriver::machine {
 namespace {
@@ -74,7 +77,21 @@ ConfigValue writeOptions(const MachineOptions& options) {
         ConfigValue::Map{{"pin", options.heartbeat->line}, {"rate_hz", options.heartbeat->rate}};
   }
   if (options.motor_power) map["motor_power"] = writeMotorPower(*options.motor_power);
+  map["outputs"] = config::writeOutputs(options.outputs);
+  map["inputs"] = config::writeInputs(options.inputs);
   return map;
+}
+
+/// @param what "outputs"
+template <typename Config>
+void checkNames(const std::vector<Config>& all, const char* what,
+                std::vector<ConfigIssue>& issues) {
+  std::set<std::string> names;
+  for (const Config& one : all) {
+    if (names.insert(one.name).second) continue;
+    issues.push_back({fmt::format("{}/{}", what, printable(one.name)),
+                      "is given twice, and each needs a name of its own", true});
+  }
 }
 
 void checkOptions(const std::vector<config::AxisConfig>* axes, const MachineOptions& options,
@@ -96,6 +113,10 @@ void checkOptions(const std::vector<config::AxisConfig>* axes, const MachineOpti
   readEmergencyStop(reader, axes, read.motor_power.has_value(), read.emergency_disable,
                     read.emergency_stop, used);
   read.heartbeat = readHeartbeat(reader, used);
+  checkNames(options.outputs, "outputs", issues);
+  checkNames(options.inputs, "inputs", issues);
+  config::readOutputs(reader, used);
+  config::readInputs(reader, used);
 }
 
 }  // namespace

@@ -58,6 +58,7 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
       has_inputs_(inputs > 0),
       threaded_(options.threaded),
       on_motion_(options.on_motion),
+      on_io_(options.on_io),
       most_looks_in_vain_(std::max(clock.realtime() ? kFewestLooks : kFewestLooksOnRig,
                                    options.write_timeout_ns / kLookPeriodNs)),
       writers_(
@@ -406,6 +407,7 @@ void Shell::turnEnded(const MachineSnapshot& before,
   }
   answered_.notify_all();
   if (on_motion_ && motionBegins(before, *now)) on_motion_();
+  if (on_io_ && now->io != before.io) on_io_(*now->io);
 }
 
 void Shell::write(const activity::PinJob& job) { writers_.write(job.id, {job.output, job.level}); }

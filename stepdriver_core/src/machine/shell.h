@@ -37,6 +37,8 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
     pulse::RealtimeRequest realtime;
     /// Called when a motion begins, by the thread that all axes wait for: it returns at once.
     std::function<void()> on_motion;
+    /// Called when a line with a name has changed, by the same thread.
+    std::function<void(const IoStates&)> on_io;
     FlightRecorder* recorder = nullptr;  ///< outlives the shell; nullptr: nothing is recorded
   };
 
@@ -124,6 +126,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   const bool has_inputs_;
   const bool threaded_;
   const std::function<void()> on_motion_;
+  const std::function<void(const IoStates&)> on_io_;
   const std::int64_t most_looks_in_vain_;
   gpio::LineWriters writers_;
 

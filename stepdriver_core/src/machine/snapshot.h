@@ -12,6 +12,7 @@
 #include "channel/channel_state.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/machine/io_states.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "trajectory/ended_path.h"
 #include "trajectory/path_axis.h"
@@ -59,6 +60,9 @@ struct AxisSnapshot {
 struct MachineSnapshot {
   std::vector<AxisSnapshot> axes;
   std::uint64_t stops_handled = 0;  ///< emergency stops
+  /// Those of them after which each output with a name is in its safe state, or has failed.
+  std::uint64_t stops_concluded = 0;
+  std::shared_ptr<const IoStates> io;  ///< the same as before if nothing has changed
 };
 
 /// The state of an axis at one instant.

@@ -66,6 +66,14 @@ Wiring::Wiring(const std::vector<config::AxisConfig>& axes, const MachineOptions
       inputs.push_back({power->feedback->line, power->feedback->bias, true});
     }
   }
+  for (const config::OutputConfig& output : options.outputs) {
+    named_outputs.push_back(static_cast<int>(outputs.size()));
+    outputs.push_back({output.line, output.level(output.at_fault), false});
+  }
+  for (const config::InputConfig& input : options.inputs) {
+    named_inputs.push_back(static_cast<int>(inputs.size()));
+    inputs.push_back({input.line.line, input.line.bias, true});
+  }
 }
 
 pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes) {

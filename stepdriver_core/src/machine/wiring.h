@@ -5,6 +5,7 @@
 
 #include "activity/motor_power.h"
 #include "motor/motor_lines.h"
+#include "named_lines.h"
 #include "pulse/heartbeat.h"
 #include "pulse/pulse_engine.h"
 #include "stepdriver_core/config/axis_config.h"
@@ -27,11 +28,17 @@ struct Wiring {
   std::optional<pulse::Signal> emergency_stop;
   std::optional<pulse::HeartbeatLine> heartbeat;
   std::optional<activity::MotorPowerLines> motor_power;
+  std::vector<int> named_outputs;  // in the order of MachineOptions::outputs
+  std::vector<int> named_inputs;
 
   /// @param options those that it was made of.
   activity::MotorPower motorPower(const MachineOptions& options) const {
     if (!motor_power) return {};
     return {*options.motor_power, *motor_power};
+  }
+  NamedLines namedLines(const MachineOptions& options) const {
+    return {NamedOutputs(options.outputs, named_outputs),
+            NamedInputs(options.inputs, named_inputs)};
   }
 };
 

@@ -10,7 +10,7 @@ namespace {
 std::unique_ptr<Simulation> makeSimulation(const MachineConfig& config, const std::string& name) {
   try {
     return std::make_unique<Simulation>(config.axes, config.emergency_stop, config.motor_power,
-                                        config.simulation);
+                                        config.simulation, config.outputs, config.inputs);
   } catch (const Error& error) {
     const std::string key = "simulation/trace";
     throw ConfigError(

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/read_axes.h"
+#include "config/read_io.h"
 #include "config/read_kinematics.h"
 #include "machine/read_options.h"
 #include "pulse/cpu_latency.h"
@@ -69,6 +70,8 @@ machine::MachineOptions MachineConfig::options() const {
   options.emergency_disable = emergency_disable;
   options.heartbeat = heartbeat;
   options.motor_power = motor_power;
+  options.outputs = outputs;
+  options.inputs = inputs;
   options.state_file = state_file;
   options.record_seconds = recorder.seconds;
   options.record_bytes = static_cast<std::size_t>(recorder.memory_mb * 1e6);
@@ -103,6 +106,8 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
                              config.motor_power.has_value(), config.emergency_disable,
                              config.emergency_stop, used);
   config.heartbeat = machine::readHeartbeat(reader, used);
+  config.outputs = config::readOutputs(reader, used);
+  config.inputs = config::readInputs(reader, used);
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !config.emergency_stop) {
     simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",
@@ -110,7 +115,8 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
                                                            reader.fullName("emergency_stop/pin")));
   }
   const std::string simulation_speed = simulation.fullName("speed");
-  config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right);
+  config.simulation = readSimulation(std::move(simulation), config.axes, axes_are_right,
+                                     config.outputs, config.inputs);
   if (config.heartbeat && config.backend == GpioBackend::kSimulated &&
       config.simulation.speed == 0.0) {
     reader.contradiction("heartbeat",

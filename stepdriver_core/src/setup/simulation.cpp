@@ -162,6 +162,26 @@ std::optional<sim::MotorPowerSpec> relayOf(const std::optional<config::MotorPowe
   return spec;
 }
 
+sim::RigIo ioOf(const std::vector<config::OutputConfig>& outputs,
+                const std::vector<config::InputConfig>& inputs, const SimulationConfig& config) {
+  sim::RigIo io;
+  for (const config::OutputConfig& output : outputs) {
+    io.outputs.push_back({output.name, output.line, output.active_level});
+  }
+  for (const config::InputConfig& input : inputs) {
+    const auto found = config.inputs.find(input.name);
+    const SimulatedInput simulated =
+        found != config.inputs.end() ? found->second : SimulatedInput();
+    sim::SwitchSpec contact;
+    contact.line = input.line.line;
+    contact.active_level = input.line.active_level;
+    contact.bounces = simulated.bounces;
+    contact.bounce_ns = std::llround(simulated.bounce_ms * 1e6);
+    io.inputs.push_back({input.name, contact});
+  }
+  return io;
+}
+
 std::shared_ptr<sim::PinTrace> traceOf(const SimulationConfig& config) {
   if (config.trace.empty()) return nullptr;
   using Replaces = sim::VcdTrace::Replaces;
@@ -242,11 +262,15 @@ void checkSimulation(const std::vector<AxisConfig>& axes, const SimulationConfig
 Simulation::Simulation(const std::vector<AxisConfig>& axes,
                        std::optional<config::InputSwitch> emergency_stop,
                        const std::optional<config::MotorPowerConfig>& motor_power,
-                       const SimulationConfig& config)
+                       const SimulationConfig& config,
+                       const std::vector<config::OutputConfig>& outputs,
+                       const std::vector<config::InputConfig>& inputs)
     : axes_(axes),
       emergency_stop_(std::move(emergency_stop)),
+      inputs_(inputs),
       clock_(config.speed),
-      rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes), relayOf(motor_power)),
+      rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes), relayOf(motor_power),
+           ioOf(outputs, inputs, config)),
       backend_(rig_, [this] { return timeOfEdge(); }) {
   for (const AxisConfig& axis : axes) {
     for (std::size_t i = 0; i < axis.motors(); ++i) {
@@ -260,6 +284,14 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
     }
   }
   if (emergency_stop_) pressEmergencyStop(config.emergency_stop);
+  for (const auto& [name, simulated] : config.inputs) {
+    if (simulated.pressed) pressInput(name, true);
+  }
+  for (const config::OutputConfig& output : outputs) {
+    const auto found = config.outputs.find(output.name);
+    if (found == config.outputs.end() || !found->second.fail_write_after) continue;
+    rig_.failWrites(output.line, *found->second.fail_write_after, EIO);
+  }
 }
 
 pulse::Nanoseconds Simulation::timeOfEdge() {
@@ -271,6 +303,10 @@ pulse::Nanoseconds Simulation::timeOfEdge() {
 void Simulation::pressEmergencyStop(bool pressed) {
   if (!emergency_stop_) throw Refused("emergency_stop isn't configured: there is no button");
   rig_.setInput(emergency_stop_->line, pressed == emergency_stop_->active_level, clock_.now());
+}
+
+void Simulation::pressInput(const std::string& name, bool pressed) {
+  rig_.pressInput(name, pressed, clock_.now());
 }
 
 void Simulation::pressEndstop(const std::string& axis, End end, bool pressed) {

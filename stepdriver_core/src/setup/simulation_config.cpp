@@ -161,10 +161,38 @@ std::vector<std::string> motorsOf(const config::AxisConfig& axis) {
   return names;
 }
 
+void readOutputsOfRig(ConfigReader all, const std::vector<config::OutputConfig>& outputs,
+                      SimulationConfig& config) {
+  for (const config::OutputConfig& output : outputs) {
+    ConfigReader reader = all.map(output.name);
+    config.outputs[output.name].fail_write_after =
+        reader.findInteger("fail_write_after", 0, kMostWrites, Presence::kOptional);
+    reader.rejectUnknown();
+    all.allow(output.name);
+  }
+  all.rejectUnknown();
+}
+
+void readInputsOfRig(ConfigReader all, const std::vector<config::InputConfig>& inputs,
+                     SimulationConfig& config) {
+  for (const config::InputConfig& input : inputs) {
+    ConfigReader reader = all.map(input.name);
+    SimulatedInput& own = config.inputs[input.name];
+    own.pressed = reader.boolean("pressed", own.pressed);
+    own.bounces = reader.integer("bounces", 0, kMostBounces, own.bounces);
+    own.bounce_ms = reader.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, own.bounce_ms);
+    reader.rejectUnknown();
+    all.allow(input.name);
+  }
+  all.rejectUnknown();
+}
+
 }  // namespace
 
 SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::AxisConfig>& axes,
-                                bool axes_are_right) {
+                                bool axes_are_right,
+                                const std::vector<config::OutputConfig>& outputs,
+                                const std::vector<config::InputConfig>& inputs) {
   SimulationConfig config;
   config.speed = reader.number("speed", Range{0.0, kHighestSpeed}, config.speed);
   config.trace = reader.text("trace", config.trace);
@@ -179,6 +207,8 @@ SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::A
         SimulatedAxisReader(rigs.map(axis.name), unit).readWithMotors(motorsOf(axis));
   }
   if (!axes.empty()) rigs.rejectUnknown();
+  readOutputsOfRig(reader.map("outputs"), outputs, config);
+  readInputsOfRig(reader.map("inputs"), inputs, config);
   reader.rejectUnknown();
   return config;
 }

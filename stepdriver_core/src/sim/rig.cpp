@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <unordered_map>
@@ -19,10 +20,16 @@ namespace stepdriver::sim {
 namespace {
 
 struct PinOnLine {
-  RigAxis* axis;           ///< nullptr: the relay of the motor power
-  std::optional<Pin> pin;  ///< the chip's pin; empty: the brake
+  enum class Of { kChip, kBrake, kMotorPower, kOutput };
+  Of of;
+  RigAxis* axis;  ///< of a chip or a brake
+  Pin pin;        ///< of a chip
   int trace_pin;
 };
+
+// Places of what presses an input with a name.
+constexpr double kReleased = 0.0;
+constexpr double kPressed = 1.0;
 
 struct WriteFault {
   std::int64_t writes_left;
@@ -34,7 +41,8 @@ struct Line {
   std::vector<PinOnLine> pins;
   std::vector<SwitchModel*> contacts;
   std::vector<RigAxis*> axes;  // whose contacts these are
-  bool other_level = false;    // the other level of an input that no axis has
+  bool other_level = false;    // of an input that no axis has
+  std::optional<bool> driven;  // as an output
   std::optional<WriteFault> write_fault;
   gpio::EdgeListener listener;
   bool told_level = false;  // the last level that the listener was told
@@ -58,7 +66,8 @@ struct Line {
 class Rig::Impl {
  public:
   Impl(const std::vector<RigAxisSpec>& specs, std::shared_ptr<PinTrace> trace,
-       const std::vector<RigCoupling>& couplings, const std::optional<MotorPowerSpec>& motor_power)
+       const std::vector<RigCoupling>& couplings, const std::optional<MotorPowerSpec>& motor_power,
+       const RigIo& io)
       : feed(std::move(trace)) {
     axes.reserve(specs.size());
     for (const RigAxisSpec& spec : specs) {
@@ -71,6 +80,8 @@ class Rig::Impl {
     }
     for (const RigCoupling& coupling : couplings) couple(coupling);
     if (motor_power) wire(*motor_power);
+    for (const RigOutput& output : io.outputs) wire(output);
+    for (const RigInput& input : io.inputs) wire(input);
   }
 
   ~Impl() { feed.finish(summary()); }
@@ -111,15 +122,23 @@ class Rig::Impl {
 
   /// A line drives one of its pins with this level: by its request, or by an edge after that.
   void drive(const PinOnLine& on_line, bool is_request, bool level, std::int64_t time_ns) {
-    if (on_line.axis == nullptr) {
-      relay->set(level, time_ns);
-      switchPower(time_ns);
-    } else if (!on_line.pin) {
-      on_line.axis->setBrake(level, time_ns);
-    } else if (is_request) {
-      on_line.axis->request(*on_line.pin, level, time_ns);
-    } else {
-      on_line.axis->edge(*on_line.pin, level, time_ns);
+    switch (on_line.of) {
+      case PinOnLine::Of::kOutput:
+        break;
+      case PinOnLine::Of::kMotorPower:
+        relay->set(level, time_ns);
+        switchPower(time_ns);
+        break;
+      case PinOnLine::Of::kBrake:
+        on_line.axis->setBrake(level, time_ns);
+        break;
+      case PinOnLine::Of::kChip:
+        if (is_request) {
+          on_line.axis->request(on_line.pin, level, time_ns);
+        } else {
+          on_line.axis->edge(on_line.pin, level, time_ns);
+        }
+        break;
     }
   }
 
@@ -150,6 +169,7 @@ class Rig::Impl {
   Slides slides;
   std::vector<std::unique_ptr<RigAxis>> axes;
   std::optional<PowerRelay> relay;
+  std::map<std::string, SwitchModel> inputs;  // with a name
   TraceFeed feed;
   std::vector<Line> lines;
   std::vector<int> watched;           // those of them with a listener
@@ -183,12 +203,28 @@ class Rig::Impl {
   void wire(const MotorPowerSpec& motor_power) {
     relay.emplace(motor_power);
     const int index = feed.addPin({"machine", "motor_power"}, !motor_power.active_level);
-    lineOf(motor_power.line).pins.push_back({nullptr, std::nullopt, index});
+    lineOf(motor_power.line).pins.push_back({PinOnLine::Of::kMotorPower, nullptr, {}, index});
     if (SwitchModel* feedback = relay->feedback()) {
       lineOf(motor_power.feedback_line).contacts.push_back(feedback);
       feed.addSwitch({"machine", "motor_power_feedback"}, feedback);
     }
     switchPower(latest_ns);
+  }
+
+  void wire(const RigOutput& output) {
+    TracePin pin{"outputs", output.name};
+    pin.active = output.active_level;
+    const int index = feed.addPin(pin, !output.active_level);
+    lineOf(output.line).pins.push_back({PinOnLine::Of::kOutput, nullptr, {}, index});
+  }
+
+  void wire(const RigInput& input) {
+    SwitchSpec contact = input.contact;
+    contact.position = kPressed;
+    contact.hysteresis = 0.0;
+    SwitchModel& own = inputs.try_emplace(input.name, contact, Side::kMax, kReleased).first->second;
+    lineOf(contact.line).contacts.push_back(&own);
+    feed.addSwitch({"inputs", input.name}, &own);
   }
 
   void wire(RigAxis& axis) {
@@ -200,11 +236,11 @@ class Rig::Impl {
       trace_pin.active = activeLevel(axis.spec(), pin);
       trace_pin.both_edges = pin == Pin::kStep && axis.spec().chip.both_edges;
       const int index = feed.addPin(trace_pin, axis.chip().lineLevel(pin));
-      lineOf(line).pins.push_back({&axis, pin, index});
+      lineOf(line).pins.push_back({PinOnLine::Of::kChip, &axis, pin, index});
     }
     if (const BrakeModel* brake = axis.brake()) {
       const int index = feed.addPin({axis.spec().name, "brake"}, brake->lineLevel());
-      lineOf(brake->spec().line).pins.push_back({&axis, std::nullopt, index});
+      lineOf(brake->spec().line).pins.push_back({PinOnLine::Of::kBrake, &axis, {}, index});
     }
     wire(axis, axis.switchAt(Side::kMin), "endstop_min");
     wire(axis, axis.switchAt(Side::kMax), "endstop_max");
@@ -225,8 +261,8 @@ class Rig::Impl {
 
 Rig::Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace,
          const std::vector<RigCoupling>& couplings,
-         const std::optional<MotorPowerSpec>& motor_power)
-    : impl_(std::make_unique<Impl>(axes, std::move(trace), couplings, motor_power)) {}
+         const std::optional<MotorPowerSpec>& motor_power, const RigIo& io)
+    : impl_(std::make_unique<Impl>(axes, std::move(trace), couplings, motor_power, io)) {}
 
 Rig::~Rig() = default;
 
@@ -266,6 +302,20 @@ void Rig::clearWriteFault(const std::string& line) {
   impl_->failWrites(line, std::nullopt);
 }
 
+void Rig::pressInput(const std::string& name, bool pressed, std::int64_t time_ns) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const auto input = impl_->inputs.find(name);
+  if (input == impl_->inputs.end()) throw Error("the rig has no input named " + name);
+  const std::int64_t now_ns = impl_->advance(time_ns);
+  input->second.follow(pressed ? kPressed : kReleased, now_ns);
+  impl_->switchesMoved(now_ns);
+}
+
+std::optional<bool> Rig::outputLevel(const std::string& line) const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->lineOf(line).driven;
+}
+
 void Rig::setInput(const std::string& line, bool level, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
@@ -298,7 +348,9 @@ int Rig::lineIndex(const std::string& line) {
 void Rig::onRequest(int line, bool level, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  const std::vector<PinOnLine>& pins = impl_->at(line).pins;
+  Line& driven = impl_->at(line);
+  driven.driven = level;
+  const std::vector<PinOnLine>& pins = driven.pins;
   if (pins.empty()) return;
   for (const PinOnLine& pin : pins) {
     impl_->feed.settle(pin.trace_pin, level, now_ns);
@@ -310,7 +362,9 @@ void Rig::onRequest(int line, bool level, std::int64_t time_ns) {
 void Rig::onEdge(int line, bool level, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const std::int64_t now_ns = impl_->advance(time_ns);
-  const std::vector<PinOnLine>& pins = impl_->at(line).pins;
+  Line& driven = impl_->at(line);
+  driven.driven = level;
+  const std::vector<PinOnLine>& pins = driven.pins;
   if (pins.empty()) return;
   for (const PinOnLine& pin : pins) {
     impl_->feed.edge(pin.trace_pin, level, now_ns);

@@ -102,6 +102,12 @@ std::vector<NamedLine> linesOf(const std::vector<config::AxisConfig>& axes,
     lines.push_back({"motor_power", power->line});
     if (power->feedback) lines.push_back({"motor_power/feedback", power->feedback->line});
   }
+  for (const config::OutputConfig& output : machine.outputs) {
+    lines.push_back({"outputs/" + output.name, output.line});
+  }
+  for (const config::InputConfig& input : machine.inputs) {
+    lines.push_back({"inputs/" + input.name, input.line.line});
+  }
   if (machine.heartbeat) lines.push_back({"heartbeat", machine.heartbeat->line});
   return lines;
 }

@@ -44,6 +44,7 @@
 #include "node/services/machine_services.h"
 #include "node/systemd/service_manager.h"
 #include "node/topics/clock_publisher.h"
+#include "node/topics/io_publisher.h"
 #include "node/topics/jog_subscriber.h"
 #include "node/topics/setpoint_subscriber.h"
 #include "node/topics/state_publisher.h"
@@ -81,10 +82,11 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~enable  ~home
               ~move_line  ~follow_path  ~append_path  ~plan_path  ~hold  ~resume  ~dump
+              ~set_output
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
-              (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  /diagnostics
-              /clock (with ~publish_clock)
+              ~rig/inputs/NAME (on the simulated rig)
+  topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  ~io_states
+              /diagnostics  /clock (with ~publish_clock)
               ~jog  ~setpoint  ~AXIS/setpoint  ~command  (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_path
               ~follow_joint_trajectory
@@ -221,12 +223,14 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   warnOfPositions(machine);
   if (machine.capability()) warnOfSlowness(config.axes, *machine.capability());
 
-  CallQueues queues(machine.axes().size());
+  CallQueues queues(machine.axes().size(), config.outputs.size());
   FlightRecorderService recorder(machine, config.recorder, ros::this_node::getName());
   // Subscribers to latched topics need a queue too.
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
+  const IoPublisher io_publisher(private_node, machine, hardware.clock(),
+                                 hardware.simulation() != nullptr ? config.simulation.speed : 1.0);
   MasterDirectory directory;
   LatchedMessages latched(directory);
   ActionTopics topics(private_node, parameters.action_status_frequency, latched);

@@ -29,6 +29,8 @@ constexpr pulse::Nanoseconds kLatestPass = 8 * kMillisecond;
 constexpr pulse::Nanoseconds kLead = 2 * kMillisecond;
 constexpr pulse::Nanoseconds kLongestLead = 40 * kMillisecond;
 constexpr const char* kEmergencyStop = "emergency_stop";
+/// An output with a name.
+constexpr const char* kTool = "tool";
 /// The period of a stream of jogs, and their number.
 constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
 constexpr int kJogs = 12;
@@ -136,6 +138,15 @@ machine::MachineOptions optionsOf(int variant) {
     options.motor_power->feedback = config::InputSwitch{"power.feedback", true};
     options.motor_power->feedback_timeout_ns = 50 * kMillisecond;
   }
+  config::OutputConfig tool;
+  tool.name = kTool;
+  tool.line = kTool;
+  tool.active_level = variant != 1;
+  tool.min_on_ns = 5 * kMillisecond;
+  tool.at_fault = variant == 2;
+  if (variant == 0) tool.at_stop = false;
+  if (variant == kSharing) tool.max_on_ns = 20 * kMillisecond;
+  options.outputs.push_back(tool);
   return options;
 }
 
@@ -220,7 +231,8 @@ Participants::Participants(const Schedule& schedule)
       oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
       rig_(rigOf(configs_, schedule), trace_, test::Bench::couplings(configs_),
-           test::Bench::motorPowerOf(optionsOf(schedule.variant))),
+           test::Bench::motorPowerOf(optionsOf(schedule.variant)),
+           test::Bench::ioOf(optionsOf(schedule.variant))),
       backend_(rig_, [this] { return clock_.now(); }),
       wiring_(configs_, optionsOf(schedule.variant)),
       lines_(std::make_shared<FailingReads>(backend_.request(wiring_.outputs, wiring_.inputs))) {
@@ -232,7 +244,8 @@ Participants::Participants(const Schedule& schedule)
   if (schedule.variant == kSharing) oracle_.share({0, 1});
   controller_ = std::make_unique<machine::Controller>(
       configs_, wiring_.motor_lines, std::move(names), wiring_.emergency_stop,
-      emergencyDisableOf(schedule.variant), wiring_.motorPower(optionsOf(schedule.variant)));
+      emergencyDisableOf(schedule.variant), wiring_.motorPower(optionsOf(schedule.variant)),
+      wiring_.namedLines(optionsOf(schedule.variant)));
   if (ramps()) engine_->rampStops(machine::longestRamp(configs_));
   core_ = std::make_unique<machine::ShellCore>(*controller_, *engine_, clock_, lines_,
                                                wiring_.inputs.size(), static_cast<Host&>(*this),
@@ -426,23 +439,41 @@ bool Participants::step() {
 }
 
 void Participants::go(Who who) {
+  act(who);
+  answerEmergencyStops();
+}
+
+void Participants::answerEmergencyStops() {
+  for (Client& client : clients_) {
+    if (!client.waits_for_stops) continue;
+    if (core_->snapshot()->stops_concluded < *client.waits_for_stops) continue;
+    client.waits_for_stops.reset();
+    pauseBeforeTurn(client);
+    if (engine_->stopsAsked() == engine_->stopsServed()) {
+      oracle_.emergencyStopAnswered(clock_.now());
+    }
+    note("answer of emergency stop");
+    checkOutputs();
+  }
+}
+
+// Until somebody recovers from it.
+void Participants::checkOutputs() {
+  if (!engine_->emergencyStopped() || pins_failed_) return;
+  for (const config::OutputConfig& output : optionsOf(schedule_.variant).outputs) {
+    if (rig_.outputLevel(output.line) == output.level(output.at_fault)) continue;
+    oracle_.complain("the output " + output.name + " is not in its safe state when an emergency " +
+                     "stop is answered");
+  }
+}
+
+void Participants::act(Who who) {
   ++steps_;
   if (log_ && who != Who::kEngine && who != Who::kClock) note(nameOf(who));
   switch (who) {
-    case Who::kNews: {
+    case Who::kNews:
       core_->takeNews();
-      for (Client& client : clients_) {
-        if (!client.waits_for_stops) continue;
-        if (controller_->snapshot()->stops_handled < *client.waits_for_stops) continue;
-        client.waits_for_stops.reset();
-        pauseBeforeTurn(client);
-        if (engine_->stopsAsked() == engine_->stopsServed()) {
-          oracle_.emergencyStopAnswered(clock_.now());
-        }
-        note("answer of emergency stop");
-      }
       return;
-    }
     case Who::kPinDone: {
       const activity::PinDone done = pins_done_.front();
       pins_done_.pop_front();
@@ -1206,6 +1237,11 @@ void Participants::moveEnds(const machine::MachineSnapshot& before,
       move.rest = own.path_axis.positionOf(own.path_axis.restAt(targets[i]));
     }
   }
+}
+
+void Participants::switchTool(int client, bool on) {
+  post(client, on ? "switch the tool on" : "switch the tool off", machine::SetOutput{kTool, on},
+       {});
 }
 
 void Participants::emergencyStop(int client) {

@@ -141,6 +141,7 @@ class Participants : private machine::ShellCore::Host {
   /// Appends to the path that an axis follows, if it is one; a last segment ends it.
   /// @param size of the segment; 0: none, only that this is the end.
   void appendToPath(int client, std::size_t axis, double size, bool is_last);
+  void switchTool(int client, bool on);
   void emergencyStop(int client);
   void shutDown(int client);
   void stopLastMove(int client, std::size_t axis);
@@ -215,6 +216,9 @@ class Participants : private machine::ShellCore::Host {
   bool step();
   bool canGo(Who who);
   void go(Who who);
+  void act(Who who);
+  void answerEmergencyStops();
+  void checkOutputs();
   bool isDelayed(Who who) const;
   void turnEnded(const machine::MachineSnapshot& before,
                  const std::shared_ptr<const machine::MachineSnapshot>& now,

@@ -105,7 +105,7 @@ class Bench {
         bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
-        rig(judged(rig_axes, axes), trace, couplings(axes), motorPowerOf(options)),
+        rig(judged(rig_axes, axes), trace, couplings(axes), motorPowerOf(options), ioOf(options)),
         backend(rig, [this] { return clock.now(); }) {
     options.threaded = threaded;
     machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
@@ -138,6 +138,21 @@ class Bench {
       spec.feedback_active = config->feedback->active_level;
     }
     return spec;
+  }
+
+  /// The lines with a name, as they are configured.
+  static sim::RigIo ioOf(const machine::MachineOptions& options) {
+    sim::RigIo io;
+    for (const config::OutputConfig& output : options.outputs) {
+      io.outputs.push_back({output.name, output.line, output.active_level});
+    }
+    for (const config::InputConfig& input : options.inputs) {
+      sim::SwitchSpec contact;
+      contact.line = input.line.line;
+      contact.active_level = input.line.active_level;
+      io.inputs.push_back({input.name, contact});
+    }
+    return io;
   }
 
   static std::vector<sim::RigAxisSpec> rigAxes(const std::vector<config::AxisConfig>& axes) {

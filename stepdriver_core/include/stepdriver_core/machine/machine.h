@@ -11,9 +11,11 @@
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/config/motor_power_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/io_states.h"
 #include "stepdriver_core/machine/recording.h"
 #include "stepdriver_core/machine/streams.h"
 #include "stepdriver_core/pulse/capability.h"
@@ -71,6 +73,10 @@ struct MachineOptions {
   /// recover(); off at an emergency stop and at the end. If it doesn't come in time or is lost,
   /// that is an emergency stop, and all axes have a fault that says so.
   std::optional<config::MotorPowerConfig> motor_power{};
+  /// Lines with a name, see setOutput() and ioStates(). If an output can't be written, all axes
+  /// have a fault.
+  std::vector<config::OutputConfig> outputs{};
+  std::vector<config::InputConfig> inputs{};
   /// Absolute path of the file that keeps positions across a restart; empty: no file. A position
   /// in it that Axis::setPosition() would refuse isn't restored.
   std::string state_file{};
@@ -272,7 +278,8 @@ class Machine {
   /// and then returns. Every axis is at fault until recover(), from the beginning of the ramp on.
   /// MachineOptions::emergency_disable may disable the motors then; this doesn't wait
   /// until they are disabled. MachineOptions::emergency_stop does the same; if it is active at the
-  /// start, no motor is energized.
+  /// start, no motor is energized. Each output with a name is in its safe state when this returns,
+  /// unless its line has failed.
   ///
   /// @throw GpioError if the pulse thread hangs, see whyHung(): then no other pulse goes out when
   ///   the chip answers again, except for those of the write that hangs.
@@ -287,6 +294,25 @@ class Machine {
   /// @throw Error if an axis can't recover, because its chip still reports a fault or a line can't
   ///   be written; it names the axis, which stays at fault. The other axes have recovered.
   void recover();
+
+  /// Switches an output with a name, as soon as its least times allow. Returns when its line was
+  /// written.
+  ///
+  /// While an axis is at fault, from an emergency stop until recover(), and from the beginning of a
+  /// shutdown on, each output is in its safe state. It stays in it until this is called again.
+  ///
+  /// @throw Refused if there is no such output, while the outputs are in their safe states, if that
+  ///   comes before it was switched, or if another call switches it otherwise meanwhile.
+  /// @throw GpioError if its line can't be written; then all axes have a fault.
+  void setOutput(const std::string& name, bool on);
+
+  /// The outputs and inputs with a name.
+  IoStates ioStates() const;
+
+  /// @param told called at each change of an output or an input with a name, by the thread that all
+  ///   axes wait for: it returns at once, and calls nothing of the machine. Empty: nobody is told,
+  ///   and when this returns, nobody is being told.
+  void onIoChange(std::function<void(const IoStates&)> told);
 
   /// Energizes the motors of all axes that have an enable line, or switches their current off:
   /// those that move decelerate first, all at once. Returns when it is done for all, see

@@ -16,7 +16,7 @@ constexpr const char* kNothingRecorded = "nothing is recorded: recorder/seconds 
 struct Recording {
   /// An output of an axis. Axes can share one.
   struct Pin {
-    std::string axis;
+    std::string axis;     ///< `machine` or `outputs` for lines that belong to no axis
     std::string name;     ///< step, dir (or cw, ccw), enable, ms1, ms2, ms3, sleep or reset
     int output = 0;       ///< index in `levels`
     bool active = false;  ///< the level of a pulse, of forward, of an energized motor, of the bit

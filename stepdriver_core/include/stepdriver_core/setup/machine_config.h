@@ -7,6 +7,7 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/config_reader.h"
 #include "stepdriver_core/config/config_value.h"
+#include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/setup/simulation_config.h"
@@ -44,7 +45,9 @@ struct MachineConfig {
   machine::EmergencyDisable emergency_disable{};
   std::optional<machine::HeartbeatConfig> heartbeat;    ///< see machine::MachineOptions
   std::optional<config::MotorPowerConfig> motor_power;  ///< see machine::MachineOptions
-  std::string state_file;                               ///< see machine::MachineOptions
+  std::vector<config::OutputConfig> outputs;            ///< in the order of the file
+  std::vector<config::InputConfig> inputs;
+  std::string state_file;  ///< see machine::MachineOptions
   RecorderConfig recorder;
 
   /// What a machine::Machine of this configuration takes, in addition to the axes.
@@ -78,6 +81,19 @@ struct MachineConfig {
 ///   feedback_timeout_ms: 1000.0
 /// heartbeat:                     # optional: an output for an external monostable or safety relay
 ///   {pin: "gpiochip0:24", rate_hz: 100.0}
+/// outputs:                       # optional: by their names
+///   pen:
+///     pin: "gpiochip0:5"
+///     active_level: high         # optional
+///     initial: off               # or on: from the start
+///     at_stop: keep              # or off, on: at a stop of all axes
+///     at_fault: off              # or on: the safe state
+///     max_on_s: 10.0             # optional: then it is switched off
+///     min_on_ms: 0.0
+///     min_off_ms: 0.0
+/// inputs:                        # optional: by their names
+///   probe:
+///     {pin: "gpiochip0:6", active_level: low, bias: pull_up, debounce_ms: 2.0}
 /// state_file: ""                 # absolute path of the file that keeps positions; empty: no file
 /// recorder:                      # the flight recorder
 ///   seconds: 10.0                # that it keeps; 0: nothing is recorded

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/config/motor_power_config.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -40,11 +41,13 @@ class Simulation {
  public:
   /// @param emergency_stop the machine's input, to which the rig connects a button.
   /// @param motor_power the machine's, for which the rig has a relay.
+  /// @param outputs, inputs those with a name.
   /// @throw Error if the trace can't be written, or as sim::Rig.
   Simulation(const std::vector<config::AxisConfig>& axes,
              std::optional<config::InputSwitch> emergency_stop,
              const std::optional<config::MotorPowerConfig>& motor_power,
-             const SimulationConfig& config);
+             const SimulationConfig& config, const std::vector<config::OutputConfig>& outputs = {},
+             const std::vector<config::InputConfig>& inputs = {});
 
   gpio::Backend& backend() { return backend_; }
   pulse::Clock& clock() { return clock_; }
@@ -57,6 +60,12 @@ class Simulation {
   /// Presses the button of the emergency-stop input, or releases it. @throw Refused if no such
   /// input is configured.
   void pressEmergencyStop(bool pressed);
+
+  /// The inputs with a name, which can be pressed.
+  const std::vector<config::InputConfig>& inputs() const { return inputs_; }
+
+  /// Presses one of them, or releases it. @throw Error if there is no such input.
+  void pressInput(const std::string& name, bool pressed);
 
   /// An end of an axis, with its switch.
   enum class End { kMin, kMax };
@@ -75,6 +84,7 @@ class Simulation {
 
   std::vector<config::AxisConfig> axes_;
   const std::optional<config::InputSwitch> emergency_stop_;
+  const std::vector<config::InputConfig> inputs_;
   std::map<std::string, sim::RigFaults> faults_;
   std::mutex mutex_;
   std::map<std::string, sim::RigFaults> pressed_;  // the faults, and the pressed switches

@@ -7,6 +7,7 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/config_reader.h"
+#include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
 
@@ -62,6 +63,19 @@ struct SimulatedAxis {
   }
 };
 
+/// An output with a name on the rig.
+struct SimulatedOutput {
+  /// How many writes succeed before all others fail.
+  std::optional<int> fail_write_after;
+};
+
+/// An input with a name on the rig: a switch.
+struct SimulatedInput {
+  bool pressed = false;    ///< at the start
+  int bounces = 0;         ///< extra on-off pairs after each change
+  double bounce_ms = 0.2;  ///< [ms] from one bounce edge to the next
+};
+
 /// The configuration of the simulated rig.
 struct SimulationConfig {
   double speed = 1.0;  ///< seconds of the rig per second; 0: as fast as possible
@@ -70,6 +84,8 @@ struct SimulationConfig {
   bool trace_overwrites_any_file = false;
   bool emergency_stop = false;  ///< its button is pressed at the start
   std::map<std::string, SimulatedAxis> axes;
+  std::map<std::string, SimulatedOutput> outputs;
+  std::map<std::string, SimulatedInput> inputs;
 };
 
 /// Reads the map `simulation` of a configuration; every key is optional.
@@ -114,14 +130,21 @@ struct SimulationConfig {
 ///       motors:                  # of an axis with several: what is different at one of them
 ///         right: {start_mm: 3.5} # any of the keys above; no other fault or wrong wire applies
 ///         then
+///   outputs:
+///     pen: {fail_write_after: 10}  # writes; those after them fail. Default: none fails
+///   inputs:
+///     probe: {pressed: false, bounces: 0, bounce_ms: 0.2}
 /// @endcode
 ///
 /// @param reader of that map.
 /// @param axes the axes that are simulated.
 /// @param axes_are_right false: the axes have issues. Values that depend on them are then not
 ///   checked.
+/// @param outputs, inputs those with a name.
 SimulationConfig readSimulation(config::ConfigReader reader,
-                                const std::vector<config::AxisConfig>& axes, bool axes_are_right);
+                                const std::vector<config::AxisConfig>& axes, bool axes_are_right,
+                                const std::vector<config::OutputConfig>& outputs = {},
+                                const std::vector<config::InputConfig>& inputs = {});
 
 /// Checks what depends on the limits of the axes: the min switch must be below the max switch.
 ///

@@ -9,7 +9,7 @@ namespace stepdriver::sim {
 
 /// A pin of the rig in a trace: one scope for each axis.
 struct TracePin {
-  std::string scope;     ///< name of the axis
+  std::string scope;     ///< name of the axis; machine, outputs or inputs
   std::string variable;  ///< step, dir (or cw, ccw), enable, ms1, ms2, ms3, sleep, reset,
                          ///< endstop_min or _max, fault, in_position
   /// The level of a pulse, of forward, of an energized motor and so on. If it is known, a file says

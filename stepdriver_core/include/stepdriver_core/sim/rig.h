@@ -131,6 +131,25 @@ struct RigCoupling {
   std::vector<std::vector<double>> inverse;
 };
 
+/// An output with a name, which the rig shows in its trace.
+struct RigOutput {
+  std::string name;
+  std::string line;
+  bool active_level = true;  ///< level of the line while it is on
+};
+
+/// An input with a name: a switch that is pressed by hand. Its position and hysteresis aren't used.
+struct RigInput {
+  std::string name;
+  SwitchSpec contact;
+};
+
+/// The lines with a name of the rig.
+struct RigIo {
+  std::vector<RigOutput> outputs;
+  std::vector<RigInput> inputs;
+};
+
 /// Everything that the chip must never see. One edge may violate several of these. A time of
 /// exactly the limit is no violation.
 enum class Violation {
@@ -234,12 +253,13 @@ class Rig : public gpio::Board {
   ///   levels are those of the lines. May be null.
   /// @param couplings the motors of all other axes move only their own carriages.
   /// @param motor_power empty: the power is always there.
+  /// @param io further lines.
   /// @throw Error if an axis is named twice, doesn't travel, or has microsteps that its chip
   /// doesn't
   ///   have, or if a coupling names an axis that there isn't, or has matrices of another size.
   explicit Rig(const std::vector<RigAxisSpec>& axes, std::shared_ptr<PinTrace> trace = nullptr,
                const std::vector<RigCoupling>& couplings = {},
-               const std::optional<MotorPowerSpec>& motor_power = {});
+               const std::optional<MotorPowerSpec>& motor_power = {}, const RigIo& io = {});
   ~Rig() override;
 
   /// @throw Error if there is no such axis; so do all functions that take an axis.
@@ -262,6 +282,14 @@ class Rig : public gpio::Board {
   void failWrites(const std::string& line, std::int64_t writes, int error);
   /// Writes of this line succeed again.
   void clearWriteFault(const std::string& line);
+
+  /// Presses an input with a name, or releases it; it bounces as its switch does.
+  ///
+  /// @throw Error if there is no such input.
+  void pressInput(const std::string& name, bool pressed, std::int64_t time_ns);
+
+  /// The level of an output; empty if it was never requested.
+  std::optional<bool> outputLevel(const std::string& line) const;
 
   /// Sets the level of an input that belongs to no axis, such as the emergency stop.
   void setInput(const std::string& line, bool level, std::int64_t time_ns);

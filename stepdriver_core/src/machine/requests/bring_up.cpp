@@ -13,6 +13,8 @@ void BringUp::serve(RequestContext& machine, const SharedCall& call) const {
     machine.activities.begin(std::make_unique<activity::BringUp>(machine.context, *axis, call),
                              kTakenOver);
   }
+  machine.named.inputs.begin(machine.context);
+  if (!machine.isEmergencyStopInputActive()) machine.named.outputs.begin(call);
 }
 
 }  // namespace stepdriver::machine

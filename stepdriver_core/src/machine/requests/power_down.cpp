@@ -19,6 +19,7 @@ void PowerDown::serve(RequestContext& machine, const SharedCall& call) const {
     }
   }
   context.motor_power.switchOff(context.now, call);
+  machine.named.outputs.await(call);
 }
 
 }  // namespace stepdriver::machine

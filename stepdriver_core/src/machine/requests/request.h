@@ -27,6 +27,7 @@
 #include "resume.h"
 #include "set_limits.h"
 #include "set_microsteps.h"
+#include "set_output.h"
 #include "set_position.h"
 #include "set_speed_override.h"
 #include "sleep.h"
@@ -41,7 +42,7 @@ namespace stepdriver::machine {
 using Request = std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints,
                              MoveLine, FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll,
                              Hold, Resume, SetSpeedOverride, SetLimits, Home, CancelHoming, Enable,
-                             Sleep, Reset, SetMicrosteps, SetPosition, Recover, BringUp,
+                             Sleep, Reset, SetMicrosteps, SetPosition, Recover, SetOutput, BringUp,
                              RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
 
 /// Whether it may be refused because of the level of a switch: the inputs are read when it is made.

@@ -6,6 +6,8 @@
 
 #include "activity/driver_activities.h"
 #include "message_text.h"
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::machine {
 
@@ -99,6 +101,29 @@ std::string whyNoPin(const config::AxisConfig& axis,
     if (!(chip.*active_level)) return fmt::format("the {} has no {} pin", chip.title, name);
   }
   return fmt::format("pins/{} isn't configured", pin);
+}
+
+bool RequestContext::isEmergencyStopInputActive() const {
+  if (!emergency_stop) return false;
+  const int level = context.levels.level(emergency_stop->line);
+  return level < 0 || (level != 0) == emergency_stop->active;
+}
+
+void RequestContext::refuseWhileEmergencyStopInput() const {
+  if (!isEmergencyStopInputActive()) return;
+  const int level = context.levels.level(emergency_stop->line);
+  const std::string input = "the emergency stop input " + context.lines.input(emergency_stop->line);
+  if (level < 0) throw Refused(input + " can't be read: " + gpio::errorText(-level));
+  throw Refused(input + " is active; release it");
+}
+
+std::string RequestContext::whySafe() const {
+  if (!context.mode.closed.empty()) return context.mode.closed;
+  for (const auto& axis : context.axes) {
+    if (!axis->fault) continue;
+    return fmt::format("{} is at fault: {}; call recover first", axis->name(), axis->fault.what());
+  }
+  return context.hasUnknownStop() ? "an emergency stop has come; call recover first" : "";
 }
 
 }  // namespace stepdriver::machine

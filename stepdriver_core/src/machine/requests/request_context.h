@@ -10,6 +10,7 @@
 #include "activity/activities.h"
 #include "activity/context.h"
 #include "channel/channel_config.h"
+#include "machine/named_lines.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::machine {
@@ -42,15 +43,17 @@ class AxisWords {
 class RequestContext {
  public:
   RequestContext(activity::Context& its_context, activity::Activities& its_activities,
-                 std::optional<pulse::Signal> emergency_stop_input)
+                 std::optional<pulse::Signal> emergency_stop_input, NamedLines lines_with_names)
       : context(its_context),
         activities(its_activities),
-        emergency_stop(std::move(emergency_stop_input)) {}
+        emergency_stop(std::move(emergency_stop_input)),
+        named(std::move(lines_with_names)) {}
 
   activity::Context& context;
   activity::Activities& activities;
   const std::optional<pulse::Signal> emergency_stop;  ///< the machine's input
-  std::vector<SharedCall> awaiting_rest;              ///< answered when every axis is at rest
+  NamedLines named;
+  std::vector<SharedCall> awaiting_rest;  ///< answered when every axis is at rest
 
   axis::AxisModel& axis(AxisId id) const { return *context.axes.at(id); }
   /// The axis, and all that share its motors.
@@ -65,6 +68,11 @@ class RequestContext {
   /// Requires that the axis neither moves nor changes its pins. @param what is refused, in words.
   void refuseUnlessFree(const axis::AxisModel& axis, const std::string& what) const;
   void refuseUnlessReadyToMove(const axis::AxisModel& axis) const;
+  /// Whether it is active, or can't be read.
+  bool isEmergencyStopInputActive() const;
+  void refuseWhileEmergencyStopInput() const;
+  /// Why the outputs with a name must be in their safe states; empty: they needn't.
+  std::string whySafe() const;
 
  private:
   void refuseUnlessSharersAreFree(const axis::AxisModel& axis, const std::string& what) const;

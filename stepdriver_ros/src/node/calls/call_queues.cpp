@@ -14,10 +14,11 @@ constexpr std::chrono::milliseconds kPoll{5};
 
 }  // namespace
 
-CallQueues::CallQueues(std::size_t axes)
+CallQueues::CallQueues(std::size_t axes, std::size_t outputs)
     : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
       trajectories_(waiting_pool_, kTrajectoryThreads),
       streams_(waiting_pool_, static_cast<int>(axes) + 1),
+      outputs_(waiting_pool_, static_cast<int>(2 * outputs) + 1),
       recordings_(waiting_pool_, 1),
       control_(control_pool_, kControlThreads),
       stops_("stops"),
@@ -55,7 +56,8 @@ void CallQueues::stop() {
 
 bool CallQueues::allAnswered() {
   // A queue is empty when it contains no call and none of its calls is running.
-  bool empty = control_.isEmpty() && lines_.isEmpty() && recordings_.isEmpty();
+  bool empty =
+      control_.isEmpty() && lines_.isEmpty() && outputs_.isEmpty() && recordings_.isEmpty();
   for (ros::CallbackQueue& queue : axes_) empty = empty && queue.isEmpty();
   for (ros::CallbackQueue& queue : power_) empty = empty && queue.isEmpty();
   return empty;

@@ -35,7 +35,8 @@ class CallQueues {
   /// In addition, how many calls that enable or disable an axis run at once.
   static constexpr int kPowerThreadsPerAxis = 2;
 
-  explicit CallQueues(std::size_t axes);
+  /// @param axes, outputs how many there are; outputs are those with a name.
+  explicit CallQueues(std::size_t axes, std::size_t outputs = 0);
   ~CallQueues() { stop(); }
   CallQueues(const CallQueues&) = delete;
   CallQueues& operator=(const CallQueues&) = delete;
@@ -48,6 +49,8 @@ class CallQueues {
   ros::CallbackQueue& trajectories() { return trajectories_; }
   /// Messages of setpoints. One that must wake its axes waits for them.
   ros::CallbackQueue& streams() { return streams_; }
+  /// Calls that switch outputs. Each may wait for the least time of its output.
+  ros::CallbackQueue& outputs() { return outputs_; }
   /// Calls that write files, one after another.
   ros::CallbackQueue& recordings() { return recordings_; }
   /// Calls that enable or disable this axis.
@@ -79,6 +82,7 @@ class CallQueues {
   PooledQueue lines_;
   PooledQueue trajectories_;
   PooledQueue streams_;
+  PooledQueue outputs_;
   PooledQueue recordings_;
   PooledQueue control_;
   TriggerServer stops_;

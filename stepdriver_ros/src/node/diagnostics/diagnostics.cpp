@@ -17,6 +17,7 @@ namespace {
 const ros::WallDuration kReportPeriod(1.0);
 constexpr const char* kEngineName = "pulse engine";
 constexpr const char* kMasterName = "ROS master";
+constexpr const char* kNamedLinesName = "named lines";
 constexpr const char* kStateFileName = "state file";
 constexpr const char* kRecorderName = "flight recorder";
 
@@ -52,6 +53,9 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   }
   updater_.add(kEngineName, [this](Status& status) { fillEngineStatus(status); });
   updater_.add(kMasterName, [this](Status& status) { fillMasterStatus(status); });
+  if (!config.outputs.empty() || !config.inputs.empty()) {
+    updater_.add(kNamedLinesName, [this](Status& status) { fillNamedLinesStatus(status); });
+  }
   if (!state_file_.empty()) {
     updater_.add(kStateFileName, [this](Status& status) { fillStateFileStatus(status); });
   }
@@ -96,6 +100,24 @@ void Diagnostics::fillMasterStatus(Status& status) const {
   status.add("URI", reading.uri);
   status.add("silent [s]", fmt::format("{:.0f}", reading.silent));
   status.add("times registered again", reading.restarts);
+}
+
+void Diagnostics::fillNamedLinesStatus(Status& status) const {
+  const machine::IoStates states = machine_.ioStates();
+  status.summary(Status::OK, "as they were switched");
+  const auto add = [&](const std::string& name, const std::string& text, const std::string& error) {
+    if (!error.empty()) status.mergeSummary(Status::ERROR, error);
+    status.add(name, error.empty() ? text : text + " (uncertain)");
+  };
+  for (const machine::OutputState& output : states.outputs) {
+    if (!output.note.empty()) {
+      status.mergeSummary(Status::WARN, fmt::format("{} {}", output.name, output.note));
+    }
+    add("output " + output.name, output.on ? "on" : "off", output.error);
+  }
+  for (const machine::InputState& input : states.inputs) {
+    add("input " + input.name, input.active ? "active" : "inactive", input.error);
+  }
 }
 
 void Diagnostics::fillStateFileStatus(Status& status) const {

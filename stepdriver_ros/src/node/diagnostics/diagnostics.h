@@ -18,7 +18,7 @@
 namespace stepdriver::ros_node {
 
 /// The topic /diagnostics at 1 Hz: a status for each axis, and one each for the pulse engine, the
-/// ROS master, the state file and the flight recorder, if there are these.
+/// ROS master, the lines with a name, the state file and the flight recorder, if there are these.
 class Diagnostics {
  public:
   /// @param node, private_node handles of the node, and of its private names.
@@ -37,6 +37,7 @@ class Diagnostics {
   static void fillAxisStatus(const axis::Axis& axis, Status& status);
   void fillEngineStatus(Status& status);
   void fillMasterStatus(Status& status) const;
+  void fillNamedLinesStatus(Status& status) const;
   void fillStateFileStatus(Status& status) const;
   void fillRecorderStatus(Status& status) const;
 

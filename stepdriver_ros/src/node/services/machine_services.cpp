@@ -9,6 +9,7 @@
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/PlanPath.h>
 #include <stepdriver/RigReport.h>
+#include <stepdriver/SetOutput.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <chrono>
@@ -141,6 +142,7 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
       "resume",
       triggerHandler("the hold is over: held motions continue", [&machine] { machine.resume(); })));
   advertiseSpeedOverride(machine);
+  advertiseSetOutput(machine);
   advertiseCoordinatedMoves(machine);
 }
 
@@ -207,6 +209,19 @@ void MachineServices::advertiseSpeedOverride(machine::Machine& machine) {
   servers_.push_back(node_.advertiseService("speed_override", handler));
 }
 
+// A call may wait for the least time of its output, and delays no other.
+void MachineServices::advertiseSetOutput(machine::Machine& machine) {
+  const boost::function<bool(SetOutput::Request&, SetOutput::Response&)> handler =
+      [&machine](SetOutput::Request& request, SetOutput::Response& response) {
+        return respond(response, [&] {
+          machine.setOutput(request.name, request.on != 0);
+          response.message = fmt::format("{} is {}", request.name, request.on != 0 ? "on" : "off");
+        });
+      };
+  node_.setCallbackQueue(&queues_.outputs());
+  servers_.push_back(node_.advertiseService("set_output", handler));
+}
+
 void MachineServices::advertiseRig(setup::Simulation& simulation) {
   const boost::function<bool(RigReport::Request&, RigReport::Response&)> handler =
       [&simulation](RigReport::Request& /*request*/, RigReport::Response& response) {
@@ -230,12 +245,28 @@ void MachineServices::advertiseRig(setup::Simulation& simulation) {
         });
       };
   servers_.push_back(node_.advertiseService("rig/emergency_stop", press));
+  for (const config::InputConfig& input : simulation.inputs()) {
+    advertiseInput(simulation, input.name);
+  }
   for (const config::AxisConfig& axis : simulation.axes()) {
     if (axis.hasEndstop(false))
       advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMin);
     if (axis.hasEndstop(true))
       advertiseEndstop(simulation, axis.name, setup::Simulation::End::kMax);
   }
+}
+
+void MachineServices::advertiseInput(setup::Simulation& simulation, const std::string& name) {
+  using Press = std_srvs::SetBool;
+  const boost::function<bool(Press::Request&, Press::Response&)> press =
+      [&simulation, name](Press::Request& request, Press::Response& response) {
+        return respond(response, [&] {
+          simulation.pressInput(name, request.data != 0);
+          response.message =
+              fmt::format("the input {} is {}", name, request.data != 0 ? "pressed" : "released");
+        });
+      };
+  servers_.push_back(node_.advertiseService("rig/inputs/" + name, press));
 }
 
 void MachineServices::advertiseEndstop(setup::Simulation& simulation, const std::string& axis,

@@ -26,6 +26,8 @@ class MachineServices {
  private:
   void advertiseEndstop(setup::Simulation& simulation, const std::string& axis,
                         setup::Simulation::End end);
+  void advertiseInput(setup::Simulation& simulation, const std::string& name);
+  void advertiseSetOutput(machine::Machine& machine);
   void advertiseSpeedOverride(machine::Machine& machine);
   void advertiseCoordinatedMoves(machine::Machine& machine);
 

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "stepdriver_core/config/axis_config.h"
+
+/// Lines with a name, which belong to a machine and to none of its axes.
+namespace stepdriver::config {
+
+/// An output: a relay, a pump, a laser, the magnet that lifts a pen.
+struct OutputConfig {
+  std::string name;
+  std::string line;
+  bool active_level = true;  ///< level of the line while the output is on
+  bool initial = false;      ///< whether it is on from the start of the machine
+  /// Whether Machine::stop() switches it on or off; empty: it stays as it is.
+  std::optional<bool> at_stop;
+  /// Whether it is on in its safe state: at an emergency stop and at a fault of any axis until
+  /// recover(), from the beginning of a shutdown on, and before and after the machine has the line.
+  /// A pull resistor should give the line that level.
+  bool at_fault = false;
+  /// [ns] It is switched off when it has been on for this long; empty: it may stay on.
+  std::optional<std::int64_t> max_on_ns;
+  /// [ns] How long it stays on, or off, at least. The safe state doesn't wait for that.
+  std::int64_t min_on_ns = 0;
+  std::int64_t min_off_ns = 0;
+
+  bool level(bool on) const { return on == active_level; }
+};
+
+/// An input: a sensor, a probe, a button.
+struct InputConfig {
+  std::string name;
+  InputSwitch line;
+  /// [ns] A change counts when the level has stayed for this long; 0: each level that is read.
+  std::int64_t debounce_ns = 0;
+};
+
+}  // namespace stepdriver::config

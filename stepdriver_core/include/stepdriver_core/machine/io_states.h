@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::machine {
+
+/// The state of an output with a name.
+struct OutputState {
+  std::string name;
+  bool on = false;  ///< as its line was written last
+  /// On the clock of the machine, when that write had ended; empty: it has not changed since the
+  /// start.
+  std::optional<pulse::Nanoseconds> changed;
+  std::string note;   ///< why it was switched off by itself; empty until that happens
+  std::string error;  ///< why its line could not be written, so that `on` isn't certain
+};
+
+/// The state of an input with a name.
+struct InputState {
+  std::string name;
+  bool active = false;
+  /// On the clock of the machine: the time of the edge, or of the reading if no edge was reported.
+  /// Empty: it has not changed since the start.
+  std::optional<pulse::Nanoseconds> changed;
+  std::string error;  ///< why it can't be read: `active` is then the last reading
+};
+
+/// The lines with a name, in the order of the configuration.
+struct IoStates {
+  std::vector<OutputState> outputs;
+  std::vector<InputState> inputs;
+};
+
+inline bool operator==(const OutputState& one, const OutputState& other) {
+  return one.name == other.name && one.on == other.on && one.changed == other.changed &&
+         one.note == other.note && one.error == other.error;
+}
+inline bool operator==(const InputState& one, const InputState& other) {
+  return one.name == other.name && one.active == other.active && one.changed == other.changed &&
+         one.error == other.error;
+}
+inline bool operator==(const IoStates& one, const IoStates& other) {
+  return one.outputs == other.outputs && one.inputs == other.inputs;
+}
+inline bool operator!=(const IoStates& one, const IoStates& other) { return !(one == other); }
+
+}  // namespace stepdriver::machine

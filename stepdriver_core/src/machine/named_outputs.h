@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "activity/context.h"
+#include "stepdriver_core/config/io_config.h"
+#include "stepdriver_core/machine/io_states.h"
+
+namespace stepdriver::machine {
+
+/// An output with a name: whether it is to be on, and the only place that knows whether it is. Its
+/// line is requested in its safe state.
+class NamedOutput {
+ public:
+  /// @param line its index in the request.
+  NamedOutput(const config::OutputConfig& config, int line);
+
+  const std::string& name() const { return config_.name; }
+  const OutputState& state() const { return state_; }
+  const config::OutputConfig& config() const { return config_; }
+
+  /// Switches it, as soon as its least times allow.
+  ///
+  /// @param call is answered when that is done, or with the reason if something else comes first.
+  void set(bool on, const activity::SharedCall& call);
+  /// Switches it as it begins. @param call is answered when that is done, and doesn't fail if its
+  ///   safe state comes first.
+  void begin(const activity::SharedCall& call);
+  /// Writes a line that has failed once more. @param call is answered when that is done.
+  void retry(const activity::SharedCall& call);
+  /// @param call is answered when no write is in progress; it fails if the line has failed.
+  void await(const activity::SharedCall& call);
+
+  /// Something may have happened.
+  ///
+  /// @param why_safe why it must be in its safe state; empty: it needn't.
+  /// @return why its line could not be written; empty if nothing went wrong.
+  std::string poll(activity::Context& context, const std::string& why_safe);
+  /// Clock time by which poll() must be called.
+  pulse::Nanoseconds due() const;
+  bool isBeingWritten() const { return job_.has_value(); }
+
+ private:
+  struct Job {
+    std::uint64_t id = 0;
+    bool on = false;
+    bool safe = false;
+    pulse::Nanoseconds began = 0;
+  };
+
+  std::string endWrite(activity::Context& context);
+  void write(activity::Context& context, bool safe);
+  void refuseCalls(const std::string& why);
+  bool mustGoOff(pulse::Nanoseconds now) const;
+  pulse::Nanoseconds mayChange() const;
+
+  config::OutputConfig config_;
+  int line_;
+  bool wanted_;
+  OutputState state_;
+  bool certain_ = true;                      // that the line has the level of that state
+  bool gave_up_ = false;                     // to write the safe state, until retry()
+  pulse::Nanoseconds on_since_ = 0;          // when the write that switched it on began
+  bool may_wait_ = false;                    // for its least times
+  std::optional<Job> job_;                   // being written
+  std::vector<activity::SharedCall> calls_;  // wait until it is as wanted
+  std::vector<activity::SharedCall>
+      write_calls_;  // wait for the end of the next write, if there is one
+};
+
+/// All outputs with a name of a machine.
+class NamedOutputs {
+ public:
+  NamedOutputs() = default;
+  /// @param lines of each, by its index in the request.
+  NamedOutputs(const std::vector<config::OutputConfig>& outputs, const std::vector<int>& lines);
+
+  /// Switches each as it begins. @param call is answered when that is done.
+  void begin(const activity::SharedCall& call);
+  /// @throw Refused if there is no such output; it names those that there are.
+  void set(const std::string& name, bool on, const activity::SharedCall& call);
+  /// The machine is stopped.
+  void stop();
+  /// See NamedOutput.
+  void retry(const activity::SharedCall& call);
+  void await(const activity::SharedCall& call);
+  std::string poll(activity::Context& context, const std::string& why_safe);
+  pulse::Nanoseconds due() const;
+  bool areBeingWritten() const;
+  std::vector<OutputState> states() const;
+  bool empty() const { return outputs_.empty(); }
+
+ private:
+  std::vector<NamedOutput> outputs_;
+};
+
+}  // namespace stepdriver::machine

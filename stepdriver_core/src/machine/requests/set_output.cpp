@@ -1,0 +1,21 @@
+#include "set_output.h"
+
+#include <fmt/format.h>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/printable.h"
+
+namespace stepdriver::machine {
+
+std::string SetOutput::text(const AxisWords& /*axes*/) const {
+  return fmt::format("switch {} {}", printable(name), on ? "on" : "off");
+}
+
+void SetOutput::serve(RequestContext& machine, const SharedCall& call) const {
+  const std::string why = machine.whySafe();
+  if (!why.empty()) throw Refused(fmt::format("the output {}: {}", printable(name), why));
+  machine.refuseWhileEmergencyStopInput();
+  machine.named.outputs.set(name, on, call);
+}
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "request_context.h"
+
+namespace stepdriver::machine {
+
+/// Machine::setOutput()
+struct SetOutput {
+  std::string name;
+  bool on = false;
+
+  static constexpr bool kReadsInputs = true;
+  std::string text(const AxisWords& axes) const;
+  void serve(RequestContext& machine, const SharedCall& call) const;
+};
+
+}  // namespace stepdriver::machine

@@ -1,0 +1,161 @@
+#include "config/read_io.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "support/config_map.h"
+
+namespace stepdriver::config {
+namespace {
+
+ConfigValue machineWith(const std::string& path, ConfigValue value) {
+  ConfigValue machine = mapOf({});
+  put(machine, "outputs/pen/pin", std::string("A"));
+  put(machine, "inputs/probe/pin", std::string("B"));
+  put(machine, "inputs/probe/active_level", std::string("low"));
+  if (!path.empty()) put(machine, path, std::move(value));
+  return machine;
+}
+
+/// What was read, and the issues with it.
+struct Read {
+  explicit Read(const ConfigValue& machine) {
+    ConfigReader reader(machine, "", issues);
+    UsedLines used(issues);
+    outputs = readOutputs(reader, used);
+    inputs = readInputs(reader, used);
+  }
+  std::vector<ConfigIssue> issues;
+  std::vector<OutputConfig> outputs;
+  std::vector<InputConfig> inputs;
+};
+
+std::string issueOf(const std::string& path, ConfigValue value) {
+  const Lines lines = linesOf(Read(machineWith(path, std::move(value))).issues);
+  return lines.size() == 1 ? lines.front() : std::to_string(lines.size()) + " issues";
+}
+
+TEST(ReadIo, HasDefaultsThatSwitchNothing) {
+  const Read read(machineWith("", {}));
+  EXPECT_EQ(linesOf(read.issues), Lines());
+  ASSERT_EQ(read.outputs.size(), 1U);
+  const OutputConfig& pen = read.outputs.front();
+  EXPECT_EQ(pen.name, "pen");
+  EXPECT_EQ(pen.line, "A");
+  EXPECT_TRUE(pen.active_level);
+  EXPECT_FALSE(pen.initial);
+  EXPECT_FALSE(pen.at_stop);
+  EXPECT_FALSE(pen.at_fault);
+  EXPECT_FALSE(pen.max_on_ns);
+  EXPECT_EQ(pen.min_on_ns, 0);
+  EXPECT_EQ(pen.min_off_ns, 0);
+  ASSERT_EQ(read.inputs.size(), 1U);
+  EXPECT_EQ(read.inputs.front().name, "probe");
+  EXPECT_EQ(read.inputs.front().line.line, "B");
+  EXPECT_FALSE(read.inputs.front().line.active_level);
+  EXPECT_EQ(read.inputs.front().debounce_ns, 0);
+  const Read none{ConfigValue(mapOf({}))};
+  EXPECT_TRUE(none.outputs.empty() && none.inputs.empty() && none.issues.empty());
+}
+
+TEST(ReadIo, TakesOnAndOffWithAndWithoutQuotes) {
+  for (const ConfigValue& on : {ConfigValue(true), ConfigValue("on")}) {
+    EXPECT_TRUE(Read(machineWith("outputs/pen/initial", on)).outputs.front().initial);
+    EXPECT_TRUE(Read(machineWith("outputs/pen/at_fault", on)).outputs.front().at_fault);
+    EXPECT_EQ(Read(machineWith("outputs/pen/at_stop", on)).outputs.front().at_stop, true);
+    EXPECT_TRUE(Read(machineWith("outputs/pen/at_stop", on)).issues.empty());
+  }
+  EXPECT_EQ(Read(machineWith("outputs/pen/at_stop", false)).outputs.front().at_stop, false);
+  EXPECT_EQ(Read(machineWith("outputs/pen/at_stop", "keep")).outputs.front().at_stop, std::nullopt);
+}
+
+TEST(ReadIo, TakesBothEndsOfEachRange) {
+  const auto pen = [](const char* key, double value) {
+    const Read read(machineWith(std::string("outputs/pen/") + key, value));
+    EXPECT_EQ(linesOf(read.issues), Lines()) << key << " " << value;
+    return read.outputs.front();
+  };
+  EXPECT_EQ(pen("max_on_s", 0.001).max_on_ns, 1'000'000);
+  EXPECT_EQ(pen("max_on_s", 86'400.0).max_on_ns, 86'400'000'000'000);
+  EXPECT_EQ(pen("min_on_ms", 0.0).min_on_ns, 0);
+  EXPECT_EQ(pen("min_on_ms", 60'000.0).min_on_ns, 60'000'000'000);
+  EXPECT_EQ(pen("min_off_ms", 60'000.0).min_off_ns, 60'000'000'000);
+  EXPECT_EQ(Read(machineWith("inputs/probe/debounce_ms", 1000)).inputs.front().debounce_ns,
+            1'000'000'000);
+}
+
+TEST(ReadIo, NamesWhatIsWrongItsValueAndWhatIsAllowed) {
+  EXPECT_EQ(issueOf("outputs/pen/max_on_s", 0.0),
+            "/outputs/pen/max_on_s: is 0.0, but must be from 0.001 to 86400");
+  EXPECT_EQ(issueOf("outputs/pen/max_on_s", 86'401.0),
+            "/outputs/pen/max_on_s: is 86401.0, but must be from 0.001 to 86400");
+  EXPECT_EQ(issueOf("outputs/pen/min_on_ms", -1.0),
+            "/outputs/pen/min_on_ms: is -1.0, but must be from 0 to 60000");
+  EXPECT_EQ(issueOf("outputs/pen/min_off_ms", 60'001.0),
+            "/outputs/pen/min_off_ms: is 60001.0, but must be from 0 to 60000");
+  EXPECT_EQ(issueOf("inputs/probe/debounce_ms", 1001.0),
+            "/inputs/probe/debounce_ms: is 1001.0, but must be from 0 to 1000");
+  EXPECT_EQ(issueOf("outputs/pen/active_level", "on"),
+            "/outputs/pen/active_level: is \"on\", but must be low or high");
+  EXPECT_EQ(issueOf("outputs/pen/initial", "high"),
+            "/outputs/pen/initial: is \"high\", but must be off or on");
+  EXPECT_EQ(issueOf("outputs/pen/at_stop", "hold"),
+            "/outputs/pen/at_stop: is \"hold\", but must be keep, off or on");
+  EXPECT_EQ(
+      issueOf("outputs/pen/pin", "a b"),
+      "/outputs/pen/pin: is \"a b\", but must be a line: chip:offset, as \"gpiochip0:17\", or "
+      "a line's name");
+  EXPECT_EQ(issueOf("outputs/pen/max_on", 1.0),
+            "/outputs/pen/max_on: is not known; did you mean max_on_s?");
+  EXPECT_EQ(issueOf("inputs/probe/pin", "A"),
+            "/inputs/probe/pin: is \"A\", which is used twice: it is /outputs/pen/pin already, and "
+            "each pin needs a line of its own");
+  EXPECT_EQ(
+      issueOf("outputs/1st/pin", "C"),
+      "/outputs/1st: has the name \"1st\", but the name of an output must begin with a letter "
+      "and continue with letters, digits and _ only");
+  EXPECT_EQ(issueOf("outputs/pen", 5), "/outputs/pen: is 5 (an integer), but must be a map");
+}
+
+TEST(ReadIo, RefusesAnOutputThatMayNotBeOnForLongIfItsSafeStateIsOn) {
+  ConfigValue machine = machineWith("outputs/pen/max_on_s", 2.0);
+  put(machine, "outputs/pen/at_fault", std::string("on"));
+  EXPECT_EQ(linesOf(Read(machine).issues),
+            Lines{"/outputs/pen/max_on_s: is 2.0, but /outputs/pen/at_fault is \"on\": in its safe "
+                  "state the output is on for any time"});
+  ConfigValue longer = machineWith("outputs/pen/max_on_s", 2.0);
+  put(longer, "outputs/pen/min_on_ms", 2000.0);
+  EXPECT_EQ(linesOf(Read(longer).issues), Lines());
+  put(longer, "outputs/pen/min_on_ms", 2000.001);
+  EXPECT_EQ(linesOf(Read(longer).issues),
+            Lines{"/outputs/pen/max_on_s: is 2.0, but /outputs/pen/min_on_ms is 2000.001: the "
+                  "output can't stay on for longer than it may"});
+}
+
+TEST(ReadIo, ReadsWhatItWrites) {
+  OutputConfig pen{"pen", "A", false, true, false, false, 2'500'000'000, 1'500'000, 2'000'000};
+  OutputConfig lamp{"lamp", "B", true, false, true, true, {}, 0, 0};
+  InputConfig probe{"probe", {"C", true, Bias::kPullUp}, 2'500'000};
+  const ConfigValue machine =
+      mapOf({{"outputs", writeOutputs({pen, lamp})}, {"inputs", writeInputs({probe})}});
+  const Read read(machine);
+  EXPECT_EQ(linesOf(read.issues), Lines());
+  ASSERT_EQ(read.outputs.size(), 2U);
+  EXPECT_EQ(read.outputs[1].name, "pen");
+  EXPECT_EQ(read.outputs[1].level(true), false);
+  EXPECT_TRUE(read.outputs[1].initial);
+  EXPECT_EQ(read.outputs[1].at_stop, false);
+  EXPECT_EQ(read.outputs[1].max_on_ns, pen.max_on_ns);
+  EXPECT_EQ(read.outputs[1].min_on_ns, pen.min_on_ns);
+  EXPECT_EQ(read.outputs[1].min_off_ns, pen.min_off_ns);
+  EXPECT_TRUE(read.outputs[0].at_fault);
+  EXPECT_EQ(read.outputs[0].at_stop, true);
+  ASSERT_EQ(read.inputs.size(), 1U);
+  EXPECT_EQ(read.inputs[0].line.bias, Bias::kPullUp);
+  EXPECT_EQ(read.inputs[0].debounce_ns, probe.debounce_ns);
+}
+
+}  // namespace
+}  // namespace stepdriver::config

@@ -1,0 +1,418 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/recording.h"
+#include "stepdriver_core/setup/simulation.h"
+#include "support/bench.h"
+#include "support/constants.h"
+#include "support/refusal.h"
+
+// Outputs and inputs with a name.
+
+namespace stepdriver {
+namespace {
+
+using machine::EmergencyDisable;
+using machine::OutputState;
+using test::Bench;
+using test::kMillisecond;
+using test::linearAxis;
+
+constexpr std::int64_t kSecond = 1'000 * kMillisecond;
+
+config::OutputConfig output(const std::string& name) {
+  config::OutputConfig config;
+  config.name = name;
+  config.line = name + ".line";
+  return config;
+}
+
+config::InputConfig input(const std::string& name) {
+  config::InputConfig config;
+  config.name = name;
+  config.line = config::InputSwitch{name + ".line", false};
+  return config;
+}
+
+/// A pen that is lifted by its magnet, and a clamp that holds without current.
+class NamedLines : public testing::Test {
+ protected:
+  NamedLines() {
+    options.outputs = {output("pen"), output("clamp")};
+    options.outputs[1].active_level = false;
+    options.outputs[1].at_fault = true;
+    options.inputs = {input("probe")};
+    options.emergency_stop = config::InputSwitch{"button", true};
+    options.record_seconds = 60.0;
+  }
+
+  void begin(bool threaded = false) {
+    bench = std::make_unique<Bench>(axes, Bench::rigAxes(axes), threaded, 0.0, options);
+  }
+
+  const config::OutputConfig& pen() { return options.outputs[0]; }
+  OutputState state(std::size_t number = 0) const {
+    return bench->machine->ioStates().outputs.at(number);
+  }
+  /// Whether an output is on, by its line on the rig.
+  bool isOn(std::size_t number = 0) const {
+    const config::OutputConfig& config = options.outputs.at(number);
+    const bool on = bench->rig.outputLevel(config.line) == config.active_level;
+    EXPECT_EQ(state(number).on, on) << config.name;
+    return on;
+  }
+  void expectSafe() const {
+    for (std::size_t i = 0; i < options.outputs.size(); ++i) {
+      EXPECT_EQ(isOn(i), options.outputs[i].at_fault) << options.outputs[i].name;
+    }
+  }
+  void unsafe() {
+    bench->machine->setOutput("pen", true);
+    bench->machine->setOutput("clamp", false);
+    ASSERT_TRUE(isOn(0));
+    ASSERT_FALSE(isOn(1));
+  }
+  /// Times at which the pen was switched.
+  std::vector<std::int64_t> switched(bool on) const {
+    return bench->trace->times("outputs", "pen", on == options.outputs[0].active_level);
+  }
+  std::string fault() const { return bench->machine->axis("x").state().fault; }
+
+  std::vector<config::AxisConfig> axes{linearAxis("x"), linearAxis("y")};
+  machine::MachineOptions options;
+  std::unique_ptr<Bench> bench;
+};
+
+TEST_F(NamedLines, OutputsBeginAsConfiguredAndAreSwitchedByName) {
+  options.outputs[0].initial = true;
+  begin();
+  EXPECT_TRUE(isOn(0));
+  EXPECT_FALSE(isOn(1)) << "its safe state is only the one before the start";
+  bench->machine->advance(1.0);
+  const std::int64_t before = bench->clock.now();
+  bench->machine->setOutput("pen", false);
+  EXPECT_FALSE(isOn(0));
+  EXPECT_EQ(state().changed, before);
+  EXPECT_EQ(switched(false), std::vector<std::int64_t>{before});
+  bench->machine->setOutput("pen", false);
+  EXPECT_EQ(state().changed, before);
+}
+
+TEST_F(NamedLines, UnknownNamesAreRefusedWithThoseThatThereAre) {
+  begin();
+  EXPECT_REFUSED(bench->machine->setOutput("pan", true),
+                 "there is no output pan; there are pen, clamp");
+  EXPECT_REFUSED(bench->machine->setOutput("", true), "there is no output ");
+  EXPECT_REFUSED(bench->machine->setOutput("probe", true), "there is no output probe");
+  options.outputs.clear();
+  begin();
+  EXPECT_REFUSED(bench->machine->setOutput("pen", true),
+                 "there is no output pen: none is configured");
+}
+
+TEST_F(NamedLines, OutputsAreSafeWhenAnEmergencyStopIsAnsweredAndStaySoAfterRecover) {
+  begin();
+  unsafe();
+  const axis::Move move = bench->axis().moveTo(0.05);
+  bench->machine->advance(0.3);
+  const std::int64_t asked = bench->clock.now();
+  bench->machine->emergencyStop();
+  expectSafe();
+  EXPECT_LE(*state().changed - asked, kMillisecond);
+  EXPECT_REFUSED(bench->machine->setOutput("pen", true),
+                 "the output pen: x is at fault: emergency stop; call recover first");
+  bench->machine->recover();
+  bench->machine->advance(1.0);
+  expectSafe();
+  bench->machine->setOutput("pen", true);
+  EXPECT_TRUE(isOn());
+  EXPECT_EQ(bench->axis().wait(move).end, axis::MoveEnd::kEmergencyStop);
+}
+
+TEST_F(NamedLines, OutputsAreSafeFromTheBeginningOfARampOn) {
+  options.emergency_disable = EmergencyDisable::kRamp;
+  begin();
+  unsafe();
+  bench->axis().moveTo(0.05);
+  bench->machine->advance(0.3);
+  const std::int64_t asked = bench->clock.now();
+  bench->machine->emergencyStop();
+  EXPECT_GT(bench->clock.now() - asked, 90 * kMillisecond) << "0.1 m/s at 1 m/s^2";
+  EXPECT_LE(*state(0).changed - asked, kMillisecond);
+  EXPECT_LE(*state(1).changed - asked, kMillisecond);
+  expectSafe();
+}
+
+TEST_F(NamedLines, OutputsAreSafeAfterTheButtonAndAFaultOfOneAxis) {
+  begin();
+  unsafe();
+  bench->rig.setInput("button", true, bench->clock.now());
+  EXPECT_REFUSED(bench->machine->setOutput("pen", true), "emergency stop input");
+  bench->machine->advance(0.001);
+  expectSafe();
+  bench->rig.setInput("button", false, bench->clock.now());
+  bench->machine->recover();
+  unsafe();
+  bench->rig.failWrites("y.step", 0, EIO);
+  bench->move(0.01, "y");
+  expectSafe();
+  EXPECT_EQ(fault(), "");
+  EXPECT_REFUSED(bench->machine->setOutput("pen", true), "y is at fault: the STEP line");
+}
+
+TEST_F(NamedLines, NothingIsSwitchedOnAtTheStartWhileTheButtonIsPressed) {
+  options.outputs[0].initial = true;
+  options.threaded = false;
+  pulse::VirtualClock clock;
+  sim::Rig rig(Bench::rigAxes(axes), nullptr, {}, {}, Bench::ioOf(options));
+  rig.setInput("button", true, 0);
+  gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
+  machine::Machine machine(axes, backend, clock, options);
+  machine.advance(0.1);
+  EXPECT_FALSE(machine.ioStates().outputs[0].changed);
+  EXPECT_EQ(rig.outputLevel(pen().line), false);
+  rig.setInput("button", false, clock.now());
+  machine.recover();
+  machine.advance(0.1);
+  EXPECT_EQ(rig.outputLevel(pen().line), false) << "recover switches nothing on";
+}
+
+TEST_F(NamedLines, AStopSwitchesOnlyWhatIsConfiguredSo) {
+  options.outputs[0].at_stop = false;
+  options.outputs.push_back(output("light"));
+  options.outputs.back().at_stop = true;
+  begin();
+  unsafe();
+  bench->machine->stop();
+  bench->machine->advance(0.001);
+  EXPECT_FALSE(isOn(0));
+  EXPECT_FALSE(isOn(1)) << "it keeps its state, which is not its safe one";
+  EXPECT_TRUE(isOn(2));
+  unsafe();
+  bench->machine->hold();
+  bench->axis().stop();
+  bench->machine->advance(1.0);
+  EXPECT_TRUE(isOn(0)) << "neither a hold nor the stop of one axis is a stop of the machine";
+  bench->machine->setOutput("pen", true);
+}
+
+TEST_F(NamedLines, AnOutputIsSwitchedOffAfterItsLongestTimeToTheNanosecond) {
+  options.outputs[0].max_on_ns = 2 * kSecond;
+  begin();
+  bench->machine->setOutput("pen", true);
+  const std::int64_t on = *state().changed;
+  bench->machine->advance(1.5);
+  bench->machine->setOutput("pen", true);
+  EXPECT_EQ(state().note, "");
+  bench->machine->advance(0.5);
+  EXPECT_FALSE(isOn()) << "a call for the state that it has doesn't prolong it";
+  EXPECT_EQ(switched(false), std::vector<std::int64_t>{on + 2 * kSecond});
+  EXPECT_EQ(state().note,
+            "was switched off: it had been on for 2 s, the most that max_on_s allows");
+  EXPECT_EQ(fault(), "");
+  bench->machine->setOutput("pen", true);
+  EXPECT_EQ(state().note, "");
+  EXPECT_TRUE(isOn());
+}
+
+TEST_F(NamedLines, LeastTimesDelayASwitchButNotTheSafeState) {
+  options.outputs[0].min_on_ns = 300 * kMillisecond;
+  options.outputs[0].min_off_ns = 100 * kMillisecond;
+  begin();
+  bench->machine->setOutput("pen", true);
+  const std::int64_t on = *state().changed;
+  bench->machine->setOutput("pen", false);
+  EXPECT_EQ(switched(false).back() - on, 300 * kMillisecond);
+  bench->machine->setOutput("pen", true);
+  EXPECT_EQ(switched(true).back() - switched(false).back(), 100 * kMillisecond);
+  bench->machine->emergencyStop();
+  expectSafe();
+  EXPECT_EQ(switched(false).back(), switched(true).back());
+}
+
+TEST_F(NamedLines, ACallThatWaitsForALeastTimeEndsWithWhatComesFirst) {
+  options.outputs[0].min_on_ns = 60 * kSecond;
+  begin(true);
+  bench->machine->setOutput("pen", true);
+  auto off = std::async(std::launch::async, [&] {
+    return test::refusal([&] { bench->machine->setOutput("pen", false); });
+  });
+  // In virtual time the wait has a length only if the clock doesn't run: it ends by either.
+  bench->machine->emergencyStop();
+  const std::string message = off.get();
+  EXPECT_TRUE(message.empty() || message.find("emergency stop") != std::string::npos) << message;
+  expectSafe();
+}
+
+TEST_F(NamedLines, ALineThatFailsIsAFaultOfEveryAxisAndRecoverWritesItAgain) {
+  begin();
+  bench->axis().setPosition(0.0);
+  const axis::Move move = bench->axis().moveTo(0.05);
+  bench->machine->advance(0.3);
+  bench->rig.failWrites("pen.line", 0, EIO);
+  try {
+    bench->machine->setOutput("pen", true);
+    FAIL() << "it was not written";
+  } catch (const GpioError& error) {
+    EXPECT_STREQ(error.what(),
+                 "the line pen.line of the output pen can't be written: EIO, input/output error; "
+                 "check the cable and the supply of its chip");
+  }
+  EXPECT_EQ(fault().find("the line pen.line of the output pen can't be written"), 0U) << fault();
+  EXPECT_EQ(bench->axis("y").state().fault, fault());
+  EXPECT_EQ(bench->axis().wait(move).end, axis::MoveEnd::kFault);
+  EXPECT_TRUE(bench->axis().state().position_valid) << "it decelerates";
+  EXPECT_TRUE(isOn(1));
+  EXPECT_NE(state().error, "");
+  EXPECT_THROW(bench->machine->recover(), Error);
+  EXPECT_NE(fault(), "");
+  bench->rig.clearWriteFault("pen.line");
+  bench->machine->recover();
+  EXPECT_EQ(fault(), "");
+  EXPECT_EQ(state().error, "");
+  bench->machine->setOutput("pen", true);
+  EXPECT_TRUE(isOn());
+}
+
+// The safe state is written although the write before it has failed.
+TEST_F(NamedLines, ALineThatFailsOnceIsInItsSafeStateAfterIt) {
+  begin();
+  bench->machine->setOutput("pen", true);
+  bench->machine->setOutput("clamp", true);
+  bench->rig.failWrites("clamp.line", 0, EIO);
+  EXPECT_THROW(bench->machine->setOutput("clamp", false), GpioError);
+  EXPECT_FALSE(isOn(0)) << "it is safe as well";
+  bench->machine->emergencyStop();
+  bench->rig.clearWriteFault("clamp.line");
+  bench->machine->recover();
+  expectSafe();
+}
+
+TEST_F(NamedLines, AShutdownAndTheEndOfTheMachineLeaveTheSafeState) {
+  begin();
+  unsafe();
+  bench->axis().moveTo(0.05);
+  bench->machine->advance(0.3);
+  const std::int64_t closed = bench->clock.now();
+  bench->machine->shutdown();
+  EXPECT_EQ(*state().changed, closed) << "not only when the axes are at rest";
+  expectSafe();
+  EXPECT_REFUSED(bench->machine->setOutput("pen", true), "shut down");
+  begin();
+  unsafe();
+  bench->machine.reset();
+  EXPECT_EQ(bench->rig.outputLevel("pen.line"), false);
+  EXPECT_EQ(bench->rig.outputLevel("clamp.line"), false);
+}
+
+TEST_F(NamedLines, AreInTheFlightRecorder) {
+  begin();
+  unsafe();
+  const machine::Recording recording = bench->machine->recording();
+  int found = 0;
+  for (const machine::Recording::Pin& pin : recording.pins) {
+    if (pin.axis != "outputs") continue;
+    ++found;
+    const auto edges = std::count_if(
+        recording.edges.begin(), recording.edges.end(),
+        [&](const machine::Recording::Edge& edge) { return edge.output == pin.output; });
+    EXPECT_GE(edges, 1) << pin.name;
+  }
+  EXPECT_EQ(found, 2);
+  const bool told = std::any_of(
+      recording.events.begin(), recording.events.end(),
+      [](const auto& event) { return event.text.find("switch pen on") != std::string::npos; });
+  EXPECT_TRUE(told);
+}
+
+TEST_F(NamedLines, WrongOnesOfAProgramAreRefused) {
+  options.outputs[1].line = "x.step";
+  options.inputs.push_back(input("probe"));
+  options.outputs[0].max_on_ns = 0;
+  try {
+    begin();
+    FAIL() << "it has begun";
+  } catch (const ConfigError& error) {
+    const std::string text = error.what();
+    for (const char* words : {"outputs/clamp/pin", "used twice", "inputs/probe", "given twice",
+                              "outputs/pen/max_on_s", "must be from 0.001 to 86400"}) {
+      EXPECT_NE(text.find(words), std::string::npos) << words << " in " << text;
+    }
+  }
+}
+
+// ---- inputs ----
+
+TEST_F(NamedLines, AnInputIsReadAtTheStartAndItsEdgesGiveTheTimes) {
+  begin();
+  EXPECT_FALSE(bench->machine->ioStates().inputs[0].active);
+  EXPECT_FALSE(bench->machine->ioStates().inputs[0].changed);
+  bench->machine->advance(0.5);
+  const std::int64_t pressed = bench->clock.now();
+  bench->rig.pressInput("probe", true, pressed);
+  bench->machine->advance(0.2);
+  EXPECT_TRUE(bench->machine->ioStates().inputs[0].active);
+  EXPECT_EQ(bench->machine->ioStates().inputs[0].changed, pressed);
+  bench->rig.pressInput("probe", false, bench->clock.now());
+  bench->machine->advance(0.001);
+  EXPECT_FALSE(bench->machine->ioStates().inputs[0].active);
+}
+
+TEST_F(NamedLines, AShortGlitchIsNoChangeWithADebounce) {
+  options.inputs[0].debounce_ns = 5 * kMillisecond;
+  begin();
+  bench->rig.pressInput("probe", true, bench->clock.now());
+  bench->machine->advance(0.004);
+  bench->rig.pressInput("probe", false, bench->clock.now());
+  bench->machine->advance(0.1);
+  EXPECT_FALSE(bench->machine->ioStates().inputs[0].changed);
+  const std::int64_t pressed = bench->clock.now();
+  bench->rig.pressInput("probe", true, pressed);
+  bench->machine->advance(0.004);
+  EXPECT_FALSE(bench->machine->ioStates().inputs[0].active);
+  bench->machine->advance(0.002);
+  EXPECT_TRUE(bench->machine->ioStates().inputs[0].active);
+  EXPECT_EQ(bench->machine->ioStates().inputs[0].changed, pressed);
+}
+
+// The rig reports the first edge only: all bounces are lost edges.
+TEST(NamedInput, ThatBouncesChangesOnceAtItsFirstEdge) {
+  const std::vector<config::AxisConfig> axes{linearAxis("x")};
+  machine::MachineOptions options;
+  options.threaded = false;
+  options.inputs = {input("probe")};
+  options.inputs[0].debounce_ns = 5 * kMillisecond;
+  setup::SimulationConfig config;
+  config.speed = 0.0;
+  config.inputs["probe"] = {false, 20, 0.7};
+  setup::Simulation simulation(axes, {}, {}, config, {}, options.inputs);
+  machine::Machine machine(axes, simulation.backend(), simulation.clock(), options);
+  int changes = 0;
+  machine::InputState before = machine.ioStates().inputs[0];
+  for (const bool pressed : {true, false, true}) {
+    const std::int64_t time = simulation.clock().now();
+    simulation.pressInput("probe", pressed);
+    for (int i = 0; i < 100; ++i) {
+      machine.advance(0.001);
+      const machine::InputState now = machine.ioStates().inputs[0];
+      if (now.active != before.active) ++changes;
+      before = now;
+    }
+    EXPECT_EQ(before.active, pressed);
+    EXPECT_EQ(before.changed, time);
+  }
+  EXPECT_EQ(changes, 3);
+}
+
+}  // namespace
+}  // namespace stepdriver

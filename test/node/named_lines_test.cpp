@@ -1,0 +1,148 @@
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <stepdriver/IoStates.h>
+#include <stepdriver/SetOutput.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "support/contents_of.h"
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/says.h"
+#include "support/wait.h"
+
+// Outputs and inputs with a name: service, topic, diagnostics and the rig.
+
+namespace stepdriver::node_test {
+namespace {
+
+class NamedLines : public testing::Test {
+ protected:
+  NamedLines() {
+    node.set("outputs/pen/pin", "pen");
+    node.set("outputs/pen/max_on_s", 3600.0);
+    node.set("outputs/relay/pin", "relay");
+    node.set("outputs/relay/initial", "on");
+    node.set("inputs/probe/pin", "probe");
+    node.set("inputs/probe/active_level", "low");
+    node.set("inputs/probe/debounce_ms", 5.0);
+    node.set("simulation/inputs/probe/bounces", 10);
+  }
+
+  SetOutput::Response set(const std::string& name, bool on) {
+    SetOutput::Request request;
+    request.name = name;
+    request.on = on;
+    return node.call<SetOutput>("set_output", request);
+  }
+  void press(bool pressed) {
+    std_srvs::SetBool::Request request;
+    request.data = pressed;
+    EXPECT_TRUE(node.call<std_srvs::SetBool>("rig/inputs/probe", request).success);
+  }
+
+  NodeUnderTest node;
+};
+
+TEST_F(NamedLines, AreSwitchedByAServiceAndShownByALatchedTopic) {
+  node.start();
+  const SetOutput::Response response = set("pen", true);
+  EXPECT_TRUE(response.success) << response.message;
+  EXPECT_EQ(response.message, "pen is on");
+  const Recorder<IoStates> states(node.full("io_states"));
+  ASSERT_TRUE(states.waitForLatest([](const IoStates& now) {
+    return now.output_name == std::vector<std::string>{"pen", "relay"} && now.output_on.at(0) &&
+           now.output_on.at(1);
+  })) << "a late subscriber sees them";
+  const IoStates first = states.messages().back();
+  EXPECT_GT(first.output_changed.at(0), ros::Time(0));
+  EXPECT_LE(first.output_changed.at(0), first.header.stamp);
+  EXPECT_EQ(first.input_name, std::vector<std::string>{"probe"});
+  EXPECT_FALSE(first.input_active.at(0));
+  EXPECT_EQ(first.input_changed.at(0), ros::Time(0));
+  const std::size_t before = states.count();
+  press(true);
+  EXPECT_TRUE(
+      states.waitForLatest([](const IoStates& now) { return now.input_active.at(0) != 0; }));
+  press(false);
+  EXPECT_TRUE(states.waitForLatest([](const IoStates& now) {
+    return !now.input_active.at(0) && now.input_changed.at(0) > ros::Time(0);
+  }));
+  EXPECT_LE(states.count() - before, 2U) << "bounces are no changes";
+}
+
+TEST_F(NamedLines, AreSafeAfterAnEmergencyStopAndRefusedUntilRecover) {
+  node.start();
+  const Recorder<IoStates> states(node.full("io_states"));
+  EXPECT_TRUE(set("pen", true).success);
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("emergency_stop").success);
+  EXPECT_TRUE(states.waitForLatest(
+      [](const IoStates& now) { return !now.output_on.at(0) && !now.output_on.at(1); }));
+  const SetOutput::Response refused = set("pen", true);
+  EXPECT_FALSE(refused.success);
+  expectSays(refused.message, "the output pen: x is at fault: emergency stop; call recover first");
+  EXPECT_TRUE(node.call<std_srvs::Trigger>("recover").success);
+  EXPECT_TRUE(set("pen", true).success);
+  const SetOutput::Response unknown = set("pan", true);
+  EXPECT_FALSE(unknown.success);
+  expectSays(unknown.message, "there is no output pan; there are pen, relay");
+}
+
+TEST_F(NamedLines, AreInTheDiagnosticsWithTheirErrors) {
+  node.set("simulation/outputs/pen/fail_write_after", 1);
+  node.start();
+  const Recorder<diagnostic_msgs::DiagnosticArray> reports("/diagnostics");
+  const auto shows = [&](int level, const std::string& words) {
+    return waitUntil([&] {
+      for (const auto& report : reports.messages()) {
+        for (const auto& status : report.status) {
+          const bool is_it = status.name.find("named lines") != std::string::npos &&
+                             status.level == level &&
+                             status.message.find(words) != std::string::npos;
+          if (is_it) return true;
+        }
+      }
+      return false;
+    });
+  };
+  EXPECT_TRUE(shows(diagnostic_msgs::DiagnosticStatus::OK, ""));
+  EXPECT_TRUE(set("pen", true).success);
+  const SetOutput::Response failed = set("pen", false);
+  EXPECT_FALSE(failed.success);
+  expectSays(failed.message, "the output pen can't be written: EIO");
+  EXPECT_TRUE(shows(diagnostic_msgs::DiagnosticStatus::ERROR, "the output pen can't be written"));
+}
+
+TEST_F(NamedLines, AreInTheTraceOfTheRig) {
+  const std::string trace = node.traced();
+  node.start();
+  EXPECT_TRUE(set("pen", true).success);
+  press(true);
+  node.rig();
+  const std::string text = test::contentsOf(trace);
+  for (const char* words : {"$scope module outputs", "$scope module inputs", " pen $end",
+                            " relay $end", " probe $end"}) {
+    expectSays(text, words);
+  }
+}
+
+TEST(WithoutNamedLines, TheServiceRefusesAndTheTopicIsEmpty) {
+  NodeUnderTest node;
+  node.start();
+  SetOutput::Request request;
+  request.name = "pen";
+  const SetOutput::Response response = node.call<SetOutput>("set_output", request);
+  EXPECT_FALSE(response.success);
+  expectSays(response.message, "there is no output pen: none is configured");
+  const Recorder<IoStates> states(node.full("io_states"));
+  EXPECT_TRUE(states.waitForLatest(
+      [](const IoStates& now) { return now.output_name.empty() && now.input_name.empty(); }));
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
