@@ -43,10 +43,11 @@ class AxisWords {
 class RequestContext {
  public:
   RequestContext(activity::Context& its_context, activity::Activities& its_activities,
-                 std::optional<pulse::Signal> emergency_stop_input, NamedLines lines_with_names)
+                 const std::optional<pulse::Signal>& emergency_stop_input,
+                 NamedLines lines_with_names)
       : context(its_context),
         activities(its_activities),
-        emergency_stop(std::move(emergency_stop_input)),
+        emergency_stop(emergency_stop_input),
         named(std::move(lines_with_names)) {}
 
   activity::Context& context;
