@@ -21,9 +21,9 @@ namespace {
 
 constexpr double kCoarsest = 20e3;  // microsteps/m
 constexpr double kFinest = 400e3;
-constexpr double kSlowest = 1e-3;     // m/s: 8 mm take 8 s
-constexpr double kLongestRamp = 5.0;  // s
-constexpr double kMostSteps = 10e3;   // of a motor, at full speed in the time of a ramp
+constexpr double kSlowest = 1e-3;        // m/s: 8 mm take 8 s
+constexpr double kLongestRamp = 5.0;     // s
+constexpr double kMostRampSteps = 10e3;  // of a motor, at full speed in the time of a ramp
 /// Of an axis if each motor makes one [microsteps]: a millimetre in the coarsest scale, as the rig
 /// has 25 mm.
 constexpr double kMostWay = 20.0;
@@ -44,7 +44,7 @@ double signOf(const Draw& draw) { return draw() < 0.5 ? -1.0 : 1.0; }
 void drawMotion(config::AxisConfig& axis, double fastest, double rate, const Draw& draw) {
   const double highest = config::kHighestAcceleration / axis.steps_per_unit;
   axis.max_speed = within(kSlowest, fastest, draw);
-  const double longest = std::min(kLongestRamp, kMostSteps / (axis.max_speed * rate));
+  const double longest = std::min(kLongestRamp, kMostRampSteps / (axis.max_speed * rate));
   const double lowest = axis.max_speed / longest;
   axis.acceleration = within(lowest, highest, draw);
   axis.deceleration = within(lowest, highest, draw);
