@@ -1124,7 +1124,8 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
 
 void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes, double first,
                                 double second) {
-  constexpr double kLongest = 30.0;     // s
+  // [s] Each of the lines: both end before kLongestCall with an override of 0.4 too.
+  constexpr double kLongest = 15.0;
   constexpr double kMostSize = 0.0005;  // m
   const double begin = std::min(kMostSize, kLongest * first);
   const double end = begin + std::min(kMostSize, kLongest * second);
