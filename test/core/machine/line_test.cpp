@@ -480,8 +480,8 @@ TEST_F(Line, RefusesWhatItCannotDoAndMovesNothing) {
   const auto refused = [&](const machine::LineRequest& request) {
     return refusal([&] { start(request); });
   };
-  EXPECT_EQ(refused({{}, {}}), "no axis is named; there are x, y, c");
-  EXPECT_EQ(refused({{"x", "q"}, {1.0, 1.0}}), "there is no axis q; there are x, y, c");
+  EXPECT_EQ(refused({{}, {}}), "no axis is named (axes: x, y, c)");
+  EXPECT_EQ(refused({{"x", "q"}, {1.0, 1.0}}), "there is no axis q (axes: x, y, c)");
   EXPECT_EQ(refused({{"x", "x"}, {1.0, 1.0}}), "the axis x is named twice");
   EXPECT_EQ(refused({{"x", "y"}, {1.0}}), "there are 2 names, but 1 positions");
   EXPECT_EQ(refused({{"x", "y"}, {1.0, std::nan("")}}),

@@ -39,7 +39,7 @@ TEST(Machine, NamesTheAxesThatThereAre) {
     bench.machine->axis("z");
     FAIL();
   } catch (const Refused& refused) {
-    EXPECT_STREQ(refused.what(), "there is no axis z; there are x, y");
+    EXPECT_STREQ(refused.what(), "there is no axis z (axes: x, y)");
   }
 }
 
