@@ -15,7 +15,7 @@ changes need, --ros and --core without their longest searches: about a quarter o
   --all   everything below but --soak, with the longest searches and the benchmarks of --core
   --lint  clang-format, clang-tidy and shellcheck on the project's own files; doxygen on the public
           headers; the keys of package.xml; the links of the pages, and the files that they name; the table of
-          their commands; the tests that docs/reliability.md names; the English of pages and comments
+          their commands; the tests that docs/reliability.md names; the spelling
   --core  stepdriver_core and its tests, built alone, as on a machine without ROS, its Python package, and
           programs that use the installed library; the pictures of docs/motion.md drawn with this build
   --kernel  the GPIO backends, and whole machines, on a separate kernel with simulated GPIO chips

@@ -28,8 +28,7 @@ struct GoalPlan {
 /// it would still pass a soft limit, it has those of stops.
 ///
 /// @throw motion::TooLong if the motion takes too long; Refused if the timeout of a setpoint is
-/// over
-///   before the axis moves.
+///   over before the axis moves.
 /// @param now motion time at which its overshoot begins to count: until the plan begins, the axis
 ///   continues its motion.
 GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t now, std::int64_t at);

@@ -17,9 +17,8 @@ class SetpointStream {
   };
 
   /// @param position [microsteps] @param now motion time
-  /// @param timeout_ns A setpoint that comes later than this after the last one begins a stream,
-  /// and
-  ///   so does one that comes more than 75 ms after it: streams have at least 20 Hz.
+  /// @param timeout_ns A setpoint that comes later than this after the last one begins a stream.
+  ///   So does one that comes more than 75 ms after it, because streams have at least 20 Hz.
   /// @param stops AxisModel::stops: a stop ends a stream too.
   Course add(double position, std::int64_t now, std::int64_t timeout_ns, std::uint64_t stops);
   /// Another command has taken the axis: the next setpoint begins a stream.
