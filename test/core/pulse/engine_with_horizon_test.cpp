@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "support/ahead_port.h"
+#include "support/constants.h"
 #include "support/pulse_engine_bench.h"
 
 /// The engine with a port that plays steps up to 50 ms ahead of time.
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kMillisecond = 1'000'000;
+using test::kMillisecond;
 constexpr Nanoseconds kHorizon = 50 * kMillisecond;
 constexpr Nanoseconds kStart = 100 * kMillisecond;
 

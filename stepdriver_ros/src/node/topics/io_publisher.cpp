@@ -11,14 +11,14 @@ namespace {
 // Changes that wait for the thread, or in it for a subscriber: an input that never settles must not
 // fill the memory. The latest states are always kept.
 constexpr std::size_t kMostChanges = 1000;
-constexpr int kQueueSize = 100;
+constexpr int kIoQueueSize = 100;
 
 }  // namespace
 
 IoPublisher::IoPublisher(ros::NodeHandle node, machine::Machine& machine, pulse::Clock& clock,
                          double speed)
     : machine_(machine), clock_(clock), speed_(speed) {
-  publisher_ = node.advertise<IoStates>("io_states", kQueueSize, true);
+  publisher_ = node.advertise<IoStates>("io_states", kIoQueueSize, true);
   const machine::IoStates states = machine.ioStates();
   if (states.outputs.empty() && states.inputs.empty()) {
     publish({states, ros::Time::now(), 0});
