@@ -48,7 +48,7 @@ TEST(TrajectoryAtTheEnd, IsTheClientToldOfByTheThreadThatEndsTheNode) {
   bench.machine->advance(1.0);
 
   bench.machine->shutdown();
-  action.tellEnded();
+  action.reportEnded();
   ASSERT_TRUE(waitUntil([&] { return client.getState().isDone(); })) << "no result comes";
   EXPECT_EQ(client.getState(), State::ABORTED);
   expectSays(client.getResult()->error_string, "the machine was shut down");
