@@ -35,7 +35,7 @@ bool isAt(const axis::AxisModel& axis, const Goal& goal) {
 /// Why the last motion of an axis was ended by a fault or an emergency stop. That is latched by the
 /// axis or by one that shares its motors; a recover may have cleared it meanwhile.
 std::string faultThatEnded(const axis::AxisModel& axis) {
-  const std::string fault = axis.faultText();
+  std::string fault = axis.faultText();
   if (!fault.empty()) return fault;
   switch (axis.motor.state().end) {
     case pulse::EndReason::kChipFault:

@@ -700,6 +700,7 @@ class StopChoice {
   // that takes longer than its runs, at least one corner. The last run ends at a stop.
   static std::vector<bool> slowCorners(const Run& whole, const std::vector<Run>& stopping) {
     std::vector<double> lost;
+    lost.reserve(stopping.size());
     for (const Run& run : stopping) lost.push_back(timeIn(whole, run) - run.plan.duration());
     std::vector<bool> slow(stopping.size(), false);
     std::size_t worst = 0;
