@@ -39,14 +39,19 @@ struct Meaning {
   int longer_stop = 1;
 };
 
+/// How long an axis may take to come to rest.
+struct Slowing {
+  pulse::Nanoseconds deceleration = 0;  ///< the longest one, with a margin
+  pulse::Nanoseconds shaper = 0;        ///< by how much longer its shaper makes it
+};
+
 /// Judges pulses by the answers that clients got. After the answer of a stop, only pulses of later
 /// motions are allowed.
 class Oracle {
  public:
-  /// @param slowing the longest deceleration of each axis alone, with a margin.
+  /// @param slowing of each axis alone.
   /// @param slipped motion time is clock time minus this.
-  Oracle(const std::array<pulse::Nanoseconds, kAxes>& slowing,
-         std::function<pulse::Nanoseconds()> slipped)
+  Oracle(const std::array<Slowing, kAxes>& slowing, std::function<pulse::Nanoseconds()> slipped)
       : slowing_(slowing), slipped_(std::move(slipped)) {}
 
   std::vector<std::string> complaints;
@@ -194,14 +199,18 @@ class Oracle {
   }
 
   pulse::Nanoseconds slowingOf(std::size_t axis) const {
-    return std::max(1, longer_stops_[axis]) * slowing_[axis];
+    const Slowing& slowing = slowing_[axis];
+    return std::max(1, longer_stops_[axis]) * (slowing.deceleration + slowing.shaper);
   }
 
-  // Axes that share a path take as long as the slowest of them.
+  // Axes that share a path decelerate as slowly as the slowest of them, and each shaper adds its
+  // time to that.
   void moveTogether(const Meaning& meaning) {
-    pulse::Nanoseconds longest = 0;
+    Slowing longest;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      if (meaning.axes[axis]) longest = std::max(longest, slowing_[axis]);
+      if (!meaning.axes[axis]) continue;
+      longest.deceleration = std::max(longest.deceleration, slowing_[axis].deceleration);
+      longest.shaper = std::max(longest.shaper, slowing_[axis].shaper);
     }
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (!meaning.axes[axis]) continue;
@@ -277,7 +286,7 @@ class Oracle {
     });
   }
 
-  std::array<pulse::Nanoseconds, kAxes> slowing_;
+  std::array<Slowing, kAxes> slowing_;
   std::array<int, kAxes> longer_stops_{};
   std::vector<std::size_t> sharing_;
   const std::function<pulse::Nanoseconds()> slipped_;

@@ -195,18 +195,19 @@ double timeOfFullStep(const config::AxisConfig& config) {
 }
 
 /// For each axis, the longest deceleration and 10 %, and the time of its shaper.
-std::array<pulse::Nanoseconds, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
-                                                const Schedule& schedule) {
+std::array<Slowing, kAxes> slowingOf(const std::vector<config::AxisConfig>& configs,
+                                     const Schedule& schedule) {
   const bool late = isEngineLate(schedule);
-  std::array<pulse::Nanoseconds, kAxes> slowing{};
+  std::array<Slowing, kAxes> slowing{};
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const config::AxisConfig& config = configs[axis];
     const double deceleration = config.stop_deceleration.value_or(config.deceleration);
     double time = config.max_speed / deceleration;
     if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
-    time = 1.1 * time + motor::shapingTimeOf(config);
+    time *= 1.1;
     if (!schedule.machine.empty()) time += timeOfFullStep(config);
-    slowing[axis] = std::llround(time * 1e9) + (late ? kLongestLead : kLead);
+    slowing[axis] = {std::llround(time * 1e9) + (late ? kLongestLead : kLead),
+                     std::llround(motor::shapingTimeOf(config) * 1e9)};
   }
   return slowing;
 }
