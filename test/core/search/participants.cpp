@@ -756,8 +756,18 @@ double Participants::onRig(std::size_t axis, double position) {
   return placeOnRig(axis) + (position - now.position) * configs_[axis].steps_per_unit;
 }
 
-// Nothing that was asked before this call moves it any more.
+// Nothing that was asked before this call moves it any more, nor an axis that shares its motors:
+// while such a one moves, the microsteps of the motors move both.
 bool Participants::mayRest(std::size_t axis, std::uint64_t call) {
+  const auto& shared = configs_[axis].kinematics;
+  if (shared == nullptr) return mayRestAlone(axis, call);
+  for (std::size_t sharer = 0; sharer < shared->axes.size(); ++sharer) {
+    if (!mayRestAlone(sharer, call)) return false;
+  }
+  return true;
+}
+
+bool Participants::mayRestAlone(std::size_t axis, std::uint64_t call) {
   const auto snapshot = controller_->snapshot();
   const axis::AxisState& state = snapshot->axes.at(axis).state;
   if (waits_[axis] || state.moving || state.held || state.homing != axis::HomingPhase::kNone) {

@@ -271,6 +271,7 @@ class Participants : private machine::ShellCore::Host {
   double roundingOf(std::size_t axis) const;
   double onRig(std::size_t axis, double position);
   bool mayRest(std::size_t axis, std::uint64_t call);
+  bool mayRestAlone(std::size_t axis, std::uint64_t call);
   double stoppingWay(std::size_t axis) const;
   void noteLimits(const machine::SetLimits& set);
   void passes(std::size_t motor);
