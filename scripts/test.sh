@@ -459,7 +459,7 @@ build_core_asan() {
   configure_sanitized asan && build_sanitized asan machine_tests pulse_tests recorder_tests search_tests
 }
 build_core_tsan() {
-  configure_sanitized tsan && build_sanitized tsan gpio_tests machine_tests pulse_tests recorder_tests
+  configure_sanitized tsan && build_sanitized tsan gpio_tests machine_tests port_tests pulse_tests recorder_tests
 }
 # After those of the core.
 build_node_asan() { build_sanitized asan stepdriver_node; }
