@@ -29,7 +29,7 @@ namespace {
 using pulse::Nanoseconds;
 
 constexpr int kMicrosteps = 16;                       // in a full step
-constexpr double kRamp = 0.2;                         // of the motion, for each ramp
+constexpr double kRamp = 0.2;                         // what each ramp takes of a motion's time
 constexpr Nanoseconds kStepTime = 1000;               // an A4988's, high and low
 constexpr Nanoseconds kBegin = 20'000'000;            // from now
 constexpr Nanoseconds kMaxLateness = 60'000'000'000;  // a late edge is a result here, not a fault

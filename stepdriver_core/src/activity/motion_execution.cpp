@@ -396,7 +396,7 @@ void MotionExecution::extend(Extension extension, const SharedCall& call) {
   if (open_.empty()) tryExtension();
 }
 
-// EarlyEnd its path can't be continued.
+// Why its path can't be continued.
 Failure MotionExecution::noContinuation() const {
   const axis::AxisModel& axis = *orders_.front().axis;
   return {

@@ -36,7 +36,7 @@ class StartTogether : public Script {
 
  private:
   std::vector<Start> starts_;
-  std::vector<std::unique_ptr<FollowGoal>> goals_;  // are ready to begin
+  std::vector<std::unique_ptr<FollowGoal>> goals_;  // they are ready to begin
   bool may_begin_ = false;
 };
 

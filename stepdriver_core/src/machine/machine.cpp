@@ -532,7 +532,7 @@ class Machine::Impl {
   pulse::Clock& clock_;
   // Destroyed in this order: axes, shell, controller, engine, recorder, lines.
   Disposer disposer_;
-  std::mutex io_mutex_;  // of the next
+  std::mutex io_mutex_;  // guards on_io_
   std::function<void(const IoStates&)> on_io_;
   std::shared_ptr<gpio::Lines> lines_;
   axis::LineNames names_;

@@ -59,12 +59,12 @@ class GpioPort final : public StepPort {
   PinRing* ring_ = nullptr;
   const std::vector<ChannelConfig> configs_;
   std::vector<PulseTrain> trains_;
-  DueTree dues_;                           // of the ends of pulses, and of turns
+  DueTree dues_;                           // when pulses and turns end
   std::size_t aims_ = 0;                   // lanes that turn
   std::vector<std::size_t> puts_;          // channels with a step that hasn't been played
-  std::vector<std::size_t> due_channels_;  // of this pass
-  std::vector<std::size_t> edges_;         // of this pass: channels with an edge of STEP
-  std::vector<gpio::LineWrite> writes_;    // of this pass
+  std::vector<std::size_t> due_channels_;  // in this pass
+  std::vector<std::size_t> edges_;         // channels with an edge of STEP in this pass
+  std::vector<gpio::LineWrite> writes_;    // in this pass
   std::vector<Outcome> outcomes_;
 };
 
